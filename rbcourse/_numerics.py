@@ -1,0 +1,141 @@
+"""Arguments checked by name, and the functions that need care near zero."""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+EPS = float(np.finfo(np.float64).eps)
+
+
+def as_array(name: str, value: ArrayLike, *core: int | str) -> Array:
+    """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
+
+    A letter in `core` stands for any size from 1 up, the same at each of its places:
+    ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are batch axes.
+
+    Raises
+    ------
+    ValueError
+        If `value` is ragged, not made of real numbers, or of another shape; the message names the
+        argument, the wanted and the given.
+    """
+    given: Any
+    try:
+        given = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(
+            f"{name}: an array of numbers wanted, got rows of unequal length"
+        ) from error
+    if given.dtype.kind not in "biuf":
+        raise ValueError(f"{name}: real numbers wanted, got dtype {given.dtype}")
+    if not _has_core(given.shape, core):
+        wanted = ", ".join(["...", *map(str, core)])
+        raise ValueError(f"{name}: shape ({wanted}) wanted, got {given.shape}")
+    array: Array = given.astype(np.float64)
+    return array
+
+
+def as_finite(name: str, value: ArrayLike, *core: int | str) -> Array:
+    """Return `as_array` of the arguments, where no entry may be NaN or infinite.
+
+    Raises
+    ------
+    ValueError
+        As `as_array`; and the message names the first entry that is not finite.
+    """
+    array = as_array(name, value, *core)
+    _check_all(np.isfinite(array), name, array, "a finite number")
+    return array
+
+
+def as_time(t: ArrayLike, batch_ndim: int) -> Array:
+    """Return the times `t`, all in [0, 1], with `batch_ndim` axes of length 1 appended.
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and the message names the first time outside [0, 1].
+    """
+    times = as_finite("t", t)
+    _check_all((times >= 0) & (times <= 1), "t", times, "a time in [0, 1]")
+    return times.reshape(times.shape + (1,) * batch_ndim)
+
+
+def as_angle(angle: ArrayLike) -> Array:
+    """Return angles of rotation, all in [0, π].
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and the message names the first angle outside [0, π].
+    """
+    angles = as_finite("angle", angle)
+    _check_all((angles >= 0) & (angles <= np.pi), "angle", angles, "an angle in [0, π]")
+    return angles
+
+
+def check_order(order: int) -> int:
+    """Return `order`, the order of a derivative, or raise a ValueError if it is not 0, 1 or 2."""
+    if order not in (0, 1, 2):
+        raise ValueError(f"order: 0, 1 or 2 wanted, got {order!r}")
+    return order
+
+
+def _check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
+    if not passes.all():
+        first = tuple(int(i) for i in np.argwhere(~passes)[0])
+        entry = f"{name}[{', '.join(map(str, first))}]" if first else name
+        raise ValueError(f"{entry} is {array[first]}, {wanted} is wanted")
+
+
+def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:
+    if len(shape) < len(core):
+        return False
+    tail = shape[len(shape) - len(core) :]
+    letters = {c: size for c, size in zip(core, tail, strict=True) if isinstance(c, str)}
+    wanted = [letters[c] if isinstance(c, str) else c for c in core]
+    return list(tail) == wanted and 0 not in letters.values()
+
+
+def check_broadcast(core: int, **arrays: Array) -> tuple[int, ...]:
+    """Return the common batch shape of `arrays` without their last `core` axes.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the message gives every argument with its batch shape.
+    """
+    batches = {name: array.shape[: array.ndim - core] for name, array in arrays.items()}
+    try:
+        return np.broadcast_shapes(*batches.values())
+    except ValueError as error:
+        listed = ", ".join(f"{name} {batch}" for name, batch in batches.items())
+        raise ValueError(f"batch shapes do not broadcast: {listed}") from error
+
+
+def sinc(x: Array) -> Array:
+    """Return sin(x)/x, and 1 at x = 0."""
+    return np.where(x == 0, 1.0, np.sin(x) / np.where(x == 0, 1.0, x))[()]
+
+
+def versine_ratio(x: Array) -> Array:
+    """Return (1 − cos x)/x², and 1/2 at x = 0, without cancellation."""
+    return sinc(x / 2) ** 2 / 2
+
+
+def sine_gap_ratio(x: Array) -> Array:
+    """Return (x − sin x)/x³, and 1/6 at x = 0, with an absolute error of eps/x²."""
+    return _over_square(1 - sinc(x), x, 1 / 6)
+
+
+def cotangent_gap_ratio(x: Array) -> Array:
+    """Return (1 − (x/2) cot(x/2))/x², and 1/12 at x = 0, with an absolute error of eps/x²."""
+    return _over_square(1 - np.cos(x / 2) / sinc(x / 2), x, 1 / 12)
+
+
+def _over_square(gap: Array, x: Array, limit: float) -> Array:
+    """Return gap/x². Its users multiply by x² again, so below 1e-4 the limit is exact enough."""
+    tiny = np.abs(x) < 1e-4
+    return np.where(tiny, limit, gap / np.where(tiny, 1.0, x) ** 2)

@@ -1,0 +1,174 @@
+"""The nearest rotation, the nearest pose, and membership: in any dimension n."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._numerics import Array, as_array, as_finite
+
+
+def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
+    """Tell which matrices are rotations: MᵀM = I and det M = 1.
+
+    Parameters
+    ----------
+    M : array_like, shape (..., n, n)
+        Candidates. NaN and infinity are no errors here, they fail.
+    atol : float, optional
+        The largest defect that passes, in any entry of MᵀM − I and in det M − 1.
+
+    Returns
+    -------
+    ndarray of bool, shape (...)
+
+    Raises
+    ------
+    ValueError
+        If `M` is not an array of real numbers of that shape.
+
+    See Also
+    --------
+    project_so : The nearest rotation of what fails.
+
+    References
+    ----------
+    RR 1.1, RR (1), RR (2); BK 2.1.
+
+    Examples
+    --------
+    >>> is_so([[[0, -1], [1, 0]], [[0, 1], [1, 0]]])
+    array([ True, False])
+    """
+    M = as_array("M", M, "n", "n")
+    with np.errstate(over="ignore", invalid="ignore"):
+        defect = np.abs(np.swapaxes(M, -1, -2) @ M - np.eye(M.shape[-1])).max(axis=(-2, -1))
+        return np.asarray((defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol))
+
+
+def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
+    """Tell which matrices are poses [[R, d], [0, 1]], R a rotation and d finite.
+
+    Parameters
+    ----------
+    A : array_like, shape (..., n + 1, n + 1)
+        Candidates. NaN and infinity are no errors here, they fail.
+    atol : float, optional
+        The largest defect of the rotation (see `is_so`) and of the last row that passes.
+
+    Returns
+    -------
+    ndarray of bool, shape (...)
+
+    Raises
+    ------
+    ValueError
+        If `A` is not an array of real numbers of that shape, n ≥ 1.
+
+    See Also
+    --------
+    project_se : The nearest pose of what fails.
+
+    References
+    ----------
+    RR 1.3; BK 2.1.
+
+    Examples
+    --------
+    >>> bool(is_se([[0, -1, 5], [1, 0, 7], [0, 0, 1]]))
+    True
+    """
+    A = _pose_shaped(as_array("A", A, "n+1", "n+1"), "A")
+    with np.errstate(invalid="ignore"):
+        last_row = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1]).max(axis=-1) <= atol
+    translation = np.isfinite(A[..., :-1, -1]).all(axis=-1)
+    return np.asarray(is_so(A[..., :-1, :-1], atol) & last_row & translation)
+
+
+def project_so(M: ArrayLike) -> Array:
+    """Return the rotation nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
+
+    Parameters
+    ----------
+    M : array_like, shape (..., n, n)
+        Any matrices, singular and reflected ones too.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+        Rotations R. S = RᵀM is symmetric and its two smallest eigenvalues sum to 0 or more, which
+        only a nearest rotation does. L M projects to L R, and M L to R L, for every rotation L.
+
+    Raises
+    ------
+    ValueError
+        If `M` is not finite or not of that shape.
+
+    See Also
+    --------
+    project_se : The same for poses.
+
+    Notes
+    -----
+    Singular set: where the two smallest eigenvalues of RᵀM sum to 0 several rotations are equally
+    near (rank n − 2 or less; or det M < 0 with its smallest singular value repeated), and one of
+    them is returned. Near that set R is accurate to a few eps ‖M‖ over that sum.
+
+    The paper prints U Vᵀ, which is a reflection where det M < 0.
+
+    References
+    ----------
+    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5).
+
+    Examples
+    --------
+    >>> project_so([[0, -2], [3, 0]])
+    array([[ 0., -1.],
+           [ 1.,  0.]])
+    """
+    U, _, Vt = np.linalg.svd(as_finite("M", M, "n", "n"))
+    U[..., :, -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
+    return U @ Vt
+
+
+def project_se(B: ArrayLike) -> Array:
+    """Return the pose nearest to B: its rotation block projected, its translation kept.
+
+    Parameters
+    ----------
+    B : array_like, shape (..., n + 1, n + 1)
+        Affine matrices [[B1, B2], [0, 1]]; any other last row is replaced.
+
+    Returns
+    -------
+    ndarray, shape (..., n + 1, n + 1)
+        Poses [[project_so(B1), B2], [0, 1]].
+
+    Raises
+    ------
+    ValueError
+        If `B` is not finite or not of that shape, n ≥ 1.
+
+    See Also
+    --------
+    project_so : What happens to B1, and where that is not unique.
+
+    References
+    ----------
+    BK 5, BK Prop. 4, BK Prop. 5; RR 1.6.
+
+    Examples
+    --------
+    >>> project_se([[3, 2, 4], [2, 3, 2], [0, 1, 1]]).round(12) + 0.0
+    array([[1., 0., 4.],
+           [0., 1., 2.],
+           [0., 0., 1.]])
+    """
+    A = _pose_shaped(as_finite("B", B, "n+1", "n+1"), "B")
+    A[..., :-1, :-1] = project_so(A[..., :-1, :-1])
+    A[..., -1, :] = np.eye(A.shape[-1])[-1]
+    return A
+
+
+def _pose_shaped(A: Array, name: str) -> Array:
+    if A.shape[-1] < 2:
+        raise ValueError(f"{name}: shape (..., n+1, n+1) with n >= 1 wanted, got {A.shape}")
+    return A

@@ -1,0 +1,248 @@
+"""The rotation group SO(3) and its Lie algebra so(3): hat, vee, exp, log and their Jacobians."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import (
+    Array,
+    as_finite,
+    cotangent_gap_ratio,
+    sinc,
+    sine_gap_ratio,
+    versine_ratio,
+)
+from rbcourse.quaternion import quaternion_from_matrix
+
+
+def hat_so3(w: ArrayLike) -> Array:
+    """Return the skew-symmetric matrix of a vector: hat_so3(w) @ x = w × x.
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 3)
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+
+    Raises
+    ------
+    ValueError
+        If `w` is not finite or not of that shape.
+
+    See Also
+    --------
+    vee_so3 : The way back.
+
+    References
+    ----------
+    BK 2.1, BK (2).
+
+    Examples
+    --------
+    >>> hat_so3([1, 2, 3])
+    array([[ 0., -3.,  2.],
+           [ 3.,  0., -1.],
+           [-2.,  1.,  0.]])
+    """
+    w = as_finite("w", w, 3)
+    W = np.zeros((*w.shape, 3))
+    W[..., 2, 1], W[..., 0, 2], W[..., 1, 0] = np.moveaxis(w, -1, 0)
+    return W - np.swapaxes(W, -1, -2)
+
+
+def vee_so3(W: ArrayLike) -> Array:
+    """Return the vector of the skew-symmetric part (W − Wᵀ)/2: the inverse of `hat_so3`.
+
+    Parameters
+    ----------
+    W : array_like, shape (..., 3, 3)
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        If `W` is not finite or not of that shape.
+
+    References
+    ----------
+    BK 2.1.
+
+    Examples
+    --------
+    >>> vee_so3(hat_so3([1, 2, 3]))
+    array([1., 2., 3.])
+    """
+    W = as_finite("W", W, 3, 3)
+    half = (W - np.swapaxes(W, -1, -2)) / 2
+    return np.stack([half[..., 2, 1], half[..., 0, 2], half[..., 1, 0]], axis=-1)
+
+
+BASIS_SO3 = hat_so3(np.eye(3))
+"""The standard basis of so(3), shape (3, 3, 3): turns about x, y and z (BK (2))."""
+BASIS_SO3.flags.writeable = False
+
+
+def exp_so3(w: ArrayLike) -> Array:
+    """Return the rotation by ‖w‖ about w: Rodrigues' formula.
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 3)
+        Rotation vectors (exponential coordinates), in rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        I + (sin a)/a ŵ + (1 − cos a)/a² ŵ² with a = ‖w‖, accurate to a few eps (1 + a).
+
+    Raises
+    ------
+    ValueError
+        If `w` is not finite or not of that shape.
+
+    See Also
+    --------
+    log_so3 : The way back.
+
+    Notes
+    -----
+    No singular set; w = 0 gives I exactly. Vectors along one axis whose lengths differ by 2π give
+    the same rotation.
+
+    References
+    ----------
+    BK 2.5.
+
+    Examples
+    --------
+    >>> exp_so3([0, 0, np.pi / 2]).round(12) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    W, angle = _hat_and_angle(as_finite("w", w, 3))
+    return np.eye(3) + sinc(angle) * W + versine_ratio(angle) * W @ W
+
+
+def log_so3(R: ArrayLike) -> Array:
+    """Return the rotation vector of R, the shortest one: exp_so3(log_so3(R)) = R.
+
+    Parameters
+    ----------
+    R : array_like, shape (..., 3, 3)
+        Rotation matrices; what is none is not repaired (see `project_so`).
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Axis times angle, the angle in [0, π] rad; accurate to a few eps, at half-turns too.
+
+    Raises
+    ------
+    ValueError
+        If `R` is not finite or not of that shape.
+
+    Notes
+    -----
+    Singular set: at a half-turn both w and −w are logarithms. The one whose component of largest
+    magnitude (the first of equals) is positive is returned.
+
+    References
+    ----------
+    BK 2.5.
+
+    Examples
+    --------
+    >>> log_so3([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    array([0.        , 0.        , 1.57079633])
+    """
+    q = quaternion_from_matrix(as_finite("R", R, 3, 3))
+    w, v = q[..., :1], q[..., 1:]
+    sine = np.linalg.norm(v, axis=-1, keepdims=True)
+    turning = sine > 0
+    return v * np.where(turning, 2 * np.arctan2(sine, w) / np.where(turning, sine, 1.0), 2.0)
+
+
+def right_jacobian_so3(w: ArrayLike) -> Array:
+    """Return J with body angular velocity = J w' along the curve exp_so3(w(t)).
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 3)
+        Rotation vectors, in rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        I − (1 − cos a)/a² ŵ + (a − sin a)/a³ ŵ² with a = ‖w‖, accurate to a few eps (1 + a). Its
+        transpose is the left Jacobian, which gives the velocity in the fixed frame.
+
+    Raises
+    ------
+    ValueError
+        If `w` is not finite or not of that shape.
+
+    See Also
+    --------
+    right_jacobian_inverse_so3 : From angular velocity to w'.
+
+    Notes
+    -----
+    Singular set: J itself is smooth; it has rank 1 where ‖w‖ = 2π, 4π, …
+
+    References
+    ----------
+    BK 2.5.
+
+    Examples
+    --------
+    >>> right_jacobian_so3([0, 0, 1]) @ [0, 0, 5]  # along the axis nothing changes
+    array([0., 0., 5.])
+    """
+    W, angle = _hat_and_angle(as_finite("w", w, 3))
+    return np.eye(3) - versine_ratio(angle) * W + sine_gap_ratio(angle) * W @ W
+
+
+def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
+    """Return the inverse of `right_jacobian_so3`: w' = J⁻¹ times the body angular velocity.
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 3)
+        Rotation vectors, in rad, ‖w‖ < 2π.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        I + ŵ/2 + (1 − (a/2) cot(a/2))/a² ŵ² with a = ‖w‖.
+
+    Raises
+    ------
+    ValueError
+        If `w` is not finite or not of that shape.
+
+    Notes
+    -----
+    Singular set: ‖w‖ = 2π, 4π, …, where there is no inverse. Near it the entries grow like 1 over
+    the distance, and at the floating-point numbers nearest to it they are finite and huge.
+
+    References
+    ----------
+    BK 2.5.
+
+    Examples
+    --------
+    >>> w = [0.3, -0.4, 1.2]
+    >>> bool(np.allclose(right_jacobian_inverse_so3(w) @ right_jacobian_so3(w), np.eye(3)))
+    True
+    """
+    W, angle = _hat_and_angle(as_finite("w", w, 3))
+    return np.eye(3) + W / 2 + cotangent_gap_ratio(angle) * W @ W
+
+
+def _hat_and_angle(w: Array) -> tuple[Array, Array]:
+    return hat_so3(w), np.linalg.norm(w, axis=-1)[..., None, None]

@@ -1,0 +1,112 @@
+"""What is true, computed another way: mpmath and brute force. Never imports rbcourse."""
+
+import mpmath as mp
+import numpy as np
+
+DIGITS = 60
+
+
+def _array(matrix):
+    return np.array([[float(x) for x in row] for row in matrix.tolist()])
+
+
+def exact_hat(w):
+    x, y, z = w
+    return mp.matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def exact_norm(w):
+    return mp.sqrt(mp.fsum(mp.mpf(x) ** 2 for x in w))
+
+
+def exact_exp(w):
+    """Rodrigues' formula, as an mpmath matrix; the caller sets the precision."""
+    angle, W = exact_norm(w), exact_hat([mp.mpf(x) for x in w])
+    if angle == 0:
+        return mp.eye(3)
+    return mp.eye(3) + mp.sin(angle) / angle * W + (1 - mp.cos(angle)) / angle**2 * W**2
+
+
+def exp_so3(w):
+    with mp.workdps(DIGITS):
+        return _array(exact_exp([float(x) for x in w]))
+
+
+def log_so3(R):
+    """The rotation vector of the rotation nearest to R, by the polar iteration of Newton."""
+    with mp.workdps(DIGITS):
+        X = mp.matrix(np.asarray(R, dtype=float).tolist())
+        for _ in range(8):
+            X = (X + (X.T) ** -1) / 2
+        sine = [X[2, 1] - X[1, 2], X[0, 2] - X[2, 0], X[1, 0] - X[0, 1]]
+        angle = mp.atan2(exact_norm(sine), X[0, 0] + X[1, 1] + X[2, 2] - 1)
+        symmetric = (X + X.T) / 2 - mp.cos(angle) * mp.eye(3)  # (1 − cos) n nᵀ
+        k = max(range(3), key=lambda i: symmetric[i, i])
+        if angle > 1:
+            axis = [symmetric[i, k] for i in range(3)]
+            sign = -1 if mp.fsum(a * s for a, s in zip(axis, sine, strict=True)) < 0 else 1
+        else:
+            axis, sign = sine, 1
+        length = exact_norm(axis)
+        if length == 0:
+            return np.zeros(3)
+        return np.array([float(sign * angle * a / length) for a in axis])
+
+
+def right_jacobian_so3(w):
+    """∫₀¹ exp(−s ŵ) ds, the definition behind the closed form, by quadrature."""
+    with mp.workdps(20):
+        entries = [
+            mp.quad(lambda s, i=i, j=j: exact_exp([-s * mp.mpf(float(x)) for x in w])[i, j], [0, 1])
+            for i in range(3)
+            for j in range(3)
+        ]
+        return np.array([float(x) for x in entries]).reshape(3, 3)
+
+
+def theta(t, angle, order=0):
+    """BK (16) for f(t) = t, as printed, by its own derivatives."""
+    with mp.workdps(DIGITS):
+        w = mp.mpf(float(angle))
+        return float(
+            mp.diff(
+                lambda u: mp.atan2(u * mp.sin(w), 1 - u + u * mp.cos(w)) / w,
+                mp.mpf(float(t)),
+                order,
+            )
+        )
+
+
+def f(t, angle, order=0):
+    """BK Corollary 2, as printed, by its own derivatives."""
+    with mp.workdps(DIGITS):
+        w = mp.mpf(float(angle))
+        return float(
+            mp.diff(
+                lambda u: mp.sin(w * u) / (mp.sin(w * (1 - u)) + mp.sin(w * u)),
+                mp.mpf(float(t)),
+                order,
+            )
+        )
+
+
+def line_singular_value(t, angle):
+    """BK (17) as printed."""
+    with mp.workdps(DIGITS):
+        u, c = mp.mpf(float(t)), 2 * (1 - mp.cos(mp.mpf(float(angle))))
+        return float(mp.sqrt(c * u**2 - c * u + 1))
+
+
+def two_smallest_eigenvalues(S):
+    """The sum of the two smallest eigenvalues of the symmetric part of S (…, n, n)."""
+    return np.linalg.eigvalsh((S + np.swapaxes(S, -1, -2)) / 2)[..., :2].sum(axis=-1)
+
+
+def velocity_by_series(curve, t, size=2.0**-10):
+    """R'(t) of a matrix curve by a central difference of order 8: error about 1e-13."""
+    steps = np.array([1, 2, 3, 4])
+    weights = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
+    return sum(
+        weight * (curve(t + k * size) - curve(t - k * size)) / size
+        for k, weight in zip(steps, weights, strict=True)
+    )

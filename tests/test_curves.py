@@ -1,0 +1,212 @@
+import awkward
+import numpy as np
+import oracles
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+
+import rbcourse as rb
+
+EPS = np.finfo(float).eps
+RNG = np.random.default_rng(61)
+STARTS = Rotation.random(30, rng=RNG).as_matrix()
+TIMES = np.linspace(0, 1, 9)
+
+
+def turns(angles):
+    """One rotation vector of each angle, about random axes."""
+    axes = RNG.normal(size=(len(angles), 3))
+    return np.asarray(angles)[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+ANGLES = np.concatenate(
+    [RNG.uniform(0, 3.1, 22), 10.0 ** -np.array([1, 3, 6, 9, 12]), [0, 3.14, 3.1415]]
+)
+TURNS = turns(ANGLES)
+GOALS = STARTS @ np.array([oracles.exp_so3(w) for w in TURNS])
+GEODESICS = rb.geodesic_so3(STARTS, GOALS)
+LINES = rb.projected_line_so3(STARTS, GOALS)
+
+
+def quick(t, order):
+    """A reparameterisation that leaves [0, 1]: 4 t² − 3 t."""
+    return (4 * t**2 - 3 * t, 8 * t - 3, 8 + 0 * t)[order]
+
+
+@pytest.mark.source("BK 6.1")
+def test_the_geodesic_turns_uniformly_about_one_axis():
+    for R0, w, i in zip(STARTS, TURNS, range(30), strict=True):
+        want = np.array([R0 @ oracles.exp_so3(t * w) for t in TIMES])
+        assert np.abs(GEODESICS(TIMES)[:, i] - want).max() < 20 * EPS
+
+
+@pytest.mark.source("BK 6.1")
+def test_the_geodesic_agrees_with_scipy():
+    for i in range(22):
+        slerp = Slerp([0, 1], Rotation.from_matrix([STARTS[i], GOALS[i]]))
+        assert np.abs(GEODESICS(TIMES)[:, i] - slerp(TIMES).as_matrix()).max() < 40 * EPS
+
+
+@pytest.mark.source("BK Remark 7")
+def test_the_geodesic_is_slerp():
+    q0, q1 = rb.quaternion_from_matrix(STARTS), rb.quaternion_from_matrix(GOALS)
+    slerp = rb.matrix_from_quaternion(rb.slerp(q0, q1, TIMES))
+    assert np.abs(GEODESICS(TIMES) - slerp).max() < 40 * EPS
+
+
+@pytest.mark.source("BK 6.1")
+def test_the_geodesics_velocity_is_constant_and_its_length_the_angle():
+    assert np.array_equal(
+        GEODESICS(TIMES, 1), np.broadcast_to(GEODESICS.rotation_vector, (9, 30, 3))
+    )
+    assert np.all(GEODESICS(TIMES, 2) == 0)
+    assert np.abs(np.linalg.norm(GEODESICS(0.3, 1), axis=-1) - ANGLES).max() < 20 * EPS
+
+
+@pytest.mark.parametrize("curve", [GEODESICS, LINES], ids=["geodesic", "projected line"])
+def test_both_ends_are_met(curve):
+    assert np.abs(curve(0) - STARTS).max() < 8 * EPS
+    assert np.abs(curve(1) - GOALS).max() < 20 * EPS
+
+
+@pytest.mark.source("BK Prop. 6", "BK (15)", "BK Cor. 1")
+@pytest.mark.parametrize("f", [None, quick], ids=["the identity", "one that leaves the interval"])
+def test_the_projected_line_is_the_projection_of_the_line(f):
+    curves, t = rb.projected_line_so3(STARTS, GOALS, f), np.linspace(0, 1, 21)
+    x = (t if f is None else quick(t, 0))[:, None, None, None]
+    M = STARTS + (GOALS - STARTS) * x
+    R = rb.project_so(M)
+    margin = oracles.two_smallest_eigenvalues(np.swapaxes(R, -1, -2) @ M)
+    off = np.abs(curves(t) - R).max(axis=(-2, -1))
+    scale = np.linalg.norm(M, axis=(-2, -1))
+    assert np.all(off < 40 * EPS * scale / margin)  # LAPACK's SVD errs by up to 20 of these
+
+
+@pytest.mark.source("BK Prop. 6", "BK (17)")
+def test_the_margin_is_the_least_sum_of_the_two_smallest_eigenvalues():
+    for i in range(len(ANGLES)):
+        t = np.linspace(0, 1, 1001)[:, None, None]
+        M = STARTS[i] + (GOALS[i] - STARTS[i]) * t
+        sums = oracles.two_smallest_eigenvalues(np.swapaxes(rb.project_so(M), -1, -2) @ M)
+        assert abs(sums.min() - LINES.margin[i]) < 20 * EPS
+
+
+@pytest.mark.source("BK Cor. 1")
+def test_geodesic_and_projected_line_follow_the_same_path():
+    """The rotation between a point of one and the start is about the axis of the other."""
+    between = rb.log_so3(np.swapaxes(STARTS, -1, -2) @ LINES(TIMES))
+    across = np.cross(between, TURNS)
+    assert np.abs(across).max() < 40 * EPS * np.pi
+
+
+@pytest.mark.source("BK Cor. 2")
+def test_the_line_run_through_as_f_projects_to_the_geodesic():
+    angle = np.linalg.norm(GEODESICS.rotation_vector, axis=-1)
+    lines = rb.projected_line_so3(STARTS, GOALS, lambda t, order: rb.f(t, angle, order))
+    growth = 1 + 2 * np.tan(angle / 2) / np.maximum(angle, 1)
+    for order in (0, 1, 2):
+        core = (-2, -1) if order == 0 else -1
+        off = np.abs(lines(TIMES, order) - GEODESICS(TIMES, order)).max(axis=core)
+        assert np.all(off < 20 * EPS * growth ** (1 + order))
+
+
+@pytest.mark.parametrize("f", [None, quick], ids=["the identity", "one that leaves the interval"])
+def test_velocity_and_acceleration_are_the_derivatives(f):
+    few = ANGLES < 2.5
+    curves = rb.projected_line_so3(STARTS[few], GOALS[few], f)
+    for t in (0.2, 0.5, 0.7):
+        rate = oracles.velocity_by_series(curves, t)
+        velocity = rb.vee_so3(np.swapaxes(curves(t), -1, -2) @ rate)
+        assert np.abs(curves(t, 1) - velocity).max() < 1e-9
+        acceleration = oracles.velocity_by_series(lambda u: curves(u, 1), t)
+        assert np.abs(curves(t, 2) - acceleration).max() < 1e-8
+
+
+@pytest.mark.source("BK 6.1", "BK Prop. 3")
+def test_moving_the_ends_moves_the_curve():
+    L, Q = Rotation.random(2, rng=1).as_matrix()
+    for make in (rb.geodesic_so3, rb.projected_line_so3):
+        curve, moved = make(STARTS[:22], GOALS[:22]), make(L @ STARTS[:22] @ Q, L @ GOALS[:22] @ Q)
+        bound = 80 * EPS / LINES.margin[:22, None, None]
+        assert np.all(np.abs(moved(TIMES) - L @ curve(TIMES) @ Q) < bound)
+
+
+def test_no_turn_at_all():
+    for make in (rb.geodesic_so3, rb.projected_line_so3):
+        curve = make(np.eye(3), np.eye(3))
+        assert np.array_equal(curve(TIMES), np.broadcast_to(np.eye(3), (9, 3, 3)))
+        for order in (1, 2):
+            assert np.all(curve(TIMES, order) == 0)
+    assert rb.projected_line_so3(np.eye(3), np.eye(3)).margin == 2
+
+
+def test_between_rotations_a_half_turn_apart_the_geodesic_is_a_shortest_one_and_says_which():
+    matrices, axes = awkward.half_turns()
+    curves = rb.geodesic_so3(STARTS[0], STARTS[0] @ matrices)
+    assert np.abs(np.linalg.norm(curves.rotation_vector, axis=-1) - np.pi).max() < 8 * EPS
+    assert np.abs(curves(1) - STARTS[0] @ matrices).max() < 20 * EPS
+    curve = rb.geodesic_so3(np.eye(3), np.diag([-1, 1, -1]))
+    assert np.abs(curve.rotation_vector - [0, np.pi, 0]).max() < 2 * EPS
+
+
+def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused():
+    matrices, _ = awkward.half_turns()
+    for R1 in matrices:
+        curve = rb.projected_line_so3(np.eye(3), R1)
+        assert curve.margin < 8 * EPS
+        assert np.abs(curve([0.25, 0.75]) - [np.eye(3), R1]).max() < 20 * EPS
+        for order in (0, 1, 2):
+            with pytest.raises(ValueError, match=r"t = 0\.5: the nearest rotation .* not unique"):
+                curve([0.25, 0.5], order)
+
+
+def test_just_before_the_half_turn_the_line_is_still_right():
+    w = np.array([0, 0, np.pi - 1e-8])
+    curve = rb.projected_line_so3(np.eye(3), oracles.exp_so3(w))
+    assert abs(curve.margin - 1e-8) < 4 * EPS
+    want = oracles.theta(0.5 + 1e-9, w[2]) * w[2]
+    assert abs(rb.log_so3(curve(0.5 + 1e-9))[2] - want) < 20 * EPS / 1e-8
+
+
+def test_shapes_are_times_then_stack_then_core():
+    R0, R1 = STARTS[:6].reshape(2, 3, 3, 3), GOALS[6:9]
+    for make in (rb.geodesic_so3, rb.projected_line_so3):
+        curve = make(R0, R1)
+        assert curve.batch_shape == (2, 3)
+        t = np.array([[0.1, 0.5], [0.2, 1], [0, 0.4], [0.3, 0.9]])
+        for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+            stacked = curve(t, order)
+            assert stacked.shape == (4, 2, 2, 3, *core)
+            for i in np.ndindex(2, 3):
+                single = make(R0[i], R1[i[1]])
+                assert single(t, order).shape == (4, 2, *core)
+                assert single(0.5, order).shape == core
+                for k in np.ndindex(4, 2):
+                    assert np.array_equal(stacked[k][i], single(t, order)[k])
+
+
+def test_f_may_be_a_constant_rate_and_must_have_the_right_ends():
+    curve = rb.projected_line_so3(STARTS[:2], GOALS[:2], lambda t, order: (t, 1, 0)[order])
+    assert np.array_equal(curve(TIMES, 2), rb.projected_line_so3(STARTS[:2], GOALS[:2])(TIMES, 2))
+    with pytest.raises(ValueError, match=r"f: f\(0\) = 0 and f\(1\) = 1 are wanted"):
+        rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: t / 2)
+    with pytest.raises(ValueError, match=r"f\(t, 0\): shape \(2,\) wanted, got \(3,\)"):
+        rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.zeros(3))
+    with pytest.raises(ValueError, match=r"f\(t, 0\) is nan"):
+        rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.nan)
+
+
+@pytest.mark.parametrize("make", [rb.geodesic_so3, rb.projected_line_so3])
+def test_bad_arguments_are_named(make):
+    with pytest.raises(ValueError, match=r"R1: shape \(\.\.\., 3, 3\) wanted, got \(4, 4\)"):
+        make(np.eye(3), np.eye(4))
+    with pytest.raises(ValueError, match=r"R0\[2, 1\] is inf"):
+        make([[1, 0, 0], [0, 1, 0], [0, np.inf, 1]], np.eye(3))
+    with pytest.raises(ValueError, match="R0: an array of numbers wanted, got rows of unequal"):
+        make([[1, 0, 0], [0, 1]], np.eye(3))
+    with pytest.raises(ValueError, match=r"batch shapes do not broadcast: R0 \(2,\), R1 \(3,\)"):
+        make(STARTS[:2], GOALS[:3])
+    curve = make(STARTS[0], GOALS[0])
+    with pytest.raises(ValueError, match=r"t\[2\] is 1.5, a time in \[0, 1\] is wanted"):
+        curve([0, 1, 1.5])
+    with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got 3"):
+        curve(0.5, 3)

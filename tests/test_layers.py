@@ -1,0 +1,82 @@
+"""A module imports from lower levels only, and importing the package loads NumPy alone."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import rbcourse
+
+PACKAGE = Path(rbcourse.__file__).parent
+LEVELS = {
+    "_numerics": 0,
+    "quaternion": 1,
+    "projection": 1,
+    "line": 1,
+    "so3": 2,
+    "curves": 4,
+    "plots": 6,
+    "lessons": 8,
+}
+ALLOWED = {
+    "plots": {"matplotlib", "IPython"},
+    "lessons": {"nbformat", "nbclient"},
+}
+
+
+def imports(source):
+    """Every module imported anywhere in the source, inside functions too."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield "." * node.level + (node.module or "")
+
+
+def upward(module, source):
+    """The imports of the package that are not from a lower level."""
+    inner = [name for name in imports(source) if name.startswith((".", "rbcourse"))]
+    named = [name.removeprefix("rbcourse.") for name in inner]
+    return [name for name in named if LEVELS.get(name, 99) >= LEVELS[module]]
+
+
+def test_every_module_has_a_level():
+    assert {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"} == set(LEVELS)
+
+
+@pytest.mark.parametrize("module", LEVELS)
+def test_imports_go_down(module):
+    assert upward(module, (PACKAGE / f"{module}.py").read_text("utf-8")) == []
+
+
+def test_an_import_that_goes_up_is_seen():
+    for source in (
+        "from rbcourse.curves import theta",
+        "import rbcourse.so3",
+        "def late():\n    from rbcourse import exp_so3",
+        "from .curves import theta",
+        "from rbcourse.quaternion import slerp",
+    ):
+        assert upward("projection", source) != [], source
+    assert upward("curves", "from rbcourse.so3 import exp_so3\nimport numpy") == []
+
+
+@pytest.mark.parametrize("module", LEVELS)
+def test_only_named_libraries_are_used(module):
+    outer = {name.split(".")[0] for name in imports((PACKAGE / f"{module}.py").read_text("utf-8"))}
+    known = {"rbcourse", "numpy", "scipy"} | ALLOWED.get(module, set())
+    assert outer - known - set(sys.stdlib_module_names) == set()
+
+
+def test_import_loads_numpy_only():
+    code = "import sys, numpy; before = set(sys.modules); import rbcourse; print(*set(sys.modules) - before)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[0] for name in done.stdout.split()}
+    assert loaded - set(sys.stdlib_module_names) - {"numpy"} == {"rbcourse"}
+
+
+def test_every_public_name_is_listed_once_and_documented():
+    assert len(set(rbcourse.__all__)) == len(rbcourse.__all__)
+    for name in rbcourse.__all__:
+        assert getattr(rbcourse, name).__doc__, name

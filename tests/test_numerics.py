@@ -1,0 +1,77 @@
+import re
+
+import mpmath as mp
+import numpy as np
+import pytest
+from rbcourse import _numerics as numerics
+
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize(
+    ("value", "core", "message"),
+    [
+        ([1, 2], (3,), "x: shape (..., 3) wanted, got (2,)"),
+        (5, (3,), "x: shape (..., 3) wanted, got ()"),
+        (np.zeros((2, 3)), ("n", "n"), "x: shape (..., n, n) wanted, got (2, 3)"),
+        (np.zeros((4, 0, 0)), ("n", "n"), "x: shape (..., n, n) wanted, got (4, 0, 0)"),
+        ([[1, 2], [3]], (2,), "x: an array of numbers wanted, got rows of unequal length"),
+        (["1", "2", "3"], (3,), "x: real numbers wanted, got dtype <U1"),
+        ([1j, 0, 0], (3,), "x: real numbers wanted, got dtype complex128"),
+        (None, (), "x: real numbers wanted, got dtype object"),
+        ([1, np.nan, np.inf], (3,), "x[1] is nan, a finite number is wanted"),
+        ([[1, 2], [3, -np.inf]], (2,), "x[1, 1] is -inf, a finite number is wanted"),
+        (np.nan, (), "x is nan, a finite number is wanted"),
+    ],
+)
+def test_bad_arguments_are_named(value, core, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        numerics.as_finite("x", value, *core)
+
+
+def test_good_arguments_become_floats_and_are_copied():
+    given = np.arange(6).reshape(2, 3)
+    array = numerics.as_finite("x", given, 3)
+    array[0, 0] = 9
+    assert array.dtype == np.float64
+    assert given[0, 0] == 0
+    assert numerics.as_finite("x", np.zeros((0, 3, 3)), "n", "n").shape == (0, 3, 3)
+
+
+def test_times_outside_the_unit_interval_are_named():
+    assert numerics.as_time([0, 1], 2).shape == (2, 1, 1)
+    for bad in (-1e-16, 1.0000000000000002):
+        with pytest.raises(ValueError, match=re.escape(f"t[1] is {bad}, a time in [0, 1]")):
+            numerics.as_time([0, bad], 0)
+
+
+def test_angles_outside_0_to_pi_are_named():
+    assert np.array_equal(numerics.as_angle([0, np.pi]), [0, np.pi])
+    for bad in (-1e-300, 3.2):
+        with pytest.raises(ValueError, match=re.escape(f"angle is {bad}, an angle in [0, π]")):
+            numerics.as_angle(bad)
+
+
+def test_batches_that_do_not_broadcast_are_listed():
+    a, b = np.zeros((2, 3, 3)), np.zeros((4, 3, 3))
+    with pytest.raises(ValueError, match=r"batch shapes do not broadcast: a \(2,\), b \(4,\)"):
+        numerics.check_broadcast(2, a=a, b=b)
+    assert numerics.check_broadcast(2, a=a, b=b[:1]) == (2,)
+
+
+@pytest.mark.parametrize(
+    ("function", "exact", "limit", "power"),
+    [
+        (numerics.sinc, lambda x: mp.sin(x) / x, 1, 0),
+        (numerics.versine_ratio, lambda x: (1 - mp.cos(x)) / x**2, 1 / 2, 0),
+        (numerics.sine_gap_ratio, lambda x: (x - mp.sin(x)) / x**3, 1 / 6, 2),
+        (numerics.cotangent_gap_ratio, lambda x: (1 - x / 2 * mp.cot(x / 2)) / x**2, 1 / 12, 2),
+    ],
+)
+def test_ratios_near_zero(function, exact, limit, power):
+    """Those with power 2 multiply a square: eps absolute after that."""
+    assert function(np.array(0.0)) == limit
+    for x in [1e-300, 1e-160, 1e-9, 9.99e-5, 1e-4, 1.01e-4, 0.01, 0.9, 1.0, 2.0, 3.1]:
+        with mp.workdps(700 if x < 1e-9 else 60):
+            want = exact(mp.mpf(x))
+            assert abs(function(np.array(x)) - want) * x**power < 3 * EPS * (want * x**power + 1)

@@ -1,0 +1,152 @@
+import awkward
+import numpy as np
+import oracles
+import pytest
+
+import rbcourse as rb
+
+EPS = np.finfo(float).eps
+DIMENSIONS = [1, 2, 3, 4, 7]
+
+
+def members(n, rng):
+    """Random rotations of Rⁿ, by Householder's QR."""
+    Q = np.linalg.qr(rng.normal(size=(40, n, n)))[0]
+    Q[..., 0] *= np.linalg.det(Q)[:, None]
+    return Q
+
+
+def assert_members(R):
+    n = R.shape[-1]
+    assert np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(n)).max() < 8 * n * EPS
+    assert np.all(np.linalg.det(R) > 0)
+
+
+def assert_nearest(R, M):
+    """RᵀM symmetric, its two smallest eigenvalues sum to 0 or more: nearest, by second order."""
+    S, n = np.swapaxes(R, -1, -2) @ M, M.shape[-1]
+    size = np.linalg.norm(M, axis=(-2, -1))
+    skew = np.linalg.norm(S - np.swapaxes(S, -1, -2), axis=(-2, -1))
+    assert np.all(skew <= 40 * n * EPS * size)
+    if n > 1:
+        assert np.all(oracles.two_smallest_eigenvalues(S) >= -40 * n * EPS * size)
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+@pytest.mark.source("BK Prop. 2", "RR 1.4", "RR (4)", "RR (5)")
+def test_the_projection_is_a_member_and_the_nearest(n):
+    M = awkward.matrices(n, np.random.default_rng(n))
+    R = rb.project_so(M)
+    assert_members(R)
+    assert_nearest(R, M)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.source("BK Prop. 2")
+def test_no_other_rotation_is_nearer(n):
+    rng = np.random.default_rng(n)
+    M = awkward.matrices(n, rng)
+    others = members(n, rng)
+    best = np.linalg.norm(M - rb.project_so(M), axis=(-2, -1))
+    for other in others:
+        assert np.all(best <= np.linalg.norm(M - other, axis=(-2, -1)) + 4 * n * EPS * (1 + best))
+
+
+@pytest.mark.source("BK Prop. 2")
+def test_the_printed_projection_is_a_reflection_where_the_determinant_is_negative():
+    M = np.diag([3.0, 2.0, -1.0])
+    U, _, Vt = np.linalg.svd(M)
+    assert np.linalg.det(U @ Vt) < 0
+    assert np.array_equal(rb.project_so(M), np.eye(3))
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+def test_rotations_stay(n):
+    R = members(n, np.random.default_rng(n))
+    assert np.abs(rb.project_so(R) - R).max() < 8 * n * EPS
+
+
+@pytest.mark.source("BK Prop. 3")
+def test_the_projection_is_invariant_on_both_sides():
+    rng = np.random.default_rng(3)
+    M, L = rng.normal(size=(40, 3, 3)), members(3, rng)
+    R = rb.project_so(M)
+    gap = oracles.two_smallest_eigenvalues(np.swapaxes(R, -1, -2) @ M)
+    bound = 40 * EPS * np.linalg.norm(M, axis=(-2, -1)) / gap
+    assert np.all(np.abs(rb.project_so(L @ M) - L @ R).max(axis=(-2, -1)) < bound)
+    assert np.all(np.abs(rb.project_so(M @ L) - R @ L).max(axis=(-2, -1)) < bound)
+
+
+@pytest.mark.source("RR 1.4")
+def test_the_reports_example():
+    printed = [
+        [-0.75271952, 0.38914789, 0.5310153],
+        [0.38914789, -0.38759388, 0.83566435],
+        [0.5310153, 0.83566435, 0.1403134],
+    ]
+    assert np.abs(rb.project_so(np.arange(1, 10).reshape(3, 3)) - printed).max() < 1e-8
+
+
+@pytest.mark.source("BK Prop. 4", "BK Prop. 5", "RR 1.6")
+def test_the_nearest_pose_keeps_the_translation():
+    rng = np.random.default_rng(4)
+    B = rng.normal(size=(5, 2, 4, 4))
+    A = rb.project_se(B)
+    assert np.array_equal(A[..., :3, 3], B[..., :3, 3])
+    assert np.array_equal(A[..., 3, :], np.broadcast_to([0, 0, 0, 1], (5, 2, 4)))
+    assert_nearest(A[..., :3, :3], B[..., :3, :3])
+    assert rb.is_se(A, 1e-14).all()
+
+
+@pytest.mark.source("RR 1.1", "RR (1)", "RR (2)", "BK 2.1")
+def test_membership_of_so():
+    assert rb.is_so(members(3, np.random.default_rng(0)), 1e-14).all()
+    reflected, stretched, drifted = np.diag([1, 1, -1]), np.diag([2, 0.5]), np.eye(3) + 1e-3
+    assert not rb.is_so(reflected)
+    assert not rb.is_so(stretched)
+    assert not rb.is_so(drifted)
+    assert rb.is_so(drifted, atol=0.01)
+    assert rb.is_so([[1]])
+    assert not rb.is_so([[-1]])
+
+
+@pytest.mark.source("RR 1.3", "BK 2.1")
+def test_membership_of_se():
+    A = np.eye(4)
+    A[:3, 3] = [1e6, -2, 3]
+    assert rb.is_se(A)
+    for entry, value in [((3, 0), 1e-3), ((3, 3), 2), ((0, 0), -1), ((0, 3), np.inf)]:
+        other = A.copy()
+        other[entry] = value
+        assert not rb.is_se(other), entry
+
+
+@pytest.mark.parametrize("is_member", [rb.is_so, rb.is_se])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
+def test_membership_never_fails_on_values(is_member, value):
+    assert not is_member(np.full((2, 3, 3), value)).any()
+
+
+def test_stacks_are_the_stack_of_their_members():
+    M = np.random.default_rng(1).normal(size=(2, 3, 4, 4))
+    for i in np.ndindex(2, 3):
+        assert np.array_equal(rb.project_so(M)[i], rb.project_so(M[i]))
+        assert np.array_equal(rb.project_se(M)[i], rb.project_se(M[i]))
+    assert rb.project_so(np.zeros((0, 3, 3))).shape == (0, 3, 3)
+
+
+def test_arguments_are_left_alone():
+    M = np.arange(9.0).reshape(3, 3)
+    rb.project_so(M)
+    rb.project_se(M)
+    assert np.array_equal(M, np.arange(9.0).reshape(3, 3))
+
+
+def test_bad_arguments_are_named():
+    for function in (rb.project_so, rb.is_so):
+        with pytest.raises(ValueError, match=r"M: shape \(\.\.\., n, n\) wanted, got \(2, 3\)"):
+            function(np.zeros((2, 3)))
+    with pytest.raises(ValueError, match=r"B: shape .* n >= 1 wanted, got \(1, 1\)"):
+        rb.project_se([[1]])
+    with pytest.raises(ValueError, match=r"M\[0, 1\] is nan"):
+        rb.project_so([[1, np.nan], [0, 1]])
