@@ -21,10 +21,9 @@ LINE_ANGLES = np.concatenate([10.0 ** np.arange(-12, 0), [0.5, 1.0, np.pi / 2, 2
 LINE_ANGLES = np.concatenate([LINE_ANGLES, np.pi - 10.0 ** -np.arange(1, 9)])
 """From 1e-12 to π − 1e-8."""
 
-LINE_TIMES = np.array(
-    [0, 1e-300, 1e-16, 1e-9, 1e-3, 0.1, 0.25, 0.49, 0.5 - 1e-9, 0.5, 0.5 + 1e-9, 0.6, 0.75, 0.9]
-    + [1 - 1e-3, 1 - 1e-9, 1 - 2.0**-53, 1]
-)
+_EARLY_TIMES = [0, 1e-300, 1e-16, 1e-9, 1e-3, 0.1, 0.25, 0.49, 0.5 - 1e-9, 0.5]
+_LATE_TIMES = [0.5 + 1e-9, 0.6, 0.75, 0.9, 1 - 1e-3, 1 - 1e-9, 1 - 2.0**-53, 1]
+LINE_TIMES = np.array([*_EARLY_TIMES, *_LATE_TIMES])
 
 
 def half_turns():

@@ -32,6 +32,12 @@ def exp_so3(w):
         return _array(exact_exp([float(x) for x in w]))
 
 
+def expm(A):
+    """The exponential of any matrix, by its power series."""
+    with mp.workdps(DIGITS):
+        return _array(mp.expm(mp.matrix(np.asarray(A, dtype=float).tolist()), method="taylor"))
+
+
 def log_so3(R):
     """The rotation vector of the rotation nearest to R, by the polar iteration of Newton."""
     with mp.workdps(DIGITS):

@@ -140,7 +140,7 @@ def test_no_turn_at_all():
 
 
 def test_between_rotations_a_half_turn_apart_the_geodesic_is_a_shortest_one_and_says_which():
-    matrices, axes = awkward.half_turns()
+    matrices, _ = awkward.half_turns()
     curves = rb.geodesic_so3(STARTS[0], STARTS[0] @ matrices)
     assert np.abs(np.linalg.norm(curves.rotation_vector, axis=-1) - np.pi).max() < 8 * EPS
     assert np.abs(curves(1) - STARTS[0] @ matrices).max() < 20 * EPS

@@ -4,8 +4,10 @@ import ast
 import subprocess
 import sys
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
+
 import rbcourse
 
 PACKAGE = Path(rbcourse.__file__).parent
@@ -16,11 +18,13 @@ LEVELS = {
     "line": 1,
     "so3": 2,
     "curves": 4,
+    "figures": 5,
     "plots": 6,
     "lessons": 8,
 }
 ALLOWED = {
-    "plots": {"matplotlib", "IPython"},
+    "figures": {"matplotlib"},
+    "plots": {"matplotlib", "mpl_toolkits"},
     "lessons": {"nbformat", "nbclient"},
 }
 
@@ -70,8 +74,15 @@ def test_only_named_libraries_are_used(module):
 
 
 def test_import_loads_numpy_only():
-    code = "import sys, numpy; before = set(sys.modules); import rbcourse; print(*set(sys.modules) - before)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    code = """
+        import sys, numpy
+        before = set(sys.modules)
+        import rbcourse
+        print(*set(sys.modules) - before)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", dedent(code)], capture_output=True, text=True, check=True
+    )
     loaded = {name.split(".")[0] for name in done.stdout.split()}
     assert loaded - set(sys.stdlib_module_names) - {"numpy"} == {"rbcourse"}
 

@@ -40,7 +40,7 @@ def test_theta_undoes_f():
     assert np.all(error <= 4 * EPS * np.maximum(1, 2 * np.tan(angle / 2) / angle))
 
 
-@pytest.mark.source("BK Cor. 2")
+@pytest.mark.source("BK Cor. 2", "errata 10")
 def test_the_equation_for_f_holds_with_the_angle_on_its_right_and_not_as_printed():
     angle, t = 2.0, 0.3
     x = rb.f(t, angle)
@@ -49,7 +49,7 @@ def test_the_equation_for_f_holds_with_the_angle_on_its_right_and_not_as_printed
     assert abs(left - t) > 0.1
 
 
-@pytest.mark.source("BK Cor. 1")
+@pytest.mark.source("BK Cor. 1", "errata 9")
 def test_the_printed_derivative_of_theta_lacks_a_square():
     t, angle = 0.5, 2.0
     s, slope = rb.line_singular_value(t, angle), np.sin(angle) / angle
@@ -58,7 +58,7 @@ def test_the_printed_derivative_of_theta_lacks_a_square():
     assert abs(slope / s - difference) > 0.5
 
 
-@pytest.mark.source("BK (16)")
+@pytest.mark.source("BK (16)", "errata 8")
 def test_the_printed_order_of_atan2_is_cosine_first():
     x, angle = 0.3, 1.0
     cosine, sine = 1 - x + x * np.cos(angle), x * np.sin(angle)
@@ -86,12 +86,40 @@ def test_the_symmetry_that_puts_the_middle_in_the_middle():
         assert np.abs(rb.f(t, angle) + rb.f(1 - t, angle) - 1).max() < 4 * EPS
 
 
-@pytest.mark.source("BK Prop. 6")
+@pytest.mark.source("BK Prop. 6", "errata 7")
 def test_theta_leaves_the_unit_interval_where_f_does():
     outside = np.array([-0.5, 1.5])
     want = [oracles.theta(t, 1.0) for t in outside]
     assert np.abs(rb.theta(outside, 1.0) - want).max() < 2 * EPS
     assert want[0] < 0 < 1 < want[1]
+
+
+@pytest.mark.source("BK Prop. 6", "errata 5", "errata 7")
+def test_the_printed_sign_and_eigenvectors_of_N_in_the_proof():
+    w = np.array([0.3, -1.2, 0.8])
+    a, W, R2 = np.linalg.norm(w), np.cross(np.eye(3), -w), oracles.exp_so3(w)
+    N = 2 * np.eye(3) - R2 - R2.T
+    printed = (1 - np.cos(a)) / a**2 * (W @ W + (W @ W).T)
+    assert np.abs(N + printed).max() < 8 * EPS
+    assert np.abs(N - printed).max() > 1
+    for x, y, z in (w, [0, 1, 0]):
+        denominators = [x**2 + z**2, x**2 * y**2 + (x**2 + z**2) ** 2 + y**2 * z**2]
+        assert (min(denominators) == 0) == (x == z == 0)
+    assert np.abs(np.linalg.eigvalsh(N) - 2 * (1 - np.cos(a)) * np.array([0, 1, 1])).max() < 8 * EPS
+
+
+@pytest.mark.source("BK Prop. 6", "BK (15)", "errata 6")
+def test_the_printed_product_in_the_proof_has_a_plus_too_many():
+    w, x = np.array([0.3, -1.2, 0.8]), 0.3
+    a, W = np.linalg.norm(w), np.cross(np.eye(3), -w)
+    s = oracles.line_singular_value(x, a)
+    g1, g2 = (1 - x + x * np.cos(a)) / s, x * np.sin(a) / s
+    projected = oracles.exp_so3(w * oracles.theta(x, a))
+    holds = np.eye(3) + W / a * g2 + (1 - g1) * W @ W / a**2
+    assert np.abs(holds - projected).max() < 8 * EPS
+    for unit in (np.eye(3), np.ones((3, 3))):  # either reading of a number plus a matrix
+        printed = np.eye(3) + W / a * g2 + (1 - g1) * unit + W @ W / a**2
+        assert np.abs(printed - projected).max() > 0.1
 
 
 def test_angle_0_is_the_limit():
@@ -116,7 +144,7 @@ def test_angle_pi_is_the_step():
 def test_shapes_and_bad_arguments(function):
     assert function(np.zeros((5, 1)), np.ones(4)).shape == (5, 4)
     assert isinstance(function(0.5, 1.0), float)
-    with pytest.raises(ValueError, match="angle is 3.2, an angle in"):
+    with pytest.raises(ValueError, match=r"angle is 3\.2, an angle in"):
         function(0.5, 3.2)
     with pytest.raises(ValueError, match=r"batch shapes do not broadcast: t \(2,\), angle \(3,\)"):
         function([0, 1], [1, 2, 3])

@@ -3,6 +3,7 @@ import re
 import mpmath as mp
 import numpy as np
 import pytest
+
 from rbcourse import _numerics as numerics
 
 EPS = np.finfo(float).eps

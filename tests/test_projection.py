@@ -52,7 +52,7 @@ def test_no_other_rotation_is_nearer(n):
         assert np.all(best <= np.linalg.norm(M - other, axis=(-2, -1)) + 4 * n * EPS * (1 + best))
 
 
-@pytest.mark.source("BK Prop. 2")
+@pytest.mark.source("BK Prop. 2", "errata 2")
 def test_the_printed_projection_is_a_reflection_where_the_determinant_is_negative():
     M = np.diag([3.0, 2.0, -1.0])
     U, _, Vt = np.linalg.svd(M)
@@ -77,8 +77,8 @@ def test_the_projection_is_invariant_on_both_sides():
     assert np.all(np.abs(rb.project_so(M @ L) - R @ L).max(axis=(-2, -1)) < bound)
 
 
-@pytest.mark.source("RR 1.4")
-def test_the_reports_example():
+@pytest.mark.source("RR 1.4", "RR Fig. 1", "errata 21")
+def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
     printed = [
         [-0.75271952, 0.38914789, 0.5310153],
         [0.38914789, -0.38759388, 0.83566435],

@@ -18,7 +18,7 @@ def test_hat_is_the_cross_product():
     assert np.array_equal(rb.vee_so3(rb.hat_so3(w) + 3 * np.eye(3)), w)
 
 
-@pytest.mark.source("BK (2)")
+@pytest.mark.source("BK (2)", "errata 12")
 def test_the_basis_is_the_hats_of_the_axes():
     assert np.array_equal(rb.BASIS_SO3, rb.hat_so3(np.eye(3)))
     assert np.array_equal(np.einsum("i,ijk", [1, 2, 3], rb.BASIS_SO3), rb.hat_so3([1, 2, 3]))
@@ -44,6 +44,16 @@ def test_exp_of_long_vectors_loses_what_their_length_loses():
 def test_exp_of_nothing_is_exact():
     assert np.array_equal(rb.exp_so3([0, 0, 0]), np.eye(3))
     assert np.array_equal(rb.exp_so3([1e-300, 0, 0])[2, 1], 1e-300)
+
+
+@pytest.mark.source("BK 2.5", "errata 14")
+def test_the_printed_exponential_at_R_has_its_vector_beside_the_exponent():
+    R, w = oracles.exp_so3([0.5, -1, 2]), np.array([0.4, 0.1, -0.3])
+    V = R @ rb.hat_so3(w)
+    holds = R @ oracles.expm(R.T @ V)
+    assert np.abs(holds - R @ rb.exp_so3(w)).max() < 8 * EPS
+    printed = R @ oracles.expm(R.T) @ V
+    assert np.abs(printed.T @ printed - np.eye(3)).max() > 0.1
 
 
 @pytest.mark.source("BK 2.5")

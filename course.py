@@ -1,0 +1,149 @@
+"""Every task of the course: python course.py figures | test | lab | lint.
+
+The first call makes the environment .venv from environment.txt; later calls use it. When
+environment.txt or the Python changes, or the folder is moved, .venv is made anew.
+"""
+
+from __future__ import print_function
+
+import sys
+
+if sys.version_info < (3, 11):
+    sys.exit(
+        "rbcourse needs Python 3.11 or newer, and this is Python %d.%d (%s)."
+        % (sys.version_info[0], sys.version_info[1], sys.executable)
+    )
+
+import argparse
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+VENV = ROOT / ".venv"
+PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+UV = shutil.which("uv")
+
+
+def main():
+    """Read the command line, set up what is missing, do the task."""
+    parser = argparse.ArgumentParser(prog="course.py", description=__doc__.splitlines()[0])
+    tasks = parser.add_subparsers(dest="task", required=True, metavar="TASK")
+    tasks.add_parser("figures", help="run every lesson; rewrite its outputs and figures/")
+    tasks.add_parser("test", help="run every test, the lessons too; further words go to pytest")
+    lab = tasks.add_parser("lab", help="open the lessons; further words go to JupyterLab")
+    lab.add_argument("--edit", action="store_true", help="the originals, not the copies in work/")
+    tasks.add_parser("lint", help="check style and types of all code")
+    known, further = parser.parse_known_args()
+    if further and known.task not in ("test", "lab"):
+        parser.error("%s takes no %s" % (known.task, " ".join(further)))
+    set_up()
+    if known.task == "figures":
+        run("-m", "rbcourse.lessons", "regenerate")
+    elif known.task == "test":
+        run("-m", "pytest", "-n", "auto", "--dist", "loadfile", *further)
+    elif known.task == "lab":
+        open_lab(known.edit, further)
+    else:
+        set_up_linters()
+        run("-m", "ruff", "check")
+        run("-m", "ruff", "format", "--check")
+        run("-m", "mypy")
+
+
+def run(*words):
+    """Run Python in the environment, in the folder of the course; stop if it fails."""
+    code = subprocess.call([str(PYTHON)] + list(words), cwd=ROOT)
+    if code:
+        sys.exit(code)
+
+
+def open_lab(edit, further):
+    """Open JupyterLab; it asks nobody for news, and a root user need not be told what he is."""
+    if not edit:
+        run("-m", "rbcourse.lessons", "copy")
+    words = [
+        "-m",
+        "jupyterlab",
+        "--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work")),
+        "--LabApp.news_url=None",
+        "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate",
+    ]
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        words.append("--allow-root")
+    run(*(words + further))
+
+
+def set_up():
+    """Make .venv if it is not there, was left unfinished, or belongs to something else."""
+    stamp = VENV / "made-by-course.txt"
+    wanted = fingerprint(ROOT / "environment.txt", sys.version, ROOT)
+    if stamp.exists() and stamp.read_text() == wanted:
+        return
+    if Path(sys.prefix) == VENV:
+        sys.exit("The environment has to be made anew: leave it first with 'deactivate'.")
+    print("Setting up .venv, once; about a minute", end="", flush=True)
+    try:
+        if VENV.exists():
+            shutil.rmtree(VENV)
+    except OSError as error:
+        sys.exit("\n.venv is in use (%s). Close JupyterLab and try again." % error)
+    if UV:
+        patiently(UV, "venv", "--python", sys.executable, str(VENV))
+    else:
+        patiently(sys.executable, "-m", "venv", str(VENV))
+    install("-r", "environment.txt")
+    stamp.write_text(wanted)
+    print(" done.", flush=True)
+
+
+def set_up_linters():
+    """Install the linters at the versions of pyproject.toml."""
+    stamp = VENV / "linters-by-course.txt"
+    wanted = fingerprint(ROOT / "pyproject.toml")
+    if not stamp.exists() or stamp.read_text() != wanted:
+        print("Installing the linters", end="", flush=True)
+        install("-e", ".[lint]")
+        stamp.write_text(wanted)
+        print(" done.", flush=True)
+
+
+def install(*words):
+    """Install into .venv, with uv where it is on the PATH."""
+    if UV:
+        patiently(UV, "pip", "install", "--python", str(PYTHON), *words)
+    else:
+        patiently(str(PYTHON), "-m", "pip", "install", "--disable-pip-version-check", *words)
+
+
+def patiently(*command):
+    """Run a command, a dot every two seconds; if it fails, show the end of what it said."""
+    environment = dict(os.environ, UV_PYTHON_DOWNLOADS="never")
+    with tempfile.TemporaryFile("w+", errors="replace") as said:
+        job = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=said, stderr=said)
+        while True:
+            try:
+                job.wait(timeout=2)
+                break
+            except subprocess.TimeoutExpired:
+                print(".", end="", flush=True)
+        if job.returncode:
+            said.seek(0)
+            print("\n" + "".join(said.readlines()[-25:]))
+            sys.exit("Set-up failed; README.md, 'When something goes wrong', may help.")
+
+
+def fingerprint(path, *more):
+    """Return a text that changes when the file or one of the other things does."""
+    text = "\n".join([path.read_text(encoding="utf-8")] + [str(word) for word in more])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)

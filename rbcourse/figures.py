@@ -1,0 +1,178 @@
+"""Figures as files: the picture, and the numbers behind it, the same bytes each time.
+
+A table is a dict of columns of one shape, whose names carry the units:
+``{"t [1]": ..., "angle [rad]": ..., "theta [1]": ...}``.
+"""
+
+import base64
+import csv
+import html
+import io
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.curves import Curve
+
+Table = Mapping[str, ArrayLike]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A saved figure, as a notebook shows it: the picture with its description.
+
+    Parameters
+    ----------
+    name : str
+        The name of its files, without ending.
+    alt : str
+        What is to be seen, for who cannot see it.
+    png : bytes
+        The picture.
+    """
+
+    name: str
+    alt: str
+    png: bytes
+
+    def __repr__(self) -> str:
+        """Return the name and the description."""
+        return f"{self.name}: {self.alt}"
+
+    def _repr_html_(self) -> str:
+        source = base64.b64encode(self.png).decode()
+        return (
+            f'<figure><img style="max-width: 100%" alt="{html.escape(self.alt)}" '
+            f'src="data:image/png;base64,{source}"/>'
+            f"<figcaption>{self.name}: .png, .pdf, .csv</figcaption></figure>"
+        )
+
+
+def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
+    """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
+
+    The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, or else
+    to ``figures`` in the current folder. The same input gives the same bytes.
+
+    Parameters
+    ----------
+    fig : Figure
+        The figure.
+    name : str
+        The name of the files, without ending.
+    data : mapping of str to array_like
+        The plotted numbers: columns of one shape, with units in their names.
+    alt : str
+        A sentence or two that say what is to be seen.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    ValueError
+        If the columns differ in shape.
+    """
+    text = csv_text(data)
+    folder = Path(os.environ.get("RBCOURSE_FIGURES", "figures"))
+    folder.mkdir(parents=True, exist_ok=True)
+    picture = io.BytesIO()
+    fig.savefig(picture, format="png", metadata={"Software": None})
+    fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+    plt.close(fig)
+    (folder / f"{name}.png").write_bytes(picture.getvalue())
+    (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+    return Picture(name, alt, picture.getvalue())
+
+
+def csv_text(data: Table) -> str:
+    """Return a table as CSV: a line of names, then numbers with twelve significant digits.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like
+        Columns of one shape; more than one axis is written row by row.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ValueError
+        If the columns differ in shape; the message gives every shape.
+
+    Examples
+    --------
+    >>> print(csv_text({"t [1]": [0, 0.5], "angle [rad]": [1 / 3, 2]}), end="")
+    t [1],angle [rad]
+    0,0.333333333333
+    0.5,2
+    """
+    columns = {name: np.asarray(column) for name, column in data.items()}
+    if len({column.shape for column in columns.values()}) > 1:
+        shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
+        raise ValueError(f"data: columns of one shape wanted, got {shapes}")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(map(_cell, column.ravel()) for column in columns.values()), strict=True))
+    return text.getvalue()
+
+
+def _cell(value: Any) -> str:
+    return str(value) if isinstance(value, str) else f"{value:.12g}"
+
+
+def pose_table(names: list[str], poses: Array) -> Table:
+    """Return poses as a table: one row each, position and rotation matrix.
+
+    Parameters
+    ----------
+    names : list of str
+        One for each pose.
+    poses : ndarray, shape (len(names), 4, 4)
+        Poses [[R, d], [0, 1]].
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    position = dict(zip(["x [m]", "y [m]", "z [m]"], poses[:, :3, 3].T, strict=True))
+    entries = {f"R{i + 1}{j + 1} [1]": poses[:, i, j] for i in range(3) for j in range(3)}
+    return {"frame": np.array(names), **position, **entries}
+
+
+def motion_table(curves: Mapping[str, Curve], point: ArrayLike, t: ArrayLike) -> Table:
+    """Return where rotations carry a point, and how fast they turn, as a table.
+
+    Parameters
+    ----------
+    curves : mapping of str to Curve
+        Rotations over time, with their names.
+    point : array_like, shape (3,)
+        A point of the unit sphere, body frame.
+    t : array_like, shape (times,)
+        Times in [0, 1].
+
+    Returns
+    -------
+    dict of str to ndarray
+        The times; for each curve x, y, z of the point in the fixed frame, and the angular speed.
+    """
+    table = {"t [1]": np.asarray(t)}
+    for name, curve in curves.items():
+        x, y, z = (curve(t) @ np.asarray(point)).T
+        speed = np.linalg.norm(curve(t, 1), axis=-1)
+        table |= {f"{name} x [1]": x, f"{name} y [1]": y, f"{name} z [1]": z}
+        table |= {f"{name} speed [rad]": speed}
+    return table

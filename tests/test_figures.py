@@ -1,0 +1,151 @@
+"""Saved figures, and the numbers behind the committed ones against their definitions."""
+
+import csv
+import re
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import oracles
+import pytest
+
+import rbcourse as rb
+from rbcourse import figures
+
+FIGURES = Path(__file__).parents[1] / "figures"
+TABLE = {"t [1]": [0, 0.5, 1], "theta [1]": [0, 1 / 3, 1]}
+
+
+def committed(name):
+    with (FIGURES / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    return rows[0], rows[1:]
+
+
+def numbers(name):
+    header, rows = committed(name)
+    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+
+
+def save(folder, monkeypatch, alt="a line"):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(folder))
+    fig, ax = plt.subplots()
+    ax.plot(*TABLE.values())
+    return figures.save_figure(fig, "line", TABLE, alt)
+
+
+def test_a_figure_is_saved_as_picture_document_and_numbers(tmp_path, monkeypatch):
+    picture = save(tmp_path, monkeypatch)
+    assert {file.name for file in tmp_path.iterdir()} == {"line.png", "line.pdf", "line.csv"}
+    assert picture.png == (tmp_path / "line.png").read_bytes()
+    assert (tmp_path / "line.csv").read_text() == "t [1],theta [1]\n0,0\n0.5,0.333333333333\n1,1\n"
+    assert plt.get_fignums() == []
+
+
+def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
+    for folder in ("a", "b"):
+        save(tmp_path / folder, monkeypatch)
+    for name in ("line.png", "line.pdf", "line.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("RBCOURSE_FIGURES", raising=False)
+    fig, _ = plt.subplots()
+    figures.save_figure(fig, "empty", TABLE, "nothing")
+    assert (tmp_path / "figures" / "empty.png").exists()
+
+
+def test_a_picture_says_what_is_to_be_seen(tmp_path, monkeypatch):
+    picture = save(tmp_path, monkeypatch, alt='from "0" to <1>')
+    assert repr(picture) == 'line: from "0" to <1>'
+    assert 'alt="from &quot;0&quot; to &lt;1&gt;"' in picture._repr_html_()
+
+
+def test_columns_of_different_shapes_are_refused_and_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+    fig, _ = plt.subplots()
+    with pytest.raises(ValueError, match=r"one shape wanted, got t \[1\] \(2,\), x \[m\] \(3,\)"):
+        figures.save_figure(fig, "bad", {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "")
+    assert list(tmp_path.iterdir()) == []
+    plt.close(fig)
+
+
+def test_fonts_in_documents_are_what_journals_take():
+    documents = sorted(FIGURES.glob("*.pdf"))
+    assert documents
+    for document in documents:
+        content = document.read_bytes()
+        assert b"/Type3" not in content.replace(b" ", b""), document.name
+        assert b"/FontFile2" in content, document.name
+        assert b"CreationDate" not in content, document.name
+
+
+def test_every_figure_has_its_three_files_and_units_in_every_column():
+    names = {file.stem for file in FIGURES.iterdir()}
+    for name in names:
+        assert {file.suffix for file in FIGURES.glob(f"{name}.*")} == {".png", ".pdf", ".csv"}
+        for column in committed(name)[0]:
+            assert re.search(r" \[(1|m|rad)\]$", column) or column == "frame", column
+
+
+@pytest.mark.source("BK Fig. 1")
+def test_the_data_of_paper_fig1():
+    header, rows = committed("paper_fig1")
+    values = np.array([row[1:] for row in rows], dtype=float)
+    assert header[1:4] == ["x [m]", "y [m]", "z [m]"]
+    assert [row[0] for row in rows] == ["F", "M"]
+    R = values[:, 3:].reshape(2, 3, 3)
+    assert np.array_equal(
+        values[0], np.eye(4)[:3, [3, 0, 1, 2]].T.ravel()[[0, 1, 2, *range(3, 12)]]
+    )
+    assert rb.is_so(R, 1e-11).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "order"),
+    [
+        pytest.param("paper_fig2a", "theta", 0, marks=pytest.mark.source("BK Fig. 2")),
+        pytest.param("paper_fig2b", "theta_dot", 1, marks=pytest.mark.source("BK Fig. 2")),
+        pytest.param("paper_fig3a", "f", 0, marks=pytest.mark.source("BK Fig. 3")),
+        pytest.param("paper_fig3b", "f_dot", 1, marks=pytest.mark.source("BK Fig. 3")),
+    ],
+)
+def test_the_data_of_paper_fig2_and_fig3(name, column, order):
+    data = numbers(name)
+    angle, t, value = data["angle [rad]"], data["t [1]"], data[f"{column} [1]"]
+    assert np.allclose(np.unique(angle), np.arange(1, 23) * np.pi / 24, rtol=1e-11)
+    assert np.allclose(np.unique(t), np.linspace(0, 1, 101), atol=1e-11)
+    oracle = getattr(oracles, column.removesuffix("_dot"))
+    for i in range(0, len(t), 37):
+        assert value[i] == pytest.approx(oracle(t[i], angle[i], order), rel=1e-9, abs=1e-10)
+
+
+@pytest.mark.source("BK Prop. 6")
+def test_the_data_of_the_chord():
+    t, x, y, arc_x, arc_y = numbers("lesson06_chord").values()
+    chord = (1 - t) + t * np.exp(1j * np.radians(150))
+    assert np.abs(x + 1j * y - chord).max() < 1e-11
+    assert np.abs(arc_x + 1j * arc_y - chord / np.abs(chord)).max() < 1e-11
+
+
+@pytest.mark.source("BK Cor. 1")
+def test_the_data_of_the_same_path():
+    data = numbers("lesson06_same_path")
+    t, geodesic, projected = (
+        data["t [1]"],
+        *(
+            np.array([data[f"{name} {axis} [1]"] for axis in "xyz"])
+            for name in ("geodesic", "projected line")
+        ),
+    )
+    angle = np.linalg.norm([1.2, 1.7, 1.5])
+    assert np.abs(np.linalg.norm([geodesic, projected], axis=1) - 1).max() < 1e-11
+    turned = np.arccos(np.clip(geodesic.T @ geodesic[:, 0], -1, 1))
+    assert np.abs(turned - angle * t).max() < 1e-5  # the cosine forgets small angles
+    normal = np.cross(geodesic[:, 0], geodesic[:, -1])
+    assert np.abs(normal @ projected).max() < 1e-11
+    assert np.abs(data["geodesic speed [rad]"] - angle).max() < 1e-11
+    slope = [oracles.theta(x, angle, 1) for x in t]
+    assert np.abs(data["projected line speed [rad]"] / angle - slope).max() < 1e-9

@@ -1,0 +1,167 @@
+"""The files round the package agree with each other, and the package works without them."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from textwrap import dedent
+from zipfile import ZipFile
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.version import Version
+
+import rbcourse
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+LINES = [
+    line
+    for line in (ROOT / "environment.txt").read_text("utf-8").splitlines()
+    if line and not line.startswith("#")
+]
+PINS = {pin.name: pin.specifier for pin in map(Requirement, LINES[:-1])}
+
+
+def read(name):
+    return (ROOT / name).read_text("utf-8")
+
+
+def test_the_environment_is_exact_and_ends_with_the_course():
+    assert LINES[-1] == "-e ."
+    for name, specifier in PINS.items():
+        assert re.fullmatch(r"==[\d.]+", str(specifier)), name
+
+
+def test_the_environment_is_what_the_package_and_its_extras_need():
+    extras = PROJECT["optional-dependencies"]
+    wanted = [*PROJECT["dependencies"], *extras["lessons"], *extras["test"]]
+    ranges = {range_.name: range_.specifier for range_ in map(Requirement, wanted)}
+    assert set(ranges) == set(PINS)
+    for name, specifier in ranges.items():
+        assert specifier.contains(Version(str(PINS[name]).removeprefix("=="))), name
+        assert "==" not in str(specifier), name
+
+
+def test_the_core_needs_numpy_and_scipy_only():
+    assert {Requirement(line).name for line in PROJECT["dependencies"]} == {"numpy", "scipy"}
+
+
+def test_binder_gets_the_same_environment():
+    assert read("binder/requirements.txt").split() == ["-r", "../environment.txt"]
+
+
+def test_every_file_has_the_same_version():
+    version = rbcourse.__version__
+    assert re.search(r"^version: (.*)$", read("CITATION.cff"), re.MULTILINE)[1] == version
+    assert re.search(r"^## (\S+)", read("CHANGELOG.md"), re.MULTILINE)[1] == version
+
+
+def test_the_citation_names_both_sources():
+    citation = read("CITATION.cff")
+    assert "10.1243/0954406021524909" in citation
+    for name in ("Belta", "Kumar", "Samayamantula", "Zou"):
+        assert f"family-names: {name}" in citation
+
+
+def test_both_licences_are_stated():
+    assert read("LICENSE").startswith("MIT License")
+    assert "CC BY 4.0" in read("README.md")
+
+
+def test_every_file_that_the_readme_points_to_is_there():
+    targets = re.findall(r"\]\(([^)#]+?)\)", read("README.md") + read("CONTRIBUTING.md"))
+    assert targets
+    for target in targets:
+        assert target.startswith("https://") or (ROOT / target).exists(), target
+
+
+def course(*words, code="", folder=ROOT):
+    """Run course.py in a new Python, after some other code."""
+    source = f"""
+        import runpy, sys
+        sys.argv[1:] = {list(words)!r}
+        {code}
+        runpy.run_path({str(ROOT / "course.py")!r}, run_name="__main__")
+    """
+    return subprocess.run(
+        [sys.executable, "-c", dedent(source)], capture_output=True, text=True, cwd=folder
+    )
+
+
+def test_an_old_python_is_told_so_in_one_line():
+    done = course("figures", code="sys.version_info = (3, 10, 13)")
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert re.fullmatch(r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\.\n", done.stderr)
+
+
+def test_even_python_2_can_read_the_script_that_tells_it_so():
+    """No syntax beyond Python 2: no f-string, annotation, walrus, match, star in a display."""
+    tree = ast.parse(read("course.py"))
+    for node in ast.walk(tree):
+        assert not isinstance(node, ast.JoinedStr | ast.AnnAssign | ast.NamedExpr | ast.Match)
+        if isinstance(node, ast.FunctionDef):
+            assert node.returns is None
+            assert not any(arg.annotation for arg in node.args.args)
+        if isinstance(node, ast.List | ast.Tuple | ast.Set):
+            assert not any(isinstance(item, ast.Starred) for item in node.elts)
+        if isinstance(node, ast.Call):
+            assert sum(isinstance(arg, ast.Starred) for arg in node.args) <= 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["figure"], "invalid choice: 'figure'"),
+        ([], "required: TASK"),
+        (["figures", "06"], "figures takes no 06"),
+        (["lint", "--fix"], "lint takes no --fix"),
+    ],
+)
+def test_a_wrong_task_is_named(words, said):
+    done = course(*words)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    code = f"from flit_core import buildapi; buildapi.build_wheel({str(folder)!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_the_wheel_evaluates_a_geodesic_with_numpy_and_scipy_alone(wheel, tmp_path):
+    code = f"""
+        import sys
+        sys.path.insert(0, {str(wheel)!r})
+        known = {{"numpy", "scipy", "rbcourse", *sys.stdlib_module_names}}
+
+        class Nothing:
+            def find_spec(self, name, path=None, target=None):
+                if name.split(".")[0] not in known and not name.startswith("_"):
+                    raise ModuleNotFoundError(name)
+
+        sys.meta_path.insert(0, Nothing())
+        import rbcourse
+        assert rbcourse.__file__.startswith({str(wheel)!r})
+        c = rbcourse.geodesic_so3([[1, 0, 0], [0, 1, 0], [0, 0, 1]], rbcourse.exp_so3([0, 0, 1]))
+        print(rbcourse.log_so3(c(0.5)).round(12))
+    """
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", dedent(code)], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.stderr == ""
+    assert done.stdout == "[0.  0.  0.5]\n"
+
+
+def test_the_wheel_carries_types_and_style(wheel):
+    names = ZipFile(wheel).namelist()
+    assert "rbcourse/py.typed" in names
+    assert "rbcourse/rbcourse.mplstyle" in names
+    assert not [name for name in names if name.startswith(("tests", "notebooks"))]
