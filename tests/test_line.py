@@ -97,7 +97,7 @@ def test_theta_leaves_the_unit_interval_where_f_does():
 @pytest.mark.source("BK Prop. 6", "errata 5", "errata 7")
 def test_the_printed_sign_and_eigenvectors_of_N_in_the_proof():
     w = np.array([0.3, -1.2, 0.8])
-    a, W, R2 = np.linalg.norm(w), np.cross(np.eye(3), -w), oracles.exp_so3(w)
+    a, W, R2 = np.linalg.norm(w), rb.hat_so3(w), oracles.exp_so3(w)
     N = 2 * np.eye(3) - R2 - R2.T
     printed = (1 - np.cos(a)) / a**2 * (W @ W + (W @ W).T)
     assert np.abs(N + printed).max() < 8 * EPS
@@ -111,7 +111,7 @@ def test_the_printed_sign_and_eigenvectors_of_N_in_the_proof():
 @pytest.mark.source("BK Prop. 6", "BK (15)", "errata 6")
 def test_the_printed_product_in_the_proof_has_a_plus_too_many():
     w, x = np.array([0.3, -1.2, 0.8]), 0.3
-    a, W = np.linalg.norm(w), np.cross(np.eye(3), -w)
+    a, W = np.linalg.norm(w), rb.hat_so3(w)
     s = oracles.line_singular_value(x, a)
     g1, g2 = (1 - x + x * np.cos(a)) / s, x * np.sin(a) / s
     projected = oracles.exp_so3(w * oracles.theta(x, a))
