@@ -17,8 +17,9 @@ ANGLES = np.array(
 
 ROTATION_VECTORS = (ANGLES[:, None, None] * UNIT_AXES).reshape(-1, 3)
 
-LINE_ANGLES = np.concatenate([10.0 ** np.arange(-12, 0), [0.5, 1.0, np.pi / 2, 2.0, 3.0]])
-LINE_ANGLES = np.concatenate([LINE_ANGLES, np.pi - 10.0 ** -np.arange(1, 9)])
+LINE_ANGLES = np.concatenate(
+    [10.0 ** np.arange(-12, 0), [9e-7, 0.5, 1, np.pi / 2, 2, 3], np.pi - 10.0 ** -np.arange(1, 9)]
+)
 """From 1e-12 to π − 1e-8."""
 
 _EARLY_TIMES = [0, 1e-300, 1e-16, 1e-9, 1e-3, 0.1, 0.25, 0.49, 0.5 - 1e-9, 0.5]

@@ -71,6 +71,10 @@ def test_the_moving_frame_shows_both_frames(ax3d):
     table = pose_table(["F", "M"], poses)
     artists = plots.draw_moving_frame(ax3d, table)
     assert len(artists) == 8  # box, six axes, vector
+    edges = np.array(artists[0]._segments3d)
+    assert edges.shape == (12, 2, 3)
+    assert np.abs(edges.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-15
+    assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-15  # turned by 90°
     assert np.array_equal(np.array(artists[-1].get_data_3d()).T, [[0, 0, 0], [1, 2, 3]])
     texts = [text.get_text() for text in ax3d.texts]
     assert texts == ["x", "y", "z", "{F}", "x", "y", "z", "{M}", "d"]
