@@ -16,6 +16,7 @@ if sys.version_info < (3, 11):
 
 import argparse
 import hashlib
+import json
 import os
 import shutil
 import subprocess
@@ -62,19 +63,18 @@ def run(*words):
 
 
 def open_lab(edit, further):
-    """Open JupyterLab; it asks nobody for news, and a root user need not be told what he is."""
+    """Open JupyterLab; it asks for no news, and a root user need not be told what he is."""
     if not edit:
         run("-m", "rbcourse.lessons", "copy")
-    words = [
-        "-m",
-        "jupyterlab",
-        "--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work")),
-        "--LabApp.news_url=None",
-        "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate",
-    ]
+    settings = VENV / "share" / "jupyter" / "lab" / "settings"
+    settings.mkdir(parents=True, exist_ok=True)
+    quiet = {"fetchNews": "false", "checkForUpdates": False}
+    overrides = {"@jupyterlab/apputils-extension:notification": quiet}
+    (settings / "overrides.json").write_text(json.dumps(overrides))
+    words = ["--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work"))]
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         words.append("--allow-root")
-    run(*(words + further))
+    run("-m", "jupyterlab", *(words + further))
 
 
 def set_up():

@@ -74,6 +74,12 @@ def faults(notebook):
     heads = [line for cell in notebook.cells for line in cell.source.splitlines()[:1]]
     if sum(line.startswith("# ") for line in heads) != 1:
         found.append("not one first-level heading")
+    for cell in notebook.cells:
+        lines = cell.source.splitlines()
+        if cell.cell_type == "markdown" and any(line.startswith("#") for line in lines[1:]):
+            found.append("a heading is not the first line of its cell")
+        if cell.metadata.get("jp-MarkdownHeadingCollapsed") and len(lines) > 1:
+            found.append("a collapsed heading shows what follows it")
     for number, cell in enumerate(code_cells(notebook), start=1):
         if cell.execution_count != number:
             found.append(f"code cell {number} has the count {cell.execution_count}")
@@ -116,8 +122,10 @@ def test_faults_are_seen():
         new_output("stream", name="stderr", text="Warning"),
         new_output("execute_result", data={"text/plain": "1.11e-16"}),
     ]
-    found = faults(new_notebook(cells=[new_markdown_cell("## Two"), cell]))
-    assert len(found) == 9
+    text = new_markdown_cell("## Answer\n42\n## Next")
+    text.metadata["jp-MarkdownHeadingCollapsed"] = True
+    found = faults(new_notebook(cells=[text, cell]))
+    assert len(found) == 11
     good = new_code_cell("x = 1", execution_count=1)
     good.outputs = [new_output("stream", name="stdout", text="difference < 1e-14")]
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
