@@ -120,8 +120,13 @@ def install(*words):
 
 
 def patiently(*command):
-    """Run a command, a dot every two seconds; if it fails, show the end of what it said."""
-    environment = dict(os.environ, UV_PYTHON_DOWNLOADS="never")
+    """Run a command, a dot every two seconds; if it fails, show the end of what it said.
+
+    The certificates of the system, as pip takes them (uv has two names for that): networks of
+    schools and firms have their own.
+    """
+    uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
+    environment = dict(uv, **os.environ)
     with tempfile.TemporaryFile("w+", errors="replace") as said:
         job = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=said, stderr=said)
         while True:
