@@ -131,10 +131,11 @@ def regenerate(lessons: Path, figures: Path) -> None:
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
-    """Copy the lessons to a folder to work in, trusted; what was changed there is never touched.
+    """Copy the lessons to a folder to work in, trusted; what was written there is never touched.
 
     A lesson that is new to the folder is copied. One that has changed since it was copied takes
-    the place of its copy if that was left alone, and is laid beside it otherwise.
+    the place of its copy if the cells of that are as they were, run or not, and is laid beside it
+    otherwise.
 
     Parameters
     ----------
@@ -146,20 +147,29 @@ def copy_lessons(lessons: Path, work: Path) -> None:
     copied = json.loads(record.read_text("utf-8")) if record.exists() else {}
     for path in lesson_paths(lessons):
         text, target = path.read_text("utf-8"), work / path.name
-        digest, last = _digest(text), copied.get(path.name)
-        if target.exists() and digest == last:
+        last = copied.get(path.name, {})
+        if target.exists() and last.get("lesson") == _digest(text):
             continue
-        if target.exists() and _digest(target.read_text("utf-8")) != last:
+        if target.exists() and last.get("cells") != _digest(_cells(target.read_text("utf-8"))):
             target = next(p for p in _numbered(target) if not p.exists())
             print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
         target.write_text(text, encoding="utf-8", newline="\n")
         NotebookNotary().sign(nbformat.reads(text, as_version=4))
-        copied[path.name] = digest
-    record.write_text(json.dumps(copied, indent=1), encoding="utf-8")
+        copied[path.name] = {"lesson": _digest(text), "cells": _digest(_cells(text))}
+        record.write_text(json.dumps(copied, indent=1), encoding="utf-8")
 
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _cells(text: str) -> str:
+    """Return what a person writes in a notebook; all of it where it cannot be read as one."""
+    try:
+        cells = nbformat.reads(text, as_version=4).cells
+    except nbformat.reader.NotJSONError:
+        return text
+    return json.dumps([(cell.cell_type, cell.source) for cell in cells])
 
 
 def _numbered(path: Path) -> Iterator[Path]:

@@ -28,7 +28,7 @@ COLOURS = {
 
 LABELS = {
     "t": "time t",
-    "angle": "‖ω₀‖ (rad)",
+    "angle": "angle a (rad)",
     "theta": "θ",
     "theta_dot": "dθ/dt",
     "f": "f",
@@ -79,7 +79,7 @@ def draw_family(ax: Axes, data: Table) -> list[Any]:
         for row, colour, dash in zip(rows, colours, _DASHES, strict=True)
     ]
     ax.set(xlabel=_label(x_name), ylabel=_label(y_name), xlim=(x.min(), x.max()))
-    ax.legend(title="‖ω₀‖ (rad)", loc="center left", bbox_to_anchor=(1, 0.5))
+    ax.legend(title="angle a (rad)", loc="center left", bbox_to_anchor=(1, 0.5))
     return lines
 
 
@@ -101,7 +101,8 @@ def draw_surface(ax: Any, data: Table) -> list[Any]:
     surface = ax.plot_surface(
         x, parameter, y, cmap="viridis_r", rcount=24, ccount=34, lw=0.3, edgecolor="white"
     )
-    ax.set(xlabel=_label(x_name), ylabel=_label(p_name), xticks=[0, 0.5, 1])
+    ax.set(xlabel=_label(x_name), xticks=[0, 0.5, 1])
+    ax.set_ylabel(_label(p_name), labelpad=8)
     ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
     ax.text2D(0.06, 0.88, _label(y_name), transform=ax.transAxes)
     ax.view_init(elev=24, azim=-128)
@@ -130,7 +131,7 @@ def describe_family(data: Table) -> str:
     ]
     times = ", ".join(f"{value:g}" for value in x[0, at])
     return (
-        f"{_label(y_name)} over the time t, for {len(parameter)} angles ‖ω₀‖, as a surface and as "
+        f"{_label(y_name)} over the time t, for {len(parameter)} angles a, as a surface and as "
         f"curves. At the times {times} {'; '.join(ends)}."
     )
 
@@ -153,13 +154,13 @@ def draw_moving_frame(ax: Any, data: Table) -> list[Any]:
     d, R = np.stack(rest[:3], axis=-1), np.stack(rest[3:], axis=-1).reshape(2, 3, 3)
     artists = [_draw_box(ax, d[1], R[1], np.array([0.7, 0.5, 0.35]))]
     for name, origin, axes in zip(names, d, R, strict=True):
-        artists += _draw_triad(ax, origin, axes, f"{{{name}}}")
-    artists += ax.plot(*d.T, color=COLOURS["reference"], ls="--")
-    ax.text(*(0.5 * d[0] + 0.5 * d[1] - [0, 0, 0.2]), "d", fontstyle="italic")
-    ax.set_box_aspect(np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1), zoom=1.15)
+        artists += _draw_triad(ax, origin, axes, name)
+    vector = ax.quiver(*d[0], *(d[1] - d[0]), color=COLOURS["reference"], arrow_length_ratio=0.06)
+    ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
+    ax.set_box_aspect(np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1), zoom=1.3)
     ax.set_axis_off()
     ax.view_init(elev=20, azim=-60)
-    return artists
+    return [*artists, vector]
 
 
 def describe_moving_frame(data: Table) -> str:
@@ -199,7 +200,7 @@ def draw_chord(ax: Axes, data: Table) -> list[Any]:
     -------
     list of artists
     """
-    _, x, y, arc_x, arc_y = (np.asarray(column) for column in data.values())
+    t, x, y, arc_x, arc_y = (np.asarray(column) for column in data.values())
     circle = Circle((0, 0), 1, fill=False, color=COLOURS["reference"], lw=1)
     ax.add_patch(circle)
     rays = ax.plot(
@@ -214,9 +215,10 @@ def draw_chord(ax: Axes, data: Table) -> list[Any]:
         ms=8,
         label="their projections on the circle",
     )
-    ax.set(
-        aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.12, 1.12), xlabel="real", ylabel="imaginary"
-    )
+    for k, offset in ((0, (-14, -22)), (len(x) // 2, (2, 9)), (-1, (-14, -24))):
+        ax.annotate(f"t = {t[k]:g}", (x[k], y[k]), offset, textcoords="offset points")
+    ax.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.12, 1.12))
+    ax.set(xlabel="real part", ylabel="imaginary part")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
     return [circle, *rays, *chord, *arc]
 
@@ -266,6 +268,8 @@ def draw_paths(ax: Any, data: Table) -> list[Any]:
     ax.plot_wireframe(*sphere, color="0.85", lw=0.5)
     lines = [ax.plot(*path, **_MOTIONS[name])[0] for name, path in paths.items()]
     start, middle, end = paths["geodesic"][:, [0, paths["geodesic"].shape[1] // 2, -1]].T
+    for when, place in (("t = 0", start), ("t = 1", end)):
+        ax.text(*(0.82 * place), when, ha="center", va="center")
     x, y, z = np.cross(start, end) / np.linalg.norm(np.cross(start, end)) + middle / 2
     ax.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
     ax.set_proj_type("ortho")
@@ -340,8 +344,8 @@ def _draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
     artists = []
     for axis, direction in zip("xyz", R.T, strict=True):
         artists.append(ax.quiver(*origin, *direction, color=COLOURS[axis], lw=2.5))
-        ax.text(*(origin + 1.12 * direction), axis, color=COLOURS[axis])
-    ax.text(*(origin - 0.25 * R.sum(axis=1)), name)
+        ax.text(*(origin + 1.15 * direction), f"${axis}_{name}$", color=COLOURS[axis])
+    ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center")
     return artists
 
 

@@ -258,6 +258,25 @@ def test_a_copy_that_was_worked_in_is_never_touched(folders, capsys):
     assert "your copy stays, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
 
 
+def test_a_copy_that_was_only_run_is_replaced(folders):
+    lessons.copy_lessons(*folders)
+    copy = folders[1] / "01_plane.ipynb"
+    copy.write_text(lessons.execute(copy, folders[1]), encoding="utf-8")
+    notebook_at(folders[0] / "01_plane.ipynb", "2")
+    lessons.copy_lessons(*folders)
+    assert '"2"' in copy.read_text()
+    assert len(list(folders[1].glob("*.ipynb"))) == 1
+
+
+def test_a_copy_that_is_no_notebook_any_more_is_never_touched(folders):
+    lessons.copy_lessons(*folders)
+    (folders[1] / "01_plane.ipynb").write_text("my notes")
+    notebook_at(folders[0] / "01_plane.ipynb", "2")
+    lessons.copy_lessons(*folders)
+    assert (folders[1] / "01_plane.ipynb").read_text() == "my notes"
+    assert (folders[1] / "01_plane_2.ipynb").exists()
+
+
 def test_a_copy_that_was_there_before_is_never_touched(folders):
     folders[1].mkdir()
     mine = notebook_at(folders[1] / "01_plane.ipynb", "my work")

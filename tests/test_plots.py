@@ -75,9 +75,10 @@ def test_the_moving_frame_shows_both_frames(ax3d):
     assert edges.shape == (12, 2, 3)
     assert np.abs(edges.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-15
     assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-15  # turned by 90°
-    assert np.array_equal(np.array(artists[-1].get_data_3d()).T, [[0, 0, 0], [1, 2, 3]])
+    assert np.array_equal(artists[-1]._segments3d[0], [[1, 2, 3], [0, 0, 0]])
     texts = [text.get_text() for text in ax3d.texts]
-    assert texts == ["x", "y", "z", "{F}", "x", "y", "z", "{M}", "d"]
+    axes = [f"${axis}_{name}$" for name in "FM" for axis in "xyz"]
+    assert texts == [*axes[:3], "{F}", *axes[3:], "{M}", "d"]
     said = plots.describe_moving_frame(table)
     assert "(1, 2, 3) m" in said
     assert "90 degrees" in said
