@@ -59,6 +59,7 @@ def execute(path: Path, figures: Path) -> str:
         notebook,
         kernel_name=KERNEL["name"],
         record_timing=False,
+        coalesce_streams=True,
         timeout=120,
         extra_arguments=["--log-level=ERROR"],
         resources={"metadata": {"path": str(path.parent)}},

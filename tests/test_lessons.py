@@ -199,6 +199,13 @@ def test_runs_give_the_same_bytes(tmp_path):
     assert f"{2:032x}" in first
 
 
+def test_what_is_printed_in_pieces_is_stored_as_one(tmp_path):
+    source = "import time\nprint('one', flush=True)\ntime.sleep(0.5)\nprint('two')"
+    path = notebook_at(tmp_path / "01_pieces.ipynb", source)
+    stored = nbformat.reads(lessons.execute(path, tmp_path), as_version=4)
+    assert [output.text for output in stored.cells[0].outputs] == ["one\ntwo\n"]
+
+
 def test_nothing_is_rewritten_when_a_lesson_fails(tmp_path):
     good = "import os, pathlib\npathlib.Path(os.environ['RBCOURSE_FIGURES'], 'new.png').touch()"
     paths = [
