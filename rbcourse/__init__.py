@@ -1,12 +1,6 @@
 """Rigid-body motion, taught by code that runs: rotations, projections and curves on SO(3)."""
 
-from rbcourse.curves import (
-    AlongGeodesic,
-    Curve,
-    ProjectedLine,
-    geodesic_so3,
-    projected_line_so3,
-)
+from rbcourse.curves import Curve, geodesic_so3, projected_line_so3
 from rbcourse.line import f, line_singular_value, theta
 from rbcourse.projection import is_se, is_so, project_se, project_so
 from rbcourse.quaternion import (
@@ -32,9 +26,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BASIS_SO3",
-    "AlongGeodesic",
     "Curve",
-    "ProjectedLine",
     "exp_so3",
     "f",
     "geodesic_so3",

@@ -64,7 +64,7 @@ def as_time(t: ArrayLike, batch_ndim: int) -> Array:
 
 
 def as_angle(angle: ArrayLike) -> Array:
-    """Return angles of rotation, all in [0, π].
+    """Return angles of rotation, all in [0, π]; what is larger by rounding only becomes π.
 
     Raises
     ------
@@ -72,13 +72,14 @@ def as_angle(angle: ArrayLike) -> Array:
         As `as_finite`; and the message names the first angle outside [0, π].
     """
     angles = as_finite("angle", angle)
-    _check_all((angles >= 0) & (angles <= np.pi), "angle", angles, "an angle in [0, π]")
-    return angles
+    within = (angles >= 0) & (angles <= np.pi * (1 + 4 * EPS))
+    _check_all(within, "angle", angles, "an angle in [0, π]")
+    return np.minimum(angles, np.pi)
 
 
 def check_order(order: int) -> int:
     """Return `order`, the order of a derivative, or raise a ValueError if it is not 0, 1 or 2."""
-    if order not in (0, 1, 2):
+    if not isinstance(order, int | np.integer) or order not in (0, 1, 2):
         raise ValueError(f"order: 0, 1 or 2 wanted, got {order!r}")
     return order
 
@@ -99,15 +100,15 @@ def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:
     return list(tail) == wanted and 0 not in letters.values()
 
 
-def check_broadcast(core: int, **arrays: Array) -> tuple[int, ...]:
-    """Return the common batch shape of `arrays` without their last `core` axes.
+def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
+    """Return the common batch shape of arrays, each given with the number of its core axes.
 
     Raises
     ------
     ValueError
         If there is none; the message gives every argument with its batch shape.
     """
-    batches = {name: array.shape[: array.ndim - core] for name, array in arrays.items()}
+    batches = {name: array.shape[: array.ndim - core] for name, (array, core) in arguments.items()}
     try:
         return np.broadcast_shapes(*batches.values())
     except ValueError as error:

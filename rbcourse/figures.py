@@ -19,10 +19,17 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
-from rbcourse.curves import Curve
-
 Table = Mapping[str, ArrayLike]
+
+COLOURS = {
+    "x": "#D55E00",
+    "y": "#009E73",
+    "z": "#0072B2",
+    "optimum": "#000000",
+    "projection": "#CC79A7",
+    "reference": "#808080",
+}
+"""The same meaning has the same colour everywhere; all can be told apart when colour-blind."""
 
 
 @dataclass(frozen=True)
@@ -131,48 +138,3 @@ def csv_text(data: Table) -> str:
 
 def _cell(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.12g}"
-
-
-def pose_table(names: list[str], poses: Array) -> Table:
-    """Return poses as a table: one row each, position and rotation matrix.
-
-    Parameters
-    ----------
-    names : list of str
-        One for each pose.
-    poses : ndarray, shape (len(names), 4, 4)
-        Poses [[R, d], [0, 1]].
-
-    Returns
-    -------
-    dict of str to ndarray
-    """
-    position = dict(zip(["x [m]", "y [m]", "z [m]"], poses[:, :3, 3].T, strict=True))
-    entries = {f"R{i + 1}{j + 1} [1]": poses[:, i, j] for i in range(3) for j in range(3)}
-    return {"frame": np.array(names), **position, **entries}
-
-
-def motion_table(curves: Mapping[str, Curve], point: ArrayLike, t: ArrayLike) -> Table:
-    """Return where rotations carry a point, and how fast they turn, as a table.
-
-    Parameters
-    ----------
-    curves : mapping of str to Curve
-        Rotations over time, with their names.
-    point : array_like, shape (3,)
-        A point of the unit sphere, body frame.
-    t : array_like, shape (times,)
-        Times in [0, 1].
-
-    Returns
-    -------
-    dict of str to ndarray
-        The times; for each curve x, y, z of the point in the fixed frame, and the angular speed.
-    """
-    table = {"t [1]": np.asarray(t)}
-    for name, curve in curves.items():
-        x, y, z = (curve(t) @ np.asarray(point)).T
-        speed = np.linalg.norm(curve(t, 1), axis=-1)
-        table |= {f"{name} x [1]": x, f"{name} y [1]": y, f"{name} z [1]": z}
-        table |= {f"{name} speed [rad]": speed}
-    return table

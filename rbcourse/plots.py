@@ -1,9 +1,10 @@
-"""Still figures: artists on axes that the caller owns.
+"""Still figures of curves: artists on axes that the caller owns.
 
 Each ``draw_*(ax, data)`` draws a table (see `rbcourse.figures`) and returns its artists; the
 ``describe_*(data)`` beside it says in words what is to be seen.
 """
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -11,20 +12,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
-from rbcourse.figures import Table
-
-COLOURS = {
-    "x": "#D55E00",
-    "y": "#009E73",
-    "z": "#0072B2",
-    "optimum": "#000000",
-    "projection": "#CC79A7",
-    "reference": "#808080",
-}
-"""The same meaning has the same colour everywhere; all can be told apart when colour-blind."""
+from rbcourse.curves import Curve
+from rbcourse.figures import COLOURS, Table
 
 LABELS = {
     "t": "time t",
@@ -58,7 +50,7 @@ _DASHES: list[Any] = ["-", "--", "-.", ":", (0, (6, 1, 1, 1)), (0, (3, 1, 1, 1, 
 
 
 def draw_family(ax: Axes, data: Table) -> list[Any]:
-    """Draw six curves of a table (parameter, abscissa, value), one for each of six parameters.
+    """Draw up to six curves of a table (parameter, abscissa, value), each for one parameter.
 
     Parameters
     ----------
@@ -70,13 +62,17 @@ def draw_family(ax: Axes, data: Table) -> list[Any]:
     Returns
     -------
     list of Line2D
+
+    References
+    ----------
+    BK Fig. 2, BK Fig. 3.
     """
     (_, parameter), (x_name, x), (y_name, y) = _columns(data)
     rows = _shown_rows(parameter)
     colours = plt.get_cmap("viridis")(np.linspace(0.85, 0, len(rows)))
     lines = [
         ax.plot(x[row], y[row], color=colour, ls=dash, label=pi_fraction(parameter[row, 0]))[0]
-        for row, colour, dash in zip(rows, colours, _DASHES, strict=True)
+        for row, colour, dash in zip(rows, colours, _DASHES, strict=False)
     ]
     ax.set(xlabel=_label(x_name), ylabel=_label(y_name), xlim=(x.min(), x.max()))
     ax.legend(title="angle a (rad)", loc="center left", bbox_to_anchor=(1, 0.5))
@@ -96,6 +92,10 @@ def draw_surface(ax: Any, data: Table) -> list[Any]:
     Returns
     -------
     list of Poly3DCollection
+
+    References
+    ----------
+    BK Fig. 2, BK Fig. 3.
     """
     (p_name, parameter), (x_name, x), (y_name, y) = _columns(data)
     surface = ax.plot_surface(
@@ -133,56 +133,6 @@ def describe_family(data: Table) -> str:
     return (
         f"{_label(y_name)} over the time t, for {len(parameter)} angles a, as a surface and as "
         f"curves. At the times {times} {'; '.join(ends)}."
-    )
-
-
-def draw_moving_frame(ax: Any, data: Table) -> list[Any]:
-    """Draw a fixed frame, a moving frame on its body, and the position vector between them.
-
-    Parameters
-    ----------
-    ax : Axes3D
-        Where to draw.
-    data : mapping of str to array_like, shape (2,)
-        A `pose_table` of the fixed frame and the moving one, in that order.
-
-    Returns
-    -------
-    list of artists
-    """
-    names, rest = np.asarray(data["frame"]), [np.asarray(data[key]) for key in list(data)[1:]]
-    d, R = np.stack(rest[:3], axis=-1), np.stack(rest[3:], axis=-1).reshape(2, 3, 3)
-    artists = [_draw_box(ax, d[1], R[1], np.array([0.7, 0.5, 0.35]))]
-    for name, origin, axes in zip(names, d, R, strict=True):
-        artists += _draw_triad(ax, origin, axes, name)
-    vector = ax.quiver(*d[0], *(d[1] - d[0]), color=COLOURS["reference"], arrow_length_ratio=0.06)
-    ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
-    ax.set_box_aspect(np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1), zoom=1.3)
-    ax.set_axis_off()
-    ax.view_init(elev=20, azim=-60)
-    return [*artists, vector]
-
-
-def describe_moving_frame(data: Table) -> str:
-    """Return in words what `draw_moving_frame` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (2,)
-        As for `draw_moving_frame`.
-
-    Returns
-    -------
-    str
-    """
-    fixed, moving = np.asarray(data["frame"])
-    place = ", ".join(f"{np.asarray(data[key])[1]:g}" for key in ("x [m]", "y [m]", "z [m]"))
-    trace = sum(np.asarray(data[f"R{i}{i} [1]"])[1] for i in (1, 2, 3))
-    turn = np.degrees(np.arccos((trace - 1) / 2))
-    return (
-        f"The fixed frame {{{fixed}}} with its axes x, y, z, and a box that carries the moving "
-        f"frame {{{moving}}}. Its origin is at ({place}) m, the tip of the vector d, and it is "
-        f"turned by {turn:.0f} degrees against the fixed one."
     )
 
 
@@ -242,6 +192,32 @@ def describe_chord(data: Table) -> str:
         "steps, and rays from the centre through the cuts to the circle. The first step on the "
         f"circle spans {steps[0]:.0f} degrees, the widest, in the middle, {steps.max():.0f}."
     )
+
+
+def motion_table(curves: Mapping[str, Curve], point: ArrayLike, t: ArrayLike) -> Table:
+    """Return where rotations carry a point, and how fast they turn, as a table.
+
+    Parameters
+    ----------
+    curves : mapping of str to Curve
+        Rotations over time, with their names.
+    point : array_like, shape (3,)
+        A point of the unit sphere, body frame.
+    t : array_like, shape (times,)
+        Times in [0, 1].
+
+    Returns
+    -------
+    dict of str to ndarray
+        The times; for each curve x, y, z of the point in the fixed frame, and the angular speed.
+    """
+    table = {"t [1]": np.asarray(t)}
+    for name, curve in curves.items():
+        x, y, z = (curve(t) @ np.asarray(point)).T
+        speed = np.linalg.norm(curve(t, 1), axis=-1)
+        table |= {f"{name} x [1]": x, f"{name} y [1]": y, f"{name} z [1]": z}
+        table |= {f"{name} speed [rad]": speed}
+    return table
 
 
 def draw_paths(ax: Any, data: Table) -> list[Any]:
@@ -314,13 +290,20 @@ def describe_paths(data: Table) -> str:
     -------
     str
     """
-    geodesic, projected = (np.asarray(data[f"{name} speed [rad]"]) for name in _MOTIONS)
+    said = []
+    for name in _MOTIONS:
+        speed = np.asarray(data[f"{name} speed [rad]"])
+        marks = np.array([data[f"{name} {axis} [1]"] for axis in "xyz"]).T[::10]
+        sine = np.linalg.norm(np.cross(marks[:-1], marks[1:]), axis=1)
+        steps = np.degrees(np.arctan2(sine, np.sum(marks[:-1] * marks[1:], axis=1)))
+        said.append(
+            f"the {name} takes the steps {', '.join(f'{step:.0f}' for step in steps)} degrees; its "
+            f"speed is {speed[0]:.2f} at the start, {speed[len(speed) // 2]:.2f} in the middle, "
+            f"{speed[-1]:.2f} at the end"
+        )
     return (
-        "Left, a sphere: the geodesic and the projected line carry a point along one and the same "
-        f"arc; the marks at {len(geodesic[::10])} equal times are evenly spaced for the geodesic, "
-        "and for the projected line dense at both ends and sparse in the middle. Right, the "
-        f"angular speed: constant {geodesic[0]:.2f} for the geodesic; for the projected line "
-        f"{projected[0]:.2f} at the ends and {projected.max():.2f} in the middle."
+        "Left, a sphere with the paths of one point under two motions, marked at equal times; "
+        f"right, the angular speeds in rad per unit time. Between the marks {'; '.join(said)}."
     )
 
 
@@ -334,32 +317,10 @@ def _label(column: str) -> str:
 
 
 def _shown_rows(parameter: Array) -> list[int]:
-    """Return the rows of the five multiples of π/6 below π, and the last."""
+    """Return the rows nearest to the five multiples of π/6 below π, and the last."""
     sixths = np.arange(1, 6) * np.pi / 6
-    return [int(np.abs(parameter[:, 0] - angle).argmin()) for angle in sixths] + [-1]
-
-
-def _draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
-    """Draw the columns of R as arrows x, y, z from the origin, with their names."""
-    artists = []
-    for axis, direction in zip("xyz", R.T, strict=True):
-        artists.append(ax.quiver(*origin, *direction, color=COLOURS[axis], lw=2.5))
-        ax.text(*(origin + 1.15 * direction), f"${axis}_{name}$", color=COLOURS[axis])
-    ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center")
-    return artists
-
-
-def _draw_box(ax: Any, centre: Array, R: Array, half: Array) -> Any:
-    """Draw the edges of a box with the half sides `half`, turned by R about its centre."""
-    corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij")).reshape(3, 8).T
-    placed = centre + (corners * half) @ R.T
-    edges = [
-        (placed[i], placed[j])
-        for i in range(8)
-        for j in range(i)
-        if np.abs(corners[i] - corners[j]).sum() == 2
-    ]
-    return ax.add_collection3d(Line3DCollection(edges, colors=COLOURS["reference"], lw=1))
+    nearest = [int(np.abs(parameter[:, 0] - angle).argmin()) for angle in sixths]
+    return sorted({*nearest, len(parameter) - 1})
 
 
 def pi_fraction(angle: float) -> str:
@@ -376,9 +337,12 @@ def pi_fraction(angle: float) -> str:
 
     Examples
     --------
-    >>> pi_fraction(5 * np.pi / 6), pi_fraction(np.pi)
-    ('5π/6', 'π')
+    >>> pi_fraction(5 * np.pi / 6), pi_fraction(np.pi), pi_fraction(-np.pi / 2), pi_fraction(0)
+    ('5π/6', 'π', '−π/2', '0')
     """
     share = Fraction(angle / np.pi).limit_denominator(24)
+    if share == 0:
+        return "0"
+    sign, count = "−" if share < 0 else "", abs(share.numerator)
     over = f"/{share.denominator}" if share.denominator > 1 else ""
-    return f"{share.numerator if share.numerator > 1 else ''}π{over}"
+    return f"{sign}{count if count > 1 else ''}π{over}"

@@ -41,7 +41,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     M = as_array("M", M, "n", "n")
     with np.errstate(over="ignore", invalid="ignore"):
         defect = np.abs(np.swapaxes(M, -1, -2) @ M - np.eye(M.shape[-1])).max(axis=(-2, -1))
-        return np.asarray((defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol))
+        return ((defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol))[()]
 
 
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -80,7 +80,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore"):
         last_row = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1]).max(axis=-1) <= atol
     translation = np.isfinite(A[..., :-1, -1]).all(axis=-1)
-    return np.asarray(is_so(A[..., :-1, :-1], atol) & last_row & translation)
+    return (is_so(A[..., :-1, :-1], atol) & last_row & translation)[()]
 
 
 def project_so(M: ArrayLike) -> Array:
@@ -116,7 +116,7 @@ def project_so(M: ArrayLike) -> Array:
 
     References
     ----------
-    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5).
+    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Examples
     --------

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, as_array, as_finite, as_time, check_broadcast, sinc
+from rbcourse._numerics import EPS, Array, as_array, as_finite, as_time, check_broadcast, sinc
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -42,7 +42,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.linalg.norm(as_array("q", q, 4), axis=-1)
-        return np.asarray(np.abs(norm - 1) <= atol)
+        return (np.abs(norm - 1) <= atol)[()]
 
 
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
@@ -73,7 +73,7 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     array([0., 0., 0., 1.])
     """
     p, q = as_finite("p", p, 4), as_finite("q", q, 4)
-    check_broadcast(1, p=p, q=q)
+    check_broadcast(p=(p, 1), q=(q, 1))
     (a, u), (b, v) = _split(p), _split(q)
     scalar = a * b - np.sum(u * v, axis=-1, keepdims=True)
     return np.concatenate([scalar, a * v + b * u + np.cross(u, v)], axis=-1)
@@ -104,7 +104,7 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
     >>> quaternion_multiply([0.6, 0, 0.8, 0], quaternion_conjugate([0.6, 0, 0.8, 0]))
     array([1., 0., 0., 0.])
     """
-    return as_finite("q", q, 4) * _CONJUGATE
+    return as_finite("q", q, 4) * _CONJUGATE + 0.0
 
 
 def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
@@ -136,7 +136,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     array([-1., -2.,  3.])
     """
     q, p = as_finite("q", q, 4), as_finite("p", p, 3)
-    check_broadcast(1, q=q, p=p)
+    check_broadcast(q=(q, 1), p=(p, 1))
     pure = np.concatenate([np.zeros((*p.shape[:-1], 1)), p], axis=-1)
     return quaternion_multiply(quaternion_multiply(q, pure), quaternion_conjugate(q))[..., 1:]
 
@@ -202,7 +202,8 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     Notes
     -----
     Singular set: at a half-turn w = 0, and q and −q are equally good. The one whose component of
-    largest magnitude (the first of equals) is positive is returned.
+    largest magnitude (the first of equals) is positive is returned, with w = 0. What differs from
+    a half-turn by rounding only, w below 4 eps, counts as one.
 
     References
     ----------
@@ -216,8 +217,13 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     four_qq = _four_outer(as_finite("R", R, 3, 3))
     largest = np.argmax(np.diagonal(four_qq, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(four_qq, largest[..., None, None], axis=-2)[..., 0, :]
-    q = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    return np.where(q[..., :1] < 0, -q, q)
+    q = row / _norm(row)
+    w, v = _split(q)
+    half_turn = np.abs(w) < 4 * EPS
+    size = np.abs(v)
+    first = np.argmax(size > size.max(axis=-1, keepdims=True) - 1e-8, axis=-1)[..., None]
+    sign = np.where(half_turn, np.take_along_axis(v, first, axis=-1), w)
+    return np.concatenate([np.where(half_turn, 0.0, w), v], axis=-1) * np.where(sign < 0, -1.0, 1.0)
 
 
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
@@ -247,8 +253,8 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
 
     Notes
     -----
-    Singular set: where q0 · q1 = 0 the rotations are a half-turn apart and both arcs are shortest;
-    the one to q1 as given is taken. Equal quaternions need no care.
+    Singular set: where q0 · q1 = 0, to 4 eps, the rotations are a half-turn apart and both arcs
+    are shortest; the one to q1 as given is taken. Equal quaternions need no care.
 
     References
     ----------
@@ -262,8 +268,8 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
            [0.   , 0.   , 0.   , 1.   ]])
     """
     q0, q1 = as_finite("q0", q0, 4), as_finite("q1", q1, 4)
-    u = as_time(t, len(check_broadcast(1, q0=q0, q1=q1)) + 1)
-    q1 = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < 0, -q1, q1)
+    u = as_time(t, len(check_broadcast(q0=(q0, 1), q1=(q1, 1))) + 1)
+    q1 = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1)
     angle = 2 * np.arctan2(_norm(q1 - q0), _norm(q1 + q0))
     weight0 = (1 - u) * sinc((1 - u) * angle) / sinc(angle)
     weight1 = u * sinc(u * angle) / sinc(angle)

@@ -139,7 +139,8 @@ def log_so3(R: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Axis times angle, the angle in [0, π] rad; accurate to a few eps, at half-turns too.
+        Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps, at half-turns
+        too.
 
     Raises
     ------
@@ -149,7 +150,8 @@ def log_so3(R: ArrayLike) -> Array:
     Notes
     -----
     Singular set: at a half-turn both w and −w are logarithms. The one whose component of largest
-    magnitude (the first of equals) is positive is returned.
+    magnitude (the first of equals) is positive is returned. What differs from a half-turn by
+    rounding only, less than 8 eps in the angle, counts as one.
 
     References
     ----------

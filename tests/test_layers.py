@@ -19,12 +19,14 @@ LEVELS = {
     "so3": 2,
     "curves": 4,
     "figures": 5,
+    "frames": 6,
     "plots": 6,
     "lessons": 8,
 }
 ALLOWED = {
     "figures": {"matplotlib"},
-    "plots": {"matplotlib", "mpl_toolkits"},
+    "frames": {"mpl_toolkits"},
+    "plots": {"matplotlib"},
     "lessons": {"nbformat", "nbclient"},
 }
 

@@ -48,6 +48,7 @@ def test_times_outside_the_unit_interval_are_named():
 
 def test_angles_outside_0_to_pi_are_named():
     assert np.array_equal(numerics.as_angle([0, np.pi]), [0, np.pi])
+    assert numerics.as_angle(np.nextafter(np.pi, 4)) == np.pi
     for bad in (-1e-300, 3.2):
         with pytest.raises(ValueError, match=re.escape(f"angle is {bad}, an angle in [0, π]")):
             numerics.as_angle(bad)
@@ -56,8 +57,8 @@ def test_angles_outside_0_to_pi_are_named():
 def test_batches_that_do_not_broadcast_are_listed():
     a, b = np.zeros((2, 3, 3)), np.zeros((4, 3, 3))
     with pytest.raises(ValueError, match=r"batch shapes do not broadcast: a \(2,\), b \(4,\)"):
-        numerics.check_broadcast(2, a=a, b=b)
-    assert numerics.check_broadcast(2, a=a, b=b[:1]) == (2,)
+        numerics.check_broadcast(a=(a, 2), b=(b, 2))
+    assert numerics.check_broadcast(a=(a, 2), b=(b[0], 1)) == (2, 3)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,22 @@ def test_batches_that_do_not_broadcast_are_listed():
 def test_ratios_near_zero(function, exact, limit, power):
     """Those with power 2 multiply a square: eps absolute after that."""
     assert function(np.array(0.0)) == limit
-    for x in [1e-300, 1e-160, 1e-9, 9.99e-5, 1e-4, 1.01e-4, 1e-3, 9e-3, 0.01, 0.9, 1.0, 2.0, 3.1]:
+    for x in [
+        1e-300,
+        1e-160,
+        1e-9,
+        9.99e-5,
+        1e-4,
+        1.01e-4,
+        5e-4,
+        1e-3,
+        9e-3,
+        0.01,
+        0.9,
+        1.0,
+        2.0,
+        3.1,
+    ]:
         with mp.workdps(700 if x < 1e-9 else 60):
             want = exact(mp.mpf(x))
             assert abs(function(np.array(x)) - want) * x**power < 3 * EPS * (want * x**power + 1)

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse import plots
-from rbcourse.figures import motion_table, pose_table
+from rbcourse import frames, plots
 
 
 @pytest.fixture
@@ -36,7 +35,7 @@ def motions():
         "geodesic": rb.geodesic_so3(np.eye(3), R1),
         "projected line": rb.projected_line_so3(np.eye(3), R1),
     }
-    return motion_table(curves, [1, 0, 0], np.linspace(0, 1, 21))
+    return plots.motion_table(curves, [1, 0, 0], np.linspace(0, 1, 21))
 
 
 def test_a_family_shows_six_curves_that_differ_in_colour_and_dashes(ax, family):
@@ -49,6 +48,11 @@ def test_a_family_shows_six_curves_that_differ_in_colour_and_dashes(ax, family):
     assert len({tuple(line.get_color()) for line in lines}) == 6
     assert len({str(line._dash_pattern) for line in lines}) == 6
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("time t", "θ")
+
+
+def test_a_family_of_one_is_one_curve(ax, family):
+    (line,) = plots.draw_family(ax, {name: column[5:6] for name, column in family.items()})
+    assert np.array_equal(line.get_ydata(), family["theta [1]"][5])
 
 
 def test_a_surface_spans_the_table(ax3d, family):
@@ -68,8 +72,8 @@ def test_a_family_is_described_by_its_numbers(family):
 def test_the_moving_frame_shows_both_frames(ax3d):
     poses = np.stack([np.eye(4), np.eye(4)])
     poses[1, :3, :3], poses[1, :3, 3] = rb.exp_so3([0, 0, np.pi / 2]), [1, 2, 3]
-    table = pose_table(["F", "M"], poses)
-    artists = plots.draw_moving_frame(ax3d, table)
+    table = frames.pose_table(["F", "M"], poses)
+    artists = frames.draw_moving_frame(ax3d, table)
     assert len(artists) == 8  # box, six axes, vector
     edges = np.array(artists[0]._segments3d)
     assert edges.shape == (12, 2, 3)
@@ -79,7 +83,7 @@ def test_the_moving_frame_shows_both_frames(ax3d):
     texts = [text.get_text() for text in ax3d.texts]
     axes = [f"${axis}_{name}$" for name in "FM" for axis in "xyz"]
     assert texts == [*axes[:3], "{F}", *axes[3:], "{M}", "d"]
-    said = plots.describe_moving_frame(table)
+    said = frames.describe_moving_frame(table)
     assert "(1, 2, 3) m" in said
     assert "90 degrees" in said
 
@@ -113,7 +117,9 @@ def test_paths_and_speeds_show_both_motions(ax, ax3d, motions):
         assert np.array_equal(path.get_data_3d(), shown)
         assert np.array_equal(speed.get_ydata(), motions[f"{name} speed [rad]"])
         assert path.get_color() == speed.get_color()
-    assert "constant 2.00 for the geodesic" in plots.describe_paths(motions)
+    said = plots.describe_paths(motions)
+    assert "the geodesic takes the steps 57, 57 degrees; its speed is 2.00 at the start" in said
+    assert "0.91 at the start, 3.11 in the middle, 0.91 at the end" in said
 
 
 def test_the_style_is_part_of_the_package():
