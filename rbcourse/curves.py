@@ -255,7 +255,9 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
         raise ValueError(
             "f: rbcourse.f wants its angle, lambda t, order: rbcourse.f(t, angle, order)"
         )
-    return ProjectedLine(*_start_and_rotation_vector(R0, R1), f or _identity)
+    if not (f is None or callable(f)):
+        raise ValueError(f"f: a callable f(t, order) is wanted, got {f!r}")
+    return ProjectedLine(*_start_and_rotation_vector(R0, R1), _identity if f is None else f)
 
 
 def _start_and_rotation_vector(R0: ArrayLike, R1: ArrayLike) -> tuple[Array, Array]:

@@ -37,6 +37,15 @@ def half_turns():
     return np.array(matrices), np.array(axes)
 
 
+def rounded_half_turns(rng, count=500):
+    """Pairs R0, R1 = R0 (2 n nᵀ − I), rounded, with random starts and axes, and the axes n."""
+    R0 = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
+    R0[..., 0] *= np.linalg.det(R0)[:, None]
+    n = np.concatenate([rng.normal(size=(count - 26, 3)), AXES])
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    return R0, R0 @ (2 * n[:, :, None] * n[:, None, :] - np.eye(3)), n
+
+
 _PERMUTED = [np.array([2, 2, 1.0]), np.array([2, 1, 2.0]), np.array([1, 2, 2.0])]
 
 

@@ -114,10 +114,10 @@ def test_velocity_and_acceleration_are_the_derivatives(f):
     few = ANGLES < 2.5
     curves = rb.projected_line_so3(STARTS[few], GOALS[few], f)
     for t in (0.2, 0.5, 0.7):
-        rate = oracles.velocity_by_series(curves, t)
+        rate = oracles.derivative_by_differences(curves, t)
         velocity = rb.vee_so3(np.swapaxes(curves(t), -1, -2) @ rate)
         assert np.abs(curves(t, 1) - velocity).max() < 1e-9
-        acceleration = oracles.velocity_by_series(lambda u: curves(u, 1), t)
+        acceleration = oracles.derivative_by_differences(lambda u: curves(u, 1), t)
         assert np.abs(curves(t, 2) - acceleration).max() < 1e-8
 
 
@@ -139,24 +139,41 @@ def test_no_turn_at_all():
     assert rb.projected_line_so3(np.eye(3), np.eye(3)).margin == 2
 
 
+def named_sign(n):
+    """The axes ±n whose component of largest magnitude, the first of equals, is positive."""
+    first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
+    return n * np.sign(np.take_along_axis(n, first[:, None], axis=1))
+
+
+def half_turn_pairs():
+    exact, axes = awkward.half_turns()
+    R0, R1, n = awkward.rounded_half_turns(np.random.default_rng(180))
+    start = np.broadcast_to(np.eye(3), exact.shape)
+    return np.concatenate([start, R0]), np.concatenate([exact, R1]), np.concatenate([axes, n])
+
+
 def test_between_rotations_a_half_turn_apart_the_geodesic_is_a_shortest_one_and_says_which():
-    matrices, _ = awkward.half_turns()
-    curves = rb.geodesic_so3(STARTS[0], STARTS[0] @ matrices)
-    assert np.abs(np.linalg.norm(curves.rotation_vector, axis=-1) - np.pi).max() < 8 * EPS
-    assert np.abs(curves(1) - STARTS[0] @ matrices).max() < 20 * EPS
-    curve = rb.geodesic_so3(np.eye(3), np.diag([-1, 1, -1]))
-    assert np.abs(curve.rotation_vector - [0, np.pi, 0]).max() < 2 * EPS
+    R0, R1, n = half_turn_pairs()
+    curves = rb.geodesic_so3(R0, R1)
+    assert np.abs(curves.rotation_vector - np.pi * named_sign(n)).max() < 40 * EPS
+    assert np.abs(curves(1) - R1).max() < 40 * EPS
 
 
 def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused():
-    matrices, _ = awkward.half_turns()
-    for R1 in matrices:
-        curve = rb.projected_line_so3(np.eye(3), R1)
-        assert curve.margin < 8 * EPS
-        assert np.abs(curve([0.25, 0.75]) - [np.eye(3), R1]).max() < 20 * EPS
+    for R0, R1, _ in zip(*half_turn_pairs(), strict=True):
+        curve = rb.projected_line_so3(R0, R1)
+        assert 0 <= curve.margin < 8 * EPS
+        assert np.abs(curve([0, 0.25, 0.75, 1]) - [R0, R0, R1, R1]).max() < 80 * EPS
         for order in (0, 1, 2):
-            with pytest.raises(ValueError, match=r"t = 0\.5: the nearest rotation .* not unique"):
+            with pytest.raises(ValueError, match=r"^t = 0\.5: the nearest rotation .* not unique"):
                 curve([0.25, 0.5], order)
+
+
+def test_in_a_stack_the_pair_a_half_turn_apart_is_named():
+    R1 = np.stack([np.diag([1.0, 1, 1]), np.diag([-1.0, 1, -1])])
+    curve = rb.projected_line_so3(np.eye(3), np.stack([R1, R1[::-1], R1[:1].repeat(2, 0)]))
+    with pytest.raises(ValueError, match=r"R0 and R1 of pair \[0, 1\] are a half-turn apart"):
+        curve([0.1, 0.5])
 
 
 def test_just_before_the_half_turn_the_line_is_still_right():
@@ -181,7 +198,7 @@ def test_shapes_are_times_then_stack_then_core():
                 assert single(t, order).shape == (4, 2, *core)
                 assert single(0.5, order).shape == core
                 for k in np.ndindex(4, 2):
-                    assert np.array_equal(stacked[k][i], single(t, order)[k])
+                    assert np.abs(stacked[k][i] - single(t, order)[k]).max() < 40 * EPS
 
 
 def test_f_may_be_a_constant_rate_and_must_have_the_right_ends():
@@ -193,6 +210,27 @@ def test_f_may_be_a_constant_rate_and_must_have_the_right_ends():
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.zeros(3))
     with pytest.raises(ValueError, match=r"f\(t, 0\) is nan"):
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.nan)
+
+
+def test_f_without_its_angle_is_refused():
+    with pytest.raises(ValueError, match=r"f: rbcourse\.f wants its angle"):
+        rb.projected_line_so3(STARTS[0], GOALS[0], rb.f)
+    for no_function in (0, 1, [], "f"):
+        with pytest.raises(ValueError, match=r"f: a callable f\(t, order\) is wanted"):
+            rb.projected_line_so3(STARTS[0], GOALS[0], no_function)
+
+
+def test_f_may_work_in_place_and_end_at_rounding():
+    def squared(t, order):
+        t *= t
+        return (t * (1 + 1e-14), 2 * np.sqrt(t), 2)[order]
+
+    curve = rb.projected_line_so3(STARTS[0], GOALS[0], squared)
+    want = rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: (t**2, 2 * t, 2)[order])
+    for order in (0, 1, 2):
+        assert np.abs(curve(TIMES, order) - want(TIMES, order)).max() < 1e-10
+    with pytest.raises(ValueError, match=r"are wanted, got 0\.0 and 1\.000001"):
+        rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: t * 1.000001)
 
 
 @pytest.mark.parametrize("make", [rb.geodesic_so3, rb.projected_line_so3])

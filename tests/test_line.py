@@ -122,6 +122,18 @@ def test_the_printed_product_in_the_proof_has_a_plus_too_many():
         assert np.abs(printed - projected).max() > 0.1
 
 
+def test_theta_far_from_the_line():
+    for t, angle in ((1e6, 9.99e-10), (1e10, 9.99e-10), (-1e3, 1e-6), (1e12, 3.0)):
+        want = oracles.theta(t, angle)
+        assert abs(rb.theta(t, angle) - want) < 4 * EPS * abs(want)
+
+
+def test_what_is_larger_than_pi_by_rounding_only_is_pi():
+    above = np.nextafter(np.pi, 4)
+    for function in (rb.theta, rb.f, rb.line_singular_value):
+        assert function(0.25, above) == function(0.25, np.pi)
+
+
 def test_angle_0_is_the_limit():
     t = awkward.LINE_TIMES
     for function in (rb.theta, rb.f):
@@ -150,6 +162,8 @@ def test_shapes_and_bad_arguments(function):
         function([0, 1], [1, 2, 3])
     with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got 3"):
         function(0.5, 1.0, 3)
+    with pytest.raises(ValueError, match=r"order: 0, 1 or 2 wanted, got array"):
+        function(0.5, 1.0, np.array([0, 1]))
     with pytest.raises(ValueError, match=r"t\[1\] is nan"):
         function([0, np.nan], 1.0)
 

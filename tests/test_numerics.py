@@ -58,7 +58,7 @@ def test_batches_that_do_not_broadcast_are_listed():
     a, b = np.zeros((2, 3, 3)), np.zeros((4, 3, 3))
     with pytest.raises(ValueError, match=r"batch shapes do not broadcast: a \(2,\), b \(4,\)"):
         numerics.check_broadcast(a=(a, 2), b=(b, 2))
-    assert numerics.check_broadcast(a=(a, 2), b=(b[0], 1)) == (2, 3)
+    assert numerics.check_broadcast(a=(a, 2), b=(np.zeros((5, 2, 3)), 1)) == (5, 2)
 
 
 @pytest.mark.parametrize(

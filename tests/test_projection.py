@@ -128,10 +128,10 @@ def test_membership_never_fails_on_values(is_member, value):
 
 
 def test_stacks_are_the_stack_of_their_members():
-    M = np.random.default_rng(1).normal(size=(2, 3, 4, 4))
+    M = np.eye(4) + 0.1 * np.random.default_rng(1).normal(size=(2, 3, 4, 4))
     for i in np.ndindex(2, 3):
-        assert np.array_equal(rb.project_so(M)[i], rb.project_so(M[i]))
-        assert np.array_equal(rb.project_se(M)[i], rb.project_se(M[i]))
+        assert np.abs(rb.project_so(M)[i] - rb.project_so(M[i])).max() < 40 * EPS
+        assert np.abs(rb.project_se(M)[i] - rb.project_se(M[i])).max() < 40 * EPS
     assert rb.project_so(np.zeros((0, 3, 3))).shape == (0, 3, 3)
 
 

@@ -93,7 +93,7 @@ def test_the_jacobian_turns_rates_into_angular_velocity():
 
     t = 0.4
     w, rate = np.sin(t) * RANDOM[0] + t**2 * RANDOM[1], np.cos(t) * RANDOM[0] + 2 * t * RANDOM[1]
-    velocity = rb.vee_so3(curve(t).T @ oracles.velocity_by_series(curve, t))
+    velocity = rb.vee_so3(curve(t).T @ oracles.derivative_by_differences(curve, t))
     assert np.abs(rb.right_jacobian_so3(w) @ rate - velocity).max() < 1e-11
     assert np.abs(rb.right_jacobian_inverse_so3(w) @ velocity - rate).max() < 1e-11
 
@@ -116,7 +116,7 @@ def test_near_a_full_turn_the_inverse_jacobian_is_huge():
 def test_functions_of_vectors(function):
     w = RANDOM[:6].reshape(2, 3, 3)
     for i in np.ndindex(2, 3):
-        assert np.array_equal(function(w)[i], function(w[i]))
+        assert np.abs(function(w)[i] - function(w[i])).max() < 8 * EPS
     with pytest.raises(ValueError, match=r"w: shape \(\.\.\., 3\) wanted, got \(2,\)"):
         function([1, 2])
     with pytest.raises(ValueError, match=r"w\[1, 2\] is inf"):
@@ -129,7 +129,7 @@ def test_functions_of_vectors(function):
 def test_functions_of_matrices(function, name):
     R = rb.exp_so3(RANDOM[:6]).reshape(2, 3, 3, 3)
     for i in np.ndindex(2, 3):
-        assert np.array_equal(function(R)[i], function(R[i]))
+        assert np.abs(function(R)[i] - function(R[i])).max() < 8 * EPS
     with pytest.raises(ValueError, match=rf"{name}: shape \(\.\.\., 3, 3\) wanted, got \(3,\)"):
         function([1, 2, 3])
     with pytest.raises(ValueError, match=rf"{name}\[0, 0\] is nan"):
