@@ -1,7 +1,7 @@
 """Every task of the course: python course.py figures | test | lab | lint.
 
 The first call makes the environment .venv from environment.txt; later calls use it. When
-environment.txt or the Python changes, or the folder is moved, .venv is made anew.
+environment.txt changes or the folder is moved, .venv is made anew.
 """
 
 from __future__ import print_function
@@ -56,8 +56,17 @@ def main():
 
 
 def run(*words):
-    """Run Python in the environment, in the folder of the course; stop if it fails."""
-    code = subprocess.call([str(PYTHON)] + list(words), cwd=ROOT)
+    """Run Python in the environment, in the folder of the course; stop if it fails.
+
+    Ctrl-C reaches the job too, and the job decides: JupyterLab asks first.
+    """
+    job = subprocess.Popen([str(PYTHON)] + list(words), cwd=ROOT)
+    while True:
+        try:
+            code = job.wait()
+            break
+        except KeyboardInterrupt:
+            pass
     if code:
         sys.exit(code)
 
@@ -78,12 +87,15 @@ def open_lab(edit, further):
 
 
 def set_up():
-    """Make .venv if it is not there, was left unfinished, or belongs to something else."""
+    """Make .venv if it is not there, was left unfinished, or is out of date."""
     stamp = VENV / "made-by-course.txt"
-    wanted = fingerprint(ROOT / "environment.txt", sys.version, ROOT)
-    if stamp.exists() and stamp.read_text() == wanted:
+    wanted = fingerprint(ROOT / "environment.txt", ROOT)
+    found = stamp.read_text() if stamp.exists() else None
+    if found == wanted and PYTHON.exists():
         return
-    if Path(sys.prefix) == VENV:
+    if found is None and os.path.lexists(VENV):
+        sys.exit(".venv was not made by course.py: move it away or delete it, then try again.")
+    if Path(sys.prefix).resolve() == VENV.resolve():
         sys.exit("The environment has to be made anew: leave it first with 'deactivate'.")
     print("Setting up .venv, once; about a minute", end="", flush=True)
     try:
@@ -92,10 +104,12 @@ def set_up():
     except OSError as error:
         sys.exit("\n.venv is in use (%s). Close JupyterLab and try again." % error)
     if UV:
-        patiently(UV, "venv", "--python", sys.executable, str(VENV))
+        patiently(UV, "venv", "--seed", "--python", sys.executable, str(VENV))
     else:
         patiently(sys.executable, "-m", "venv", str(VENV))
+    stamp.write_text("unfinished")
     install("-r", "environment.txt")
+    patiently(str(PYTHON), "-c", "import matplotlib.pyplot")  # looks for fonts, once
     stamp.write_text(wanted)
     print(" done.", flush=True)
 
@@ -127,6 +141,7 @@ def patiently(*command):
     """
     uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
     environment = dict(uv, **os.environ)
+    environment["PIP_USER"] = "0"
     with tempfile.TemporaryFile("w+", errors="replace") as said:
         job = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=said, stderr=said)
         while True:
@@ -144,7 +159,7 @@ def patiently(*command):
 def fingerprint(path, *more):
     """Return a text that changes when the file or one of the other things does."""
     text = "\n".join([path.read_text(encoding="utf-8")] + [str(word) for word in more])
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 if __name__ == "__main__":

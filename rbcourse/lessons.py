@@ -6,11 +6,13 @@ import json
 import os
 import re
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import nbformat
 from nbclient import NotebookClient
@@ -64,15 +66,17 @@ def execute(path: Path, figures: Path) -> str:
         extra_arguments=["--log-level=ERROR"],
         resources={"metadata": {"path": str(path.parent)}},
     )
-    client.execute(env={**os.environ, "RBCOURSE_FIGURES": str(figures.resolve())})
+    with tempfile.TemporaryDirectory() as no_profile:
+        own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": no_profile}
+        client.execute(env={**os.environ, **own})
     return normalised(notebook)
 
 
 def normalised(notebook: NotebookNode) -> str:
     """Return a notebook as text without what differs from run to run or machine to machine.
 
-    Kernel and language are stored by name only, memory addresses are blanked, and random ids of
-    32 hexadecimal digits are numbered in the order of appearance.
+    Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
+    random ids of 32 hexadecimal digits are numbered in the order of appearance.
 
     Parameters
     ----------
@@ -85,26 +89,28 @@ def normalised(notebook: NotebookNode) -> str:
     """
     notebook.metadata.kernelspec = dict(KERNEL)
     notebook.metadata.language_info = {"name": "python"}
-    for cell in notebook.cells:
-        for output in cell.get("outputs", []):
-            if "text" in output:
-                output.text = _without_addresses(output.text)
-            if "text/plain" in output.get("data", {}):
-                output.data["text/plain"] = _without_addresses(output.data["text/plain"])
-    return _with_numbered_ids(nbformat.writes(notebook)) + "\n"
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    for output in (output for cell in cells for output in cell.outputs):
+        for texts, key in ((output, "text"), (output.get("data", {}), "text/plain")):
+            if key in texts:
+                texts[key] = re.sub(r"0x[0-9a-fA-F]{6,16}", "0x0", texts[key])
+    widgets = notebook.metadata.get("widgets", {})
+    *outputs, widgets = _with_numbered_ids([*(cell.outputs for cell in cells), widgets])
+    for cell, ran in zip(cells, outputs, strict=True):
+        cell.outputs = ran
+    if widgets:
+        notebook.metadata.widgets = widgets
+    return nbformat.writes(notebook) + "\n"
 
 
-def _without_addresses(text: str) -> str:
-    return re.sub(r"0x[0-9a-fA-F]{6,16}", "0x0", text)
-
-
-def _with_numbered_ids(text: str) -> str:
+def _with_numbered_ids(ran: list[Any]) -> list[Any]:
     numbers, names = count(1), dict[str, str]()
-    return re.sub(
-        r"\b[0-9a-f]{32}\b",
+    text = re.sub(
+        r"(?<![0-9a-f])[0-9a-f]{32}(?![0-9a-f])",
         lambda match: names.setdefault(match[0], f"{next(numbers):032x}"),
-        text,
+        json.dumps(ran),
     )
+    return [nbformat.from_dict(part) for part in json.loads(text)]
 
 
 def regenerate(lessons: Path, figures: Path) -> None:
@@ -116,7 +122,14 @@ def regenerate(lessons: Path, figures: Path) -> None:
     ----------
     lessons, figures : Path
         The two folders.
+
+    Raises
+    ------
+    ValueError
+        If there are no lessons.
     """
+    if not lesson_paths(lessons):
+        raise ValueError(f"{lessons}: no lessons here; this is run in the folder of the course")
     with tempfile.TemporaryDirectory() as folder:
         texts = {}
         for path in lesson_paths(lessons):
@@ -126,9 +139,13 @@ def regenerate(lessons: Path, figures: Path) -> None:
             print(f"{time.perf_counter() - start:.1f} s", flush=True)
         for path, text in texts.items():
             path.write_text(text, encoding="utf-8", newline="\n")
-        shutil.rmtree(figures, ignore_errors=True)
-        shutil.copytree(folder, figures)
-    print(f"{len(texts)} lessons, {len(list(figures.iterdir()))} files in {figures.name}/")
+        figures.mkdir(exist_ok=True)
+        drawn = {file.name: file for file in Path(folder).iterdir()}
+        for name, file in drawn.items():
+            shutil.copyfile(file, figures / name)
+        for stale in [file for file in figures.iterdir() if file.name not in drawn]:
+            stale.unlink()
+    print(f"{len(texts)} lessons, {len(drawn)} files in {figures.name}/")
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
@@ -142,35 +159,71 @@ def copy_lessons(lessons: Path, work: Path) -> None:
     ----------
     lessons, work : Path
         From where and to where.
+
+    Raises
+    ------
+    ValueError
+        If a lesson is no notebook; nothing of it is written.
     """
     work.mkdir(exist_ok=True)
-    record = work / ".copied.json"
-    copied = json.loads(record.read_text("utf-8")) if record.exists() else {}
+    record, notary = work / ".copied.json", NotebookNotary()
+    copied = _read_record(record)
     for path in lesson_paths(lessons):
-        text, target = path.read_text("utf-8"), work / path.name
-        last = copied.get(path.name, {})
-        if target.exists() and last.get("lesson") == _digest(text):
+        lesson, target = path.read_bytes(), work / path.name
+        notebook = _parsed(path)
+        last, now = copied.get(path.name), [_digest(lesson), _digest(_cells(lesson))]
+        if target.exists() and last and last[0] == now[0]:
             continue
-        if target.exists() and last.get("cells") != _digest(_cells(target.read_text("utf-8"))):
+        if not _left_alone(target, lesson, last):
             target = next(p for p in _numbered(target) if not p.exists())
             print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
-        target.write_text(text, encoding="utf-8", newline="\n")
-        NotebookNotary().sign(nbformat.reads(text, as_version=4))
-        copied[path.name] = {"lesson": _digest(text), "cells": _digest(_cells(text))}
-        record.write_text(json.dumps(copied, indent=1), encoding="utf-8")
+        target.write_bytes(lesson)
+        try:
+            notary.sign(notebook)
+        except OSError as error:
+            print(f"{target.name} is copied, but not marked as trusted: {error}")
+        copied[path.name] = now
+        part = record.with_suffix(".part")
+        part.write_text(json.dumps(copied, indent=1), encoding="utf-8")
+        part.replace(record)
+    notary.store.close()
 
 
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
+def _read_record(record: Path) -> dict[str, list[str]]:
+    """Return what was copied when; nothing where the record is lost or damaged."""
+    try:
+        copied = json.loads(record.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return copied if isinstance(copied, dict) else {}
 
 
-def _cells(text: str) -> str:
+def _left_alone(target: Path, lesson: bytes, last: list[str] | None) -> bool:
+    """Tell whether a copy is absent, the lesson itself, or as it was copied but for its outputs."""
+    if not target.exists():
+        return True
+    content = target.read_bytes()
+    return content == lesson or (last is not None and last[1] == _digest(_cells(content)))
+
+
+def _parsed(path: Path) -> NotebookNode:
+    try:
+        return nbformat.read(path, as_version=4)
+    except ValueError as error:
+        raise ValueError(f"{path.name} is no notebook: {str(error)[:80]}") from error
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+
+
+def _cells(content: bytes) -> bytes:
     """Return what a person writes in a notebook; all of it where it cannot be read as one."""
     try:
-        cells = nbformat.reads(text, as_version=4).cells
-    except nbformat.reader.NotJSONError:
-        return text
-    return json.dumps([(cell.cell_type, cell.source) for cell in cells])
+        cells = nbformat.reads(content.decode(), as_version=4).cells
+        return json.dumps([(cell.cell_type, cell.source) for cell in cells]).encode()
+    except Exception:
+        return content
 
 
 def _numbered(path: Path) -> Iterator[Path]:
@@ -182,10 +235,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m rbcourse.lessons")
     parser.add_argument("task", choices=["regenerate", "copy"])
     task = parser.parse_args().task
-    if task == "regenerate":
-        regenerate(Path("notebooks"), Path("figures"))
-    else:
-        copy_lessons(Path("notebooks"), Path("work"))
+    try:
+        if task == "regenerate":
+            regenerate(Path("notebooks"), Path("figures"))
+        else:
+            copy_lessons(Path("notebooks"), Path("work"))
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":
