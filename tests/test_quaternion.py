@@ -150,6 +150,9 @@ def test_slerp_near_its_singular_sets():
     assert np.array_equal(rb.slerp(one, -one, 0.5), one)
     near = rb.slerp(one, [1, 1e-12, 0, 0], 0.25)
     assert abs(near[1] / 0.25e-12 - 1) < 4 * EPS
+    for angle in (np.pi / 2 + 1e-9, np.pi / 2 + 0.05, np.pi - 1e-9):  # −q is the nearer goal
+        there = np.array([np.cos(angle), np.sin(angle), 0, 0])
+        assert np.abs(rb.slerp(one, there, 1) + there).max() < 4 * EPS
     half = np.sqrt(0.5)
     quarter = rb.slerp(one, [0, 0, 1, 0], 0.5)
     assert np.abs(quarter - [half, 0, half, 0]).max() < 2 * EPS
