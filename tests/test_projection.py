@@ -27,9 +27,9 @@ def assert_nearest(R, M):
     S, n = np.swapaxes(R, -1, -2) @ M, M.shape[-1]
     size = np.linalg.norm(M, axis=(-2, -1))
     skew = np.linalg.norm(S - np.swapaxes(S, -1, -2), axis=(-2, -1))
-    assert np.all(skew <= 40 * n * EPS * size)
+    assert np.all(skew <= 8 * n * EPS * size)
     if n > 1:
-        assert np.all(oracles.two_smallest_eigenvalues(S) >= -40 * n * EPS * size)
+        assert np.all(oracles.two_smallest_eigenvalues(S) >= -8 * n * EPS * size)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
