@@ -124,12 +124,16 @@ def project_so(M: ArrayLike) -> Array:
     array([[ 0., -1.],
            [ 1.,  0.]])
     """
-    M = as_finite("M", M, "n", "n")
+    return project_so_with_gap(as_finite("M", M, "n", "n"))[0]
+
+
+def project_so_with_gap(M: Array) -> tuple[Array, Array]:
+    """Return `project_so` of M, n ≥ 2, and the sum of the two smallest eigenvalues of RᵀM."""
     U, d, Vt = np.linalg.svd(M)
     sign = np.sign(np.linalg.det(U @ Vt))
     U[..., -1] *= sign[..., None]
     d[..., -1] *= sign
-    return (U + U @ _rounding_left(M, U, d, Vt)) @ Vt
+    return (U + U @ _rounding_left(M, U, d, Vt)) @ Vt, d[..., -2:].sum(axis=-1)
 
 
 def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:

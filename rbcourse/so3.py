@@ -47,7 +47,7 @@ def hat_so3(w: ArrayLike) -> Array:
     """
     w = as_finite("w", w, 3)
     W = np.zeros((*w.shape, 3))
-    W[..., 2, 1], W[..., 0, 2], W[..., 1, 0] = np.moveaxis(w, -1, 0)
+    W[..., 2, 1], W[..., 0, 2], W[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
     return W - np.swapaxes(W, -1, -2)
 
 

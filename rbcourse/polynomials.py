@@ -1,0 +1,99 @@
+"""Polynomials through given ends, in any vector space: numbers, vectors, matrices."""
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+
+from rbcourse._numerics import Array
+
+
+def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
+    """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
+
+    It is the minimum-acceleration curve: of all curves with these ends it has the least
+    ∫ ‖x''‖² dt.
+
+    Parameters
+    ----------
+    x0, x1, v0, v1 : ndarray
+        They broadcast.
+
+    Returns
+    -------
+    ndarray, shape (4, ...)
+        The coefficients of 1, t, t², t³.
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> cubic_coefficients(0.0, 1.0, 0.0, 0.0)
+    array([ 0.,  0.,  3., -2.])
+    """
+    return _stack(x0, v0, -3 * x0 + 3 * x1 - 2 * v0 - v1, 2 * x0 - 2 * x1 + v0 + v1)
+
+
+def quintic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array, a0: Array, a1: Array) -> Array:
+    """Return the quintic on [0, 1] with given values, first and second derivatives at its ends.
+
+    It is the minimum-jerk curve: of all curves with these ends it has the least ∫ ‖x'''‖² dt.
+
+    Parameters
+    ----------
+    x0, x1, v0, v1, a0, a1 : ndarray
+        They broadcast.
+
+    Returns
+    -------
+    ndarray, shape (6, ...)
+        The coefficients of 1, t, …, t⁵.
+
+    References
+    ----------
+    BK 6.
+
+    Examples
+    --------
+    >>> quintic_coefficients(0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    array([  0.,   0.,   0.,  10., -15.,   6.])
+    """
+    gap = x1 - x0 - v0 - a0 / 2
+    speed = v1 - v0 - a0
+    bend = a1 - a0
+    return _stack(
+        x0,
+        v0,
+        a0 / 2,
+        10 * gap - 4 * speed + bend / 2,
+        -15 * gap + 7 * speed - bend,
+        6 * gap - 3 * speed + bend / 2,
+    )
+
+
+def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
+    """Return a polynomial, or one of its derivatives, at the times t.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (degree + 1, ...)
+        Of 1, t, t², ….
+    t : ndarray
+        The times; they broadcast with one coefficient.
+    order : int, optional
+        Which derivative.
+
+    Returns
+    -------
+    ndarray
+
+    Examples
+    --------
+    >>> polynomial(np.array([1.0, 2.0, 3.0]), np.array([0.0, 1.0]), 1)
+    array([2., 8.])
+    """
+    return polyval(t, polyder(coefficients, order), tensor=False)
+
+
+def _stack(*coefficients: Array) -> Array:
+    return np.stack(np.broadcast_arrays(*coefficients))

@@ -1,0 +1,365 @@
+"""Projected curves on SO(3): the optimum among all matrices, then the nearest rotations to it."""
+
+import warnings
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._numerics import EPS, Array, as_angle, as_finite, as_time, check_broadcast
+from rbcourse.curves import AlongGeodesic, Curve, identity, start_and_rotation_vector
+from rbcourse.line import f as rbcourse_f
+from rbcourse.line import line_singular_value, theta
+from rbcourse.polynomials import cubic_coefficients, polynomial, quintic_coefficients
+from rbcourse.projection import project_so_with_gap
+from rbcourse.so3 import hat_so3, vee_so3
+
+Progress = Callable[[Array, int], ArrayLike]
+
+
+class ProjectedLine(AlongGeodesic):
+    """The projection of a straight line between two rotations: p(t) = θ(f(t)).
+
+    Attributes
+    ----------
+    margin : ndarray, shape (...)
+        The least sum, over the line, of the two smallest eigenvalues of RᵀM, M on the line and R
+        its projection: 2 cos(‖σ‖/2). At 0 the projection of the middle is not unique.
+
+    References
+    ----------
+    BK Prop. 6, BK (15), BK (17).
+    """
+
+    def __init__(self, R0: Array, rotation_vector: Array, f: Progress) -> None:
+        super().__init__(R0, rotation_vector)
+        self._f = f
+        self._angle = as_angle(np.linalg.norm(rotation_vector, axis=-1))
+        self.margin = 2 * np.cos(self._angle / 2)
+        _warn_if_nearly_singular(self.margin)
+        start, end = self._line(as_time([0, 1], len(self.batch_shape)), 0)
+        if np.any(np.abs(start) > 1e-12) or np.any(np.abs(end - 1) > 1e-12):
+            raise ValueError(f"f: f(0) = 0 and f(1) = 1 are wanted, got {start} and {end}")
+
+    def _line(self, t: Array, order: int) -> Array:
+        name, shape = f"f(t, {order})", np.broadcast_shapes(t.shape, self.batch_shape)
+        value = as_finite(name, self._f(t.copy(), order))
+        try:
+            return np.broadcast_to(value, shape)
+        except ValueError as error:
+            raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
+
+    def _progress(self, t: Array, order: int) -> Array:
+        on_line, angle = self._line(t, 0), self._angle
+        _check_unique(t, line_singular_value(on_line, angle) < 8 * EPS, len(self.batch_shape))
+        if order == 0:
+            return theta(on_line, angle)
+        slope, speed = theta(on_line, angle, 1), self._line(t, 1)
+        if order == 1:
+            return slope * speed
+        return theta(on_line, angle, 2) * speed**2 + slope * self._line(t, 2)
+
+
+class ProjectedPolynomial(Curve):
+    """The `Curve` of the nearest rotations to a polynomial M(t) in the space of matrices.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (degree + 1, ..., 3, 3)
+        Of 1, t, t², … in M(t).
+
+    References
+    ----------
+    BK 6, BK 6.2.
+    """
+
+    def __init__(self, coefficients: Array) -> None:
+        self.coefficients = coefficients
+        self.batch_shape = coefficients.shape[1:-2]
+
+    def _ambient(self, t: Array, order: int = 0) -> Array:
+        return polynomial(self.coefficients, t[..., None, None], order)
+
+    def _evaluate(self, t: Array, order: int) -> Array:
+        M = self._ambient(t)
+        R, gap = project_so_with_gap(M)
+        lost = gap < 8 * EPS * np.linalg.norm(M, axis=(-2, -1))
+        _check_unique(t, lost, len(self.batch_shape))
+        if order == 0:
+            return R
+        Rt = np.swapaxes(R, -1, -2)
+        P, A = Rt @ M, Rt @ self._ambient(t, 1)
+        w = _solve(_spin(P), 2 * vee_so3(A))
+        if order == 1:
+            return w
+        W = hat_so3(w)
+        A_rate = Rt @ self._ambient(t, 2) - W @ A
+        return _solve(_spin(P), 2 * vee_so3(A_rate) - _apply(_spin(A - W @ P), w))
+
+    @cached_property
+    def margin(self) -> Array:
+        """The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M.
+
+        At 0 the nearest rotation is not unique. Found on 129 times, then ever closer to the best.
+        """
+        centre, reach, count = np.full(self.batch_shape, 0.5), 0.5, 129
+        while reach > 1e-15:
+            times = np.clip(centre + self._column(np.linspace(-reach, reach, count)), 0, 1)
+            gap = self._gap(times)
+            least = gap.argmin(axis=0)[None]
+            centre = np.take_along_axis(times, least, axis=0)[0]
+            reach, count = 2 * reach / (count - 1), 17
+        return np.take_along_axis(gap, least, axis=0)[0]
+
+    def may_jump(self) -> bool:
+        """Tell whether the gap at 65 times leaves room for a 0 between them."""
+        times = self._column(np.linspace(0, 1, 65))
+        change = np.linalg.norm(np.diff(self._ambient(times), axis=0), axis=(-2, -1)).max(axis=0)
+        return bool(np.any(self._gap(times) < change))
+
+    def _gap(self, t: Array) -> Array:
+        return project_so_with_gap(self._ambient(t))[1]
+
+    def _column(self, t: Array) -> Array:
+        return t.reshape(-1, *(1 for _ in self.batch_shape))
+
+
+def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) -> ProjectedLine:
+    """Return the projection on SO(3) of the line R0 + (R1 − R0) f(t), in closed form.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices; what is none is not repaired (see `project_so`).
+    f : callable, optional
+        ``f(t, order)``, order 0, 1 or 2: how the line is run through, f(0) = 0 and f(1) = 1 to
+        1e-12, and the derivatives of that. The times come with an axis of length 1 for each batch
+        axis. By default f(t) = t.
+
+    Returns
+    -------
+    ProjectedLine
+        A `Curve`: R0 exp(σ̂ θ(f(t))), the nearest rotations to the line; with ``margin``.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, the batches do not broadcast, or f is no
+        callable, has other ends, or is `rbcourse.f` without its angle. The curve, when called: if
+        f returns what is not finite or of another shape, or at a time whose nearest rotation is
+        not unique.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6.
+
+    See Also
+    --------
+    geodesic_so3 : The same path at constant speed.
+    rbcourse.f : The timing that gives this speed, once its angle is set (see the example).
+    project_so : The projection, for any matrix.
+
+    Notes
+    -----
+    Singular set: R0 and R1 a half-turn apart. The line then runs through a matrix of rank 1, at
+    f(t) = 1/2, and its projection jumps there from R0 to R1. ``margin`` is 0 to a few eps, and the
+    curve raises at that time. Near it the projection is accurate to eps over the sum of the two
+    smallest eigenvalues of RᵀM, which ``margin`` bounds from below.
+
+    References
+    ----------
+    BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, log_so3
+    >>> c = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]))
+    >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # slow, fast, slow
+    array([0.314, 0.75 , 1.186])
+    >>> from rbcourse import f
+    >>> c = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]), lambda t, order: f(t, 1.5, order))
+    >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # uniform
+    array([0.375, 0.75 , 1.125])
+    """
+    if f is rbcourse_f:
+        raise ValueError(
+            "f: rbcourse.f wants its angle, lambda t, order: rbcourse.f(t, angle, order)"
+        )
+    if not (f is None or callable(f)):
+        raise ValueError(f"f: a callable f(t, order) is wanted, got {f!r}")
+    return ProjectedLine(*start_and_rotation_vector(R0, R1), identity if f is None else f)
+
+
+def projected_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> ProjectedPolynomial:
+    """Return the projection of the cubic with these ends: near-optimal minimum acceleration.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+
+    Returns
+    -------
+    ProjectedPolynomial
+        A `Curve`: the nearest rotations to the cubic M(t) with M(0) = R0, M'(0) = R0 hat_so3(w0),
+        M(1) = R1, M'(1) = R1 hat_so3(w1). It meets all four ends exactly; with ``margin``.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast. The
+        curve, when called at a time whose nearest rotation is not unique, to rounding.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6; the message names the time.
+
+    See Also
+    --------
+    minimum_acceleration_so3 : The optimum with the same ends.
+    acceleration_cost : What both cost.
+
+    Notes
+    -----
+    Singular set: where the two smallest eigenvalues of RᵀM sum to 0, at some time; det M may
+    change its sign before, which does no harm. A curve past such a time is returned, and is right
+    on both sides; in between it jumps. Near it, where ``margin`` is small, the curve turns by up to
+    π in a time of about ``margin`` over the speed of M, and is accurate to a few eps ‖M‖ over the
+    sum at that time, its derivatives to that over its square and its cube.
+
+    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1.
+
+    References
+    ----------
+    BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = projected_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])  # from rest
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    >>> float(c.margin.round(3))
+    1.464
+    """
+    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+    return _watched(cubic_coefficients(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1)))
+
+
+def projected_quintic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+) -> ProjectedPolynomial:
+    """Return the projection of the quintic with these ends: near-optimal minimum jerk.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+    a0, a1 : array_like, shape (..., 3)
+        Angular accelerations w' there, body frame, in rad per unit time squared.
+
+    Returns
+    -------
+    ProjectedPolynomial
+        A `Curve`: the nearest rotations to the quintic M(t) with the values R, first derivatives
+        R ŵ and second derivatives R (ŵ² + â) at both ends. It meets all six exactly; with
+        ``margin``.
+
+    Raises
+    ------
+    ValueError
+        As `projected_cubic_so3`.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6; the message names the time.
+
+    See Also
+    --------
+    projected_cubic_so3 : The same for minimum acceleration.
+
+    Notes
+    -----
+    Singular set and invariance: as for `projected_cubic_so3`.
+
+    References
+    ----------
+    BK 6, BK Prop. 3.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> rest = [0, 0, 0]
+    >>> c = projected_quintic_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, [0, 0, 2])
+    >>> c([0, 1], 2).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 0., 2.]])
+    """
+    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    a0, a1 = as_finite("a0", a0, 3), as_finite("a1", a1, 3)
+    check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1), a0=(a0, 1), a1=(a1, 1))
+    W0, W1 = hat_so3(w0), hat_so3(w1)
+    ends = R0, R1, R0 @ W0, R1 @ W1, R0 @ (W0 @ W0 + hat_so3(a0)), R1 @ (W1 @ W1 + hat_so3(a1))
+    return _watched(quintic_coefficients(*ends))
+
+
+def _check_unique(t: Array, lost: NDArray[np.bool_], batch_ndim: int) -> None:
+    """Raise a ValueError that names the first time (and curve of the stack) that is lost."""
+    if lost.any():
+        first = np.argwhere(lost)[0]
+        time = np.broadcast_to(t, lost.shape)[tuple(first)]
+        raise ValueError(
+            f"t = {time}{_which(first[lost.ndim - batch_ndim :])}: the nearest rotation is not "
+            f"unique, the curve jumps here (see margin)"
+        )
+
+
+def _watched(coefficients: Array) -> ProjectedPolynomial:
+    curve = ProjectedPolynomial(coefficients)
+    if curve.may_jump():
+        _warn_if_nearly_singular(curve.margin)
+    return curve
+
+
+def _warn_if_nearly_singular(margin: Array) -> None:
+    """Warn of the first curve (of a stack) whose margin is below 1e-6."""
+    low = np.argwhere(np.asarray(margin) < 1e-6)
+    if len(low):
+        warnings.warn(
+            f"margin = {np.asarray(margin)[tuple(low[0])]:.1e}{_which(low[0])}: somewhere the "
+            "nearest rotation is all but not unique, the curve jumps there",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def _which(index: NDArray[np.intp]) -> str:
+    return f" of curve {[int(i) for i in index]}" if len(index) else ""
+
+
+def _spin(P: Array) -> Array:
+    """Return tr(P) I − P: (tr(P) I − P) w is the vector of P ŵ + ŵ P, for symmetric P."""
+    return np.trace(P, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - P
+
+
+def _solve(matrix: Array, vector: Array) -> Array:
+    return np.linalg.solve(matrix, vector[..., None])[..., 0]
+
+
+def _apply(matrix: Array, vector: Array) -> Array:
+    return (matrix @ vector[..., None])[..., 0]

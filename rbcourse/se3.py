@@ -1,0 +1,367 @@
+"""Poses and twists: SE(3), its Lie algebra se(3), exp and log, and coordinates.
+
+A twist is (ω, v): the angular velocity and the velocity of the origin, both in the body frame.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array, as_finite, check_broadcast
+from rbcourse.so3 import (
+    exp_so3,
+    hat_so3,
+    log_so3,
+    right_jacobian_inverse_so3,
+    right_jacobian_so3,
+    vee_so3,
+)
+
+
+def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
+    """Return the pose [[R, d], [0, 1]].
+
+    Parameters
+    ----------
+    R : array_like, shape (..., 3, 3)
+        Rotation matrices; what is none is not repaired (see `project_se`).
+    d : array_like, shape (..., 3)
+        Positions, in m, fixed frame.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+
+    See Also
+    --------
+    pose_from_coordinates : The same from exponential coordinates.
+
+    References
+    ----------
+    BK 2.1.
+
+    Examples
+    --------
+    >>> pose_from_components(np.eye(3), [1, 2, 3])
+    array([[1., 0., 0., 1.],
+           [0., 1., 0., 2.],
+           [0., 0., 1., 3.],
+           [0., 0., 0., 1.]])
+    """
+    R, d = as_finite("R", R, 3, 3), as_finite("d", d, 3)
+    A = np.zeros((*check_broadcast(R=(R, 2), d=(d, 1)), 4, 4))
+    A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
+    return A
+
+
+def inverse_se3(A: ArrayLike) -> Array:
+    """Return the inverse of a pose: [[Rᵀ, −Rᵀ d], [0, 1]].
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        If `A` is not finite or not of that shape.
+
+    References
+    ----------
+    BK 2.1.
+
+    Examples
+    --------
+    >>> A = exp_se3([0, 0, 1, 2, 3, 4])
+    >>> bool(np.allclose(inverse_se3(A) @ A, np.eye(4)))
+    True
+    """
+    R, d = _components("A", A)
+    Rt = np.swapaxes(R, -1, -2)
+    return pose_from_components(Rt, -_apply(Rt, d))
+
+
+def pose_from_coordinates(x: ArrayLike) -> Array:
+    """Return the pose with the coordinates (σ, d): rotation exp_so3(σ), position d.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 6)
+        Exponential coordinates σ of the rotation, in rad, then the position d, in m, fixed frame.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        If `x` is not finite or not of that shape.
+
+    See Also
+    --------
+    coordinates_from_pose : The way back.
+    exp_se3 : Other coordinates, whose straight lines are screw motions.
+
+    References
+    ----------
+    BK 2.5.
+
+    Examples
+    --------
+    >>> pose_from_coordinates([0, 0, np.pi / 2, 1, 2, 3]).round(12)[:3] + 0.0
+    array([[ 0., -1.,  0.,  1.],
+           [ 1.,  0.,  0.,  2.],
+           [ 0.,  0.,  1.,  3.]])
+    """
+    x = as_finite("x", x, 6)
+    return pose_from_components(exp_so3(x[..., :3]), x[..., 3:])
+
+
+def coordinates_from_pose(A: ArrayLike) -> Array:
+    """Return the coordinates (σ, d) of a pose: σ = log_so3(R), and its position d.
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        σ in rad, ‖σ‖ ≤ π; d in m, fixed frame.
+
+    Raises
+    ------
+    ValueError
+        If `A` is not finite or not of that shape.
+
+    Notes
+    -----
+    Singular set: half-turns, as for `log_so3`.
+
+    References
+    ----------
+    BK 2.5.
+
+    Examples
+    --------
+    >>> coordinates_from_pose(pose_from_coordinates([0.1, 0, 0.3, 1, 2, 3])).round(12)
+    array([0.1, 0. , 0.3, 1. , 2. , 3. ])
+    """
+    R, d = _components("A", A)
+    return np.concatenate([log_so3(R), d], axis=-1)
+
+
+def hat_se3(S: ArrayLike) -> Array:
+    """Return the matrix of a twist: [[hat_so3(ω), v], [0, 0]].
+
+    Parameters
+    ----------
+    S : array_like, shape (..., 6)
+        Twists (ω, v).
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        If `S` is not finite or not of that shape.
+
+    See Also
+    --------
+    vee_se3 : The way back.
+
+    References
+    ----------
+    BK 2.1, BK (1), BK (3).
+
+    Examples
+    --------
+    >>> hat_se3([1, 2, 3, 4, 5, 6])
+    array([[ 0., -3.,  2.,  4.],
+           [ 3.,  0., -1.,  5.],
+           [-2.,  1.,  0.,  6.],
+           [ 0.,  0.,  0.,  0.]])
+    """
+    S = as_finite("S", S, 6)
+    matrix = np.zeros((*S.shape[:-1], 4, 4))
+    matrix[..., :3, :3], matrix[..., :3, 3] = hat_so3(S[..., :3]), S[..., 3:]
+    return matrix
+
+
+def vee_se3(matrix: ArrayLike) -> Array:
+    """Return the twist (ω, v) of a matrix [[ω̂, v], [0, 0]]: the inverse of `hat_se3`.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (..., 4, 4)
+        Of the 3 × 3 block the skew-symmetric part counts; the last row is not read.
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+
+    Raises
+    ------
+    ValueError
+        If `matrix` is not finite or not of that shape.
+
+    References
+    ----------
+    BK 2.1, BK (1).
+
+    Examples
+    --------
+    >>> vee_se3(hat_se3([1, 2, 3, 4, 5, 6]))
+    array([1., 2., 3., 4., 5., 6.])
+    """
+    W, v = _components("matrix", matrix)
+    return np.concatenate([vee_so3(W), v], axis=-1)
+
+
+BASIS_SE3 = hat_se3(np.eye(6))
+"""The standard basis of se(3), shape (6, 4, 4): turns about, then moves along x, y, z (BK (3))."""
+BASIS_SE3.flags.writeable = False
+
+
+def exp_se3(S: ArrayLike) -> Array:
+    """Return the pose that the constant twist S reaches from I in unit time.
+
+    Parameters
+    ----------
+    S : array_like, shape (..., 6)
+        Twists (ω, v), ω in rad and v in m, each for unit time.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        [[exp_so3(ω), J v], [0, 1]] with J the left Jacobian of SO(3), the transpose of
+        ``right_jacobian_so3(ω)``; accurate to a few eps (1 + ‖ω‖) (1 + ‖v‖).
+
+    Raises
+    ------
+    ValueError
+        If `S` is not finite or not of that shape.
+
+    See Also
+    --------
+    log_se3 : The way back.
+    screw_se3 : The motion.
+
+    Notes
+    -----
+    No singular set; ω = 0 gives the translation by v exactly.
+
+    References
+    ----------
+    BK 2.6.
+
+    Examples
+    --------
+    >>> exp_se3([0, 0, np.pi / 2, 1, 0, 3]).round(3) + 0.0  # a quarter of a circle, rising
+    array([[ 0.   , -1.   ,  0.   ,  0.637],
+           [ 1.   ,  0.   ,  0.   ,  0.637],
+           [ 0.   ,  0.   ,  1.   ,  3.   ],
+           [ 0.   ,  0.   ,  0.   ,  1.   ]])
+    """
+    S = as_finite("S", S, 6)
+    w, v = S[..., :3], S[..., 3:]
+    left_jacobian = np.swapaxes(right_jacobian_so3(w), -1, -2)
+    return pose_from_components(exp_so3(w), _apply(left_jacobian, v))
+
+
+def log_se3(A: ArrayLike) -> Array:
+    """Return the twist that reaches A from I in unit time, turning by π at most.
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π; accurate to a few eps (1 + ‖d‖).
+
+    Raises
+    ------
+    ValueError
+        If `A` is not finite or not of that shape.
+
+    See Also
+    --------
+    screw_from_pose : The axis and the pitch of that motion.
+
+    Notes
+    -----
+    Singular set: at a half-turn two twists reach A; ω is the one that `log_so3` returns.
+
+    References
+    ----------
+    BK 2.6.
+
+    Examples
+    --------
+    >>> log_se3(exp_se3([0, 0, 1.5, 1, 2, 3])).round(12)
+    array([0. , 0. , 1.5, 1. , 2. , 3. ])
+    """
+    R, d = _components("A", A)
+    w = log_so3(R)
+    left_jacobian_inverse = np.swapaxes(right_jacobian_inverse_so3(w), -1, -2)
+    return np.concatenate([w, _apply(left_jacobian_inverse, d)], axis=-1)
+
+
+def adjoint_se3(A: ArrayLike) -> Array:
+    """Return the matrix that carries twists from the body frame of A to the fixed frame.
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+
+    Returns
+    -------
+    ndarray, shape (..., 6, 6)
+        [[R, 0], [d̂ R, R]]: hat_se3(adjoint_se3(A) @ S) = A hat_se3(S) A⁻¹.
+
+    Raises
+    ------
+    ValueError
+        If `A` is not finite or not of that shape.
+
+    References
+    ----------
+    BK 2.1.
+
+    Examples
+    --------
+    >>> A = pose_from_components(np.eye(3), [0, 2, 0])
+    >>> adjoint_se3(A) @ [0, 0, 1, 0, 0, 0]  # a turn about an axis 2 m away moves the origin
+    array([0., 0., 1., 2., 0., 0.])
+    """
+    R, d = _components("A", A)
+    Ad = np.zeros((*R.shape[:-2], 6, 6))
+    Ad[..., :3, :3] = Ad[..., 3:, 3:] = R
+    Ad[..., 3:, :3] = hat_so3(d) @ R
+    return Ad
+
+
+def _components(name: str, A: ArrayLike) -> tuple[Array, Array]:
+    A = as_finite(name, A, 4, 4)
+    return A[..., :3, :3], A[..., :3, 3]
+
+
+def _apply(matrix: Array, vector: Array) -> Array:
+    return (matrix @ vector[..., None])[..., 0]

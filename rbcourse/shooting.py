@@ -1,0 +1,114 @@
+"""The optimum by shooting: the initial values for which the motion hits its end."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.curves import Curve
+from rbcourse.optimum import ConvergenceError, Ends, MinimumAcceleration, first_guess, grid, solve
+from rbcourse.so3 import hat_so3, log_so3, right_jacobian_inverse_so3
+
+NODES = 96
+STEPS = 60
+LONGEST_STEP = 0.5
+
+
+def shoot_minimum_acceleration_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> MinimumAcceleration:
+    """Return the minimum-acceleration curve with these ends, by shooting.
+
+    Equation (20), w'' + w × w' = b, is integrated from t = 0; the unknown w'(0) and b are improved
+    by Newton's method until R(1) and w(1) are the wanted ones.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (3,)
+        Angular velocities there, body frame, in rad per unit time.
+
+    Returns
+    -------
+    MinimumAcceleration
+        As `minimum_acceleration_so3`, and for the same ends the same curve to about 1e-11, if both
+        find the same solution of (19).
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite or not of that shape.
+    ConvergenceError
+        As `minimum_acceleration_so3`.
+
+    See Also
+    --------
+    minimum_acceleration_so3 : The faster and more robust way.
+
+    Notes
+    -----
+    Singular set: as for `minimum_acceleration_so3`.
+
+    References
+    ----------
+    BK (20), BK 6.2.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> c = shoot_minimum_acceleration_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 0, 0])
+    >>> c(0.5, 1).round(9) + 0.0  # 1.5 times the average, as for any cubic from rest to rest
+    array([0.  , 0.  , 2.25])
+    """
+    return solve(shoot, R0, R1, w0, w1)
+
+
+def shoot(ends: Ends, guess: Curve) -> MinimumAcceleration:
+    """Improve the aim (w'(0), b) by Newton's method, the hit moved by half a unit at most."""
+    aim = _first_aim(ends, guess)
+    for iteration in range(STEPS):
+        miss, by_aim = _miss(ends, aim)
+        size = np.abs(miss).max()
+        if size < 1e-11:
+            R = _shot(ends, aim, grid(NODES).t)[0]
+            c = ends.R0 @ (aim[3:] - np.cross(ends.w0, aim[:3]))
+            return MinimumAcceleration(ends, R, c, iteration)
+        aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
+    raise ConvergenceError(float(size), STEPS)
+
+
+def _first_aim(ends: Ends, guess: Curve) -> Array:
+    """Return w'(0) and b = w''(0) + w(0) × w'(0) of the curve that `relax` would start with."""
+    R, c = first_guess(ends, guess, 24)
+    acceleration = MinimumAcceleration(ends, R, c, 0)(0, 2)
+    return np.concatenate([acceleration, ends.R0.T @ c + np.cross(ends.w0, acceleration)])
+
+
+def _miss(ends: Ends, aim: Array) -> tuple[Array, Array]:
+    """Return by how much R1 and w1 are missed, and how that depends on the aim."""
+    R, w, sensitivity = (values[-1] for values in _shot(ends, aim, np.array([0.0, 1.0])))
+    turn = log_so3(ends.R1.T @ R)
+    turn_by_aim = right_jacobian_inverse_so3(turn) @ sensitivity[:3]
+    return np.concatenate([turn, w - ends.w1]), np.concatenate([turn_by_aim, sensitivity[3:6]])
+
+
+def _shot(ends: Ends, aim: Array, t: Array) -> tuple[Array, Array, Array]:
+    """Return R, w and the sensitivity of (turn, w, w') to the aim, at the times t."""
+    from scipy.integrate import solve_ivp
+
+    sensitivity = np.eye(9, 6, -6)
+    start = np.concatenate([ends.R0.ravel(), ends.w0, aim[:3], sensitivity.ravel()])
+    shot = solve_ivp(
+        _flow, (0, 1), start, "DOP853", t_eval=t, args=(aim[3:],), rtol=1e-12, atol=1e-13
+    )
+    return shot.y[:9].T.reshape(-1, 3, 3), shot.y[9:12].T, shot.y[15:].T.reshape(-1, 9, 6)
+
+
+def _flow(_: float, state: Array, b: Array) -> Array:
+    """Return R' = R ŵ, w', w'' = b − w × w', and the linearisation of the three."""
+    R, w, acceleration = state[:9].reshape(3, 3), state[9:12], state[12:15]
+    turn, dw, da = state[15:].reshape(3, 3, 6)
+    W = hat_so3(w)
+    dda = np.eye(3, 6, 3) + hat_so3(acceleration) @ dw - W @ da
+    rates = R @ W, acceleration, b - W @ acceleration, dw - W @ turn, da, dda
+    return np.concatenate([rate.ravel() for rate in rates])
