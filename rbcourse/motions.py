@@ -31,13 +31,12 @@ class RigidMotion(Curve):
         self.batch_shape = np.broadcast_shapes(rotation.batch_shape, coefficients.shape[1:-1])
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        times = t.reshape(t.shape[: t.ndim - len(self.batch_shape)])
-        R = self.rotation(times)
+        R = self.rotation._evaluate(t, 0)
         d = polynomial(self.coefficients, t[..., None], order)
         if order == 0:
             return pose_from_components(R, d)
         in_body = (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
-        turning = np.broadcast_to(self.rotation(times, order), in_body.shape)
+        turning = np.broadcast_to(self.rotation._evaluate(t, order), in_body.shape)
         return np.concatenate([turning, in_body], axis=-1)
 
 

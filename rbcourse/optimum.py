@@ -206,7 +206,7 @@ def _continue(solver: Solver, ends: Ends) -> MinimumAcceleration:
             curve = _attempt(solver, Ends(ends.R0, ends.R1, w0, w1), guess)
         except ConvergenceError:
             step /= 2
-            if step < 1 / 1024:
+            if step < 1 / 256:
                 raise
         else:
             if share == 1:

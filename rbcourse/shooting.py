@@ -9,7 +9,7 @@ from rbcourse.optimum import ConvergenceError, Ends, MinimumAcceleration, first_
 from rbcourse.so3 import hat_so3, log_so3, right_jacobian_inverse_so3
 
 NODES = 96
-STEPS = 60
+STEPS = 20
 LONGEST_STEP = 0.5
 
 

@@ -112,3 +112,62 @@ def derivative_by_differences(curve, t, size=2.0**-10):
         weight * (curve(t + k * size) - curve(t - k * size)) / size
         for k, weight in zip(steps, weights, strict=True)
     )
+
+
+def quaternion_product(p, q):
+    """Hamilton's product, component by component: (w, x, y, z) along the first axis."""
+    a, b, c, d = p
+    w, x, y, z = q
+    return np.array(
+        [
+            a * w - b * x - c * y - d * z,
+            a * x + b * w + c * z - d * y,
+            a * y - b * z + c * w + d * x,
+            a * z + b * y - c * x + d * w,
+        ]
+    )
+
+
+def rotation_of_quaternions(q):
+    """The matrices (N, 3, 3) of quaternions (4, N), of any length but 0."""
+    w, x, y, z = q / np.linalg.norm(q, axis=0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def minimum_acceleration(turn, w0, w1, tol=1e-9):
+    """BK (19) from I to exp(turn) by SciPy's `solve_bvp`: 13 equations for q, w, w', w''.
+
+    Returns its solution, whose `sol(t)` has the quaternion in rows 0 – 3, w in rows 4 – 6.
+    """
+    from scipy.integrate import solve_bvp
+
+    def rates(_, y):
+        q, w, acceleration, jerk = y[:4], y[4:7], y[7:10], y[10:]
+        spin = quaternion_product(q, np.concatenate([np.zeros((1, q.shape[1])), w])) / 2
+        return np.concatenate([spin, acceleration, jerk, -np.cross(w, jerk, axis=0)])
+
+    angle = np.linalg.norm(turn)
+    axis = np.asarray(turn) / angle
+
+    def quaternion(share):
+        half = share * angle / 2
+        return np.concatenate([np.cos(half)[None], np.sin(half) * axis[:, None]])
+
+    goal_back = quaternion(np.ones(1))[:, 0] * [1, -1, -1, -1]
+
+    def misses(start, end):
+        turned = quaternion_product(goal_back, end[:4])
+        return np.concatenate(
+            [start[:4] - [1, 0, 0, 0], start[4:7] - w0, turned[1:], end[4:7] - w1]
+        )
+
+    t = np.linspace(0, 1, 11)
+    guess = np.zeros((13, 11))
+    guess[:4] = quaternion(3 * t**2 - 2 * t**3)
+    guess[4:7] = np.outer(w0, 1 - t) + np.outer(w1, t)
+    return solve_bvp(rates, misses, t, guess, tol=tol, max_nodes=100_000)

@@ -1,0 +1,77 @@
+"""The acceleration functional, against closed forms and another quadrature."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import rbcourse as rb
+
+REST = np.zeros(3)
+
+
+def by_quad(curve, part):
+    def integrand(t):
+        a = curve(t, 2)[..., part]
+        return a @ a
+
+    return quad(integrand, 0, 1, epsabs=1e-13, epsrel=1e-13, limit=500)[0]
+
+
+@pytest.mark.source("BK (18)", "BK (12)", "errata 1")
+def test_one_axis_has_a_closed_form():
+    """A cubic from rest to rest over the angle a costs 2 · 12 a²; a projected line 2 ∫ (a θ'')²."""
+    turn = np.array([0, 0.9, 0])
+    optimum = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(turn), REST, REST)
+    assert rb.acceleration_cost(optimum) == pytest.approx(24 * 0.81, rel=1e-10)
+    line = rb.projected_line_so3(np.eye(3), rb.exp_so3(turn))
+    want = 2 * quad(lambda t: (0.9 * rb.theta(t, 0.9, 2)) ** 2, 0, 1, epsrel=1e-13)[0]
+    assert rb.acceleration_cost(line) == pytest.approx(want, rel=1e-10)
+
+
+@pytest.mark.source("BK (18)", "BK (14)")
+def test_the_parts_on_se3_are_the_integrals():
+    A1 = rb.pose_from_coordinates([0.5, 2.0, 1.5, 8, 10, 12])
+    curve = rb.projected_cubic_se3(np.eye(4), A1, [1, 2, 3], [2, 1, 1], [1, 1, 1], [1, 5, 3])
+    rotation, translation = rb.acceleration_cost_parts(curve)
+    assert rotation == pytest.approx(2 * by_quad(curve, slice(0, 3)), rel=1e-10)
+    assert translation == pytest.approx(by_quad(curve, slice(3, 6)), rel=1e-10)
+    assert rb.acceleration_cost(curve) == pytest.approx(rotation + translation, rel=1e-15)
+    assert rb.acceleration_cost(curve.rotation) == pytest.approx(rotation, rel=1e-10)
+
+
+@pytest.mark.source("BK 2.6")
+def test_geodesics_cost_nothing_and_screws_do():
+    A1 = rb.pose_from_coordinates([0, 0, 1, 2, 0, 0])
+    assert rb.acceleration_cost(rb.geodesic_se3(np.eye(4), A1)) == 0
+    screw = rb.screw_se3(np.eye(4), A1)
+    w, v = screw.twist[:3], screw.twist[3:]
+    rotation, translation = rb.acceleration_cost_parts(screw)
+    assert rotation == 0
+    assert translation == pytest.approx(np.sum(np.cross(w, v) ** 2), rel=1e-12)
+
+
+def test_sharp_turns_are_not_missed():
+    """A margin of 2e-3: nearly all of the cost arises within a thousandth of the time."""
+    turn = np.array([0, 0, np.pi - 2e-3])
+    line = rb.projected_line_so3(np.eye(3), rb.exp_so3(turn))
+    k = np.tan(turn[2] / 2)  # aθ = a/2 + atan u, u = (2t − 1) k; ∫ u²/(1 + u²)⁴ du = π/16
+    assert rb.acceleration_cost(line) == pytest.approx(4 * np.pi * k**3, rel=1e-9)
+
+
+def test_a_stack_has_a_cost_for_each():
+    R1 = rb.exp_so3(np.array([[0.1, 0, 0], [0, 1, 0], [0, 0, 2.5]]))
+    stack = rb.acceleration_cost(rb.projected_cubic_so3(np.eye(3), R1, REST, REST))
+    assert stack.shape == (3,)
+    for cost, R in zip(stack, R1, strict=True):
+        one = rb.acceleration_cost(rb.projected_cubic_so3(np.eye(3), R, REST, REST))
+        assert cost == pytest.approx(one, rel=2e-10)
+
+
+def test_what_does_not_settle_is_no_number():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        jump = rb.projected_cubic_so3(np.eye(3), rb.exp_so3([0, 0, np.pi - 1e-11]), REST, REST)
+    with pytest.raises((RuntimeError, ValueError), match=r"subdivisions leave|not unique"):
+        rb.acceleration_cost(jump)

@@ -1,0 +1,49 @@
+"""Polynomials through given ends."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from rbcourse.polynomials import cubic_coefficients, polynomial, quintic_coefficients
+
+RNG = np.random.default_rng(62)
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.source("BK 6.2")
+def test_both_meet_their_ends():
+    x0, x1, v0, v1, a0, a1 = RNG.normal(size=(6, 5, 3, 3))
+    cubic = cubic_coefficients(x0, x1, v0, v1)
+    quintic = quintic_coefficients(x0, x1, v0, v1, a0, a1)
+    for coefficients, ends in ((cubic, [x0, v0, x1, v1]), (quintic, [x0, v0, a0, x1, v1, a1])):
+        orders = len(ends) // 2
+        for t, wanted in ((0.0, ends[:orders]), (1.0, ends[orders:])):
+            for order, want in enumerate(wanted):
+                got = polynomial(coefficients, np.array(t), order)
+                assert np.abs(got - want).max() < 2000 * EPS
+
+
+@pytest.mark.source("BK 6.2")
+def test_the_cubic_is_the_papers():
+    R0, R1, V0, V1 = RNG.normal(size=(4, 3, 3))
+    printed = [R0, V0, -3 * R0 + 3 * R1 - 2 * V0 - V1, 2 * R0 - 2 * R1 + V0 + V1]
+    assert np.array_equal(cubic_coefficients(R0, R1, V0, V1), printed)
+
+
+@pytest.mark.parametrize(
+    ("make", "count", "order"), [(cubic_coefficients, 4, 2), (quintic_coefficients, 6, 3)]
+)
+def test_both_are_optimal(make, count, order):
+    """The derivative that counts is orthogonal to that of any change which keeps the ends."""
+    best = Polynomial(make(*RNG.normal(size=count))).deriv(order)
+    keeps_ends = Polynomial([0, 1, -1]) ** order
+    for k in range(5):
+        change = (keeps_ends * Polynomial.basis(k)).deriv(order)
+        product = (best * change).integ()
+        assert abs(product(1) - product(0)) < 10 * EPS * np.abs(product.coef).sum()
+
+
+def test_ends_and_times_broadcast():
+    coefficients = cubic_coefficients(np.zeros(3), np.ones((4, 3)), np.zeros(3), np.zeros(3))
+    assert coefficients.shape == (4, 4, 3)
+    assert polynomial(coefficients, np.zeros((7, 1, 1)), 1).shape == (7, 4, 3)

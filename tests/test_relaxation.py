@@ -1,0 +1,205 @@
+"""The optimum: two solvers of ours, SciPy's, and the equation itself."""
+
+import numpy as np
+import oracles
+import pytest
+from numpy.polynomial import Chebyshev
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+import rbcourse as rb
+
+REST = np.zeros(3)
+ALONG = np.pi / 6 * np.array([1, 2, 3])
+E1 = np.array([1.0, 0, 0])
+PAPER = {
+    "4b": (ALONG, ALONG, ALONG + E1),
+    "4c": (ALONG, ALONG, ALONG + 5 * E1),
+    "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
+}
+SOLVERS = {
+    "relaxation": rb.minimum_acceleration_so3,
+    "shooting": rb.shoot_minimum_acceleration_so3,
+}
+TIMES = np.linspace(0, 1, 101)
+
+
+def random_ends(rng, angle, speed):
+    """A turn and two velocities, uniform in balls."""
+    directions = rng.normal(size=(3, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    lengths = np.array([angle, speed, speed]) * rng.random(3) ** (1 / 3)
+    return lengths[:, None] * directions
+
+
+def interpolants(values, degree):
+    """Chebyshev interpolants on [0, 1] of three components: a differentiation of our own."""
+    return [
+        Chebyshev.interpolate(lambda t, i=i: values(t)[..., i], degree, [0, 1]) for i in range(3)
+    ]
+
+
+@pytest.mark.source("BK (19)", "BK (20)", "BK 6.2", "BK 6.3", "BK Fig. 4", "BK Fig. 5")
+@pytest.mark.parametrize("case", PAPER)
+def test_both_solvers_agree_with_scipys(case):
+    turn, w0, w1 = PAPER[case]
+    theirs = oracles.minimum_acceleration(turn, w0, w1)
+    assert theirs.success
+    y = theirs.sol(TIMES)
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    cost = weights @ np.sum(theirs.sol((nodes + 1) / 2)[7:10] ** 2, axis=0)
+    for solver in SOLVERS.values():
+        ours = solver(np.eye(3), rb.exp_so3(turn), w0, w1)
+        assert np.abs(ours(TIMES) - oracles.rotation_of_quaternions(y[:4])).max() < 1e-9
+        assert np.abs(ours(TIMES, 1) - y[4:7].T).max() < 1e-9
+        assert rb.acceleration_cost(ours) == pytest.approx(cost, rel=1e-9)
+
+
+@pytest.mark.source("BK (19)", "BK (20)", "BK Prop. 7")
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("case", PAPER)
+def test_the_curve_solves_the_equation_and_meets_its_ends(case, solver):
+    """By interpolants of w alone, and of R for its velocity."""
+    turn, w0, w1 = PAPER[case]
+    R0 = Rotation.random(rng=19).as_matrix()
+    curve = solver(R0, R0 @ rb.exp_so3(turn), w0, w1)
+    for t, R, w in ((0, R0, w0), (1, R0 @ rb.exp_so3(turn), w1)):
+        assert np.abs(curve(t) - R).max() < 1e-11
+        assert np.abs(curve(t, 1) - w).max() < 1e-11
+    t = np.linspace(0.1, 0.9, 25)
+    w = interpolants(lambda t: curve(t, 1), 30 if case != "4c" else 44)
+    value, _, second, third = (np.array([p.deriv(k)(t) for p in w]).T for k in range(4))
+    scale = np.linalg.norm(third, axis=1).max()
+    assert np.abs(third + np.cross(value, second)).max() < 1e-9 * scale
+    rate = np.array([oracles.derivative_by_differences(curve, u) for u in t])
+    assert np.abs(rate - curve(t) @ rb.hat_so3(curve(t, 1))).max() < 1e-9
+    twice = np.array([oracles.derivative_by_differences(lambda s: curve(s, 1), u) for u in t])
+    assert np.abs(twice - curve(t, 2)).max() < 1e-9
+    constant = (curve(t) @ second[..., None])[..., 0]
+    assert np.abs(constant - curve.c).max() < 1e-9 * scale
+
+
+@pytest.mark.source("BK 6.2")
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("shares", [(1, 1), (0, 0), (2, 0.5), (0, 3), (-0.3, 1.5)])
+def test_end_velocities_along_the_geodesic_give_the_closed_form(solver, shares):
+    R0 = Rotation.random(rng=4).as_matrix()
+    p = CubicHermiteSpline([0, 1], [0, 1], shares)
+    curve = solver(R0, R0 @ rb.exp_so3(ALONG), shares[0] * ALONG, shares[1] * ALONG)
+    assert np.abs(curve(TIMES) - R0 @ rb.exp_so3(np.outer(p(TIMES), ALONG))).max() < 1e-9
+    assert np.abs(curve(TIMES, 1) - np.outer(p(TIMES, 1), ALONG)).max() < 1e-9
+    assert np.abs(curve(TIMES, 2) - np.outer(p(TIMES, 2), ALONG)).max() < 1e-9
+
+
+@pytest.mark.source("BK 6.2")
+def test_500_random_problems_converge_and_none_costs_more_than_its_projection():
+    rng = np.random.default_rng(500)
+    dearer = []
+    for _ in range(500):
+        turn, w0, w1 = random_ends(rng, 3, 9)
+        ends = np.eye(3), rb.exp_so3(turn), w0, w1
+        best = rb.minimum_acceleration_so3(*ends)
+        assert best.residual < 1e-11
+        assert np.abs([best(0) - ends[0], best(1) - ends[1]]).max() < 1e-11
+        assert np.abs([best(0, 1) - w0, best(1, 1) - w1]).max() < 1e-11
+        dearer.append(
+            rb.acceleration_cost(rb.projected_cubic_so3(*ends)) / rb.acceleration_cost(best)
+        )
+    assert min(dearer) > 1
+
+
+@pytest.mark.source("BK (18)")
+def test_small_changes_that_keep_the_ends_cost_more():
+    rng = np.random.default_rng(18)
+    turn, w0, w1 = PAPER["4b"]
+    best = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(turn), w0, w1)
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    t = (nodes + 1) / 2
+
+    def cost(size, axis, k):
+        """Of R exp(size η̂), η = t²(1 − t)² tᵏ axis, by the interpolant of its velocity."""
+
+        def velocity(t):
+            eta = np.polynomial.Polynomial([0, 0, 1, -2, 1]) * np.polynomial.Polynomial.basis(k)
+            turned = size * eta(t)[:, None] * axis
+            moved = (rb.exp_so3(-turned) @ best(t, 1)[..., None])[..., 0]
+            return moved + size * eta.deriv()(t)[:, None] * axis
+
+        rate = np.array([p.deriv()(t) for p in interpolants(velocity, 40)])
+        return weights @ np.sum(rate**2, axis=0)
+
+    for k in range(4):
+        axis = rng.normal(size=3)
+        less, same, more = (cost(size, axis, k) for size in (-0.1, 0.0, 0.1))
+        assert same == pytest.approx(rb.acceleration_cost(best), rel=1e-10)
+        assert min(less, more) > same
+        small = [cost(size, axis, k) - same for size in (-1e-4, 1e-4)]
+        assert abs(small[1] - small[0]) < 1e-3 * abs(small[1] + small[0])  # stationary
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+def test_moving_the_ends_or_running_backwards_changes_nothing_else(solver):
+    L, Q = Rotation.random(2, rng=3).as_matrix()
+    turn, w0, w1 = PAPER["5"]
+    R1 = rb.exp_so3(turn)
+    curve = solver(np.eye(3), R1, w0, w1)
+    moved = solver(L @ Q, L @ R1 @ Q, w0 @ Q, w1 @ Q)
+    assert np.abs(moved(TIMES) - L @ curve(TIMES) @ Q).max() < 1e-10
+    back = solver(R1, np.eye(3), -w1, -w0)
+    assert np.abs(back(1 - TIMES) - curve(TIMES)).max() < 1e-10
+
+
+@pytest.mark.parametrize("short_of", [0, 1e-15, 1e-9, 1e-4])
+def test_near_half_turns_converge(short_of):
+    """From rest to rest the geodesic; it is returned though the projected cubic jumps."""
+    for axis in ([0, 0, 1], [0.6, -0.8, 0], [1, 1, 1]):
+        axis = np.array(axis) / np.linalg.norm(axis)
+        R1 = rb.exp_so3((np.pi - short_of) * axis)
+        curve = rb.minimum_acceleration_so3(np.eye(3), R1, REST, REST)
+        assert np.abs(curve(1) - R1).max() < 1e-11
+        assert rb.acceleration_cost(curve) == pytest.approx(24 * (np.pi - short_of) ** 2, rel=1e-9)
+        tumbling = rb.minimum_acceleration_so3(np.eye(3), R1, [1, 2, 3], [-3, 0, 1])
+        assert tumbling.residual < 1e-11
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+def test_no_motion_at_all(solver):
+    curve = solver(np.eye(3), np.eye(3), REST, REST)
+    assert np.abs(curve(TIMES) - np.eye(3)).max() < 1e-14
+    assert np.abs(curve(TIMES, 2)).max() < 1e-14
+    assert rb.acceleration_cost(curve) == 0
+
+
+@pytest.mark.parametrize(
+    ("solver", "speed"),
+    [
+        (rb.minimum_acceleration_so3, 40),
+        (rb.minimum_acceleration_so3, 1e160),
+        (rb.shoot_minimum_acceleration_so3, 1e160),
+    ],
+)
+def test_what_does_not_converge_says_how_far_it_got(solver, speed):
+    with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iterations") as failed:
+        solver(np.eye(3), rb.exp_so3([1, 2, 0]), [speed, 0, 0], [0, speed, 0])
+    assert isinstance(failed.value, RuntimeError)
+    assert failed.value.residual > 1e-11
+    assert failed.value.iterations >= 0
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+def test_shapes_and_bad_arguments(solver):
+    curve = solver(np.eye(3), rb.exp_so3([0, 1, 0]), REST, REST)
+    assert curve.batch_shape == ()
+    assert curve(np.zeros((2, 5))).shape == (2, 5, 3, 3)
+    assert curve(0.5).shape == (3, 3)
+    assert curve(0.5, 1).shape == curve(0.5, 2).shape == (3,)
+    with pytest.raises(ValueError, match=r"w0: shape \(\.\.\., 3\) wanted, got \(2,\)"):
+        solver(np.eye(3), np.eye(3), [0, 0], REST)
+    with pytest.raises(ValueError, match=r"R1\[0, 0\] is nan"):
+        solver(np.eye(3), np.full((3, 3), np.nan), REST, REST)
+    with pytest.raises(ValueError, match=r"w1: shape \(3,\) wanted, got \(4, 3\)"):
+        solver(np.eye(3), np.eye(3), REST, np.zeros((4, 3)))
+    with pytest.raises(ValueError, match=r"t is -1\.0"):
+        curve(-1)
+    with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted"):
+        curve(0, 3)
