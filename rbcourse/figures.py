@@ -90,8 +90,7 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
         If the columns differ in shape.
     """
     text = csv_text(data)
-    folder = Path(os.environ.get("RBCOURSE_FIGURES", "figures"))
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = figures_folder()
     picture = io.BytesIO()
     fig.savefig(picture, format="png", metadata={"Software": None})
     fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
@@ -99,6 +98,13 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
     (folder / f"{name}.png").write_bytes(picture.getvalue())
     (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
     return Picture(name, alt, picture.getvalue())
+
+
+def figures_folder() -> Path:
+    """Return the folder for figures, see `save_figure`; it is made if it is not there."""
+    folder = Path(os.environ.get("RBCOURSE_FIGURES", "figures"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def csv_text(data: Table) -> str:

@@ -1,19 +1,18 @@
 """What both solvers of BK (19) share: the curve they return, and the way to hard problems."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebder, chebint, chebval, chebvander
+from numpy.polynomial.chebyshev import chebder, chebint, chebvander
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array, as_finite
 from rbcourse.curves import Curve, geodesic_so3
-from rbcourse.polynomials import cubic_coefficients
-from rbcourse.projected import ProjectedPolynomial
-from rbcourse.quaternion import matrix_from_quaternion, quaternion_from_matrix
-from rbcourse.so3 import hat_so3, vee_so3
+from rbcourse.polynomials import cubic_coefficients, polynomial
+from rbcourse.projection import project_so
+from rbcourse.so3 import BASIS_SO3, hat_so3
 
 
 class ConvergenceError(RuntimeError):
@@ -48,12 +47,14 @@ class Ends(NamedTuple):
 class Grid(NamedTuple):
     """Chebyshev–Lobatto nodes on [0, 1], and matrices that act on values there.
 
-    `derivative`, `integral` from 0 and `twice` give values at the nodes, `twice` of the solution y
-    of y'' = values that is 0 at both ends. `series`, `once` and `again` give the Chebyshev
-    coefficients of the function, of its integral from 0 and of the integral of that.
+    `blend` goes from (1, 0) to (0, 1). `derivative`, `integral` from 0 and `twice` give values at
+    the nodes, `twice` of the solution y of y'' = values that is 0 at both ends. `series`, `once`
+    and `again` give the Chebyshev coefficients of the function, of its integral from 0 and of the
+    integral of that.
     """
 
     t: Array
+    blend: Array
     derivative: Array
     integral: Array
     twice: Array
@@ -72,7 +73,8 @@ def grid(n: int) -> Grid:
     derivative, integral, double = (
         chebvander(x, len(c) - 1) @ c for c in (chebder(series, scl=2), once, again)
     )
-    return Grid(t, derivative, integral, double - np.outer(t, double[-1]), series, once, again)
+    blend, twice = np.stack([1 - t, t], axis=-1), double - np.outer(t, double[-1])
+    return Grid(t, blend, derivative, integral, twice, series, once, again)
 
 
 def along(matrix: Array, values: Array) -> Array:
@@ -80,8 +82,18 @@ def along(matrix: Array, values: Array) -> Array:
     return (matrix @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
+def hats(w: Array) -> Array:
+    """Return `hat_so3` of (n, 3), unchecked."""
+    return (w @ BASIS_SO3.reshape(3, 9)).reshape(-1, 3, 3)
+
+
+def vees(W: Array) -> Array:
+    """Return `vee_so3` of (n, 3, 3), unchecked."""
+    return W.reshape(-1, 9) @ BASIS_SO3.reshape(3, 9).T / 2
+
+
 class MinimumAcceleration(Curve):
-    """A `Curve` on SO(3) that solves (19), as Chebyshev series of its quaternion and of w''.
+    """A `Curve` on SO(3) that solves (19), as Chebyshev series.
 
     Attributes
     ----------
@@ -105,15 +117,10 @@ class MinimumAcceleration(Curve):
 
     def __init__(self, ends: Ends, R: Array, c: Array, iterations: int) -> None:
         self.ends, self.c, self.iterations, self.nodes = ends, c, iterations, len(R)
-        nodes = grid(self.nodes)
-        q = quaternion_from_matrix(R)
-        flips = np.sum(q[1:] * q[:-1], axis=-1) < 0
-        q[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
-        jerk = np.swapaxes(R, -1, -2) @ c
-        self._series = nodes.series @ q, *_rates(ends, jerk)
+        self._R = R
+        nodes, jerk = grid(self.nodes), np.swapaxes(R, -1, -2) @ c
         self._tail = np.abs(nodes.series[-2:] @ R.reshape(-1, 9)).max()
-        spin = R @ hat_so3(velocity(ends, jerk))
-        off = ends.R0 + along(nodes.integral, spin) - R
+        off = ends.R0 + along(nodes.integral, R @ hats(velocity(ends, jerk))) - R
         self.residual = float(np.abs(off).max())
 
     @property
@@ -121,17 +128,25 @@ class MinimumAcceleration(Curve):
         """Whether the nodes carry the curve, to rounding."""
         return bool(self._tail < 1e-13 and self.residual < 1e-11)
 
+    @cached_property
+    def _series(self) -> tuple[Array, Array, Array]:
+        """The Chebyshev series of R, of w and of w'."""
+        jerk = np.swapaxes(self._R, -1, -2) @ self.c
+        return along(grid(self.nodes).series, self._R), *_rates(self.ends, jerk)
+
     def _evaluate(self, t: Array, order: int) -> Array:
-        value = chebval(2 * t[..., None] - 1, self._series[order], tensor=False)
+        series = self._series[order]
+        value = chebvander(2 * t - 1, len(series) - 1) @ series.reshape(len(series), -1)
         if order:
-            return value
-        return matrix_from_quaternion(value / np.linalg.norm(value, axis=-1, keepdims=True))
+            return value.reshape(*t.shape, 3)
+        R = value.reshape(*t.shape, 3, 3)
+        return R @ (3 * np.eye(3) - np.swapaxes(R, -1, -2) @ R) / 2  # rounding, made orthogonal
 
 
 def velocity(ends: Ends, jerk: Array) -> Array:
     """Return w at the nodes, from w'' there and w at the ends."""
-    t, twice = grid(len(jerk)).t, grid(len(jerk)).twice
-    return np.outer(1 - t, ends.w0) + np.outer(t, ends.w1) + twice @ jerk
+    nodes = grid(len(jerk))
+    return nodes.blend @ np.array([ends.w0, ends.w1]) + nodes.twice @ jerk
 
 
 def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
@@ -145,19 +160,23 @@ def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
     return w, acceleration
 
 
-def first_guess(ends: Ends, guess: Curve, n: int) -> tuple[Array, Array]:
-    """Return R of a curve at n nodes, and the c for which w'' = Rᵀc gives w most nearly."""
+Guess = Callable[[Array], Array]
+"""Rotations over time; a `Curve` is one."""
+
+
+def first_guess(ends: Ends, guess: Guess, n: int) -> tuple[Array, Array]:
+    """Return R of a guess at n nodes, and the c for which w'' = Rᵀc gives w most nearly."""
     nodes = grid(n)
     R = guess(nodes.t)
     R[0], R[-1] = ends.R0, ends.R1
     Rt = np.swapaxes(R, -1, -2)
-    w = vee_so3(Rt @ along(nodes.derivative, R))
+    w = vees(Rt @ along(nodes.derivative, R))
     lacking = w - velocity(ends, np.zeros_like(w))
     effect = along(nodes.twice, Rt)
     return R, np.linalg.lstsq(effect.reshape(-1, 3), lacking.ravel())[0]
 
 
-Solver = Callable[[Ends, Curve], MinimumAcceleration]
+Solver = Callable[[Ends, Guess], MinimumAcceleration]
 
 
 def solve(
@@ -179,24 +198,26 @@ def solve(
         return _continue(solver, ends)
 
 
-def _attempt(solver: Solver, ends: Ends, guess: Curve) -> MinimumAcceleration:
-    """Count a guess that jumps, an overflow and a singular system as no convergence."""
+def _attempt(solver: Solver, ends: Ends, guess: Guess) -> MinimumAcceleration:
+    """Count an overflow and a singular system as no convergence."""
     try:
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="raise", invalid="raise"):
             return solver(ends, guess)
-    except ValueError as error:
+    except (FloatingPointError, np.linalg.LinAlgError) as error:
         raise ConvergenceError(np.inf, 0) from error
 
 
-def _projected_cubic(ends: Ends) -> ProjectedPolynomial:
-    R0, R1, w0, w1 = ends
-    return ProjectedPolynomial(cubic_coefficients(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1)))
+def _projected_cubic(ends: Ends) -> Guess:
+    """Return the projected cubic, whatever its margin."""
+    V0, V1 = ends.R0 @ hat_so3(ends.w0), ends.R1 @ hat_so3(ends.w1)
+    coefficients = cubic_coefficients(ends.R0, ends.R1, V0, V1)
+    return lambda t: project_so(polynomial(coefficients, t[:, None, None]))
 
 
 def _continue(solver: Solver, ends: Ends) -> MinimumAcceleration:
     """Change the end velocities from those of the geodesic to the wanted ones, step by step."""
     geodesic = geodesic_so3(ends.R0, ends.R1)
-    guess: Curve = geodesic
+    guess: Guess = geodesic
     start = geodesic.rotation_vector
     done, step = 0.0, 0.25
     while True:

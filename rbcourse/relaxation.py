@@ -4,19 +4,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
-from rbcourse.curves import Curve
 from rbcourse.motions import RigidMotion, cubic_ends
 from rbcourse.optimum import (
     ConvergenceError,
     Ends,
+    Guess,
     MinimumAcceleration,
     along,
     first_guess,
     grid,
+    hats,
     solve,
+    vees,
     velocity,
 )
-from rbcourse.so3 import exp_so3, hat_so3, vee_so3
+from rbcourse.so3 import exp_so3, hat_so3
 
 STEPS = 60
 LONGEST_STEP = 0.5
@@ -137,28 +139,28 @@ def minimum_acceleration_se3(
     return RigidMotion(minimum_acceleration_so3(R0, R1, w0, w1), path)
 
 
-def relax(ends: Ends, guess: Curve) -> MinimumAcceleration:
-    """Solve (19) on 24 nodes, then on ever more, until they carry the curve."""
-    curve = _newton(ends, guess, 24)
+def relax(ends: Ends, guess: Guess) -> MinimumAcceleration:
+    """Solve (19) on 28 nodes, then on ever more, until they carry the curve."""
+    curve = _newton(ends, guess, 28)
     while not curve.resolved:
-        if curve.nodes == 192:
+        if curve.nodes == 224:
             raise ConvergenceError(curve.residual, curve.iterations)
         curve = _newton(ends, curve, 2 * curve.nodes)
     return curve
 
 
-def _newton(ends: Ends, guess: Curve, n: int) -> MinimumAcceleration:
+def _newton(ends: Ends, guess: Guess, n: int) -> MinimumAcceleration:
     """Solve (19) on n nodes by Newton's method, no node turned by more than half a rad at once."""
     R, c = first_guess(ends, guess, n)
     for iteration in range(1, STEPS + 1):
         turn, dc = _newton_step(ends, R, c)
-        size = np.abs(turn).max()
+        size = float(np.abs(turn).max())
         share = min(1.0, LONGEST_STEP / max(size, LONGEST_STEP))
         R = exp_so3(share * turn) @ R
         c = c + share * dc
         if size < 1e-8:
             return MinimumAcceleration(ends, R, c, iteration)
-    raise ConvergenceError(float(size), STEPS)
+    raise ConvergenceError(size, STEPS)
 
 
 def _newton_step(ends: Ends, R: Array, c: Array) -> tuple[Array, Array]:
@@ -173,9 +175,9 @@ def _newton_step(ends: Ends, R: Array, c: Array) -> tuple[Array, Array]:
     with ε = 0 at the end.
     """
     n, Rt, nodes = len(R), np.swapaxes(R, -1, -2), grid(len(R))
-    W = hat_so3(velocity(ends, Rt @ c))
+    W = hats(velocity(ends, Rt @ c))
     E = ends.R0 + along(nodes.integral, R @ W) - R
-    defect = vee_so3(E @ Rt + along(nodes.integral, E @ W @ Rt))
+    defect = vees(E @ Rt + along(nodes.integral, E @ W @ Rt))
     rows = R.reshape(-1, 3)
     RGRt = nodes.twice[:, None, :, None] * (rows @ rows.T).reshape(n, 3, n, 3)
     effect = along(nodes.integral, RGRt)

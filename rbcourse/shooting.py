@@ -4,8 +4,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
-from rbcourse.curves import Curve
-from rbcourse.optimum import ConvergenceError, Ends, MinimumAcceleration, first_guess, grid, solve
+from rbcourse.optimum import (
+    ConvergenceError,
+    Ends,
+    Guess,
+    MinimumAcceleration,
+    first_guess,
+    grid,
+    solve,
+)
 from rbcourse.so3 import hat_so3, log_so3, right_jacobian_inverse_so3
 
 NODES = 96
@@ -63,30 +70,30 @@ def shoot_minimum_acceleration_so3(
     return solve(shoot, R0, R1, w0, w1)
 
 
-def shoot(ends: Ends, guess: Curve) -> MinimumAcceleration:
+def shoot(ends: Ends, guess: Guess) -> MinimumAcceleration:
     """Improve the aim (w'(0), b) by Newton's method, the hit moved by half a unit at most."""
     aim = _first_aim(ends, guess)
     for iteration in range(STEPS):
         miss, by_aim = _miss(ends, aim)
-        size = np.abs(miss).max()
+        size = float(np.abs(miss).max())
         if size < 1e-11:
             R = _shot(ends, aim, grid(NODES).t)[0]
             c = ends.R0 @ (aim[3:] - np.cross(ends.w0, aim[:3]))
             return MinimumAcceleration(ends, R, c, iteration)
         aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
-    raise ConvergenceError(float(size), STEPS)
+    raise ConvergenceError(size, STEPS)
 
 
-def _first_aim(ends: Ends, guess: Curve) -> Array:
+def _first_aim(ends: Ends, guess: Guess) -> Array:
     """Return w'(0) and b = w''(0) + w(0) × w'(0) of the curve that `relax` would start with."""
-    R, c = first_guess(ends, guess, 24)
+    R, c = first_guess(ends, guess, 32)
     acceleration = MinimumAcceleration(ends, R, c, 0)(0, 2)
     return np.concatenate([acceleration, ends.R0.T @ c + np.cross(ends.w0, acceleration)])
 
 
 def _miss(ends: Ends, aim: Array) -> tuple[Array, Array]:
     """Return by how much R1 and w1 are missed, and how that depends on the aim."""
-    R, w, sensitivity = (values[-1] for values in _shot(ends, aim, np.array([0.0, 1.0])))
+    R, w, sensitivity = (values[-1] for values in _shot(ends, aim, np.ones(1)))
     turn = log_so3(ends.R1.T @ R)
     turn_by_aim = right_jacobian_inverse_so3(turn) @ sensitivity[:3]
     return np.concatenate([turn, w - ends.w1]), np.concatenate([turn_by_aim, sensitivity[3:6]])

@@ -28,13 +28,17 @@ LEVELS = {
     "relaxation": 7,
     "shooting": 7,
     "figures": 7,
+    "coordinates": 8,
     "frames": 8,
     "plots": 8,
+    "animate": 9,
     "lessons": 10,
 }
 ALLOWED = {
     "figures": {"matplotlib"},
-    "frames": {"mpl_toolkits"},
+    "animate": {"PIL", "matplotlib"},
+    "coordinates": {"matplotlib"},
+    "frames": {"matplotlib", "mpl_toolkits"},
     "plots": {"matplotlib"},
     "lessons": {"nbformat", "nbclient"},
 }

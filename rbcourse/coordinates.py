@@ -1,0 +1,161 @@
+"""Still figures of rotations over time, in exponential coordinates: artists on given axes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.curves import Curve
+from rbcourse.figures import COLOURS, Table
+from rbcourse.so3 import log_so3
+
+_STYLES: dict[str, dict[str, Any]] = {
+    "optimum": {"ls": "-", "marker": "o", "ms": 8, "mfc": "white"},
+    "projection": {"ls": "--", "marker": "o", "ms": 4},
+}
+
+
+def coordinate_table(curves: Mapping[str, Curve], t: ArrayLike) -> Table:
+    """Return the exponential coordinates σ of rotations over time, as a table.
+
+    Parameters
+    ----------
+    curves : mapping of str to Curve
+        Rotations over time, with their names.
+    t : array_like, shape (times,)
+        Times in [0, 1].
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    table = {"t [1]": np.asarray(t)}
+    for name, curve in curves.items():
+        for i, sigma in enumerate(log_so3(curve(t)).T, start=1):
+            table[f"{name} sigma{i} [rad]"] = sigma
+    return table
+
+
+def draw_coordinate_paths(ax: Any, data: Table) -> list[Any]:
+    """Draw the paths of an optimum and a projection in the space of σ, every tenth time marked.
+
+    Parameters
+    ----------
+    ax : Axes3D
+        Where to draw.
+    data : mapping of str to array_like, shape (times,)
+        A `coordinate_table` of "optimum" and "projection".
+
+    Returns
+    -------
+    list of Line3D
+
+    References
+    ----------
+    BK Fig. 4.
+    """
+    lines = [
+        ax.plot(*_path(data, name), color=COLOURS[name], label=name, markevery=10, **style)[0]
+        for name, style in _STYLES.items()
+    ]
+    start, end = _path(data, "optimum")[:, [0, -1]].T
+    ax.text(*start, "   t = 0", va="top")
+    ax.text(*end, "t = 1   ", va="bottom", ha="right")
+    ax.set(xlabel="σ₁ (rad)", ylabel="σ₂ (rad)")
+    ax.zaxis.set_rotate_label(False)
+    ax.set_zlabel("σ₃ (rad)", rotation=90)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    ax.view_init(elev=22, azim=-62)
+    ax.set_box_aspect((1, 1, 0.9), zoom=0.9)
+    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.06))
+    return lines
+
+
+def draw_coordinates(ax: Axes, data: Table) -> list[Any]:
+    """Draw σ₁, σ₂, σ₃ over time, of the optimum as full lines and of the projection dashed.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    data : mapping of str to array_like, shape (times,)
+        As for `draw_coordinate_paths`.
+
+    Returns
+    -------
+    list of Line2D
+
+    References
+    ----------
+    BK Fig. 4.
+    """
+    t = np.asarray(data["t [1]"])
+    lines = []
+    for name, style in _STYLES.items():
+        for axis, sigma in zip("xyz", _path(data, name), strict=True):
+            lines += ax.plot(t, sigma, color=COLOURS[axis], markevery=10, **style)
+    for axis, number, sigma in zip("xyz", "₁₂₃", _path(data, "optimum"), strict=True):
+        ax.text(1.02, sigma[-1], f"σ{number}", color=COLOURS[axis], va="center")
+    ax.set(xlabel="time t", ylabel="σ (rad)", xlim=(0, 1))
+    ax.legend(handles=[Line2D([], [], color="0.3", label=name, **s) for name, s in _STYLES.items()])
+    return lines
+
+
+def draw_difference(ax: Axes, data: Table) -> list[Any]:
+    """Draw by how much σ₁, σ₂, σ₃ of the projection differ from those of the optimum.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    data : mapping of str to array_like, shape (times,)
+        As for `draw_coordinate_paths`.
+
+    Returns
+    -------
+    list of Line2D
+    """
+    t, difference = np.asarray(data["t [1]"]), _path(data, "projection") - _path(data, "optimum")
+    lines = [
+        ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"σ{number}")[0]
+        for axis, number, part, dash in zip("xyz", "₁₂₃", difference, ["-", "--", ":"], strict=True)
+    ]
+    ax.set(xlabel="time t", ylabel="difference (rad)", xlim=(0, 1))
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5), handlelength=1.5)
+    return lines
+
+
+def describe_coordinates(data: Table) -> str:
+    """Return in words what `draw_coordinate_paths` and `draw_coordinates` show.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (times,)
+        As for `draw_coordinate_paths`.
+
+    Returns
+    -------
+    str
+    """
+    best, near = _path(data, "optimum"), _path(data, "projection")
+    apart = np.linalg.norm(best - near, axis=0)
+    end = ", ".join(f"{x:.3g}" for x in best[:, -1])
+    said = (
+        "Two paths in the space of exponential coordinates, the optimum and the projection, "
+        f"marked at equal times; the coordinates over time; and by how much they differ. "
+        f"Both run from 0 to ({end}) rad. "
+    )
+    if apart.max() < 1e-9:
+        return said + "They coincide at all times."
+    when = np.asarray(data["t [1]"])[apart.argmax()]
+    return said + f"They are farthest apart at t = {when:g}, by {apart.max():.2g} rad."
+
+
+def _path(data: Table, name: str) -> Array:
+    return np.array([data[f"{name} sigma{i} [rad]"] for i in (1, 2, 3)])
