@@ -27,6 +27,7 @@ COLOURS = {
     "z": "#0072B2",
     "optimum": "#000000",
     "projection": "#CC79A7",
+    "screw": "#E69F00",
     "reference": "#808080",
 }
 """The same meaning has the same colour everywhere; all can be told apart when colour-blind."""

@@ -341,8 +341,8 @@ def _warn_if_nearly_singular(margin: Array) -> None:
     low = np.argwhere(np.asarray(margin) < 1e-6)
     if len(low):
         warnings.warn(
-            f"margin = {np.asarray(margin)[tuple(low[0])]:.1e}{_which(low[0])}: somewhere the "
-            "nearest rotation is all but not unique, the curve jumps there",
+            f"margin < 1e-6{_which(low[0])}: somewhere the nearest rotation is all but not unique, "
+            "and the curve jumps there",
             RuntimeWarning,
             stacklevel=4,
         )

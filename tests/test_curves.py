@@ -161,7 +161,7 @@ def test_between_rotations_a_half_turn_apart_the_geodesic_is_a_shortest_one_and_
 
 def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused():
     for R0, R1, _ in zip(*half_turn_pairs(), strict=True):
-        with pytest.warns(RuntimeWarning, match="^margin = .* jumps there"):
+        with pytest.warns(RuntimeWarning, match="^margin < 1e-6: .* jumps there"):
             curve = rb.projected_line_so3(R0, R1)
         assert 0 <= curve.margin < 8 * EPS
         assert np.abs(curve([0, 0.25, 0.75, 1]) - [R0, R0, R1, R1]).max() < 80 * EPS
@@ -180,7 +180,7 @@ def test_in_a_stack_the_pair_a_half_turn_apart_is_named():
 
 def test_just_before_the_half_turn_the_line_is_still_right():
     w = np.array([0, 0, np.pi - 1e-8])
-    with pytest.warns(RuntimeWarning, match="margin = 1.0e-08"):
+    with pytest.warns(RuntimeWarning, match="^margin < 1e-6: "):
         curve = rb.projected_line_so3(np.eye(3), oracles.exp_so3(w))
     assert abs(curve.margin - 1e-8) < 4 * EPS
     want = oracles.theta(0.5 + 1e-9, w[2]) * w[2]

@@ -28,17 +28,19 @@ LEVELS = {
     "relaxation": 7,
     "shooting": 7,
     "figures": 7,
-    "coordinates": 8,
+    "comparison": 8,
     "frames": 8,
     "plots": 8,
+    "bodies": 9,
     "animate": 9,
     "lessons": 10,
 }
 ALLOWED = {
     "figures": {"matplotlib"},
     "animate": {"PIL", "matplotlib"},
-    "coordinates": {"matplotlib"},
-    "frames": {"matplotlib", "mpl_toolkits"},
+    "bodies": {"matplotlib", "mpl_toolkits"},
+    "comparison": {"matplotlib"},
+    "frames": {"mpl_toolkits"},
     "plots": {"matplotlib"},
     "lessons": {"nbformat", "nbclient"},
 }

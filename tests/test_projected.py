@@ -133,7 +133,7 @@ def test_the_margin_is_the_least_gap():
 def test_a_margin_of_nothing_is_said():
     """From rest to rest over a half-turn: the cubic runs through a matrix of rank 1."""
     half, rest = np.diag([1.0, -1, -1]), np.zeros(3)
-    with pytest.warns(RuntimeWarning, match=r"^margin = \d\.\de[-+]\d\d: .* jumps there"):
+    with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6: .* jumps there"):
         curve = rb.projected_cubic_so3(np.eye(3), half, rest, rest)
     assert curve.margin < 8 * EPS
     assert np.abs(curve([0, 0.3, 0.7, 1]) - [np.eye(3), np.eye(3), half, half]).max() < 80 * EPS

@@ -1,4 +1,4 @@
-"""Still figures of rotations over time, in exponential coordinates: artists on given axes."""
+"""Still figures that compare an optimum with its projection: artists on given axes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -155,6 +155,63 @@ def describe_coordinates(data: Table) -> str:
         return said + "They coincide at all times."
     when = np.asarray(data["t [1]"])[apart.argmax()]
     return said + f"They are farthest apart at t = {when:g}, by {apart.max():.2g} rad."
+
+
+def draw_excess(ax: Axes, data: Table) -> list[Any]:
+    """Draw, on logarithmic axes, what near-optimal curves cost too much over their excursion.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    data : mapping of str to array_like, shape (scales,)
+        The scale of the excursion; then, for each of up to four families, the cost of the
+        projection over that of the optimum, minus 1.
+
+    Returns
+    -------
+    list of Line2D
+        The families, then a line of slope four.
+    """
+    (_, scale), *families = data.items()
+    scale = np.asarray(scale)
+    looks = [("x", "o-"), ("y", "s--"), ("z", "^-."), ("projection", "d:")]
+    lines = [
+        ax.plot(scale, excess, mark, color=COLOURS[look], label=name.removesuffix(" excess [1]"))[0]
+        for (name, excess), (look, mark) in zip(families, looks, strict=False)
+    ]
+    slope = ax.plot(scale, 1e-2 * scale**4, color=COLOURS["reference"], lw=1, label="slope 4")
+    ax.set(xscale="log", yscale="log", xlabel="size s of the excursion (1: as given)")
+    ax.set_ylabel("cost / optimum − 1")
+    ax.axhline(0.01, color=COLOURS["reference"], lw=1, ls=":")
+    ax.text(scale.min(), 0.012, "1 %", color=COLOURS["reference"])
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return [*lines, *slope]
+
+
+def describe_excess(data: Table) -> str:
+    """Return in words what `draw_excess` shows.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (scales,)
+        As for `draw_excess`.
+
+    Returns
+    -------
+    str
+    """
+    (_, scale), *families = data.items()
+    ends = "; ".join(
+        f"{name.removesuffix(' excess [1]')} from {np.asarray(excess)[0]:.1e} to "
+        f"{np.asarray(excess)[-1]:.2g}"
+        for name, excess in families
+    )
+    return (
+        "What the projection costs above the optimum, as a share, over the size of the excursion "
+        f"from {np.min(scale):g} to {np.max(scale):g}, on logarithmic axes: {ends}. All follow a "
+        "line of slope four where they are small."
+    )
 
 
 def _path(data: Table, name: str) -> Array:

@@ -1,0 +1,263 @@
+"""Bodies on their way: artists on axes that the caller owns, still or moving."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import MultipleLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.figures import COLOURS, Table
+from rbcourse.frames import draw_triad, pose_columns
+from rbcourse.so3 import log_so3
+
+
+def motion_table(t: ArrayLike, poses: Array) -> Table:
+    """Return poses over time as a table: time, position and rotation matrix.
+
+    Parameters
+    ----------
+    t : array_like, shape (times,)
+        The times.
+    poses : ndarray, shape (times, 4, 4)
+        Poses [[R, d], [0, 1]].
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    return {"t [1]": np.asarray(t), **pose_columns(poses)}
+
+
+def draw_cube(ax: Any, pose: Array, side: float) -> Poly3DCollection:
+    """Draw a cube with a square on one of its faces, centred at the origin of its frame.
+
+    Parameters
+    ----------
+    ax : Axes3D
+        Where to draw.
+    pose : ndarray, shape (4, 4)
+        Where the cube is.
+    side : float
+        Its edge, in m.
+
+    Returns
+    -------
+    Poly3DCollection
+        Six faces and the square; `move_cube` moves it.
+
+    References
+    ----------
+    BK Fig. 5.
+    """
+    fill = ["0.86", "0.93", "0.98"] * 2 + [COLOURS["x"]]  # a shade for each direction
+    cube = Poly3DCollection(_cube_faces(pose, side), facecolors=fill, edgecolors="0.3", lw=0.8)
+    return ax.add_collection3d(cube)
+
+
+def move_cube(cube: Poly3DCollection, pose: Array, side: float) -> None:
+    """Move a cube that `draw_cube` has drawn."""
+    cube.set_verts(_cube_faces(pose, side))
+
+
+def draw_cube_motion(ax: Any, data: Table, side: float) -> list[Any]:
+    """Draw a cube at several times, and stars along the path of its centre.
+
+    Parameters
+    ----------
+    ax : Axes3D
+        Where to draw.
+    data : mapping of str to array_like, shape (times,)
+        A `motion_table`; a cube is drawn at each time.
+    side : float
+        Its edge, in m.
+
+    Returns
+    -------
+    list of artists
+        The cubes, then the stars.
+
+    References
+    ----------
+    BK Fig. 5.
+    """
+    poses = _poses(data)
+    cubes = [draw_cube(ax, pose, side) for pose in poses]
+    set_space(ax, poses[:, :3, 3], side)
+    return [*cubes, draw_centre_path(ax, poses[:, :3, 3])]
+
+
+def draw_centre_path(ax: Any, places: Array) -> Any:
+    """Draw stars at places, shape (times, 3), joined by a thin line, in front of everything."""
+    return ax.plot(*places.T, "*-", color=COLOURS["optimum"], ms=7, lw=0.8, zorder=1000)[0]
+
+
+def set_space(ax: Any, places: Array, side: float) -> None:
+    """Fit the axes to a cube at these places, shape (times, 3), with equal units."""
+    low, high = places.min(axis=0) - 0.8 * side, places.max(axis=0) + 0.8 * side
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set(xlabel="x (m)", ylabel="y (m)")
+    ax.zaxis.set_rotate_label(False)
+    ax.set_zlabel("z (m)", rotation=90)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_major_locator(MultipleLocator(4))
+    ax.set_box_aspect(high - low, zoom=0.9)
+    ax.view_init(elev=18, azim=-22)  # never behind the square of BK Fig. 5
+
+
+def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
+    """Draw the paths of the origin in several motions, and its frame at the start and the end.
+
+    Parameters
+    ----------
+    ax : Axes3D
+        Where to draw.
+    tables : mapping of str to table
+        A `motion_table` for up to three motions between the same poses, with their names.
+
+    Returns
+    -------
+    list of Line3D
+        A path for each motion.
+
+    References
+    ----------
+    BK 2.6.
+    """
+    looks = [(COLOURS["optimum"], "-"), (COLOURS["screw"], "--"), (COLOURS["reference"], ":")]
+    lines = [
+        ax.plot(*_poses(table)[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
+        for (name, table), (colour, dash) in zip(tables.items(), looks, strict=False)
+    ]
+    poses = _poses(next(iter(tables.values())))[[0, -1]]
+    for pose, name in zip(poses, "01", strict=True):
+        draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
+    places = np.concatenate([line.get_data_3d() for line in lines], axis=1).T
+    set_space(ax, np.concatenate([places, *(A[:3, 3] + 0.5 * A[:3, :3].T for A in poses)]), 1.0)
+    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.1))
+    return lines
+
+
+def describe_ways(tables: Mapping[str, Table]) -> str:
+    """Return in words what `draw_ways` shows.
+
+    Parameters
+    ----------
+    tables : mapping of str to table
+        As for `draw_ways`.
+
+    Returns
+    -------
+    str
+    """
+    lengths = []
+    for name, table in tables.items():
+        steps = np.linalg.norm(np.diff(_poses(table)[:, :3, 3], axis=0), axis=-1)
+        lengths.append(f"{name} {steps.sum():.2f} m")
+    return (
+        "The paths of the origin of a frame in several motions from one pose to another, and the "
+        f"frame at both ends. Lengths of the paths: {', '.join(lengths)}."
+    )
+
+
+def moving_cubes(
+    axes: Sequence[Any], tables: Mapping[str, Table], side: float
+) -> Callable[[int], list[Any]]:
+    """Draw cubes at the start of their motions, each on its axes; return what moves them.
+
+    Parameters
+    ----------
+    axes : sequence of Axes3D
+        Where to draw.
+    tables : mapping of str to table
+        A `motion_table` for each, with its name.
+    side : float
+        The edge of the cubes, in m.
+
+    Returns
+    -------
+    callable
+        ``update(i)`` moves all cubes to row i of their tables and returns them.
+    """
+    motions = [_poses(table) for table in tables.values()]
+    cubes = [draw_cube(ax, poses[0], side) for ax, poses in zip(axes, motions, strict=True)]
+    for ax, name, poses in zip(axes, tables, motions, strict=True):
+        set_space(ax, poses[:, :3, 3], side)
+        draw_centre_path(ax, poses[:: len(poses) // 10, :3, 3])
+        ax.set(xlabel="", ylabel="", zlabel="", xticklabels=[], yticklabels=[], zticklabels=[])
+        ax.set_title(name)
+
+    def update(i: int) -> list[Any]:
+        for cube, poses in zip(cubes, motions, strict=True):
+            move_cube(cube, poses[i], side)
+        return cubes
+
+    return update
+
+
+def describe_moving_cubes(tables: Mapping[str, Table]) -> str:
+    """Return in words what `moving_cubes` shows.
+
+    Parameters
+    ----------
+    tables : mapping of str to table
+        As for `moving_cubes`, two of them.
+
+    Returns
+    -------
+    str
+    """
+    first, second = (_poses(table)[:, :3, :3] for table in tables.values())
+    apart = np.degrees(np.linalg.norm(log_so3(np.swapaxes(first, -1, -2) @ second), axis=-1))
+    when = np.asarray(next(iter(tables.values()))["t [1]"])[apart.argmax()]
+    return (
+        f"Two cubes fly side by side, {' and '.join(tables)}, each with a square on one face. "
+        f"Their orientations differ most at t = {when:.2f}, by {apart.max():.0f} degrees."
+    )
+
+
+def describe_cube_motion(data: Table) -> str:
+    """Return in words what `draw_cube_motion` shows.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (times,)
+        As for `draw_cube_motion`.
+
+    Returns
+    -------
+    str
+    """
+    poses = _poses(data)
+    R = poses[:, :3, :3]
+    steps = np.degrees(np.linalg.norm(log_so3(np.swapaxes(R[:-1], -1, -2) @ R[1:]), axis=-1))
+    ends = " to ".join("(" + ", ".join(f"{x:g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
+    return (
+        f"A cube with a square on one face, at {len(poses)} times on its way from {ends} m, its "
+        f"centre starred. From one to the next it turns by "
+        f"{', '.join(f'{step:.0f}' for step in steps)} degrees."
+    )
+
+
+def _cube_faces(pose: Array, side: float) -> Array:
+    """Return the corners of the six faces, and of a square on the face of +z: (7, 4, 3)."""
+    around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    faces = np.empty((7, 4, 3))
+    for k in range(6):
+        axis, sign = k % 3, 1 - 2 * (k // 3)
+        faces[k, :, axis] = sign
+        faces[k][:, [(axis + 1) % 3, (axis + 2) % 3]] = around
+    faces[6] = faces[2] * [0.5, 0.5, 1.02]
+    placed: Array = pose[:3, 3] + side / 2 * faces @ pose[:3, :3].T
+    return placed
+
+
+def _poses(data: Table) -> Array:
+    columns = [np.asarray(column) for name, column in data.items() if name[0] in "xyzR"]
+    poses = np.zeros((len(columns[0]), 4, 4))
+    poses[:, :3, 3] = np.stack(columns[:3], axis=-1)
+    poses[:, :3, :3] = np.stack(columns[3:], axis=-1).reshape(-1, 3, 3)
+    poses[:, 3, 3] = 1
+    return poses
