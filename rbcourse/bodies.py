@@ -96,14 +96,14 @@ def draw_centre_path(ax: Any, places: Array) -> Any:
 
 def set_space(ax: Any, places: Array, side: float) -> None:
     """Fit the axes to a cube at these places, shape (times, 3), with equal units."""
-    low, high = places.min(axis=0) - 0.8 * side, places.max(axis=0) + 0.8 * side
+    low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set(xlabel="x (m)", ylabel="y (m)")
     ax.zaxis.set_rotate_label(False)
     ax.set_zlabel("z (m)", rotation=90)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_major_locator(MultipleLocator(4))
-    ax.set_box_aspect(high - low, zoom=0.9)
+    ax.set_box_aspect(high - low, zoom=0.97)
     ax.view_init(elev=18, azim=-22)  # never behind the square of BK Fig. 5
 
 
@@ -134,10 +134,24 @@ def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
     poses = _poses(next(iter(tables.values())))[[0, -1]]
     for pose, name in zip(poses, "01", strict=True):
         draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
-    places = np.concatenate([line.get_data_3d() for line in lines], axis=1).T
+    paths = np.array([line.get_data_3d() for line in lines])
+    places = np.concatenate(paths, axis=1).T
     set_space(ax, np.concatenate([places, *(A[:3, 3] + 0.5 * A[:3, :3].T for A in poses)]), 1.0)
+    _look_across(ax, paths)
     ax.legend(loc="upper left", bbox_to_anchor=(0, 1.1))
     return lines
+
+
+def _look_across(ax: Any, paths: Array) -> None:
+    """Look at the plane in which the paths, shape (n, 3, times), bend away from the chord."""
+    chord = paths[0, :, -1] - paths[0, :, 0]
+    from_start = (paths - paths[:, :, :1]).transpose(0, 2, 1).reshape(-1, 3)
+    off = from_start - np.outer(from_start @ chord, chord) / (chord @ chord)
+    x, y, z = np.cross(off[np.linalg.norm(off, axis=-1).argmax()], chord)
+    up = 1 if z >= 0 else -1
+    ax.view_init(
+        np.degrees(np.arctan2(up * z, np.hypot(x, y))), np.degrees(np.arctan2(up * y, up * x))
+    )
 
 
 def describe_ways(tables: Mapping[str, Table]) -> str:
@@ -185,7 +199,7 @@ def moving_cubes(
     cubes = [draw_cube(ax, poses[0], side) for ax, poses in zip(axes, motions, strict=True)]
     for ax, name, poses in zip(axes, tables, motions, strict=True):
         set_space(ax, poses[:, :3, 3], side)
-        draw_centre_path(ax, poses[:: len(poses) // 10, :3, 3])
+        draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
         ax.set(xlabel="", ylabel="", zlabel="", xticklabels=[], yticklabels=[], zticklabels=[])
         ax.set_title(name)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
@@ -39,6 +40,33 @@ def coordinate_table(curves: Mapping[str, Curve], t: ArrayLike) -> Table:
         for i, sigma in enumerate(log_so3(curve(t)).T, start=1):
             table[f"{name} sigma{i} [rad]"] = sigma
     return table
+
+
+def draw_comparison(fig: Figure, data: Table) -> list[Any]:
+    """Draw the paths in the space of σ, the coordinates over time, and their difference.
+
+    Parameters
+    ----------
+    fig : Figure
+        Where to draw, on axes of its own.
+    data : mapping of str to array_like, shape (times,)
+        A `coordinate_table` of "optimum" and "projection".
+
+    Returns
+    -------
+    list of artists
+
+    References
+    ----------
+    BK Fig. 4.
+    """
+    space: Any = {"a": {"projection": "3d"}}
+    axes = fig.subplot_mosaic("ab;ac", per_subplot_kw=space, height_ratios=[2, 1])
+    return [
+        *draw_coordinate_paths(axes["a"], data),
+        *draw_coordinates(axes["b"], data),
+        *draw_difference(axes["c"], data),
+    ]
 
 
 def draw_coordinate_paths(ax: Any, data: Table) -> list[Any]:
@@ -132,7 +160,7 @@ def draw_difference(ax: Axes, data: Table) -> list[Any]:
 
 
 def describe_coordinates(data: Table) -> str:
-    """Return in words what `draw_coordinate_paths` and `draw_coordinates` show.
+    """Return in words what `draw_comparison` shows.
 
     Parameters
     ----------

@@ -85,7 +85,8 @@ def test_fonts_in_documents_are_what_journals_take():
 def test_every_figure_has_its_three_files_and_units_in_every_column():
     names = {file.stem for file in FIGURES.iterdir()}
     for name in names:
-        assert {file.suffix for file in FIGURES.glob(f"{name}.*")} == {".png", ".pdf", ".csv"}
+        files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
+        assert files in ({".png", ".pdf", ".csv"}, {".png", ".gif", ".csv"})
         for column in committed(name)[0]:
             assert re.search(r" \[(1|m|rad)\]$", column) or column == "frame", column
 
@@ -149,3 +150,58 @@ def test_the_data_of_the_same_path():
     assert np.abs(data["geodesic speed [rad]"] - angle).max() < 1e-11
     slope = [oracles.theta(x, angle, 1) for x in t]
     assert np.abs(data["projected line speed [rad]"] / angle - slope).max() < 1e-9
+
+
+SIGMA = np.pi / 6 * np.array([1, 2, 3])
+
+
+@pytest.mark.source("BK Fig. 4", "BK (21)")
+@pytest.mark.parametrize(("name", "extra"), [("4a", 0), ("4b", 1), ("4c", 5)])
+def test_the_data_of_paper_fig4(name, extra):
+    """The optimum by SciPy; the projection by the definition of the nearest rotation."""
+    data = numbers(f"paper_fig{name}")
+    t, w1 = data["t [1]"], SIGMA + np.array([extra, 0, 0])
+    best, near = (
+        np.array([data[f"{curve} sigma{i} [rad]"] for i in (1, 2, 3)]).T
+        for curve in ("optimum", "projection")
+    )
+    solution = oracles.minimum_acceleration(SIGMA, SIGMA, w1)
+    want = oracles.rotation_of_quaternions(solution.sol(t)[:4])
+    assert np.abs(np.array([oracles.exp_so3(s) for s in best]) - want).max() < 1e-9
+    R1 = oracles.exp_so3(SIGMA)
+    V0, V1 = np.cross(SIGMA, np.eye(3)).T, R1 @ np.cross(w1, np.eye(3)).T
+    u = t[:, None, None]
+    M = np.eye(3) + V0 * u + (3 * (R1 - np.eye(3)) - 2 * V0 - V1) * u**2
+    M = M + (2 * (np.eye(3) - R1) + V0 + V1) * u**3
+    S = np.array([oracles.exp_so3(s).T for s in near]) @ M
+    assert np.abs(S - np.swapaxes(S, -1, -2)).max() < 1e-10
+    assert oracles.two_smallest_eigenvalues(S).min() > 1
+
+
+@pytest.mark.source("BK Fig. 5", "BK 6.3")
+def test_the_data_of_paper_fig5():
+    w0, w1 = np.array([1, 2, 3]), np.array([2, 1, 1])
+    turn = np.pi / 6 * np.array([1, 4, 3])
+    best, near = numbers("paper_fig5a"), numbers("paper_fig5b")
+    t = best["t [1]"]
+    R = np.array([best[f"R{i}{j} [1]"] for i in (1, 2, 3) for j in (1, 2, 3)]).T.reshape(-1, 3, 3)
+    want = oracles.rotation_of_quaternions(oracles.minimum_acceleration(turn, w0, w1).sol(t)[:4])
+    assert np.abs(R - want).max() < 1e-9
+    d0, d1, v0, v1 = np.zeros(3), np.array([8, 10, 12]), np.ones(3), np.array([1, 5, 3])
+    u = t[:, None]
+    path = d0 + v0 * u + (3 * (d1 - d0) - 2 * v0 - v1) * u**2 + (2 * (d0 - d1) + v0 + v1) * u**3
+    for data in (best, near):
+        assert np.abs(np.array([data[f"{x} [m]"] for x in "xyz"]).T - path).max() < 1e-10
+    ends = np.eye(3), rb.exp_so3(turn), w0, w1
+    projected = rb.projected_cubic_so3(*ends)(t)
+    R = np.array([near[f"R{i}{j} [1]"] for i in (1, 2, 3) for j in (1, 2, 3)]).T.reshape(-1, 3, 3)
+    assert np.abs(R - projected).max() < 1e-11
+
+
+@pytest.mark.source("BK 1", "BK 7")
+def test_the_excess_falls_with_the_fourth_power_of_the_excursion():
+    scale, *families = numbers("lesson09_excursion").values()
+    assert len(families) == 3
+    for excess in families:
+        slope = np.diff(np.log(excess[:4])) / np.diff(np.log(scale[:4]))
+        assert np.abs(slope - 4).max() < 0.1

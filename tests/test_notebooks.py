@@ -178,10 +178,27 @@ def test_stored_pictures_are_fresh(run):
 
 def test_stored_documents_are_fresh(run):
     """Where the picture is the same to the byte, so is the document."""
-    for drawn in run[2].glob("*.png"):
-        if drawn.read_bytes() == (STORED / drawn.name).read_bytes():
-            document = drawn.with_suffix(".pdf")
+    for document in run[2].glob("*.pdf"):
+        picture = document.with_suffix(".png")
+        if picture.read_bytes() == (STORED / picture.name).read_bytes():
             assert document.read_bytes() == (STORED / document.name).read_bytes(), document.name
+
+
+def test_stored_animations_are_fresh(run):
+    """Frame by frame, as pictures; the palette may differ by a shade."""
+    for drawn in run[2].glob("*.gif"):
+        frames, stored = (list(gif_frames(file)) for file in (drawn, STORED / drawn.name))
+        assert len(frames) == len(stored)
+        assert all(look_the_same(*pair) for pair in zip(frames, stored, strict=True)), drawn.name
+
+
+def gif_frames(file):
+    with Image.open(file) as picture:
+        for i in range(picture.n_frames):
+            picture.seek(i)
+            content = io.BytesIO()
+            picture.convert("RGB").save(content, "png")
+            yield content.getvalue()
 
 
 def test_stored_numbers_are_fresh(run):
@@ -194,7 +211,7 @@ def test_stored_numbers_are_fresh(run):
 
 def test_every_stored_figure_is_drawn_by_a_lesson():
     sources = "".join(path.read_text("utf-8") for path in LESSONS)
-    names = set(re.findall(r'save_figure\(fig, \\"(\w+)\\"', sources))
+    names = set(re.findall(r'save_(?:figure|animation)\(fig, \\"(\w+)\\"', sources))
     assert {file.stem for file in STORED.iterdir()} == names
 
 

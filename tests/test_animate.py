@@ -1,0 +1,100 @@
+"""Animations: every frame is what a full drawing would be, and players need no network."""
+
+import io
+import re
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from PIL import Image
+
+import rbcourse as rb
+from rbcourse import animate, bodies
+
+A1 = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
+TIMES = np.linspace(0, 1, 12)
+TABLE = bodies.motion_table(TIMES, rb.screw_se3(np.eye(4), A1)(TIMES))
+
+
+def cube():
+    fig, ax = plt.subplots(figsize=(3, 3), dpi=60, subplot_kw={"projection": "3d"}, layout="none")
+    return fig, bodies.moving_cubes([ax], {"cube": TABLE}, side=1)
+
+
+def save(folder, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(folder))
+    fig, update = cube()
+    return animate.save_animation(fig, "cube", TABLE, 'a "cube"', update, 12, seconds=3)
+
+
+def frames_of(file):
+    with Image.open(file) as picture:
+        for i in range(picture.n_frames):
+            picture.seek(i)
+            yield np.asarray(picture.convert("RGB"), dtype=int)
+
+
+def test_frames_are_what_a_full_drawing_gives():
+    fig, update = cube()
+    drawn = animate.render(fig, update, 12)
+    for i in (0, 5, 11):
+        for artist in update(i):
+            artist.set_animated(False)
+        full = io.BytesIO()
+        fig.savefig(full, format="png", dpi=60)
+        want = np.asarray(Image.open(full).convert("RGB"))
+        off = np.abs(np.asarray(drawn[i], dtype=int) - want).max(axis=-1)
+        assert (off > 16).mean() < 0.01  # stars are drawn before the cube, not after it
+    plt.close(fig)
+
+
+def test_the_gif_shows_each_frame_in_its_colours(tmp_path, monkeypatch):
+    save(tmp_path, monkeypatch)
+    fig, update = cube()
+    drawn = [np.asarray(frame, dtype=int) for frame in animate.render(fig, update, 12)]
+    plt.close(fig)
+    shown = list(frames_of(tmp_path / "cube.gif"))
+    assert len(shown) == 12
+    for frame, want in zip(shown, drawn, strict=True):
+        assert np.abs(frame - want).max() <= 24
+        assert np.abs(frame - want).mean() < 1
+        assert np.array_equal(frame[0, 0], [255, 255, 255])
+    with Image.open(tmp_path / "cube.gif") as picture:
+        assert picture.info["loop"] == 0
+        assert picture.info["duration"] == 250
+
+
+def test_the_files_are_saved_and_the_figure_closed(tmp_path, monkeypatch):
+    animation = save(tmp_path, monkeypatch)
+    assert {file.name for file in tmp_path.iterdir()} == {"cube.gif", "cube.png", "cube.csv"}
+    assert (tmp_path / "cube.png").read_bytes() == animation.pictures[animation.shown]
+    assert (tmp_path / "cube.csv").read_text().startswith("t [1],x [m],")
+    assert plt.get_fignums() == []
+    assert repr(animation) == 'cube: a "cube"'
+
+
+def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
+    pages = [save(tmp_path / folder, monkeypatch)._repr_html_() for folder in ("a", "b")]
+    assert pages[0] == pages[1]
+    for name in ("cube.gif", "cube.png", "cube.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_the_player_has_all_it_needs(tmp_path, monkeypatch):
+    animation = save(tmp_path, monkeypatch)
+    page = animation._repr_html_()
+    assert not re.search(r"https?:|src=\"(?!data:)", page)
+    assert 'alt="a &quot;cube&quot;"' in page
+    assert page.count("data:image/png;base64,") == 1 + 6  # the still, and every second frame
+    assert 'max="5"' in page
+    assert "setInterval(step, 500)" in page
+    assert "<div hidden>" in page  # no dead buttons where scripts do not run
+
+
+def test_columns_of_different_shapes_are_refused_and_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+    fig, update = cube()
+    with pytest.raises(ValueError, match="one shape wanted"):
+        animate.save_animation(fig, "bad", {"t [1]": [0, 1], "x [m]": [0]}, "", update, 2)
+    assert list(tmp_path.iterdir()) == []
+    plt.close(fig)
