@@ -41,7 +41,7 @@ from rbcourse.so3 import (
     vee_so3,
 )
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "BASIS_SE3",
