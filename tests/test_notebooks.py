@@ -177,10 +177,10 @@ def test_stored_pictures_are_fresh(run):
 
 
 def test_stored_documents_are_fresh(run):
-    """Where the picture is the same to the byte, so is the document."""
+    """Where picture and numbers are the same to the byte, so is the document."""
     for document in run[2].glob("*.pdf"):
-        picture = document.with_suffix(".png")
-        if picture.read_bytes() == (STORED / picture.name).read_bytes():
+        others = [document.with_suffix(suffix) for suffix in (".png", ".csv")]
+        if all(file.read_bytes() == (STORED / file.name).read_bytes() for file in others):
             assert document.read_bytes() == (STORED / document.name).read_bytes(), document.name
 
 
