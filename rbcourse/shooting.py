@@ -13,7 +13,7 @@ from rbcourse.optimum import (
     grid,
     solve,
 )
-from rbcourse.so3 import hat_so3, log_so3, right_jacobian_inverse_so3
+from rbcourse.so3 import hat_so3, log_so3
 
 NODES = 96
 STEPS = 20
@@ -92,11 +92,10 @@ def _first_aim(ends: Ends, guess: Guess) -> Array:
 
 
 def _miss(ends: Ends, aim: Array) -> tuple[Array, Array]:
-    """Return by how much R1 and w1 are missed, and how that depends on the aim."""
+    """Return by how much R1 and w1 are missed, and, near the goal, how that depends on the aim."""
     R, w, sensitivity = (values[-1] for values in _shot(ends, aim, np.ones(1)))
     turn = log_so3(ends.R1.T @ R)
-    turn_by_aim = right_jacobian_inverse_so3(turn) @ sensitivity[:3]
-    return np.concatenate([turn, w - ends.w1]), np.concatenate([turn_by_aim, sensitivity[3:6]])
+    return np.concatenate([turn, w - ends.w1]), sensitivity[:6]
 
 
 def _shot(ends: Ends, aim: Array, t: Array) -> tuple[Array, Array, Array]:

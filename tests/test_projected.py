@@ -165,12 +165,31 @@ def test_near_the_singular_set_it_is_right_or_warned_of(short_of):
         assert abs(rb.log_so3(curve(t))[2] - want) < 40 * EPS / gap
 
 
-def test_what_is_warned_of_is_found_between_the_times_looked_at():
-    """The middle is not at t = 1/2 where the velocities differ."""
-    half = np.diag([1.0, -1, -1])
-    for speed in (0.5, 1.7, 3.1):
-        with pytest.warns(RuntimeWarning, match="jumps there"):
-            rb.projected_cubic_so3(np.eye(3), half, [0, speed, 0], [0, -speed, 0])
+def through_the_centre(t, k1):
+    """Ends about one axis whose cubic, as a complex number, runs through 0 at the time t.
+
+    z(0) = 1, z'(0) = i k0, z(1) = exp(ia), z'(1) = i k1 exp(ia): with Hermite's basis,
+    z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0 fixes k0 and a.
+    """
+    h00, h10, h01, h11 = (
+        (1 + 2 * t) * (1 - t) ** 2,
+        t * (1 - t) ** 2,
+        t**2 * (3 - 2 * t),
+        t**3 - t**2,
+    )
+    k0 = np.sqrt(h01**2 + (k1 * h11) ** 2 - h00**2) / h10
+    a = np.angle(-(h00 + 1j * k0 * h10) / (h01 + 1j * k1 * h11))
+    return np.eye(3), rb.exp_so3([0, 0, a]), np.array([0, 0, k0]), np.array([0, 0, k1])
+
+
+@pytest.mark.parametrize("k", [40, 45, 50, 55])
+@pytest.mark.parametrize("fast", [5, 40])
+def test_what_is_warned_of_is_found_between_the_times_looked_at(k, fast):
+    """Half way between two of 65 times, and of 129 too."""
+    t = (k + 0.25) / 64
+    with pytest.warns(RuntimeWarning, match="jumps there"):
+        curve = rb.projected_cubic_so3(*through_the_centre(t, fast))
+    assert curve.margin < 1e-12
 
 
 def test_no_warning_without_need():

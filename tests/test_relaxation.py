@@ -162,6 +162,20 @@ def test_near_half_turns_converge(short_of):
         assert tumbling.residual < 1e-11
 
 
+def test_what_fails_from_the_projection_is_reached_by_continuation():
+    """Two fast problems from which Newton's method does not find back from the projected cubic."""
+    for turn, w0, w1 in (
+        ([-0.1, 2.5, -1.7], [-7.1, 7.0, 4.1], [-7.2, 0.4, 8.0]),
+        ([0.6, 0.4, -2.9], [6.0, -2.5, 8.6], [-0.2, 7.1, -8.1]),
+    ):
+        ends = np.eye(3), rb.exp_so3(turn), w0, w1
+        curve = rb.minimum_acceleration_so3(*ends)
+        assert curve.residual < 1e-11
+        assert np.abs(curve([0, 1], 1) - [w0, w1]).max() < 1e-11
+        near = rb.projected_cubic_so3(*ends)
+        assert rb.acceleration_cost(curve) < rb.acceleration_cost(near)
+
+
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 def test_no_motion_at_all(solver):
     curve = solver(np.eye(3), np.eye(3), REST, REST)
