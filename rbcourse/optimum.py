@@ -191,7 +191,12 @@ def solve(
     ConvergenceError
         If both fail.
     """
-    ends = Ends(_one("R0", R0, 3, 3), _one("R1", R1, 3, 3), _one("w0", w0, 3), _one("w1", w1, 3))
+    ends = Ends(
+        project_so(_one("R0", R0, 3, 3)),
+        project_so(_one("R1", R1, 3, 3)),
+        _one("w0", w0, 3),
+        _one("w1", w1, 3),
+    )
     try:
         return _attempt(solver, ends, _projected_cubic(ends))
     except ConvergenceError:

@@ -32,7 +32,7 @@ def minimum_acceleration_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (3, 3)
-        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+        Rotation matrices at t = 0 and 1; of what is none, the nearest rotation (`project_so`).
     w0, w1 : array_like, shape (3,)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -96,8 +96,7 @@ def minimum_acceleration_se3(
     Parameters
     ----------
     A0, A1 : array_like, shape (4, 4)
-        Poses at t = 0 and 1; what is none is not repaired (see `project_se`), and the last row is
-        not read.
+        Poses at t = 0 and 1; of what is none, the nearest pose (`project_se`).
     w0, w1 : array_like, shape (3,)
         Angular velocities there, body frame, in rad per unit time.
     d0_dot, d1_dot : array_like, shape (3,)

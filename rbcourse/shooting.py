@@ -31,7 +31,7 @@ def shoot_minimum_acceleration_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (3, 3)
-        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+        Rotation matrices at t = 0 and 1; of what is none, the nearest rotation (`project_so`).
     w0, w1 : array_like, shape (3,)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -79,7 +79,10 @@ def shoot(ends: Ends, guess: Guess) -> MinimumAcceleration:
         if size < 1e-11:
             R = _shot(ends, aim, grid(NODES).t)[0]
             c = ends.R0 @ (aim[3:] - np.cross(ends.w0, aim[:3]))
-            return MinimumAcceleration(ends, R, c, iteration)
+            curve = MinimumAcceleration(ends, R, c, iteration)
+            if curve.residual < 1e-10:
+                return curve
+            raise ConvergenceError(curve.residual, iteration)
         aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
     raise ConvergenceError(size, STEPS)
 

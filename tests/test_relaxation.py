@@ -177,6 +177,15 @@ def test_what_fails_from_the_projection_is_reached_by_continuation():
 
 
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(solver):
+    turn, w0, w1 = PAPER["4b"]
+    R1 = rb.exp_so3(turn)
+    rounded = solver(np.eye(3), R1.round(8), w0, w1)
+    assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
+    assert np.abs(rounded(TIMES) - solver(np.eye(3), R1, w0, w1)(TIMES)).max() < 1e-7
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 def test_no_motion_at_all(solver):
     curve = solver(np.eye(3), np.eye(3), REST, REST)
     assert np.abs(curve(TIMES) - np.eye(3)).max() < 1e-14
