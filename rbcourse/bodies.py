@@ -217,19 +217,22 @@ def describe_moving_cubes(tables: Mapping[str, Table]) -> str:
     Parameters
     ----------
     tables : mapping of str to table
-        As for `moving_cubes`, two of them.
+        As for `moving_cubes`.
 
     Returns
     -------
     str
     """
-    first, second = (_poses(table)[:, :3, :3] for table in tables.values())
-    apart = np.degrees(np.linalg.norm(log_so3(np.swapaxes(first, -1, -2) @ second), axis=-1))
-    when = np.asarray(next(iter(tables.values()))["t [1]"])[apart.argmax()]
-    return (
-        f"Two cubes fly side by side, {' and '.join(tables)}, each with a square on one face. "
-        f"Their orientations differ most at t = {when:.2f}, by {apart.max():.0f} degrees."
-    )
+    (first, table), *others = tables.items()
+    t, R = np.asarray(table["t [1]"]), np.swapaxes(_poses(table)[:, :3, :3], -1, -2)
+    said = f"Cubes with a square on one face fly side by side: {', '.join(tables)}."
+    for name, other in others:
+        apart = np.degrees(np.linalg.norm(log_so3(R @ _poses(other)[:, :3, :3]), axis=-1))
+        said += (
+            f" The orientations of {first} and {name} differ most at t = {t[apart.argmax()]:.2f}, "
+            f"by {apart.max():.0f} degrees."
+        )
+    return said
 
 
 def describe_cube_motion(data: Table) -> str:

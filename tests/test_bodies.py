@@ -98,5 +98,5 @@ def test_descriptions_give_numbers():
     assert "at 6 times on its way from (0, 0, 0) to (4, 5, 3) m" in said
     assert ", ".join([f"{angle / 5:.0f}"] * 5) in said
     same = {"one": MOTIONS["screw"], "two": MOTIONS["screw"]}
-    assert "one and two" in bodies.describe_moving_cubes(same)
+    assert "side by side: one, two." in bodies.describe_moving_cubes(same)
     assert "by 0 degrees" in bodies.describe_moving_cubes(same)
