@@ -1,11 +1,14 @@
 """Arguments checked by name, and the functions that need care near zero."""
 
+from collections.abc import Sequence
+from operator import index
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.floating[Any]]
+Rng: TypeAlias = "np.random.Generator | int | None"  # loads no numpy.random
 EPS = float(np.finfo(np.float64).eps)
 
 
@@ -50,6 +53,19 @@ def as_finite(name: str, value: ArrayLike, *core: int | str) -> Array:
     return array
 
 
+def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
+    """Return `as_finite` of the arguments, where all entries must lie in [0, 1].
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and the message names the first entry outside [0, 1].
+    """
+    array = as_finite(name, value, *core)
+    _check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
+    return array
+
+
 def as_time(t: ArrayLike, batch_ndim: int) -> Array:
     """Return the times `t`, all in [0, 1], with `batch_ndim` axes of length 1 appended.
 
@@ -77,6 +93,34 @@ def as_angle(angle: ArrayLike) -> Array:
     return np.minimum(angles, np.pi)
 
 
+def as_tolerance(name: str, value: float) -> float:
+    """Return a tolerance, or raise a ValueError if it is not a number from 0 up."""
+    tolerance = as_array(name, value)
+    if tolerance.ndim or not tolerance >= 0:
+        raise ValueError(f"{name}: a number from 0 up wanted, got {value!r}")
+    return float(tolerance)
+
+
+def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
+    """Return the shape of a batch: () for None, (n,) for n; a ValueError if it is no shape."""
+    given: Any = () if size is None else size
+    try:
+        shape = tuple(map(index, given if isinstance(given, Sequence) else [given]))
+    except TypeError as error:
+        raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}") from error
+    if any(length < 0 for length in shape):
+        raise ValueError(f"size: lengths from 0 up wanted, got {size!r}")
+    return shape
+
+
+def as_generator(rng: Rng) -> np.random.Generator:
+    """Return a generator of random numbers, or raise a ValueError if `rng` makes none."""
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"rng: a Generator, a seed or None wanted, got {rng!r}") from error
+
+
 def check_order(order: int) -> int:
     """Return `order`, the order of a derivative, or raise a ValueError if it is not 0, 1 or 2."""
     if not isinstance(order, int | np.integer) or order not in (0, 1, 2):
@@ -86,9 +130,14 @@ def check_order(order: int) -> int:
 
 def _check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
     if not passes.all():
-        first = tuple(int(i) for i in np.argwhere(~passes)[0])
-        entry = f"{name}[{', '.join(map(str, first))}]" if first else name
-        raise ValueError(f"{entry} is {array[first]}, {wanted} is wanted")
+        value = array[~passes][0]
+        raise ValueError(f"{first_index(name, ~passes)} is {value}, {wanted} is wanted")
+
+
+def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
+    """Return how the first chosen entry is called: ``R[0, 2]``, or ``R`` where there is one."""
+    first = ", ".join(str(i) for i in np.argwhere(chosen)[0])
+    return f"{name}[{first}]" if first else name
 
 
 def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:

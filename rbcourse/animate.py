@@ -4,23 +4,23 @@ import base64
 import html
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from string import Template
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.figures import Table, csv_text, figures_folder
+from rbcourse.figures import Table, csv_text, figures_folder, save_figure
 
 Update = Callable[[int], Sequence[Any]]
 
 _PLAYER = Template("""\
 <figure><img id="$name" style="max-width: 100%" alt="$alt" src="$still"/>\
-<figcaption>$name: .gif, .png, .csv</figcaption>
+<figcaption>$caption</figcaption>
 <div hidden><button aria-label="play or pause">▶</button>
 <input type="range" min="0" max="$last" value="$shown" aria-label="time" style="width: 60%"/></div>
 <script>
@@ -45,27 +45,30 @@ document.querySelectorAll("#$name").forEach((image) => {
 
 @dataclass(frozen=True)
 class Animation:
-    """A saved animation, as a notebook shows it: a player with its description.
+    """An animation, as a notebook shows it: a player with its description.
 
     Parameters
     ----------
     name : str
-        The name of its files, without ending.
+        What it is called.
     alt : str
         What is to be seen, for who cannot see it.
-    pictures : tuple of bytes
-        PNG frames of the player.
-    shown : int
-        Which of them is shown first.
+    pictures : tuple of Image
+        Its frames. The player shows every second one.
+    still : int
+        Which of them is shown before it plays.
     seconds : float
         How long it takes.
+    caption : str, optional
+        What the player says below; the name by default.
     """
 
     name: str
     alt: str
-    pictures: tuple[bytes, ...]
-    shown: int
+    pictures: tuple[Image.Image, ...]
+    still: int
     seconds: float
+    caption: str = ""
 
     def __repr__(self) -> str:
         """Return the name and the description."""
@@ -74,17 +77,67 @@ class Animation:
     def _repr_html_(self) -> str:
         """Return a player of its own: a still picture where scripts do not run."""
         sources = [
-            "data:image/png;base64," + base64.b64encode(png).decode() for png in self.pictures
+            "data:image/png;base64," + base64.b64encode(_png(picture)).decode()
+            for picture in self.pictures[self.still % 2 :: 2]
         ]
         return _PLAYER.substitute(
             name=self.name,
+            caption=self.caption or self.name,
             alt=html.escape(self.alt),
-            still=sources[self.shown],
-            shown=self.shown,
+            still=sources[self.still // 2],
+            shown=self.still // 2,
             last=len(sources) - 1,
             frames=", ".join(f'"{source}"' for source in sources),
             milliseconds=round(1000 * self.seconds / len(sources)),
         )
+
+    def save(self, path: str | Path) -> None:
+        """Write the animation to a file, as a GIF that starts again when it ends.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to write; a file that is there is replaced.
+        """
+        Path(path).write_bytes(gif(self.pictures, self.seconds))
+
+
+def animate(
+    fig: Figure,
+    name: str,
+    alt: str,
+    update: Update,
+    frames: int,
+    seconds: float = 4.0,
+    still: int = -1,
+) -> Animation:
+    """Return a figure as an animation, and leave it as it is in its still frame.
+
+    Parameters
+    ----------
+    fig : Figure
+        The figure, with everything on it that does not move. The axes must not change.
+    name : str
+        What the animation is called: a word that no other one on the page has.
+    alt : str
+        A sentence or two that say what is to be seen.
+    update : callable
+        ``update(i)`` moves the artists to frame i and returns those that move.
+    frames : int
+        How many frames.
+    seconds : float, optional
+        How long the animation takes.
+    still : int, optional
+        Which frame is shown before it plays: by default the last.
+
+    Returns
+    -------
+    Animation
+    """
+    pictures = tuple(indexed(render(fig, update, frames)))
+    for artist in update(still % frames):
+        artist.set_animated(False)
+    return Animation(name, alt, pictures, still % frames, seconds)
 
 
 def save_animation(
@@ -95,47 +148,35 @@ def save_animation(
     update: Update,
     frames: int,
     seconds: float = 4.0,
+    still: int = -1,
 ) -> Animation:
-    """Save an animation as GIF, with a still PNG of its middle and a CSV, and close the figure.
+    """Save an animation as GIF, its still frame as PNG and PDF, its numbers as CSV; close it.
 
     The files go where `save_figure` puts its own. The same input gives the same bytes.
 
     Parameters
     ----------
-    fig : Figure
-        The figure, with everything on it that does not move.
-    name : str
-        The name of the files, without ending.
+    fig, name, alt, update, frames, seconds, still
+        As for `animate`; the name is that of the files, without ending.
     data : mapping of str to array_like
         The plotted numbers: columns of one shape, with units in their names.
-    alt : str
-        A sentence or two that say what is to be seen.
-    update : callable
-        ``update(i)`` moves the artists to frame i and returns those that move.
-    frames : int
-        How many frames.
-    seconds : float, optional
-        How long the animation takes.
 
     Returns
     -------
     Animation
-        It plays every second frame.
 
     Raises
     ------
     ValueError
         If the columns differ in shape.
     """
-    text = csv_text(data)
-    pictures, middle = indexed(render(fig, update, frames)), frames // 4
-    plt.close(fig)
-    shown = tuple(_png(picture) for picture in pictures[::2])
+    csv_text(data)  # before anything is written
+    animation = animate(fig, name, alt, update, frames, seconds, still)
+    save_figure(fig, name, data, alt)
     folder = figures_folder()
-    (folder / f"{name}.gif").write_bytes(gif(pictures, seconds))
-    (folder / f"{name}.png").write_bytes(shown[middle])
-    (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-    return Animation(name, alt, shown, middle, seconds)
+    animation.save(folder / f"{name}.gif")
+    (folder / f"{name}.png").write_bytes(_png(animation.pictures[animation.still]))
+    return replace(animation, caption=f"{name}: .gif, .png, .pdf, .csv")
 
 
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
@@ -157,6 +198,7 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
     list of Image
         In RGB.
     """
+    before: Any = fig.canvas
     canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
     for artist in update(0):
         artist.set_animated(True)
@@ -170,6 +212,7 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
                 artist.do_3d_projection()
             artist.axes.draw_artist(artist)
         drawn.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    fig.set_canvas(before)
     return drawn
 
 

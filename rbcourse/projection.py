@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, as_array, as_finite
+from rbcourse._numerics import Array, as_array, as_finite, as_tolerance
 
 
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -23,7 +23,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Raises
     ------
     ValueError
-        If `M` is not an array of real numbers of that shape.
+        If `M` is not an array of real numbers of that shape, or `atol` is negative or NaN.
 
     See Also
     --------
@@ -38,7 +38,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     >>> is_so([[[0, -1], [1, 0]], [[0, 1], [1, 0]]])
     array([ True, False])
     """
-    M = as_array("M", M, "n", "n")
+    M, atol = as_array("M", M, "n", "n"), as_tolerance("atol", atol)
     with np.errstate(over="ignore", invalid="ignore"):
         defect = np.abs(np.swapaxes(M, -1, -2) @ M - np.eye(M.shape[-1])).max(axis=(-2, -1))
         return ((defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol))[()]
@@ -61,7 +61,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Raises
     ------
     ValueError
-        If `A` is not an array of real numbers of that shape, n ≥ 1.
+        If `A` is not an array of real numbers of that shape, n ≥ 1, or `atol` is negative or NaN.
 
     See Also
     --------
@@ -76,7 +76,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     >>> bool(is_se([[0, -1, 5], [1, 0, 7], [0, 0, 1]]))
     True
     """
-    A = _pose_shaped(as_array("A", A, "n+1", "n+1"), "A")
+    A, atol = _pose_shaped(as_array("A", A, "n+1", "n+1"), "A"), as_tolerance("atol", atol)
     with np.errstate(invalid="ignore"):
         last_row = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1]).max(axis=-1) <= atol
     translation = np.isfinite(A[..., :-1, -1]).all(axis=-1)

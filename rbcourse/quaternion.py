@@ -3,7 +3,17 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import EPS, Array, as_array, as_finite, as_time, check_broadcast, sinc
+from rbcourse._numerics import (
+    EPS,
+    Array,
+    as_array,
+    as_finite,
+    as_time,
+    as_tolerance,
+    check_broadcast,
+    first_index,
+    sinc,
+)
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -25,10 +35,11 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Raises
     ------
     ValueError
-        If `q` is not an array of real numbers of that shape.
+        If `q` is not an array of real numbers of that shape, or `atol` is negative or NaN.
 
     See Also
     --------
+    project_quaternion : The nearest unit quaternion of what fails.
     is_so : The same question for rotation matrices.
 
     References
@@ -40,6 +51,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     >>> is_unit_quaternion([[0.6, 0, 0.8, 0], [1, 1, 0, 0]])
     array([ True, False])
     """
+    atol = as_tolerance("atol", atol)
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.linalg.norm(as_array("q", q, 4), axis=-1)
         return (np.abs(norm - 1) <= atol)[()]
@@ -141,63 +153,63 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     return quaternion_multiply(quaternion_multiply(q, pure), quaternion_conjugate(q))[..., 1:]
 
 
-def matrix_from_quaternion(q: ArrayLike) -> Array:
-    """Return the rotation matrix R of a unit quaternion; q and −q give the same.
+def project_quaternion(q: ArrayLike) -> Array:
+    """Return the unit quaternion nearest to q: q over its norm.
 
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions; any other norm scales R by its square.
+        Quaternions of any norm but 0.
 
     Returns
     -------
-    ndarray, shape (..., 3, 3)
-        Its columns are the images of the three axes.
+    ndarray, shape (..., 4)
+
+    Raises
+    ------
+    ValueError
+        If `q` is not finite, not of that shape, or zero, the singular set: all unit quaternions are
+        equally near to zero.
+
+    See Also
+    --------
+    project_so : The same for matrices.
+
+    References
+    ----------
+    RR 1.5, RR (6), RR Fig. 2.
+
+    Examples
+    --------
+    >>> project_quaternion([10, 10, 10, 10])
+    array([0.5, 0.5, 0.5, 0.5])
+    """
+    q = as_finite("q", q, 4)
+    largest = np.abs(q).max(axis=-1, keepdims=True)
+    if not largest.all():
+        entry = first_index("q", largest[..., 0] == 0)
+        raise ValueError(f"{entry} is zero: it has no direction, no unit quaternion is nearest")
+    _, exponent = np.frexp(largest)
+    scaled = np.ldexp(q, -exponent)  # so that no square overflows
+    return scaled / _norm(scaled)
+
+
+def canonical_quaternion(q: ArrayLike) -> Array:
+    """Return the one of q and −q with w ≥ 0: one quaternion for each rotation.
+
+    Parameters
+    ----------
+    q : array_like, shape (..., 4)
+        Unit quaternions.
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
 
     Raises
     ------
     ValueError
         If `q` is not finite or not of that shape.
-
-    See Also
-    --------
-    quaternion_from_matrix : The way back.
-
-    References
-    ----------
-    RR 2.2.
-
-    Examples
-    --------
-    >>> matrix_from_quaternion([0, 0, 0, 1])
-    array([[-1.,  0.,  0.],
-           [ 0., -1.,  0.],
-           [ 0.,  0.,  1.]])
-    """
-    axes = rotate_by_quaternion(as_finite("q", q, 4)[..., None, :], np.eye(3))
-    return np.swapaxes(axes, -1, -2)
-
-
-def quaternion_from_matrix(R: ArrayLike) -> Array:
-    """Return the unit quaternion of a rotation matrix, with w ≥ 0.
-
-    The ten products of two components of q are linear in R. They form the matrix 4 q qᵀ; its row
-    with the largest diagonal entry is a multiple of q that never vanishes.
-
-    Parameters
-    ----------
-    R : array_like, shape (..., 3, 3)
-        Rotation matrices; what is none is not repaired (see `project_so`).
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        Unit quaternions (w, x, y, z), accurate to a few eps.
-
-    Raises
-    ------
-    ValueError
-        If `R` is not finite or not of that shape.
 
     Notes
     -----
@@ -211,14 +223,11 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> quaternion_from_matrix([[-1, 0, 0], [0, -1, 0], [0, 0, 1]])
-    array([0., 0., 0., 1.])
+    >>> canonical_quaternion([[-0.6, 0, 0.8, 0], [0, -1, 0, 0]]) + 0.0
+    array([[ 0.6,  0. , -0.8,  0. ],
+           [ 0. ,  1. ,  0. ,  0. ]])
     """
-    four_qq = _four_outer(as_finite("R", R, 3, 3))
-    largest = np.argmax(np.diagonal(four_qq, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(four_qq, largest[..., None, None], axis=-2)[..., 0, :]
-    q = row / _norm(row)
-    w, v = _split(q)
+    w, v = _split(as_finite("q", q, 4))
     half_turn = np.abs(w) < 4 * EPS
     size = np.abs(v)
     first = np.argmax(size > size.max(axis=-1, keepdims=True) - 1e-8, axis=-1)[..., None]
@@ -276,21 +285,56 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     return weight0 * q0 + weight1 * q1
 
 
+def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
+    """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
+
+    The other way round on the great circle of `slerp`: where that one turns by the angle a about
+    an axis, this one turns by 2π − a about the opposite axis. It ends at the other of q1 and −q1.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape (..., 4)
+        Unit quaternions of two different rotations.
+    t : array_like
+        Times in [0, 1], of any shape.
+
+    Returns
+    -------
+    ndarray, shape t.shape + (..., 4)
+        Unit quaternions, at constant angular speed.
+
+    Raises
+    ------
+    ValueError
+        As for `slerp`; and if q0 and q1 are the same rotation to 4 eps, the singular set: the long
+        way is then a full turn about any axis. Near it the axis is accurate to eps over ‖q1 − q0‖.
+
+    References
+    ----------
+    BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
+
+    Examples
+    --------
+    >>> slerp_long([1, 0, 0, 0], [0.5**0.5, 0, 0, 0.5**0.5], [0, 2 / 3, 1]).round(3) + 0.0
+    array([[ 1.   ,  0.   ,  0.   ,  0.   ],
+           [ 0.   ,  0.   ,  0.   , -1.   ],
+           [-0.707,  0.   ,  0.   , -0.707]])
+    """
+    q0, q1 = as_finite("q0", q0, 4), as_finite("q1", q1, 4)
+    u = as_time(t, len(check_broadcast(q0=(q0, 1), q1=(q1, 1))) + 1)
+    back = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1) - q0
+    size = _norm(back)
+    if (size < 4 * EPS).any():
+        entry = first_index("q1", size[..., 0] < 4 * EPS)
+        raise ValueError(f"{entry} is the same rotation as q0: the long way round has no axis")
+    angle = 2 * np.pi - 4 * np.arctan2(size, _norm(back + 2 * q0))
+    side = np.sum(back * q0, axis=-1, keepdims=True) * q0 - back
+    return np.cos(u * angle / 2) * q0 + np.sin(u * angle / 2) * side / _norm(side)
+
+
 def _norm(q: Array) -> Array:
     return np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def _split(q: Array) -> tuple[Array, Array]:
     return q[..., :1], q[..., 1:]
-
-
-def _four_outer(R: Array) -> Array:
-    """Return 4 q qᵀ, shape (..., 4, 4), for the quaternion q of R."""
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(R, (-2, -1), (0, 1))
-    rows = [
-        [1 + a + e + i, h - f, c - g, d - b],
-        [h - f, 1 + a - e - i, b + d, c + g],
-        [c - g, b + d, 1 - a + e - i, f + h],
-        [d - b, c + g, f + h, 1 - a - e + i],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

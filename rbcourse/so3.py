@@ -11,7 +11,7 @@ from rbcourse._numerics import (
     sine_gap_ratio,
     versine_ratio,
 )
-from rbcourse.quaternion import quaternion_from_matrix
+from rbcourse.conversions import quaternion_from_matrix, rotation_vector_from_quaternion
 
 
 def hat_so3(w: ArrayLike) -> Array:
@@ -162,11 +162,7 @@ def log_so3(R: ArrayLike) -> Array:
     >>> log_so3([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     array([0.        , 0.        , 1.57079633])
     """
-    q = quaternion_from_matrix(as_finite("R", R, 3, 3))
-    w, v = q[..., :1], q[..., 1:]
-    sine = np.linalg.norm(v, axis=-1, keepdims=True)
-    turning = sine > 0
-    return v * np.where(turning, 2 * np.arctan2(sine, w) / np.where(turning, sine, 1.0), 2.0)
+    return rotation_vector_from_quaternion(quaternion_from_matrix(R))
 
 
 def right_jacobian_so3(w: ArrayLike) -> Array:

@@ -1,0 +1,363 @@
+"""A rotation by other numbers: quaternions, matrices, rotation vectors, ZYX angles."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import EPS, Array, as_finite, sinc
+from rbcourse.quaternion import canonical_quaternion
+
+
+def matrix_from_quaternion(q: ArrayLike) -> Array:
+    """Return the rotation matrix R of a unit quaternion; q and −q give the same.
+
+    Parameters
+    ----------
+    q : array_like, shape (..., 4)
+        Unit quaternions; any other norm scales R by its square.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Its columns are the images of the three axes.
+
+    Raises
+    ------
+    ValueError
+        If `q` is not finite or not of that shape.
+
+    See Also
+    --------
+    quaternion_from_matrix : The way back.
+
+    References
+    ----------
+    RR 2.2.
+
+    Examples
+    --------
+    >>> matrix_from_quaternion([0, 0, 0, 1])
+    array([[-1.,  0.,  0.],
+           [ 0., -1.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    w, x, y, z = np.moveaxis(as_finite("q", q, 4), -1, 0)
+    R = np.empty((*w.shape, 3, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = (
+        w * w + x * x - y * y - z * z,
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+    )
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = (
+        2 * (x * y + w * z),
+        w * w - x * x + y * y - z * z,
+        2 * (y * z - w * x),
+    )
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = (
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        w * w - x * x - y * y + z * z,
+    )
+    return R
+
+
+def quaternion_from_matrix(R: ArrayLike) -> Array:
+    """Return the unit quaternion of a rotation matrix, with w ≥ 0.
+
+    The ten products of two components of q are linear in R. They form the matrix 4 q qᵀ; its row
+    with the largest diagonal entry is a multiple of q that never vanishes.
+
+    Parameters
+    ----------
+    R : array_like, shape (..., 3, 3)
+        Rotation matrices; what is none is not repaired (see `project_so`).
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        Unit quaternions (w, x, y, z), accurate to a few eps.
+
+    Raises
+    ------
+    ValueError
+        If `R` is not finite or not of that shape.
+
+    Notes
+    -----
+    Singular set: half-turns, where `canonical_quaternion` says which of q and −q is returned.
+
+    References
+    ----------
+    BK Remark 7.
+
+    Examples
+    --------
+    >>> quaternion_from_matrix([[-1, 0, 0], [0, -1, 0], [0, 0, 1]])
+    array([0., 0., 0., 1.])
+    """
+    four_qq = _four_outer(as_finite("R", R, 3, 3))
+    largest = np.argmax(np.diagonal(four_qq, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(four_qq, largest[..., None, None], axis=-2)[..., 0, :]
+    return canonical_quaternion(row / np.linalg.norm(row, axis=-1, keepdims=True))
+
+
+def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
+    """Return the quaternion of the rotation by ‖w‖ about w: (cos a/2, sin(a/2) w/a), a = ‖w‖.
+
+    Parameters
+    ----------
+    w : array_like, shape (..., 3)
+        Rotation vectors, in rad, of any length: one full turn gives (−1, 0, 0, 0), two give
+        (1, 0, 0, 0).
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        Unit quaternions.
+
+    Raises
+    ------
+    ValueError
+        If `w` is not finite or not of that shape.
+
+    See Also
+    --------
+    exp_so3 : The same in matrices.
+
+    References
+    ----------
+    BK 2.5, RR 2.2.
+
+    Examples
+    --------
+    >>> quaternion_from_rotation_vector([[0, 0, np.pi], [0, 0, 2 * np.pi]]).round(12) + 0.0
+    array([[ 0.,  0.,  0.,  1.],
+           [-1.,  0.,  0.,  0.]])
+    """
+    w = as_finite("w", w, 3)
+    half = np.linalg.norm(w, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), sinc(half) / 2 * w], axis=-1)
+
+
+def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
+    """Return the shortest rotation vector of a unit quaternion; q and −q give the same.
+
+    Parameters
+    ----------
+    q : array_like, shape (..., 4)
+        Unit quaternions.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps.
+
+    Raises
+    ------
+    ValueError
+        If `q` is not finite or not of that shape.
+
+    See Also
+    --------
+    log_so3 : The same from matrices.
+
+    Notes
+    -----
+    Singular set: half-turns, where `canonical_quaternion` chooses the axis.
+
+    References
+    ----------
+    BK 2.5, RR 2.2.
+
+    Examples
+    --------
+    >>> rotation_vector_from_quaternion([-(0.5**0.5), 0, 0, -(0.5**0.5)]) + 0.0
+    array([0.        , 0.        , 1.57079633])
+    """
+    q = canonical_quaternion(q)
+    w, v = q[..., :1], q[..., 1:]
+    sine = np.linalg.norm(v, axis=-1, keepdims=True)
+    turning = sine > 0
+    return v * np.where(turning, 2 * np.arctan2(sine, w) / np.where(turning, sine, 1.0), 2.0)
+
+
+def matrix_from_zyx(angles: ArrayLike) -> Array:
+    """Return R_z(α) R_y(β) R_x(γ): yaw, pitch and roll.
+
+    Read from the left, each turn is about an axis of the *body*: first z, then the new y, then
+    the newest x. Read from the right, each is about a *fixed* axis: first x, then y, then z.
+
+    Parameters
+    ----------
+    angles : array_like, shape (..., 3)
+        (α, β, γ), in rad, of any size.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices.
+
+    Raises
+    ------
+    ValueError
+        If `angles` is not finite or not of that shape.
+
+    See Also
+    --------
+    zyx_from_matrix : The way back.
+
+    References
+    ----------
+    RR 2.1, RR (7), RR (8).
+
+    Examples
+    --------
+    >>> matrix_from_zyx([np.pi / 2, 0, 0]).round(12) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    alpha, beta, gamma = np.moveaxis(as_finite("angles", angles, 3), -1, 0)
+    return _turn_about(2, alpha) @ _turn_about(1, beta) @ _turn_about(0, gamma)
+
+
+def zyx_from_matrix(R: ArrayLike) -> Array:
+    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ).
+
+    Parameters
+    ----------
+    R : array_like, shape (..., 3, 3)
+        Rotation matrices; what is none is not repaired (see `project_so`).
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Angles in rad, as `zyx_from_quaternion` returns them, gimbal lock included.
+
+    Raises
+    ------
+    ValueError
+        If `R` is not finite or not of that shape.
+
+    References
+    ----------
+    RR 2.1, RR (7), RR (8).
+
+    Examples
+    --------
+    >>> zyx_from_matrix(matrix_from_zyx([0.1, 0.2, 0.3])).round(12)
+    array([0.1, 0.2, 0.3])
+    """
+    return zyx_from_quaternion(quaternion_from_matrix(R))
+
+
+def quaternion_from_zyx(angles: ArrayLike) -> Array:
+    """Return the quaternion q_z(α) q_y(β) q_x(γ): yaw, pitch and roll.
+
+    Parameters
+    ----------
+    angles : array_like, shape (..., 3)
+        (α, β, γ), in rad, of any size.
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        Unit quaternions.
+
+    Raises
+    ------
+    ValueError
+        If `angles` is not finite or not of that shape.
+
+    See Also
+    --------
+    matrix_from_zyx : The same in matrices, and how to read it.
+
+    References
+    ----------
+    RR 2.2, where α turns about x and γ about z.
+
+    Examples
+    --------
+    >>> quaternion_from_zyx([np.pi, 0, 0]).round(12)
+    array([0., 0., 0., 1.])
+    """
+    half = as_finite("angles", angles, 3) / 2
+    (a, b, c), (sa, sb, sc) = np.moveaxis(np.cos(half), -1, 0), np.moveaxis(np.sin(half), -1, 0)
+    w, x = a * b * c + sa * sb * sc, a * b * sc - sa * sb * c
+    y, z = a * sb * c + sa * b * sc, sa * b * c - a * sb * sc
+    return np.stack([w, x, y, z], axis=-1)
+
+
+def zyx_from_quaternion(q: ArrayLike) -> Array:
+    """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
+
+    Of the half angles only two combinations enter: w + y and z − x are multiples of the cosine and
+    the sine of (α − γ)/2, w − y and z + x of those of (α + γ)/2, and β weighs the two.
+
+    Parameters
+    ----------
+    q : array_like, shape (..., 4)
+        Unit quaternions.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Angles in rad: α and γ in (−π, π], β in [−π/2, π/2]. They give q back to a few eps.
+
+    Raises
+    ------
+    ValueError
+        If `q` is not finite or not of that shape.
+
+    Notes
+    -----
+    Singular set: gimbal lock, β = ±π/2. The axes of α and γ coincide, and only α − γ, or α + γ for
+    β = −π/2, is determined. There γ = 0 is returned; what is nearer than 16 eps to it counts as
+    locked. Close to it α and γ are accurate to eps over the distance, their combination to eps.
+
+    References
+    ----------
+    RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE 17(11),
+    2022.
+
+    Examples
+    --------
+    >>> zyx_from_quaternion([0.5, -0.5, 0.5, 0.5]).round(4)  # locked: 90° about z, 90° about y
+    array([1.5708, 1.5708, 0.    ])
+    """
+    w, x, y, z = np.moveaxis(as_finite("q", q, 4), -1, 0)
+    minus, plus = 2 * np.arctan2(z - x, w + y), 2 * np.arctan2(z + x, w - y)
+    up, down = np.hypot(w + y, z - x), np.hypot(w - y, z + x)
+    lock_up, lock_down = down < 16 * EPS * up, up < 16 * EPS * down
+    plus, minus = np.where(lock_up, minus, plus), np.where(lock_down, plus, minus)
+    beta = 2 * np.arctan2(up, down) - np.pi / 2
+    return np.stack([_wrapped((plus + minus) / 2), beta, _wrapped((plus - minus) / 2)], axis=-1)
+
+
+def _wrapped(angle: Array) -> Array:
+    """Return angles between −2π and 2π as they lie in (−π, π]; −π to rounding becomes π."""
+    angle = np.where(angle > np.pi, angle - 2 * np.pi, angle)
+    return np.where(angle < -np.pi * (1 - 4 * EPS), angle + 2 * np.pi, angle)
+
+
+def _turn_about(axis: int, angle: Array) -> Array:
+    """Return R_x, R_y or R_z, shape (..., 3, 3): the matrices of RR (7)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.zeros((*angle.shape, 3, 3))
+    R[..., axis, axis] = 1
+    R[..., i, i] = R[..., j, j] = np.cos(angle)
+    R[..., j, i] = np.sin(angle)
+    R[..., i, j] = -R[..., j, i]
+    return R
+
+
+def _four_outer(R: Array) -> Array:
+    """Return 4 q qᵀ, shape (..., 4, 4), for the quaternion q of R."""
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(R, (-2, -1), (0, 1))
+    rows = [
+        [1 + a + e + i, h - f, c - g, d - b],
+        [h - f, 1 + a - e - i, b + d, c + g],
+        [c - g, b + d, 1 - a + e - i, f + h],
+        [d - b, c + g, f + h, 1 - a - e + i],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

@@ -1,0 +1,304 @@
+"""Random rotations: uniform ones, and the naive ones that are not.
+
+Uniform means Haar's measure: a set of rotations is as likely as the same set turned by any other
+rotation, from the left or from the right. Three uniform numbers are enough for one rotation.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array, Rng, as_generator, as_size, as_within_unit
+from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
+
+_BLOCK = 8192  # draws whose arrays fit into the cache together
+
+
+def arvo_rotation(x: ArrayLike) -> Array:
+    """Return Arvo's rotation of three numbers; of three uniform ones it is uniform.
+
+    A random turn about z, then a half-turn about a random axis V: −M B with M = I − 2 V Vᵀ, the
+    reflection across V, and B = R_z(θ).
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 3)
+        Numbers x₁, x₂, z in [0, 1]: θ = 2π x₁, and V = (√z cos 2π x₂, √z sin 2π x₂, √(1 − z)).
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices.
+
+    Raises
+    ------
+    ValueError
+        If `x` is not of that shape, or a number lies outside [0, 1].
+
+    See Also
+    --------
+    sample_rotation : Many of them, faster.
+
+    Notes
+    -----
+    M B, as printed, has the determinant −1 always. Its first column negated is uniform too: it is
+    −M B diag(1, −1, −1), a uniform rotation times a fixed one.
+
+    References
+    ----------
+    RR 2.1, RR (9), RR (10), RR (11); J. Arvo, Fast random rotation matrices, Graphics Gems III,
+    1992.
+
+    Examples
+    --------
+    >>> arvo_rotation([0, 0, 0])  # V = z, no turn before
+    array([[-1.,  0.,  0.],
+           [ 0., -1.,  0.],
+           [ 0.,  0.,  1.]])
+    """
+    x1, x2, z = np.moveaxis(as_within_unit("x", x, 3), -1, 0)
+    theta, phi = 2 * np.pi * x1, 2 * np.pi * x2
+    V = np.stack([np.cos(phi) * np.sqrt(z), np.sin(phi) * np.sqrt(z), np.sqrt(1 - z)], axis=-1)
+    M = np.eye(3) - 2 * V[..., :, None] * V[..., None, :]
+    B = matrix_from_zyx(np.stack([theta, 0 * theta, 0 * theta], axis=-1))
+    return -M @ B
+
+
+def shoemake_quaternion(x: ArrayLike) -> Array:
+    """Return Shoemake's quaternion of three numbers; of three uniform ones it is uniform.
+
+    Two circles, in the planes (w, z) and (x, y), whose squared radii s and 1 − s add to 1.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., 3)
+        Numbers s, x₁, x₂ in [0, 1]; the angles on the circles are θ₁ = 2π x₁ and θ₂ = 2π x₂.
+
+    Returns
+    -------
+    ndarray, shape (..., 4)
+        Unit quaternions (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂).
+
+    Raises
+    ------
+    ValueError
+        If `x` is not of that shape, or a number lies outside [0, 1].
+
+    See Also
+    --------
+    sample_quaternion : Many of them, faster.
+
+    References
+    ----------
+    RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid body path
+    planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
+
+    Examples
+    --------
+    >>> shoemake_quaternion([0.36, 0, 0])
+    array([0.6, 0. , 0.8, 0. ])
+    """
+    s, x1, x2 = np.moveaxis(as_within_unit("x", x, 3), -1, 0)
+    theta1, theta2 = 2 * np.pi * x1, 2 * np.pi * x2
+    sigma1, sigma2 = np.sqrt(1 - s), np.sqrt(s)
+    w, z = np.cos(theta2) * sigma2, np.sin(theta2) * sigma2
+    return np.stack([w, np.sin(theta1) * sigma1, np.cos(theta1) * sigma1, z], axis=-1)
+
+
+def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
+    """Return uniformly random rotation matrices.
+
+    Parameters
+    ----------
+    size : int or tuple of int, optional
+        How many; by default one, without a batch axis.
+    rng : Generator, int or None, optional
+        Where the random numbers come from: a generator, a seed, or fresh ones.
+
+    Returns
+    -------
+    ndarray, shape size + (3, 3)
+        To a few eps ``arvo_rotation(rng.random(size + (3,)))``, on every processor.
+
+    Raises
+    ------
+    ValueError
+        If `size` is no shape, or `rng` none of these.
+
+    See Also
+    --------
+    sample_rotation_naive : What not to do.
+    uniformity_tests : How to tell.
+
+    References
+    ----------
+    RR 2.1, RR (9), RR (10), RR (11).
+
+    Examples
+    --------
+    >>> R = sample_rotation(1000, rng=1)
+    >>> R.shape, bool(abs(R.mean(axis=0)).max() < 0.1)
+    ((1000, 3, 3), True)
+    """
+    return _in_blocks(_arvo, (3, 3), size, rng)
+
+
+def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
+    """Return uniformly random unit quaternions.
+
+    Parameters
+    ----------
+    size : int or tuple of int, optional
+        How many; by default one, without a batch axis.
+    rng : Generator, int or None, optional
+        Where the random numbers come from: a generator, a seed, or fresh ones.
+
+    Returns
+    -------
+    ndarray, shape size + (4,)
+        Uniform on the whole sphere: q and −q are equally likely. To a few eps
+        ``shoemake_quaternion(rng.random(size + (3,)))``, on every processor.
+
+    Raises
+    ------
+    ValueError
+        If `size` is no shape, or `rng` none of these.
+
+    See Also
+    --------
+    sample_quaternion_naive : What not to do.
+
+    References
+    ----------
+    RR 2.2, RR (13).
+
+    Examples
+    --------
+    >>> q = sample_quaternion((2, 500), rng=1)
+    >>> q.shape, bool(abs(q.mean(axis=(0, 1))).max() < 0.1)
+    ((2, 500, 4), True)
+    """
+    return _in_blocks(_shoemake, (4,), size, rng)
+
+
+def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
+    """Return rotation matrices of three uniform angles about z, y and x: not uniform.
+
+    Parameters
+    ----------
+    size : int or tuple of int, optional
+        How many; by default one, without a batch axis.
+    rng : Generator, int or None, optional
+        Where the random numbers come from: a generator, a seed, or fresh ones.
+
+    Returns
+    -------
+    ndarray, shape size + (3, 3)
+        R_z(α) R_y(β) R_x(γ), each angle uniform on [0, 2π). E tr² is 7/8; for uniform rotations
+        it is 1.
+
+    Raises
+    ------
+    ValueError
+        If `size` is no shape, or `rng` none of these.
+
+    See Also
+    --------
+    sample_rotation : The uniform one.
+
+    References
+    ----------
+    RR 2.1, RR (7), RR (8).
+
+    Examples
+    --------
+    >>> sample_rotation_naive(5, rng=1).shape
+    (5, 3, 3)
+    """
+    return matrix_from_zyx(_three_angles(size, rng))
+
+
+def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
+    """Return unit quaternions of three uniform angles about x, y and z: not uniform.
+
+    Parameters
+    ----------
+    size : int or tuple of int, optional
+        How many; by default one, without a batch axis.
+    rng : Generator, int or None, optional
+        Where the random numbers come from: a generator, a seed, or fresh ones.
+
+    Returns
+    -------
+    ndarray, shape size + (4,)
+        q_z(γ) q_y(β) q_x(α), each angle uniform on [0, 2π). The first angle turns about x; in
+        `sample_rotation_naive` it turns about z. The law of the rotations is the same.
+
+    Raises
+    ------
+    ValueError
+        If `size` is no shape, or `rng` none of these.
+
+    See Also
+    --------
+    sample_quaternion : The uniform one.
+
+    References
+    ----------
+    RR 2.2, RR (12).
+
+    Examples
+    --------
+    >>> sample_quaternion_naive(rng=1).shape
+    (4,)
+    """
+    return quaternion_from_zyx(_three_angles(size, rng)[..., ::-1])
+
+
+def _three_angles(size: int | Sequence[int] | None, rng: Rng) -> Array:
+    return 2 * np.pi * as_generator(rng).random((*as_size(size), 3))
+
+
+def _in_blocks(
+    kernel: Callable[[Array], Array],
+    core: tuple[int, ...],
+    size: int | Sequence[int] | None,
+    rng: Rng,
+) -> Array:
+    """Return a kernel's draws: it takes three uniform numbers, shape (3, m), to core + (m,)."""
+    shape, generator = as_size(size), as_generator(rng)
+    draws = np.empty((math.prod(shape), *core))
+    for start in range(0, len(draws), _BLOCK):
+        block = draws[start : start + _BLOCK]
+        x = generator.random((len(block), 3)).T
+        block[...] = np.moveaxis(kernel(np.ascontiguousarray(x)), -1, 0)
+    return draws.reshape(*shape, *core)
+
+
+def _arvo(x: Array) -> Array:
+    """Return `arvo_rotation`, multiplied out, with the angles φ and ψ = φ − θ."""
+    (c, cos_psi), (s, sin_psi) = _cos_sin(np.stack([x[1], x[1] - x[0]]))
+    height = 2 * x[2] - 1
+    radius, hc, hs = np.sqrt(1 - height * height), height * c, height * s
+    entries = [
+        *(hc * cos_psi - s * sin_psi, hc * sin_psi + s * cos_psi, radius * c),
+        *(hs * cos_psi + c * sin_psi, hs * sin_psi - c * cos_psi, radius * s),
+        *(radius * cos_psi, radius * sin_psi, -height),
+    ]
+    return np.stack(entries).reshape(3, 3, -1)
+
+
+def _shoemake(x: Array) -> Array:
+    """Return `shoemake_quaternion`."""
+    (c1, c2), (s1, s2) = _cos_sin(x[1:])
+    sigma1, sigma2 = np.sqrt(1 - x[0]), np.sqrt(x[0])
+    return np.stack([c2 * sigma2, s1 * sigma1, c1 * sigma1, s2 * sigma2])
+
+
+def _cos_sin(turns: Array) -> tuple[Array, Array]:
+    """Return cosine and sine from the tangent of half the angle, which NumPy computes faster."""
+    tangent = np.tan(np.pi * turns)
+    versed = 2 / (1 + tangent * tangent)
+    return versed - 1, tangent * versed
