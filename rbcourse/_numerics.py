@@ -15,8 +15,9 @@ EPS = float(np.finfo(np.float64).eps)
 def as_array(name: str, value: ArrayLike, *core: int | str) -> Array:
     """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
 
-    A letter in `core` stands for any size from 1 up, the same at each of its places:
-    ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are batch axes.
+    A letter in `core` stands for any size from 1 up, the same at each of its places, and "n+1" for
+    any from 2 up: ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes
+    are batch axes.
 
     Raises
     ------
@@ -51,6 +52,23 @@ def as_finite(name: str, value: ArrayLike, *core: int | str) -> Array:
     array = as_array(name, value, *core)
     _check_all(np.isfinite(array), name, array, "a finite number")
     return array
+
+
+def as_unit(name: str, value: ArrayLike, size: int) -> Array:
+    """Return `as_finite` of vectors, each over its norm.
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and the message names the first vector that is zero.
+    """
+    array = as_finite(name, value, size)
+    largest = np.abs(array).max(axis=-1, keepdims=True)
+    if not largest.all():
+        entry = first_index(name, largest[..., 0] == 0)
+        raise ValueError(f"{entry} is zero: it has no direction")
+    scaled = np.ldexp(array, -np.frexp(largest)[1])  # so that no square overflows
+    return scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
 
 
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
@@ -113,7 +131,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
     return shape
 
 
-def as_generator(rng: Rng) -> np.random.Generator:
+def as_generator(rng: Rng) -> "np.random.Generator":
     """Return a generator of random numbers, or raise a ValueError if `rng` makes none."""
     try:
         return np.random.default_rng(rng)
@@ -146,7 +164,7 @@ def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:
     tail = shape[len(shape) - len(core) :]
     letters = {c: size for c, size in zip(core, tail, strict=True) if isinstance(c, str)}
     wanted = [letters[c] if isinstance(c, str) else c for c in core]
-    return list(tail) == wanted and 0 not in letters.values()
+    return list(tail) == wanted and all(size > ("+1" in c) for c, size in letters.items())
 
 
 def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:

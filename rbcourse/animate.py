@@ -133,7 +133,16 @@ def animate(
     Returns
     -------
     Animation
+
+    Raises
+    ------
+    ValueError
+        If the name is no word, or more than 50 frames a second are asked for, or none.
     """
+    if not name.isidentifier():
+        raise ValueError(f"name: a word of letters, digits and _ wanted, got {name!r}")
+    if not 0 < frames <= 50 * seconds:
+        raise ValueError(f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s")
     pictures = tuple(indexed(render(fig, update, frames)))
     for artist in update(still % frames):
         artist.set_animated(False)
@@ -168,7 +177,7 @@ def save_animation(
     Raises
     ------
     ValueError
-        If the columns differ in shape.
+        If the columns differ in shape, and as for `animate`.
     """
     csv_text(data)  # before anything is written
     animation = animate(fig, name, alt, update, frames, seconds, still)
@@ -219,7 +228,8 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     """Return pictures with one palette: the 256 commonest colours of eight of them.
 
-    Pillow looks colours up to 6 bits a channel, so of those that agree in them one is enough.
+    Pillow looks colours up by the first 6 bits of each channel, as if the others were 0. Of those
+    that agree in them the commonest stands for all.
     """
     width, height = pictures[0].size
     some = Image.new("RGB", (width, 8 * height))
@@ -228,18 +238,23 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     counted: Any = some.getcolors(some.width * some.height)
     distinct: dict[tuple[int, ...], tuple[int, ...]] = {}
     for _, colour in sorted(counted, reverse=True):
-        distinct.setdefault(tuple(level // 4 for level in colour), colour)
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([level for colour in list(distinct.values())[:256] for level in colour])
-    return [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+        distinct.setdefault(tuple(level // 4 * 4 for level in colour), colour)
+    looked_up = Image.new("P", (1, 1))
+    looked_up.putpalette([level for key in list(distinct)[:256] for level in key])
+    shown = [level for colour in list(distinct.values())[:256] for level in colour]
+    found = [picture.quantize(palette=looked_up, dither=Image.Dither.NONE) for picture in pictures]
+    for picture in found:
+        picture.putpalette(shown)
+    return found
 
 
 def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return pictures as an endless GIF that takes so many seconds."""
+    """Return pictures as an endless GIF that takes so many seconds, in its steps of 10 ms."""
     content = io.BytesIO()
-    each = round(1000 * seconds / len(pictures))
+    ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)
+    durations = [int(10 * step) for step in np.diff(ends)]
     first, *others = pictures
-    first.save(content, "gif", save_all=True, append_images=others, duration=each, loop=0)
+    first.save(content, "gif", save_all=True, append_images=others, duration=durations, loop=0)
     return content.getvalue()
 
 

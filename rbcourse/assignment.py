@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, Rng, as_array, as_generator, as_tolerance
+from rbcourse._numerics import Array, Rng, as_finite, as_generator, as_tolerance, as_unit
 from rbcourse.animate import Animation, animate
 from rbcourse.conversions import rotation_vector_from_quaternion
 from rbcourse.projection import is_se, is_so, project_se, project_so
@@ -186,7 +186,7 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     >>> correct_quaternion([2, 2, 0, 0])
     array([0.70710678, 0.70710678, 0.        , 0.        ])
     """
-    return np.array(v) if check_quaternion(v, epsilon) else project_quaternion(_single("v", v, 4))
+    return np.array(v) if check_quaternion(v, epsilon) else as_unit("v", _single("v", v, 4), 4)
 
 
 def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
@@ -389,7 +389,7 @@ def _passes(test: Callable[..., Any], x: ArrayLike, epsilon: float) -> bool:
 
 
 def _single(name: str, x: ArrayLike, *core: int | str) -> Array:
-    array = as_array(name, x, *core)
+    array = as_finite(name, x, *core)
     if array.ndim > len(core):
         wanted = ", ".join(map(str, core))
         raise ValueError(f"{name}: shape ({wanted}) wanted, got {array.shape}")

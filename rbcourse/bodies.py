@@ -199,7 +199,8 @@ def moving_cubes(
     cubes = [draw_cube(ax, poses[0], side) for ax, poses in zip(axes, motions, strict=True)]
     for ax, name, poses in zip(axes, tables, motions, strict=True):
         set_space(ax, poses[:, :3, 3], side)
-        draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
+        if np.ptp(poses[:, :3, 3], axis=0).any():
+            draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
         ax.set(xlabel="", ylabel="", zlabel="", xticklabels=[], yticklabels=[], zticklabels=[])
         ax.set_title(name)
 
@@ -225,12 +226,14 @@ def describe_moving_cubes(tables: Mapping[str, Table]) -> str:
     """
     (first, table), *others = tables.items()
     t, R = np.asarray(table["t [1]"]), np.swapaxes(_poses(table)[:, :3, :3], -1, -2)
-    said = f"Cubes with a square on one face fly side by side: {', '.join(tables)}."
+    said = f"Cubes with a square on one face move side by side: {', '.join(tables)}."
     for name, other in others:
         apart = np.degrees(np.linalg.norm(log_so3(R @ _poses(other)[:, :3, :3]), axis=-1))
         said += (
             f" The orientations of {first} and {name} differ most at t = {t[apart.argmax()]:.2f}, "
             f"by {apart.max():.0f} degrees."
+            if apart.max() > 1e-6
+            else f" The orientations of {first} and {name} agree at all times."
         )
     return said
 

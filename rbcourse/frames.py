@@ -1,8 +1,10 @@
 """Still figures of frames: artists on axes that the caller owns."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from rbcourse._numerics import Array
@@ -79,6 +81,136 @@ def describe_moving_frame(data: Table) -> str:
         f"frame {{{moving}}}. Its origin is at ({place}) m, the tip of the vector d, and it is "
         f"turned by {turn:.0f} degrees against the fixed one."
     )
+
+
+def draw_turns(axes: Sequence[Any], data: Table) -> list[Any]:
+    """Draw a box that carries a frame in several orientations, each on its own axes.
+
+    Parameters
+    ----------
+    axes : sequence of Axes3D
+        Where to draw.
+    data : mapping of str to array_like, shape (len(axes),)
+        A `pose_table`; the names become titles.
+
+    Returns
+    -------
+    list of artists
+
+    References
+    ----------
+    RR 2.1.
+    """
+    names, R = np.asarray(data["frame"]), _rotations(data)
+    artists: list[Any] = []
+    for ax, name, turned in zip(axes, names, R, strict=True):
+        artists.append(_draw_box(ax, np.zeros(3), turned, np.array([0.8, 0.5, 0.15])))
+        for axis, direction in zip("xyz", turned.T, strict=True):
+            artists.append(
+                ax.quiver(
+                    0,
+                    0,
+                    0,
+                    *(1.2 * direction),
+                    color=COLOURS[axis],
+                    lw=2.5,
+                    arrow_length_ratio=0.15,
+                )
+            )
+            ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
+        ax.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), zlim=(-1.3, 1.3))
+        ax.set_box_aspect((1, 1, 1), zoom=1.4)
+        ax.set_axis_off()
+        ax.view_init(elev=20, azim=-55)
+        ax.set_title(name)
+    return artists
+
+
+def describe_turns(data: Table) -> str:
+    """Return in words what `draw_turns` shows.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like
+        As for `draw_turns`.
+
+    Returns
+    -------
+    str
+    """
+    said = [
+        f"{name}: x {_heading(R[:, 0])}, y {_heading(R[:, 1])}, z {_heading(R[:, 2])}"
+        for name, R in zip(np.asarray(data["frame"]), _rotations(data), strict=True)
+    ]
+    return f"A box with its axes in several orientations. Where they point: {'; '.join(said)}."
+
+
+def draw_angles(axes: Sequence[Axes], data: Table) -> list[Any]:
+    """Draw ZYX angles over time, each motion on its own axes.
+
+    Parameters
+    ----------
+    axes : sequence of Axes
+        Where to draw.
+    data : mapping of str to array_like, shape (times,)
+        The times; then for each motion the columns "NAME α [rad]", "NAME β [rad]" and
+        "NAME γ [rad]".
+
+    Returns
+    -------
+    list of Line2D
+
+    References
+    ----------
+    RR (8).
+    """
+    looks = {"α": (COLOURS["z"], "-"), "β": (COLOURS["y"], "-."), "γ": (COLOURS["x"], "--")}
+    lines = []
+    for ax, name in zip(axes, _motions(data), strict=True):
+        for angle, (colour, dash) in looks.items():
+            degrees = np.degrees(np.asarray(data[f"{name} {angle} [rad]"]))
+            lines += ax.plot(data["t [1]"], degrees, color=colour, ls=dash, label=angle)
+        ax.set(xlabel="time t", title=name, xlim=(0, 1), yticks=[-180, -90, 0, 90, 180])
+    axes[0].set_ylabel("angle (degrees)")
+    axes[0].legend()
+    return lines
+
+
+def describe_angles(data: Table) -> str:
+    """Return in words what `draw_angles` shows.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (times,)
+        As for `draw_angles`.
+
+    Returns
+    -------
+    str
+    """
+    t = np.asarray(data["t [1]"])
+    said = []
+    for name in _motions(data):
+        alpha = np.degrees(np.unwrap(np.asarray(data[f"{name} α [rad]"])))
+        rate = np.abs(np.diff(alpha) / np.diff(t)).max()
+        beta = np.degrees(np.abs(np.asarray(data[f"{name} β [rad]"])).max())
+        said.append(f"{name}: β reaches {beta:.0f} degrees, α changes by up to {rate:.0f} per unit")
+    return f"ZYX angles of steadily turning bodies over time. {'; '.join(said)} of time."
+
+
+def _motions(data: Table) -> list[str]:
+    return [key.removesuffix(" α [rad]") for key in data if key.endswith(" α [rad]")]
+
+
+def _rotations(data: Table) -> Array:
+    entries = [np.asarray(data[f"R{i}{j} [1]"]) for i in (1, 2, 3) for j in (1, 2, 3)]
+    return np.stack(entries, axis=-1).reshape(-1, 3, 3)
+
+
+def _heading(direction: Array) -> str:
+    """Return a direction as the fixed axis that it is nearest to, with its sign."""
+    k = int(np.abs(direction).argmax())
+    return f"along {'−' if direction[k] < 0 else '+'}{'xyz'[k]}"
 
 
 def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:

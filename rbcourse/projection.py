@@ -76,7 +76,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     >>> bool(is_se([[0, -1, 5], [1, 0, 7], [0, 0, 1]]))
     True
     """
-    A, atol = _pose_shaped(as_array("A", A, "n+1", "n+1"), "A"), as_tolerance("atol", atol)
+    A, atol = as_array("A", A, "n+1", "n+1"), as_tolerance("atol", atol)
     with np.errstate(invalid="ignore"):
         last_row = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1]).max(axis=-1) <= atol
     translation = np.isfinite(A[..., :-1, -1]).all(axis=-1)
@@ -182,13 +182,7 @@ def project_se(B: ArrayLike) -> Array:
            [0., 1., 2.],
            [0., 0., 1.]])
     """
-    A = _pose_shaped(as_finite("B", B, "n+1", "n+1"), "B")
+    A = as_finite("B", B, "n+1", "n+1")
     A[..., :-1, :-1] = project_so(A[..., :-1, :-1])
     A[..., -1, :] = np.eye(A.shape[-1])[-1]
-    return A
-
-
-def _pose_shaped(A: Array, name: str) -> Array:
-    if A.shape[-1] < 2:
-        raise ValueError(f"{name}: shape (..., n+1, n+1) with n >= 1 wanted, got {A.shape}")
     return A

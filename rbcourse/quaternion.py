@@ -10,6 +10,7 @@ from rbcourse._numerics import (
     as_finite,
     as_time,
     as_tolerance,
+    as_unit,
     check_broadcast,
     first_index,
     sinc,
@@ -184,14 +185,7 @@ def project_quaternion(q: ArrayLike) -> Array:
     >>> project_quaternion([10, 10, 10, 10])
     array([0.5, 0.5, 0.5, 0.5])
     """
-    q = as_finite("q", q, 4)
-    largest = np.abs(q).max(axis=-1, keepdims=True)
-    if not largest.all():
-        entry = first_index("q", largest[..., 0] == 0)
-        raise ValueError(f"{entry} is zero: it has no direction, no unit quaternion is nearest")
-    _, exponent = np.frexp(largest)
-    scaled = np.ldexp(q, -exponent)  # so that no square overflows
-    return scaled / _norm(scaled)
+    return as_unit("q", q, 4)
 
 
 def canonical_quaternion(q: ArrayLike) -> Array:

@@ -262,39 +262,39 @@ def _three_angles(size: int | Sequence[int] | None, rng: Rng) -> Array:
 
 
 def _in_blocks(
-    kernel: Callable[[Array], Array],
+    kernel: Callable[[Array], list[Array]],
     core: tuple[int, ...],
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return a kernel's draws: it takes three uniform numbers, shape (3, m), to core + (m,)."""
+    """Return draws of a kernel: it takes uniform numbers, shape (3, m), to the entries of m."""
     shape, generator = as_size(size), as_generator(rng)
     draws = np.empty((math.prod(shape), *core))
     for start in range(0, len(draws), _BLOCK):
         block = draws[start : start + _BLOCK]
-        x = generator.random((len(block), 3)).T
-        block[...] = np.moveaxis(kernel(np.ascontiguousarray(x)), -1, 0)
+        x = np.ascontiguousarray(generator.random((len(block), 3)).T)
+        for column, entry in zip(block.reshape(len(block), -1).T, kernel(x), strict=True):
+            column[...] = entry
     return draws.reshape(*shape, *core)
 
 
-def _arvo(x: Array) -> Array:
+def _arvo(x: Array) -> list[Array]:
     """Return `arvo_rotation`, multiplied out, with the angles φ and ψ = φ − θ."""
     (c, cos_psi), (s, sin_psi) = _cos_sin(np.stack([x[1], x[1] - x[0]]))
     height = 2 * x[2] - 1
     radius, hc, hs = np.sqrt(1 - height * height), height * c, height * s
-    entries = [
+    return [
         *(hc * cos_psi - s * sin_psi, hc * sin_psi + s * cos_psi, radius * c),
         *(hs * cos_psi + c * sin_psi, hs * sin_psi - c * cos_psi, radius * s),
         *(radius * cos_psi, radius * sin_psi, -height),
     ]
-    return np.stack(entries).reshape(3, 3, -1)
 
 
-def _shoemake(x: Array) -> Array:
+def _shoemake(x: Array) -> list[Array]:
     """Return `shoemake_quaternion`."""
     (c1, c2), (s1, s2) = _cos_sin(x[1:])
     sigma1, sigma2 = np.sqrt(1 - x[0]), np.sqrt(x[0])
-    return np.stack([c2 * sigma2, s1 * sigma1, c1 * sigma1, s2 * sigma2])
+    return [c2 * sigma2, s1 * sigma1, c1 * sigma1, s2 * sigma2]
 
 
 def _cos_sin(turns: Array) -> tuple[Array, Array]:

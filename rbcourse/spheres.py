@@ -19,6 +19,7 @@ _EYE = np.array(
         np.sin(_ELEVATION),
     ]
 )
+_PALE = "#E9CFDE"  # the colour of what lies behind
 _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
     "angle": ("angle (rad)", (0, np.pi), angle_law),
     "height of e₁": ("height of the image of e₁", (-1, 1), lambda z: (z + 1) / 2),
@@ -74,11 +75,11 @@ def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]
         draw_sphere(ax)
         ax.set_title(name)
         behind = strokes[:, 0] @ _EYE < 0
-        colours = np.where(behind[:, None], "#e3c3b1", COLOURS["projection"])[:, 0]
+        colours = np.where(behind, _PALE, COLOURS["projection"])
         lines = ax.add_collection3d(Line3DCollection(strokes, colors=colours, lw=1.6))
         dots = [
-            ax.plot([], [], [], "o", ms=4, mew=0, color=colour)[0]
-            for colour in ("#e3c3b1", COLOURS["projection"])
+            ax.plot([], [], [], "o", ms=5, mew=0, color=colour)[0]
+            for colour in (_PALE, COLOURS["projection"])
         ]
         panels.append((strokes, behind, colours, lines, dots))
 
@@ -106,12 +107,12 @@ def draw_sphere(ax: Any) -> None:
         color="0.85",
         lw=0.5,
     )
-    ax.plot([0, 0], [0, 0], [1, 1.25], color=COLOURS["z"], lw=2)
-    ax.text(0, 0, 1.32, "z", color=COLOURS["z"], ha="center")
+    ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
+    ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
     ax.view_init(elev=np.degrees(_ELEVATION), azim=np.degrees(_AZIMUTH))
     ax.set_proj_type("ortho")
     ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-    ax.set_box_aspect((1, 1, 1), zoom=1.5)
+    ax.set_box_aspect((1, 1, 1), zoom=1.4)
     ax.set_axis_off()
 
 

@@ -69,3 +69,10 @@ def matrices(n, rng):
             np.diag([1.0] * (n - 1) + [-1])[None],
         ]
     )
+
+
+def quaternions():
+    """Unit quaternions of turns by `ANGLES` about `UNIT_AXES`."""
+    half = ANGLES[:, None, None] / 2
+    parts = np.broadcast_arrays(np.cos(half), np.sin(half) * UNIT_AXES)
+    return np.concatenate([parts[0][..., :1], parts[1]], axis=-1).reshape(-1, 4)

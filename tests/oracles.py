@@ -128,6 +128,32 @@ def quaternion_product(p, q):
     )
 
 
+def between_rotations(p, q):
+    """The distance of unit quaternions p to the nearer of q and −q."""
+    return np.minimum(np.linalg.norm(p - q, axis=-1), np.linalg.norm(p + q, axis=-1))
+
+
+def quaternion(w):
+    """The unit quaternion of a rotation vector: cosine and sine of half its length."""
+    with mp.workdps(DIGITS):
+        x = [mp.mpf(float(c)) for c in w]
+        angle = exact_norm(x)
+        scale = mp.sin(angle / 2) / angle if angle else mp.mpf(1) / 2
+        return np.array([float(c) for c in [mp.cos(angle / 2), *(scale * c for c in x)]])
+
+
+def arc(q0, q1, t):
+    """The point at the share t of the great circle from q0 to q1, not the long way."""
+    with mp.workdps(DIGITS):
+        p, q = ([mp.mpf(float(c)) for c in x] for x in (q0, q1))
+        p, q = ([c / mp.sqrt(mp.fdot(x, x)) for c in x] for x in (p, q))
+        side = [b - mp.fdot(p, q) * a for a, b in zip(p, q, strict=True)]
+        sine = mp.sqrt(mp.fdot(side, side))
+        angle = mp.atan2(sine, mp.fdot(p, q))
+        along, across = mp.cos(t * angle), mp.sin(t * angle) / (sine or 1)
+        return np.array([float(along * a + across * b) for a, b in zip(p, side, strict=True)])
+
+
 def rotation_of_quaternions(q):
     """The matrices (N, 3, 3) of quaternions (4, N), of any length but 0."""
     w, x, y, z = q / np.linalg.norm(q, axis=0)

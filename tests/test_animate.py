@@ -1,5 +1,6 @@
 """Animations: every frame is what a full drawing would be, and players need no network."""
 
+import base64
 import io
 import re
 
@@ -64,10 +65,64 @@ def test_the_gif_shows_each_frame_in_its_colours(tmp_path, monkeypatch):
         assert picture.info["duration"] == 250
 
 
+@pytest.mark.parametrize(("count", "seconds"), [(60, 4), (100, 1.99), (3, 1), (7, 0.5)])
+def test_a_gif_takes_its_time(count, seconds):
+    shades = [Image.new("L", (4, 4), 2 * i) for i in range(count)]
+    with Image.open(io.BytesIO(animate.gif(shades, seconds))) as picture:
+        assert picture.n_frames == count
+        total = 0
+        for i in range(count):
+            picture.seek(i)
+            total += picture.info["duration"]
+    assert total == round(1000 * seconds)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": "a b"}, "name: a word"),
+        ({"name": "1x"}, "name: a word"),
+        ({"frames": 0}, "frames: 1 to 50 a second wanted, got 0"),
+        ({"frames": 51}, "frames: 1 to 50 a second wanted, got 51 in 1.0 s"),
+        ({"seconds": -1.0}, "frames: 1 to 50 a second"),
+        ({"seconds": float("nan")}, "frames: 1 to 50 a second"),
+    ],
+)
+def test_what_would_not_play_is_refused(change, message):
+    fig, update = cube()
+    given = {"name": "cube", "alt": "", "update": update, "frames": 12, "seconds": 1.0} | change
+    with pytest.raises(ValueError, match=message):
+        animate.animate(fig, **given)
+    plt.close(fig)
+
+
+@pytest.mark.parametrize(
+    ("still", "count", "shown"), [(-1, 12, 5), (-1, 11, 5), (5, 12, 2), (0, 12, 0)]
+)
+def test_the_player_starts_with_the_still_frame(still, count, shown):
+    fig, update = cube()
+    before = fig.canvas
+    animation = animate.animate(fig, "cube", "", update, count, still=still)
+    assert fig.canvas is before
+    assert not any(artist.get_animated() for artist in update(0))
+    page = animation._repr_html_()
+    first = re.search(r'src="(data:[^"]*)"', page)[1]
+    frames = re.findall(r'"(data:[^"]*)"', page.split("const frames")[1])
+    assert f'value="{shown}"' in page
+    assert frames[shown] == first
+    still_png = Image.open(io.BytesIO(base64.b64decode(first.split(",")[1]))).convert("RGB")
+    want = animation.pictures[still % count].convert("RGB")
+    assert np.array_equal(still_png, want)
+    plt.close(fig)
+
+
 def test_the_files_are_saved_and_the_figure_closed(tmp_path, monkeypatch):
     animation = save(tmp_path, monkeypatch)
-    assert {file.name for file in tmp_path.iterdir()} == {"cube.gif", "cube.png", "cube.csv"}
-    assert (tmp_path / "cube.png").read_bytes() == animation.pictures[animation.shown]
+    names = {"cube.gif", "cube.png", "cube.pdf", "cube.csv"}
+    assert {file.name for file in tmp_path.iterdir()} == names
+    assert animation.still == 11  # the last
+    still = Image.open(tmp_path / "cube.png").convert("RGB")
+    assert np.array_equal(still, animation.pictures[11].convert("RGB"))
     assert (tmp_path / "cube.csv").read_text().startswith("t [1],x [m],")
     assert plt.get_fignums() == []
     assert repr(animation) == 'cube: a "cube"'
@@ -76,7 +131,7 @@ def test_the_files_are_saved_and_the_figure_closed(tmp_path, monkeypatch):
 def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
     pages = [save(tmp_path / folder, monkeypatch)._repr_html_() for folder in ("a", "b")]
     assert pages[0] == pages[1]
-    for name in ("cube.gif", "cube.png", "cube.csv"):
+    for name in ("cube.gif", "cube.png", "cube.pdf", "cube.csv"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 

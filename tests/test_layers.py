@@ -34,6 +34,7 @@ LEVELS = {
     "comparison": 9,
     "frames": 9,
     "plots": 9,
+    "repairs": 9,
     "spheres": 9,
     "bodies": 10,
     "animate": 10,
@@ -46,8 +47,9 @@ ALLOWED = {
     "assignment": {"matplotlib"},
     "bodies": {"matplotlib", "mpl_toolkits"},
     "comparison": {"matplotlib"},
-    "frames": {"mpl_toolkits"},
+    "frames": {"matplotlib", "mpl_toolkits"},
     "plots": {"matplotlib"},
+    "repairs": {"matplotlib"},
     "spheres": {"matplotlib", "mpl_toolkits"},
     "lessons": {"nbformat", "nbclient"},
 }

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse import frames, plots
+from rbcourse import plots
 
 
 @pytest.fixture
@@ -67,25 +67,6 @@ def test_a_family_is_described_by_its_numbers(family):
     said = plots.describe_family(family)
     assert "for 22 angles" in said
     assert "for the largest angle, 11π/12 rad, it is 0, 0.0439, 0.5, 0.956, 1." in said
-
-
-def test_the_moving_frame_shows_both_frames(ax3d):
-    poses = np.stack([np.eye(4), np.eye(4)])
-    poses[1, :3, :3], poses[1, :3, 3] = rb.exp_so3([0, 0, np.pi / 2]), [1, 2, 3]
-    table = frames.pose_table(["F", "M"], poses)
-    artists = frames.draw_moving_frame(ax3d, table)
-    assert len(artists) == 8  # box, six axes, vector
-    edges = np.array(artists[0]._segments3d)
-    assert edges.shape == (12, 2, 3)
-    assert np.abs(edges.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-15
-    assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-15  # turned by 90°
-    assert np.array_equal(artists[-1]._segments3d[0], [[1, 2, 3], [0, 0, 0]])
-    texts = [text.get_text() for text in ax3d.texts]
-    axes = [f"${axis}_{name}$" for name in "FM" for axis in "xyz"]
-    assert texts == [*axes[:3], "{F}", *axes[3:], "{M}", "d"]
-    said = frames.describe_moving_frame(table)
-    assert "(1, 2, 3) m" in said
-    assert "90 degrees" in said
 
 
 def test_the_chord_shows_its_cuts_and_their_projections(ax):

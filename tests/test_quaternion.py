@@ -11,19 +11,6 @@ RNG = np.random.default_rng(2002)
 RANDOM = (lambda q: q / np.linalg.norm(q, axis=-1, keepdims=True))(RNG.normal(size=(200, 4)))
 
 
-def same_rotation(p, q):
-    """The distance of p to the nearer of q and −q."""
-    return np.minimum(np.linalg.norm(p - q, axis=-1), np.linalg.norm(p + q, axis=-1))
-
-
-def awkward_quaternions():
-    half = awkward.ANGLES[:, None, None] / 2
-    q = np.concatenate(
-        np.broadcast_arrays(np.cos(half), np.sin(half) * awkward.UNIT_AXES), axis=-1
-    )[..., [0, 3, 4, 5]]
-    return q.reshape(-1, 4)
-
-
 @pytest.mark.source("RR 1.2", "RR (3)")
 def test_a_unit_quaternion_has_norm_one():
     q = np.array([[1, 0, 0, 0], [2, 0, 0, 0], [0.5, 0.5, 0.5, -0.5], [1, 1e-4, 0, 0]])
@@ -77,48 +64,9 @@ def test_turning_by_a_product_is_turning_twice():
     assert np.allclose(once, rb.rotate_by_quaternion(p, rb.rotate_by_quaternion(q, x)), atol=1e-14)
 
 
-@pytest.mark.parametrize("q", [RANDOM, awkward_quaternions()], ids=["random", "awkward"])
-def test_matrices_agree_with_scipy(q):
-    want = Rotation.from_quat(q, scalar_first=True).as_matrix()
-    R = rb.matrix_from_quaternion(q)
-    assert np.abs(R - want).max() < 4 * EPS
-    assert np.abs(rb.matrix_from_quaternion(-q) - R).max() == 0
-
-
-@pytest.mark.parametrize("q", [RANDOM, awkward_quaternions()], ids=["random", "awkward"])
-def test_there_and_back(q):
-    back = rb.quaternion_from_matrix(rb.matrix_from_quaternion(q))
-    assert same_rotation(back, q).max() < 4 * EPS
-    assert np.all(back[..., 0] >= 0)
-
-
-def test_half_turns_keep_their_axis_with_every_sign():
-    matrices, axes = awkward.half_turns()
-    q = rb.quaternion_from_matrix(matrices)
-    want = np.concatenate([np.zeros((len(axes), 1)), axes], axis=1)
-    assert same_rotation(q, want).max() < 2 * EPS
-    assert np.all(q[:, 0] == 0)
-    largest = np.argmax(np.abs(axes) > np.abs(axes).max(axis=1, keepdims=True) - 1e-9, axis=1)
-    assert np.all(np.take_along_axis(q[:, 1:], largest[:, None], axis=1) > 0)
-
-
-def test_rounding_chooses_no_sign_at_a_half_turn():
-    R0, R1, n = awkward.rounded_half_turns(np.random.default_rng(7))
-    q = rb.quaternion_from_matrix(np.swapaxes(R0, -1, -2) @ R1)
-    first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
-    assert np.all(q[:, 0] == 0)
-    assert np.all(np.take_along_axis(q[:, 1:], first[:, None], axis=1) > 0)
-    goals = rb.quaternion_multiply(RANDOM[0], np.insert(n, 0, 0, axis=1))
-    assert np.abs(rb.slerp(RANDOM[0], goals, 1) - goals).max() < 4 * EPS
-
-
 def test_any_batch_is_the_stack_of_its_members():
     q, p = RANDOM[:6].reshape(2, 3, 4), RANDOM[6:9]
-    R = rb.matrix_from_quaternion(q)
     for i in np.ndindex(2, 3):
-        assert np.abs(R[i] - rb.matrix_from_quaternion(q[i])).max() < 4 * EPS
-        back = rb.quaternion_from_matrix(R)[i] - rb.quaternion_from_matrix(R[i])
-        assert np.abs(back).max() < 4 * EPS
         single = rb.slerp(q[i], p[i[1]], 0.3)
         assert np.abs(rb.slerp(q, p, [0.3, 0.4])[0][i] - single).max() < 4 * EPS
     assert rb.slerp(q, p, np.zeros((5, 1))).shape == (5, 1, 2, 3, 4)
@@ -164,5 +112,76 @@ def test_bad_arguments_are_named():
         rb.slerp([1, 0, 0, 0], [1, 0, 0], 0)
     with pytest.raises(ValueError, match=r"p \(2,\), q \(3,\)"):
         rb.quaternion_multiply(RANDOM[:2], RANDOM[:3])
-    with pytest.raises(ValueError, match=r"R\[0, 1\] is nan"):
-        rb.quaternion_from_matrix([[1, np.nan, 0], [0, 1, 0], [0, 0, 1]])
+
+
+@pytest.mark.source("RR 1.5", "RR (6)", "RR Fig. 2")
+def test_the_nearest_unit_quaternion_has_the_same_direction():
+    q = RANDOM * 10.0 ** RNG.uniform(-300, 300, size=(200, 1))
+    nearest = rb.project_quaternion(q)
+    assert np.abs(nearest - RANDOM).max() < 4 * EPS
+    assert np.abs(np.linalg.norm(nearest, axis=-1) - 1).max() < 2 * EPS
+    assert np.array_equal(rb.project_quaternion([10, 10, 10, 10]), [0.5] * 4)
+    assert np.array_equal(rb.project_quaternion([5e-324, 0, 0, 0]), [1, 0, 0, 0])
+    largest = np.finfo(float).max
+    assert np.array_equal(rb.project_quaternion([largest] * 4), [0.5] * 4)
+
+
+def test_zero_has_no_nearest_unit_quaternion():
+    with pytest.raises(ValueError, match=r"^q is zero"):
+        rb.project_quaternion([0, 0, 0, 0])
+    with pytest.raises(ValueError, match=r"^q\[1, 0\] is zero"):
+        rb.project_quaternion([[[1, 0, 0, 0]], [[0, 0, 0, 0]]])
+
+
+def test_one_of_q_and_minus_q_is_canonical():
+    for q in (RANDOM, awkward.quaternions(), np.insert(awkward.half_turns()[1], 0, 0, axis=1)):
+        one = rb.canonical_quaternion(q)
+        assert np.array_equal(rb.canonical_quaternion(-q), one)
+        assert np.array_equal(rb.canonical_quaternion(one), one)
+        assert np.abs(np.abs(one) - np.abs(q)).max() < 4 * EPS
+        assert np.all(one[:, 0] >= 0)
+
+
+@pytest.mark.source("BK Remark 7")
+def test_slerp_agrees_with_mpmath_on_awkward_pairs():
+    for start in (RANDOM[0], np.array([1.0, 0, 0, 0])):
+        for turn in awkward.quaternions()[::3]:
+            goal = rb.quaternion_multiply(start, turn)
+            for t in (0.3, 1.0):
+                assert (
+                    np.abs(rb.slerp(start, goal, t) - oracles.arc(start, goal, t)).max() < 8 * EPS
+                )
+                assert (
+                    np.abs(rb.slerp(start, -goal, t) - oracles.arc(start, goal, t)).max() < 8 * EPS
+                )
+
+
+@pytest.mark.source("BK Remark 7")
+def test_the_long_way_is_the_rest_of_the_great_circle():
+    """From q0 to −q1: the arc in R⁴ is longer than a quarter circle."""
+    q0, q1 = RANDOM[:50], RANDOM[50:100]
+    q1 = q1 * np.sign(np.sum(q0 * q1, axis=-1, keepdims=True))
+    for t in (0.0, 0.2, 0.5, 1.0):
+        exact = np.array([oracles.arc(p, -q, t) for p, q in zip(q0, q1, strict=True)])
+        for goal in (q1, -q1):
+            assert np.abs(rb.slerp_long(q0, goal, t) - exact).max() < 20 * EPS
+    t = np.linspace(0, 1, 9)
+    steps = np.diff(rb.slerp_long(q0, q1, t), axis=0)
+    size = np.linalg.norm(steps, axis=-1)
+    assert np.abs(size - size[0]).max() < 20 * EPS  # at constant speed
+
+
+def test_the_long_way_near_its_singular_sets():
+    one = np.array([1.0, 0, 0, 0])
+    for goal in (one, -one, [1, 1e-17, 0, 0]):
+        with pytest.raises(ValueError, match=r"^q1 is the same rotation as q0"):
+            rb.slerp_long(one, goal, 0.5)
+    with pytest.raises(ValueError, match=r"^q1\[1\] is the same"):
+        rb.slerp_long(one, [[0, 1, 0, 0], [-1, 0, 0, 0]], 0.5)
+    for angle in (1e-3, 1e-6, 1e-9):
+        near = np.array([np.cos(angle), 0, np.sin(angle), 0])
+        middle = rb.slerp_long(one, near, np.pi / 2 / (np.pi - angle))  # a quarter of the circle
+        assert np.abs(middle - [0, 0, -1, 0]).max() < 4 * EPS / angle
+    half_turn = np.array([0, 0, 0, 1.0])  # both ways are as long, and they differ
+    assert np.abs(rb.slerp_long(one, half_turn, 1) + half_turn).max() < 4 * EPS
+    assert np.abs(rb.slerp_long(one, -half_turn, 1) - half_turn).max() < 4 * EPS

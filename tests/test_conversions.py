@@ -1,0 +1,204 @@
+import awkward
+import numpy as np
+import oracles
+import pytest
+from scipy.spatial.transform import Rotation
+
+import rbcourse as rb
+
+EPS = np.finfo(float).eps
+RNG = np.random.default_rng(2026)
+RANDOM = rb.project_quaternion(RNG.normal(size=(200, 4)))
+
+
+@pytest.mark.parametrize("q", [RANDOM, awkward.quaternions()], ids=["random", "awkward"])
+def test_matrices_agree_with_scipy(q):
+    want = Rotation.from_quat(q, scalar_first=True).as_matrix()
+    R = rb.matrix_from_quaternion(q)
+    assert np.abs(R - want).max() < 4 * EPS
+    assert np.abs(rb.matrix_from_quaternion(-q) - R).max() == 0
+
+
+@pytest.mark.parametrize("q", [RANDOM, awkward.quaternions()], ids=["random", "awkward"])
+def test_there_and_back(q):
+    back = rb.quaternion_from_matrix(rb.matrix_from_quaternion(q))
+    assert oracles.between_rotations(back, q).max() < 4 * EPS
+    assert np.all(back[..., 0] >= 0)
+
+
+def test_half_turns_keep_their_axis_with_every_sign():
+    matrices, axes = awkward.half_turns()
+    q = rb.quaternion_from_matrix(matrices)
+    want = np.concatenate([np.zeros((len(axes), 1)), axes], axis=1)
+    assert oracles.between_rotations(q, want).max() < 2 * EPS
+    assert np.all(q[:, 0] == 0)
+    largest = np.argmax(np.abs(axes) > np.abs(axes).max(axis=1, keepdims=True) - 1e-9, axis=1)
+    assert np.all(np.take_along_axis(q[:, 1:], largest[:, None], axis=1) > 0)
+
+
+def test_rounding_chooses_no_sign_at_a_half_turn():
+    R0, R1, n = awkward.rounded_half_turns(np.random.default_rng(7))
+    q = rb.quaternion_from_matrix(np.swapaxes(R0, -1, -2) @ R1)
+    first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
+    assert np.all(q[:, 0] == 0)
+    assert np.all(np.take_along_axis(q[:, 1:], first[:, None], axis=1) > 0)
+
+
+@pytest.mark.source("BK 2.5", "RR 2.2")
+def test_rotation_vectors_and_quaternions_agree_with_mpmath():
+    q = rb.quaternion_from_rotation_vector(awkward.ROTATION_VECTORS)
+    exact = np.array([oracles.quaternion(w) for w in awkward.ROTATION_VECTORS])
+    assert np.abs(q - exact)[:, 0].max() < 2 * EPS
+    assert np.all(np.abs(q - exact)[:, 1:] <= 3 * EPS * np.abs(exact[:, 1:]))
+    back = rb.rotation_vector_from_quaternion(exact)
+    scale = np.linalg.norm(awkward.ROTATION_VECTORS, axis=-1, keepdims=True)
+    assert np.all(np.abs(back - awkward.ROTATION_VECTORS) <= 4 * EPS * scale)
+    assert np.array_equal(rb.rotation_vector_from_quaternion(-exact), back)
+
+
+def test_more_than_a_half_turn_comes_back_as_the_shorter_one():
+    axis = awkward.UNIT_AXES
+    back = rb.rotation_vector_from_quaternion(rb.quaternion_from_rotation_vector(4 * axis))
+    assert np.abs(back + (2 * np.pi - 4) * axis).max() < 4 * EPS
+    full = rb.quaternion_from_rotation_vector(2 * np.pi * axis)
+    assert np.abs(full - [-1, 0, 0, 0]).max() < 2 * EPS
+    turns = np.array([3, 9, -20.0])[:, None] * axis[3]
+    assert (
+        np.abs(
+            rb.matrix_from_quaternion(rb.quaternion_from_rotation_vector(turns)) - rb.exp_so3(turns)
+        ).max()
+        < 40 * EPS
+    )
+
+
+def test_exact_half_turns_are_one_rotation_with_either_sign():
+    _, axes = awkward.half_turns()
+    q = np.insert(axes, 0, 0, axis=1)
+    w = rb.rotation_vector_from_quaternion(q)
+    assert np.array_equal(rb.rotation_vector_from_quaternion(-q), w)
+    assert np.abs(np.abs(w) - np.pi * np.abs(axes)).max() < 4 * EPS
+    assert np.abs(rb.log_so3(rb.matrix_from_quaternion(q)) - w).max() < 8 * EPS
+
+
+def angles_of(count):
+    """Any angles, the multiples of π/4, and those within 1e-12 … 1e-3 of gimbal lock."""
+    quarter = np.pi / 4 * np.array(np.meshgrid(*3 * [np.arange(-8, 9)])).reshape(3, -1).T
+    near = RNG.uniform(-3, 3, size=(40, 3))
+    near[:, 1] = RNG.choice([-1, 1], 40) * (np.pi / 2 - 10.0 ** RNG.uniform(-12, -3, 40))
+    return np.concatenate([RNG.uniform(-7, 7, size=(count, 3)), quarter, near])
+
+
+@pytest.mark.source("RR 2.1", "RR (7)", "RR (8)")
+def test_zyx_matrices_are_the_product_of_the_printed_ones():
+    for a, b, c in angles_of(50):
+        (ca, cb, cc), (sa, sb, sc) = np.cos([a, b, c]), np.sin([a, b, c])
+        Rz = np.array([[ca, -sa, 0], [sa, ca, 0], [0, 0, 1]])
+        Ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
+        Rx = np.array([[1, 0, 0], [0, cc, -sc], [0, sc, cc]])
+        assert np.abs(rb.matrix_from_zyx([a, b, c]) - Rz @ Ry @ Rx).max() < 2 * EPS
+
+
+def test_zyx_angles_agree_with_scipy():
+    angles = angles_of(200)
+    R, q = rb.matrix_from_zyx(angles), rb.quaternion_from_zyx(angles)
+    want = Rotation.from_euler("ZYX", angles)
+    assert np.abs(R - want.as_matrix()).max() < 4 * EPS
+    assert oracles.between_rotations(q, want.as_quat(scalar_first=True)).max() < 4 * EPS
+    plain = angles_of(200)[:200]
+    R, want = rb.matrix_from_zyx(plain), Rotation.from_euler("ZYX", plain)
+    back = rb.zyx_from_matrix(R)
+    near_lock = np.cos(back[:, 1])  # what is left of the angles there
+    assert np.all(np.abs(back - want.as_euler("ZYX")).max(axis=1) < 20 * EPS / near_lock)
+
+
+def test_zyx_angles_give_the_rotation_back_gimbal_lock_included():
+    angles = angles_of(200)
+    R, q = rb.matrix_from_zyx(angles), rb.quaternion_from_zyx(angles)
+    for back in (rb.zyx_from_matrix(R), rb.zyx_from_quaternion(q), rb.zyx_from_quaternion(-q)):
+        assert np.all(np.abs(back[:, 1]) <= np.pi / 2 * (1 + EPS))
+        assert np.all((back[:, ::2] > -np.pi) & (back[:, ::2] <= np.pi * (1 + 8 * EPS)))
+        assert np.abs(rb.matrix_from_zyx(back) - R).max() < 16 * EPS
+
+
+def test_in_gimbal_lock_the_last_angle_is_zero():
+    a, c = np.pi / 4 * np.array(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))).reshape(2, -1)
+    for lock in (np.pi / 2, -np.pi / 2):
+        R = rb.matrix_from_zyx(np.stack([a, np.full_like(a, lock), c], axis=1))
+        back = rb.zyx_from_matrix(R)
+        assert np.all(back[:, 2] == 0)
+        assert np.abs(back[:, 1] - lock).max() < 16 * EPS
+        alone = a - c if lock > 0 else a + c  # the only combination that is determined
+        assert np.abs(np.exp(1j * back[:, 0]) - np.exp(1j * alone)).max() < 16 * EPS
+
+
+def test_close_to_gimbal_lock_both_angles_are_told():
+    for off in (1e-3, 1e-6, 1e-9):
+        given = np.array([0.3, np.pi / 2 - off, -0.4])
+        back = rb.zyx_from_matrix(rb.matrix_from_zyx(given))
+        assert np.abs(back - given).max() < 10 * EPS / off
+        assert abs((back - given) @ [1, 0, -1]) < 10 * EPS
+
+
+def test_rounding_chooses_no_sign_of_a_half_turn_about_z():
+    beta = RNG.uniform(-1, 1, size=200)
+    R = rb.matrix_from_zyx(np.stack([np.full(200, np.pi), beta, RNG.uniform(-3, 3, 200)], axis=1))
+    assert np.all(rb.zyx_from_matrix(R)[:, 0] > 0)
+
+
+@pytest.mark.source("errata 17")
+def test_the_printed_naive_quaternion_takes_its_angles_in_the_other_order():
+    a, b, c = RNG.uniform(0, 2 * np.pi, size=(3, 50)) / 2
+    printed = np.array(
+        [
+            np.cos(a) * np.cos(b) * np.cos(c) + np.sin(a) * np.sin(b) * np.sin(c),
+            np.sin(a) * np.cos(b) * np.cos(c) - np.cos(a) * np.sin(b) * np.sin(c),
+            np.cos(a) * np.sin(b) * np.cos(c) + np.sin(a) * np.cos(b) * np.sin(c),
+            np.cos(a) * np.cos(b) * np.sin(c) - np.sin(a) * np.sin(b) * np.cos(c),
+        ]
+    ).T
+    angles = 2 * np.stack([a, b, c], axis=1)
+    same, swapped = rb.quaternion_from_zyx(angles), rb.quaternion_from_zyx(angles[:, ::-1])
+    assert oracles.between_rotations(swapped, printed).max() < 4 * EPS
+    assert oracles.between_rotations(same, printed).min() > 1e-3
+
+
+def test_any_batch_is_the_stack_of_its_members():
+    q = RANDOM[:6].reshape(2, 3, 4)
+    R, w, a = rb.matrix_from_quaternion(q), RANDOM[:6, 1:].reshape(2, 3, 3), angles_of(6)[:6]
+    a = a.reshape(2, 3, 3)
+    for function, argument in [
+        (rb.matrix_from_quaternion, q),
+        (rb.quaternion_from_matrix, R),
+        (rb.quaternion_from_rotation_vector, w),
+        (rb.rotation_vector_from_quaternion, q),
+        (rb.matrix_from_zyx, a),
+        (rb.zyx_from_matrix, R),
+        (rb.quaternion_from_zyx, a),
+        (rb.zyx_from_quaternion, q),
+    ]:
+        stack = function(argument)
+        for i in np.ndindex(2, 3):
+            assert np.abs(stack[i] - function(argument[i])).max() < 8 * EPS
+        assert len(function(argument[:0])) == 0
+
+
+@pytest.mark.parametrize(
+    ("function", "name", "core"),
+    [
+        (rb.matrix_from_quaternion, "q", (4,)),
+        (rb.quaternion_from_matrix, "R", (3, 3)),
+        (rb.quaternion_from_rotation_vector, "w", (3,)),
+        (rb.rotation_vector_from_quaternion, "q", (4,)),
+        (rb.matrix_from_zyx, "angles", (3,)),
+        (rb.zyx_from_matrix, "R", (3, 3)),
+        (rb.quaternion_from_zyx, "angles", (3,)),
+        (rb.zyx_from_quaternion, "q", (4,)),
+    ],
+)
+def test_bad_arguments_are_named(function, name, core):
+    with pytest.raises(ValueError, match=rf"{name}: shape .* wanted, got \(2,\)"):
+        function([1, 2])
+    bad = np.ones(core)
+    bad[(0,) * len(core)] = np.nan
+    with pytest.raises(ValueError, match=rf"{name}\[0.*\] is nan"):
+        function(bad)

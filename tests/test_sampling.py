@@ -1,0 +1,166 @@
+"""Samplers: members of the group, the same draws from the same seed, and their twins."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbcourse.sampling import arvo_rotation, shoemake_quaternion
+
+EPS = np.finfo(float).eps
+SAMPLERS = [
+    rb.sample_rotation,
+    rb.sample_rotation_naive,
+    rb.sample_quaternion,
+    rb.sample_quaternion_naive,
+]
+HAAR = [(rb.sample_rotation, arvo_rotation), (rb.sample_quaternion, shoemake_quaternion)]
+CORNERS = np.array(np.meshgrid(*3 * [[0, 0.25, 0.5, 0.75, 1 - 2.0**-53]])).reshape(3, -1).T
+
+
+class Given(np.random.Generator):
+    """A generator that hands out given numbers."""
+
+    def __init__(self, numbers):
+        super().__init__(np.random.PCG64(0))
+        self.numbers = np.asarray(numbers).reshape(-1, 3)
+
+    def random(self, size=None):
+        taken, self.numbers = np.split(self.numbers, [int(np.prod(size)) // 3])
+        return taken.reshape(size)
+
+
+def core(sampler):
+    return (3, 3) if "rotation" in sampler.__name__ else (4,)
+
+
+@pytest.mark.source("RR 2.1", "RR 2.2", "RR (7)", "RR (8)", "RR (9)", "RR (13)")
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_draws_are_members(sampler):
+    draws = sampler(20_000, rng=1)
+    if core(sampler) == (4,):
+        assert np.abs(np.linalg.norm(draws, axis=-1) - 1).max() < 4 * EPS
+    else:
+        assert np.abs(np.swapaxes(draws, 1, 2) @ draws - np.eye(3)).max() < 8 * EPS
+        assert np.abs(np.linalg.det(draws) - 1).max() < 8 * EPS
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_any_size(sampler):
+    assert sampler().shape == core(sampler)
+    assert sampler(7).shape == (7, *core(sampler))
+    assert sampler(np.int64(7)).shape == (7, *core(sampler))
+    assert sampler((2, 3)).shape == (2, 3, *core(sampler))
+    assert sampler([2, 3]).shape == (2, 3, *core(sampler))
+    assert sampler(0).shape == (0, *core(sampler))
+    assert sampler((2, 0)).shape == (2, 0, *core(sampler))
+    assert sampler(()).shape == core(sampler)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_the_same_seed_gives_the_same_draws_in_any_portions(sampler):
+    many = sampler((3, 7001), rng=5)
+    assert np.array_equal(sampler((3, 7001), rng=5), many)
+    assert np.array_equal(sampler((3, 7001), rng=np.random.default_rng(5)), many)
+    one_by_one = np.random.default_rng(5)
+    for want in many.reshape(-1, *core(sampler))[:20]:
+        assert np.abs(sampler(rng=one_by_one) - want).max() < 4 * EPS
+    assert not np.array_equal(sampler(3, rng=6), many[0, :3])
+    generator = np.random.default_rng(5)
+    assert not np.array_equal(sampler(3, rng=generator), sampler(3, rng=generator))
+    assert not np.array_equal(sampler(3), sampler(3))
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+def test_the_global_state_is_left_alone(sampler):
+    before = np.random.get_state()  # noqa: NPY002
+    sampler(10)
+    sampler(10, rng=3)
+    after = np.random.get_state()  # noqa: NPY002
+    assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+
+
+@pytest.mark.source("RR (9)", "RR (10)", "RR (11)", "RR (13)")
+@pytest.mark.parametrize(("sampler", "textbook"), HAAR)
+def test_the_fast_draws_are_those_of_the_textbook(sampler, textbook):
+    want = textbook(np.random.default_rng(5).random((20_000, 3)))
+    assert np.abs(sampler(20_000, rng=5) - want).max() < 16 * EPS
+    assert np.abs(sampler(len(CORNERS), rng=Given(CORNERS)) - textbook(CORNERS)).max() < 16 * EPS
+
+
+@pytest.mark.source("RR (9)", "RR (10)", "RR (11)", "errata 18")
+def test_the_printed_matrix_is_a_reflection_always_and_its_negative_a_rotation():
+    x1, x2, z = np.random.default_rng(2).random((3, 500))
+    phi, theta = 2 * np.pi * x2, 2 * np.pi * x1
+    V = np.array([np.cos(phi) * np.sqrt(z), np.sin(phi) * np.sqrt(z), np.sqrt(1 - z)]).T
+    M = np.eye(3) - 2 * np.einsum("ni,nj->nij", V, V)
+    B = rb.exp_so3(theta[:, None] * [0, 0, 1])
+    assert np.abs(np.linalg.det(M @ B) + 1).max() < 16 * EPS
+    R = arvo_rotation(np.stack([x1, x2, z], axis=1))
+    assert np.abs(R + M @ B).max() < 8 * EPS
+    negated = M @ B @ np.diag([-1, 1, 1])
+    assert np.array_equal(negated, (-M @ B) @ np.diag([1, -1, -1]))
+
+
+@pytest.mark.source("RR (12)", "RR (13)")
+def test_the_printed_quaternion():
+    s, x1, x2 = np.random.default_rng(2).random((3, 500))
+    t1, t2 = 2 * np.pi * x1, 2 * np.pi * x2
+    printed = np.array(
+        [
+            np.cos(t2) * np.sqrt(s),
+            np.sin(t1) * np.sqrt(1 - s),
+            np.cos(t1) * np.sqrt(1 - s),
+            np.sin(t2) * np.sqrt(s),
+        ]
+    ).T
+    q = shoemake_quaternion(np.stack([s, x1, x2], axis=1))
+    assert np.abs(q - printed).max() < 2 * EPS
+
+
+@pytest.mark.source("RR 2.1", "RR 2.2", "errata 17")
+def test_the_naive_ones_turn_by_their_angles_in_the_printed_order():
+    angles = 2 * np.pi * np.random.default_rng(4).random((50, 3))
+    x, y, z = np.eye(3)
+    first, second, third = angles.T[..., None]
+    R = rb.exp_so3(first * z) @ rb.exp_so3(second * y) @ rb.exp_so3(third * x)
+    assert np.abs(rb.sample_rotation_naive(50, rng=4) - R).max() < 4 * EPS
+    R = rb.exp_so3(third * z) @ rb.exp_so3(second * y) @ rb.exp_so3(first * x)
+    q = rb.sample_quaternion_naive(50, rng=4)
+    assert np.abs(rb.matrix_from_quaternion(q) - R).max() < 8 * EPS
+
+
+def test_numbers_outside_the_unit_interval_are_refused():
+    for textbook in (arvo_rotation, shoemake_quaternion):
+        assert len(textbook([[0, 0, 0], [1, 1, 1]])) == 2
+        with pytest.raises(ValueError, match=r"x\[1\] is 1.5, a number in \[0, 1\] is wanted"):
+            textbook([0, 1.5, 0])
+        with pytest.raises(ValueError, match=r"x: shape \(\.\.\., 3\) wanted, got \(2,\)"):
+            textbook([0, 0])
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize("size", [-1, (2, -3), 2.5, "2", (2, 1.5), {}])
+def test_what_is_no_size_is_refused(sampler, size):
+    with pytest.raises(ValueError, match=r"^size: "):
+        sampler(size)
+
+
+@pytest.mark.parametrize("sampler", SAMPLERS)
+@pytest.mark.parametrize("rng", [-1, 0.5, "seed", object()])
+def test_what_makes_no_random_numbers_is_refused(sampler, rng):
+    with pytest.raises(ValueError, match=r"^rng: a Generator, a seed or None wanted"):
+        sampler(rng=rng)
+
+
+def test_other_processors_draw_the_same_to_rounding():
+    """NumPy told to do without the instructions that make its tangent fast."""
+    code = "import rbcourse as rb; print(*map(float, rb.sample_rotation(300, rng=8).ravel()))"
+    slow = {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, env=slow
+    )
+    drawn = np.array(done.stdout.split(), dtype=float).reshape(300, 3, 3)
+    assert np.abs(drawn - rb.sample_rotation(300, rng=8)).max() < 8 * EPS
