@@ -123,7 +123,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
     """Return the shape of a batch: () for None, (n,) for n; a ValueError if it is no shape."""
     given: Any = () if size is None else size
     try:
-        shape = tuple(map(index, given if isinstance(given, Sequence) else [given]))
+        shape = tuple(map(index, given if isinstance(given, tuple | list) else [given]))
     except TypeError as error:
         raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}") from error
     if any(length < 0 for length in shape):

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbcourse._numerics import Array, Rng, as_finite, as_generator, as_tolerance, as_unit
 from rbcourse.animate import Animation, animate
 from rbcourse.conversions import rotation_vector_from_quaternion
+from rbcourse.figures import Table
 from rbcourse.projection import is_se, is_so, project_se, project_so
 from rbcourse.quaternion import is_unit_quaternion, project_quaternion, rotate_by_quaternion
 from rbcourse.sampling import (
@@ -175,7 +176,8 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     Raises
     ------
     ValueError
-        If `v` is not four finite real numbers, or zero, or `epsilon` is negative or NaN.
+        If `v` does not pass and is zero or not four finite real numbers, or `epsilon` is negative
+        or NaN.
 
     References
     ----------
@@ -321,7 +323,10 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
     """
     turn = _rotation_vector(rotation)
     R = exp_so3(np.linspace(0, 1, _count("steps", steps) + 1)[:, None] * turn)
-    return _show("rotation", {"one rotation, step by step": (R @ _V0, R @ _V1)})
+    place = ", ".join(f"{x:.2f}" for x in R[-1] @ _V0 + 0.0)
+    degrees = np.degrees(np.linalg.norm(turn))
+    alt = f"A turn of {degrees:.0f} degrees carries the pole of a sphere to ({place})."
+    return _show("rotation", alt, image_table({"one rotation": (R @ _V0, R @ _V1)}))
 
 
 def visualize(
@@ -366,16 +371,17 @@ def visualize(
     if _chosen("quaternion", quaternion):
         q = np.array([random_quaternion(naive, rng=generator) for _ in count])
         images = rotate_by_quaternion(q, _V0), rotate_by_quaternion(q, _V1)
-        return _show("random_quaternions", {f"{len(count)} random quaternions": images})
+        data = image_table({"random quaternions": images})
+        return _show("random_quaternions", describe_images(data), data)
     R = np.array([random_rotation_matrix(naive, rng=generator) for _ in count])
-    return _show("random_matrices", {f"{len(count)} random matrices": (R @ _V0, R @ _V1)})
+    data = image_table({"random matrices": (R @ _V0, R @ _V1)})
+    return _show("random_matrices", describe_images(data), data)
 
 
-def _show(name: str, images: dict[str, tuple[Array, Array]]) -> tuple[Figure, Animation]:
-    data = image_table(images)
+def _show(name: str, alt: str, data: Table) -> tuple[Figure, Animation]:
     fig, ax = plt.subplots(figsize=(5, 5), dpi=80, subplot_kw={"projection": "3d"}, layout="none")
-    frames = len(next(iter(images.values()))[0]) + 1
-    return fig, animate(fig, name, describe_images(data), moving_images([ax], data), frames)
+    frames = np.size(next(iter(data.values()))) + 1
+    return fig, animate(fig, name, alt, moving_images([ax], data), frames)
 
 
 def _passes(test: Callable[..., Any], x: ArrayLike, epsilon: float) -> bool:

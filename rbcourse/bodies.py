@@ -115,7 +115,8 @@ def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
     ax : Axes3D
         Where to draw.
     tables : mapping of str to table
-        A `motion_table` for up to three motions between the same poses, with their names.
+        A `motion_table` for up to three motions between the same poses at the same times, with
+        their names.
 
     Returns
     -------
@@ -186,7 +187,7 @@ def moving_cubes(
     axes : sequence of Axes3D
         Where to draw.
     tables : mapping of str to table
-        A `motion_table` for each, with its name.
+        A `motion_table` for each at the same times, with its name.
     side : float
         The edge of the cubes, in m.
 

@@ -173,11 +173,11 @@ def describe_coordinates(data: Table) -> str:
     """
     best, near = _path(data, "optimum"), _path(data, "projection")
     apart = np.linalg.norm(best - near, axis=0)
-    end = ", ".join(f"{x:.3g}" for x in best[:, -1])
+    start, end = (", ".join(f"{x:.3g}" for x in best[:, k] + 0.0) for k in (0, -1))
     said = (
         "Two paths in the space of exponential coordinates, the optimum and the projection, "
         f"marked at equal times; the coordinates over time; and by how much they differ. "
-        f"Both run from 0 to ({end}) rad. "
+        f"Both run from ({start}) to ({end}) rad. "
     )
     if apart.max() < 1e-9:
         return said + "They coincide at all times."

@@ -106,7 +106,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
-        Rotation vectors, in rad, of any length: one full turn gives (−1, 0, 0, 0), two give
+        Rotation vectors, in rad, ‖w‖ < 1e154. One full turn gives (−1, 0, 0, 0), two give
         (1, 0, 0, 0).
 
     Returns
@@ -302,7 +302,8 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Angles in rad: α and γ in (−π, π], β in [−π/2, π/2]. They give q back to a few eps.
+        Angles in rad: α and γ in (−π, π] to rounding, β in [−π/2, π/2]. They give q back to a few
+        eps, in gimbal lock to 16 eps.
 
     Raises
     ------
@@ -328,7 +329,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     w, x, y, z = np.moveaxis(as_finite("q", q, 4), -1, 0)
     minus, plus = 2 * np.arctan2(z - x, w + y), 2 * np.arctan2(z + x, w - y)
     up, down = np.hypot(w + y, z - x), np.hypot(w - y, z + x)
-    lock_up, lock_down = down < 16 * EPS * up, up < 16 * EPS * down
+    lock_up, lock_down = down < 8 * EPS * up, up < 8 * EPS * down  # π/2 − |β| is twice the ratio
     plus, minus = np.where(lock_up, minus, plus), np.where(lock_down, plus, minus)
     beta = 2 * np.arctan2(up, down) - np.pi / 2
     return np.stack([_wrapped((plus + minus) / 2), beta, _wrapped((plus - minus) / 2)], axis=-1)

@@ -1,6 +1,7 @@
 """What both solvers of BK (19) share: the curve they return, and the way to hard problems."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -11,8 +12,9 @@ from numpy.typing import ArrayLike
 from rbcourse._numerics import Array, as_finite
 from rbcourse.curves import Curve, geodesic_so3
 from rbcourse.polynomials import cubic_coefficients, polynomial
+from rbcourse.projected import ProjectedPolynomial
 from rbcourse.projection import project_so
-from rbcourse.so3 import BASIS_SO3, hat_so3
+from rbcourse.so3 import BASIS_SO3, exp_so3, hat_so3, right_jacobian_inverse_so3
 
 
 class ConvergenceError(RuntimeError):
@@ -124,6 +126,13 @@ class MinimumAcceleration(Curve):
         self.residual = float(np.abs(off).max())
 
     @property
+    def cost(self) -> float:
+        """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes."""
+        nodes, (_, _, series) = grid(self.nodes), self._series
+        rates = chebvander(2 * nodes.t - 1, len(series) - 1) @ series
+        return float(2 * nodes.integral[-1] @ np.sum(rates**2, axis=-1))
+
+    @property
     def resolved(self) -> bool:
         """Whether the nodes carry the curve, to rounding."""
         return bool(self._tail < 1e-13 and self.residual < 1e-11)
@@ -184,6 +193,8 @@ def solve(
 ) -> MinimumAcceleration:
     """Solve from the projected cubic; if that fails, by continuation.
 
+    Where the projected cubic may jump, a cubic in exponential coordinates is tried too.
+
     Raises
     ------
     ValueError
@@ -192,31 +203,51 @@ def solve(
         If both fail.
     """
     ends = Ends(
-        project_so(_one("R0", R0, 3, 3)),
-        project_so(_one("R1", R1, 3, 3)),
-        _one("w0", w0, 3),
-        _one("w1", w1, 3),
+        project_so(as_single("R0", R0, 3, 3)),
+        project_so(as_single("R1", R1, 3, 3)),
+        as_single("w0", w0, 3),
+        as_single("w1", w1, 3),
     )
+    cubic = _projected_cubic(ends)
     try:
-        return _attempt(solver, ends, _projected_cubic(ends))
+        curve = _attempt(solver, ends, cubic)
     except ConvergenceError:
         return _continue(solver, ends)
+    if not cubic.may_jump():
+        return curve
+    with suppress(ConvergenceError):  # a guess that jumps may have led to a turn too many
+        other = _attempt(solver, ends, _exponential_cubic(ends))
+        curve = min(curve, other, key=lambda found: found.cost)
+    return curve
 
 
 def _attempt(solver: Solver, ends: Ends, guess: Guess) -> MinimumAcceleration:
-    """Count an overflow and a singular system as no convergence."""
+    """Count an overflow, what comes of it, and a singular system as no convergence."""
     try:
         with np.errstate(over="raise", invalid="raise"):
             return solver(ends, guess)
-    except (FloatingPointError, np.linalg.LinAlgError) as error:
+    except (FloatingPointError, np.linalg.LinAlgError, ValueError) as error:
         raise ConvergenceError(np.inf, 0) from error
 
 
-def _projected_cubic(ends: Ends) -> Guess:
-    """Return the projected cubic, whatever its margin."""
+class _ProjectedCubic(ProjectedPolynomial):
+    """The projected cubic as a guess: where the nearest rotation is not unique, any one."""
+
+    def _evaluate(self, t: Array, order: int) -> Array:
+        return project_so(self._ambient(t, order))
+
+
+def _projected_cubic(ends: Ends) -> _ProjectedCubic:
     V0, V1 = ends.R0 @ hat_so3(ends.w0), ends.R1 @ hat_so3(ends.w1)
-    coefficients = cubic_coefficients(ends.R0, ends.R1, V0, V1)
-    return lambda t: project_so(polynomial(coefficients, t[:, None, None]))
+    return _ProjectedCubic(cubic_coefficients(ends.R0, ends.R1, V0, V1))
+
+
+def _exponential_cubic(ends: Ends) -> Guess:
+    """Return R0 exp(σ(t)), with σ the cubic of these ends."""
+    turn = geodesic_so3(ends.R0, ends.R1).rotation_vector
+    end_rate = right_jacobian_inverse_so3(turn) @ ends.w1
+    coefficients = cubic_coefficients(np.zeros(3), turn, ends.w0, end_rate)
+    return lambda t: ends.R0 @ exp_so3(polynomial(coefficients, t[:, None]))
 
 
 def _continue(solver: Solver, ends: Ends) -> MinimumAcceleration:
@@ -240,7 +271,8 @@ def _continue(solver: Solver, ends: Ends) -> MinimumAcceleration:
             guess, done, step = curve, share, 2 * step
 
 
-def _one(name: str, value: ArrayLike, *core: int) -> Array:
+def as_single(name: str, value: ArrayLike, *core: int) -> Array:
+    """Return `as_finite` of the arguments, or raise a ValueError if it is a stack of them."""
     array = as_finite(name, value, *core)
     if array.ndim > len(core):
         raise ValueError(

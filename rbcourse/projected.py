@@ -68,6 +68,11 @@ class ProjectedPolynomial(Curve):
     ----------
     coefficients : ndarray, shape (degree + 1, ..., 3, 3)
         Of 1, t, t², … in M(t).
+    margin : ndarray, shape (...)
+        The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M. At 0
+        the nearest rotation is not unique.
+    margin_time : ndarray, shape (...)
+        When that is.
 
     References
     ----------
@@ -97,12 +102,19 @@ class ProjectedPolynomial(Curve):
         A_rate = Rt @ self._ambient(t, 2) - W @ A
         return _solve(_spin(P), 2 * vee_so3(A_rate) - _apply(_spin(A - W @ P), w))
 
-    @cached_property
+    @property
     def margin(self) -> Array:
-        """The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M.
+        """The least sum of the two smallest eigenvalues of RᵀM."""
+        return self._least_gap[1]
 
-        At 0 the nearest rotation is not unique. Found on 129 times, then ever closer to the best.
-        """
+    @property
+    def margin_time(self) -> Array:
+        """When the margin is reached."""
+        return self._least_gap[0]
+
+    @cached_property
+    def _least_gap(self) -> tuple[Array, Array]:
+        """When the gap is least, and how large: on 129 times, then ever closer to the best."""
         centre, reach, count = np.full(self.batch_shape, 0.5), 0.5, 129
         while reach > 1e-15:
             times = np.clip(centre + self._column(np.linspace(-reach, reach, count)), 0, 1)
@@ -110,7 +122,7 @@ class ProjectedPolynomial(Curve):
             least = gap.argmin(axis=0)[None]
             centre = np.take_along_axis(times, least, axis=0)[0]
             reach, count = 2 * reach / (count - 1), 17
-        return np.take_along_axis(gap, least, axis=0)[0]
+        return centre, np.take_along_axis(gap, least, axis=0)[0]
 
     def may_jump(self) -> bool:
         """Tell whether the gap at 65 times leaves room for a 0 between them."""

@@ -79,8 +79,8 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     A, atol = as_array("A", A, "n+1", "n+1"), as_tolerance("atol", atol)
     with np.errstate(invalid="ignore"):
         last_row = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1]).max(axis=-1) <= atol
-    translation = np.isfinite(A[..., :-1, -1]).all(axis=-1)
-    return (is_so(A[..., :-1, :-1], atol) & last_row & translation)[()]
+    finite = np.isfinite(A).all(axis=(-2, -1))
+    return (is_so(A[..., :-1, :-1], atol) & last_row & finite)[()]
 
 
 def project_so(M: ArrayLike) -> Array:
@@ -89,7 +89,7 @@ def project_so(M: ArrayLike) -> Array:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Any matrices, singular and reflected ones too.
+        Any matrices, singular and reflected ones too, whose norm is a number: entries below 1e307.
 
     Returns
     -------

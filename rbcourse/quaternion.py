@@ -55,7 +55,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     atol = as_tolerance("atol", atol)
     with np.errstate(over="ignore", invalid="ignore"):
         norm = np.linalg.norm(as_array("q", q, 4), axis=-1)
-        return (np.abs(norm - 1) <= atol)[()]
+        return ((np.abs(norm - 1) <= atol) & np.isfinite(norm))[()]
 
 
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
@@ -208,8 +208,8 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     Notes
     -----
     Singular set: at a half-turn w = 0, and q and −q are equally good. The one whose component of
-    largest magnitude (the first of equals) is positive is returned, with w = 0. What differs from
-    a half-turn by rounding only, w below 4 eps, counts as one.
+    largest magnitude is positive is returned, with w = 0; of components that are equal to 1e-8 the
+    first. What differs from a half-turn by rounding only, w below 4 eps, counts as one.
 
     References
     ----------

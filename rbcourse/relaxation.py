@@ -11,6 +11,7 @@ from rbcourse.optimum import (
     Guess,
     MinimumAcceleration,
     along,
+    as_single,
     first_guess,
     grid,
     hats,
@@ -48,7 +49,7 @@ def minimum_acceleration_so3(
         If an argument is not finite or not of that shape.
     ConvergenceError
         If Newton's method does not converge, neither from the projected cubic nor in small steps
-        from the geodesic. Not seen for ‖w0‖, ‖w1‖ < 9; in a tenth of all draws up to 20.
+        from the geodesic. Rare for ‖w0‖, ‖w1‖ < 9; a tenth of all draws up to 20.
 
     See Also
     --------
@@ -63,7 +64,8 @@ def minimum_acceleration_so3(
     the projected cubic is returned; it is stationary, and not proven to be the best.
 
     End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
-    R0ᵀR1: the shortest, or one that turns the other way round or once more and costs less.
+    R0ᵀR1: the shortest, or one that turns the other way round or once more; as a rule because that
+    costs less.
 
     References
     ----------
@@ -134,7 +136,10 @@ def minimum_acceleration_se3(
     >>> c(0.5)[:3, 3].round(9)
     array([1., 0., 0.])
     """
-    R0, R1, path = cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
+    vectors = {"w0": w0, "w1": w1, "d0_dot": d0_dot, "d1_dot": d1_dot}
+    poses = as_single("A0", A0, 4, 4), as_single("A1", A1, 4, 4)
+    ends = cubic_ends(*poses, *(as_single(name, v, 3) for name, v in vectors.items()))
+    R0, R1, path = ends
     return RigidMotion(minimum_acceleration_so3(R0, R1, w0, w1), path)
 
 

@@ -115,7 +115,8 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     size : int or tuple of int, optional
         How many; by default one, without a batch axis.
     rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones.
+        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
+        `numpy.random.default_rng` takes.
 
     Returns
     -------
@@ -125,7 +126,7 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     Raises
     ------
     ValueError
-        If `size` is no shape, or `rng` none of these.
+        If `size` is no shape, or `rng` makes no random numbers.
 
     See Also
     --------
@@ -153,7 +154,8 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
     size : int or tuple of int, optional
         How many; by default one, without a batch axis.
     rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones.
+        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
+        `numpy.random.default_rng` takes.
 
     Returns
     -------
@@ -164,7 +166,7 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
     Raises
     ------
     ValueError
-        If `size` is no shape, or `rng` none of these.
+        If `size` is no shape, or `rng` makes no random numbers.
 
     See Also
     --------
@@ -191,7 +193,8 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
     size : int or tuple of int, optional
         How many; by default one, without a batch axis.
     rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones.
+        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
+        `numpy.random.default_rng` takes.
 
     Returns
     -------
@@ -202,7 +205,7 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
     Raises
     ------
     ValueError
-        If `size` is no shape, or `rng` none of these.
+        If `size` is no shape, or `rng` makes no random numbers.
 
     See Also
     --------
@@ -228,7 +231,8 @@ def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng
     size : int or tuple of int, optional
         How many; by default one, without a batch axis.
     rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones.
+        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
+        `numpy.random.default_rng` takes.
 
     Returns
     -------
@@ -239,7 +243,7 @@ def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng
     Raises
     ------
     ValueError
-        If `size` is no shape, or `rng` none of these.
+        If `size` is no shape, or `rng` makes no random numbers.
 
     See Also
     --------
@@ -281,8 +285,8 @@ def _in_blocks(
 def _arvo(x: Array) -> list[Array]:
     """Return `arvo_rotation`, multiplied out, with the angles φ and ψ = φ − θ."""
     (c, cos_psi), (s, sin_psi) = _cos_sin(np.stack([x[1], x[1] - x[0]]))
-    height = 2 * x[2] - 1
-    radius, hc, hs = np.sqrt(1 - height * height), height * c, height * s
+    height, radius = 2 * x[2] - 1, 2 * np.sqrt(x[2] * (1 - x[2]))
+    hc, hs = height * c, height * s
     return [
         *(hc * cos_psi - s * sin_psi, hc * sin_psi + s * cos_psi, radius * c),
         *(hs * cos_psi + c * sin_psi, hs * sin_psi - c * cos_psi, radius * s),

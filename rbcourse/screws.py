@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, check_broadcast
+from rbcourse._numerics import EPS, Array, as_finite, as_unit, check_broadcast
 from rbcourse.curves import Curve
-from rbcourse.se3 import exp_se3, inverse_se3, log_se3
+from rbcourse.se3 import exp_se3, inverse_se3, log_se3, pose_from_components
 
 
 class Screw(NamedTuple):
@@ -33,9 +33,9 @@ class Screw(NamedTuple):
 
     @property
     def pitch(self) -> Array:
-        """The slide for each rad of the turn, in m: ±inf for a slide alone, NaN for no motion."""
+        """The slide for each rad of the turn, in m: inf for a slide alone, NaN for no motion."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return self.slide / self.angle
+            return np.divide(self.slide, self.angle)
 
 
 def screw_from_pose(A: ArrayLike) -> Screw:
@@ -64,8 +64,9 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     Notes
     -----
     Singular set: a half-turn has two screws, the axis of `log_so3` is taken. Where nothing turns
-    no axis is distinguished; near there the point is far away and uncertain, by a few eps ‖d‖
-    over the angle.
+    no axis is distinguished; what turns by rounding only, less than 8 eps, counts as a slide alone.
+    Near there axis, slide and pitch are uncertain by a few eps over the angle, relatively, and the
+    point, far away, by a few eps ‖d‖ over its square.
 
     References
     ----------
@@ -81,11 +82,13 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     """
     S = log_se3(A)
     w, v = S[..., :3], S[..., 3:]
-    angle, speed = np.linalg.norm(w, axis=-1), np.linalg.norm(v, axis=-1)
-    turns = angle > 0
-    length = np.where(turns, angle, np.where(speed > 0, speed, 1.0))[..., None]
-    axis = np.where(turns[..., None], w, v) / length
-    point = np.where(turns[..., None], np.cross(axis, v) / length, 0.0)
+    angle = np.linalg.norm(w, axis=-1)
+    turns = angle > 8 * EPS
+    along = np.where(turns[..., None], w, v)
+    moves = np.any(along, axis=-1, keepdims=True)
+    axis = np.where(moves, as_unit("A", np.where(moves, along, 1.0), 3), 0.0)
+    angle = np.where(turns, angle, 0.0)
+    point = np.cross(axis, v) / np.where(turns, angle, np.inf)[..., None]
     return Screw(axis, point, angle, np.vecdot(axis, v))
 
 
@@ -126,7 +129,7 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
-        Poses; what is none is not repaired (see `project_se`).
+        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
 
     Returns
     -------
@@ -165,4 +168,5 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
     """
     A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     check_broadcast(A0=(A0, 2), A1=(A1, 2))
-    return ScrewMotion(A0, log_se3(inverse_se3(A0) @ A1))
+    start = pose_from_components(A0[..., :3, :3], A0[..., :3, 3])
+    return ScrewMotion(start, log_se3(inverse_se3(A0) @ A1))

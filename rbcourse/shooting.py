@@ -46,7 +46,9 @@ def shoot_minimum_acceleration_so3(
     ValueError
         If an argument is not finite or not of that shape.
     ConvergenceError
-        As `minimum_acceleration_so3`.
+        If Newton's method does not converge, neither from the projected cubic nor in small steps
+        from the geodesic: one in some 40 of random ends with ‖w0‖, ‖w1‖ < 9. For ‖w‖ of 30 it
+        takes ten seconds to say so, for 1000 minutes.
 
     See Also
     --------
@@ -110,6 +112,8 @@ def _shot(ends: Ends, aim: Array, t: Array) -> tuple[Array, Array, Array]:
     shot = solve_ivp(
         _flow, (0, 1), start, "DOP853", t_eval=t, args=(aim[3:],), rtol=1e-12, atol=1e-13
     )
+    if not shot.success:
+        raise FloatingPointError(shot.message)
     return shot.y[:9].T.reshape(-1, 3, 3), shot.y[9:12].T, shot.y[15:].T.reshape(-1, 9, 6)
 
 

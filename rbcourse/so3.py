@@ -150,8 +150,8 @@ def log_so3(R: ArrayLike) -> Array:
     Notes
     -----
     Singular set: at a half-turn both w and −w are logarithms. The one whose component of largest
-    magnitude (the first of equals) is positive is returned. What differs from a half-turn by
-    rounding only, less than 8 eps in the angle, counts as one.
+    magnitude is positive is returned, as `canonical_quaternion` chooses it. What differs from a
+    half-turn by rounding only, less than 8 eps in the angle, counts as one.
 
     References
     ----------

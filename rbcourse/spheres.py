@@ -131,12 +131,12 @@ def describe_images(data: Table) -> str:
     strokes = _strokes(data)
     count = len(next(iter(strokes.values())))
     said = ", ".join(
-        f"{(np.abs(points[:, 0, 2]) < 0.5).sum()} {name}" for name, points in strokes.items()
+        f"{name}: {(np.abs(points[:, 0, 2]) < 0.5).sum()}" for name, points in strokes.items()
     )
     return (
-        f"Spheres with the images of the pole under {count} random rotations, one sphere for each "
-        "sample, a stroke at each image showing how it is turned. In the middle half of the "
-        f"height, which is half of the area, lie {said}."
+        f"The images of the pole of a sphere under {count} random rotations, a stroke at each "
+        "image showing how it is turned. How many lie in the middle half of the height, which is "
+        f"half of the area: {said}."
     )
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_angle, as_finite
+from rbcourse._numerics import Array, as_angle, as_finite, sine_gap_ratio
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
 
@@ -58,7 +58,7 @@ def angle_law(angle: ArrayLike) -> Array:
     array([0.   , 0.182, 1.   ])
     """
     a = as_angle(angle)
-    return (a - np.sin(a)) / np.pi
+    return a**3 * sine_gap_ratio(a) / np.pi
 
 
 def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:

@@ -88,6 +88,15 @@ def test_what_is_no_member_fails_plainly(check, thing):
     assert check(thing) is False
 
 
+def test_infinity_fails_whatever_the_tolerance():
+    assert rr.check_SOn(np.full((3, 3), np.inf), np.inf) is False
+    assert rr.check_quaternion([np.inf, 0, 0, 0], np.inf) is False
+    for place in ((0, 0), (0, 2), (2, 0)):
+        A = np.eye(3)
+        A[place] = np.inf
+        assert rr.check_SEn(A, np.inf) is False
+
+
 @pytest.mark.parametrize(
     ("correct", "thing", "message"),
     [
@@ -188,6 +197,8 @@ def test_a_hundred_random_rotations_are_shown(quaternion, tmp_path):
 )
 def test_one_rotation_is_shown_step_by_step(rotation):
     figure, animation = rr.visualize_rotation(rotation, steps=6)
+    angle = np.degrees(np.linalg.norm([0.5, 1, -2]))
+    assert f"A turn of {angle:.0f} degrees carries the pole of a sphere to (" in animation.alt
     assert len(animation.pictures) == 8
     strokes = figure.axes[0].collections[-1]
     assert len(strokes._segments3d) == 7

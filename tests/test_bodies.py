@@ -99,4 +99,14 @@ def test_descriptions_give_numbers():
     assert ", ".join([f"{angle / 5:.0f}"] * 5) in said
     same = {"one": MOTIONS["screw"], "two": MOTIONS["screw"]}
     assert "side by side: one, two." in bodies.describe_moving_cubes(same)
-    assert "by 0 degrees" in bodies.describe_moving_cubes(same)
+    assert "one and two agree at all times." in bodies.describe_moving_cubes(same)
+    t = np.linspace(0, 1, 6)
+    bump = 4 * t * (1 - t) ** 2  # most at 1/3, of the six times at 0.4
+    turned = rb.exp_so3(np.radians(50) * bump[:, None] * [0, 0.6, 0.8])
+    upright = np.broadcast_to(np.eye(3), turned.shape)
+    both = {
+        name: bodies.motion_table(t, rb.pose_from_components(R, [0, 0, 0]))
+        for name, R in {"upright": upright, "tilted": turned}.items()
+    }
+    said = bodies.describe_moving_cubes(both)
+    assert f"upright and tilted differ most at t = 0.40, by {50 * bump.max():.0f} degrees." in said

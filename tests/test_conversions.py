@@ -117,7 +117,7 @@ def test_zyx_angles_give_the_rotation_back_gimbal_lock_included():
     for back in (rb.zyx_from_matrix(R), rb.zyx_from_quaternion(q), rb.zyx_from_quaternion(-q)):
         assert np.all(np.abs(back[:, 1]) <= np.pi / 2 * (1 + EPS))
         assert np.all((back[:, ::2] > -np.pi) & (back[:, ::2] <= np.pi * (1 + 8 * EPS)))
-        assert np.abs(rb.matrix_from_zyx(back) - R).max() < 16 * EPS
+        assert np.abs(rb.matrix_from_zyx(back) - R).max() < 40 * EPS  # twice what q loses
 
 
 def test_in_gimbal_lock_the_last_angle_is_zero():

@@ -109,6 +109,44 @@ def test_screws_of_what_does_not_turn():
     assert np.array_equal(screw.pitch, [np.inf, np.nan], equal_nan=True)
 
 
+def test_what_turns_by_rounding_only_slides():
+    B = Rotation.random(200, rng=RNG).as_matrix()
+    slide = np.array([3.0, 4, 0])
+    rounded = rb.pose_from_components(B @ np.swapaxes(B, 1, 2), slide)
+    assert np.abs(rounded[:, :3, :3] - np.eye(3)).max() > 0
+    screw = rb.screw_from_pose(rounded)
+    assert np.all(screw.angle == 0)
+    assert np.abs(screw.axis - slide / 5).max() < 8 * EPS
+    assert np.abs(screw.slide - 5).max() < 40 * EPS
+    assert np.all(screw.point == 0)
+    assert np.all(np.isinf(screw.pitch))
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-170, 1e170, 1e300])
+def test_slides_of_any_size(size):
+    screw = rb.screw_from_pose(rb.pose_from_components(np.eye(3), [0, 0.6 * size, 0.8 * size]))
+    assert np.abs(screw.axis - [0, 0.6, 0.8]).max() < 4 * EPS
+    assert screw.slide == pytest.approx(size, rel=4 * EPS)
+    assert screw.pitch == np.inf
+
+
+def test_a_small_turn_is_a_turn():
+    axis = np.array([0.6, 0, 0.8])
+    for angle in (1e-3, 1e-6, 1e-9):
+        screw = rb.screw_from_pose(rb.exp_se3(np.append(angle * axis, 2 * axis)))
+        assert np.abs(screw.axis - axis).max() < 8 * EPS / angle
+        assert screw.slide == pytest.approx(2, rel=8 * EPS / angle)
+        assert screw.angle == pytest.approx(angle, rel=8 * EPS / angle)
+
+
+def test_the_last_row_is_not_read():
+    wrong = np.eye(4)
+    wrong[3] = 7
+    assert np.array_equal(
+        rb.screw_se3(wrong, GOALS[0])(0.3), rb.screw_se3(np.eye(4), GOALS[0])(0.3)
+    )
+
+
 @pytest.mark.source("BK (10)", "BK (14)")
 def test_every_point_of_the_body_runs_on_a_helix_of_one_axis():
     """The distance to the axis does not change, the height grows evenly; so it is for no geodesic

@@ -53,7 +53,7 @@ def test_the_description_counts():
     said = spheres.describe_images(TABLE)
     inside = (np.abs((R @ V0)[:, 2]) < 0.5).sum()
     assert "under 50 random rotations" in said
-    assert f"lie {inside} one, {inside} other." in said
+    assert f"area: one: {inside}, other: {inside}." in said
 
 
 @pytest.mark.source("RR 2")

@@ -139,6 +139,7 @@ def test_the_law_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions(
     for a in (0.1, 1.0, 2.5, np.pi):
         cap, _ = quad(lambda u: np.sin(u) ** 2, 0, a / 2)
         assert angle_law(a) == pytest.approx(cap / (np.pi / 4), rel=1e-12)
+    assert angle_law(1e-8) == pytest.approx(1e-24 / (6 * np.pi), rel=1e-12)
     q = np.random.default_rng(5).normal(size=(20_000, 4))
     turned = 2 * np.arctan2(np.linalg.norm(q[:, 1:], axis=1), np.abs(q[:, 0]))
     assert kstest(turned, angle_law).pvalue > 1e-8
