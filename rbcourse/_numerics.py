@@ -67,7 +67,7 @@ def as_unit(name: str, value: ArrayLike, size: int) -> Array:
     if not largest.all():
         entry = first_index(name, largest[..., 0] == 0)
         raise ValueError(f"{entry} is zero: it has no direction")
-    scaled = np.ldexp(array, -np.frexp(largest)[1])  # so that no square overflows
+    scaled = array / largest  # so that no square overflows
     return scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
 
 

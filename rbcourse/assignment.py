@@ -381,7 +381,8 @@ def visualize(
 def _show(name: str, alt: str, data: Table) -> tuple[Figure, Animation]:
     fig, ax = plt.subplots(figsize=(5, 5), dpi=80, subplot_kw={"projection": "3d"}, layout="none")
     frames = np.size(next(iter(data.values()))) + 1
-    return fig, animate(fig, name, alt, moving_images([ax], data), frames)
+    seconds = max(4.0, frames / 25)
+    return fig, animate(fig, name, alt, moving_images([ax], data), frames, seconds)
 
 
 def _passes(test: Callable[..., Any], x: ArrayLike, epsilon: float) -> bool:

@@ -94,7 +94,8 @@ def draw_coordinate_paths(ax: Any, data: Table) -> list[Any]:
     start, end = _path(data, "optimum")[:, [0, -1]].T
     ax.text(*start, "   t = 0", va="top")
     ax.text(*end, "t = 1   ", va="bottom", ha="right")
-    ax.set(xlabel="σ₁ (rad)", ylabel="σ₂ (rad)")
+    ax.set(xlabel="σ₁ (rad)")
+    ax.set_ylabel("σ₂ (rad)", labelpad=8)
     ax.zaxis.set_rotate_label(False)
     ax.set_zlabel("σ₃ (rad)", rotation=90)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
@@ -127,9 +128,9 @@ def draw_coordinates(ax: Axes, data: Table) -> list[Any]:
     lines = []
     for name, style in _STYLES.items():
         for axis, sigma in zip("xyz", _path(data, name), strict=True):
-            lines += ax.plot(t, sigma, color=COLOURS[axis], markevery=10, **style)
+            lines += ax.plot(t, sigma, color=COLOURS[axis], markevery=10, clip_on=False, **style)
     for axis, number, sigma in zip("xyz", "₁₂₃", _path(data, "optimum"), strict=True):
-        ax.text(1.02, sigma[-1], f"σ{number}", color=COLOURS[axis], va="center")
+        ax.text(1.04, sigma[-1], f"σ{number}", color=COLOURS[axis], va="center")
     ax.set(xlabel="time t", ylabel="σ (rad)", xlim=(0, 1))
     ax.legend(handles=[Line2D([], [], color="0.3", label=name, **s) for name, s in _STYLES.items()])
     return lines
@@ -154,8 +155,10 @@ def draw_difference(ax: Axes, data: Table) -> list[Any]:
         ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"σ{number}")[0]
         for axis, number, part, dash in zip("xyz", "₁₂₃", difference, ["-", "--", ":"], strict=True)
     ]
-    ax.set(xlabel="time t", ylabel="difference (rad)", xlim=(0, 1))
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5), handlelength=1.5)
+    ax.set(xlabel="time t", ylabel="Δσ (rad)", xlim=(0, 1))
+    ax.legend(
+        title="projection\n− optimum", loc="center left", bbox_to_anchor=(1, 0.5), handlelength=1.5
+    )
     return lines
 
 
@@ -173,7 +176,7 @@ def describe_coordinates(data: Table) -> str:
     """
     best, near = _path(data, "optimum"), _path(data, "projection")
     apart = np.linalg.norm(best - near, axis=0)
-    start, end = (", ".join(f"{x:.3g}" for x in best[:, k] + 0.0) for k in (0, -1))
+    start, end = (", ".join(f"{x:.3g}" for x in best[:, k].round(9) + 0.0) for k in (0, -1))
     said = (
         "Two paths in the space of exponential coordinates, the optimum and the projection, "
         f"marked at equal times; the coordinates over time; and by how much they differ. "
@@ -182,7 +185,7 @@ def describe_coordinates(data: Table) -> str:
     if apart.max() < 1e-9:
         return said + "They coincide at all times."
     when = np.asarray(data["t [1]"])[apart.argmax()]
-    return said + f"They are farthest apart at t = {when:g}, by {apart.max():.2g} rad."
+    return said + f"σ differs most at t = {when:g}, by {apart.max():.2g} rad in length."
 
 
 def draw_excess(ax: Axes, data: Table) -> list[Any]:

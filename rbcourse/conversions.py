@@ -302,7 +302,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Angles in rad: α and γ in (−π, π] to rounding, β in [−π/2, π/2]. They give q back to a few
+        Angles in rad: α and γ in (−π, π], β in [−π/2, π/2]. They give q back to a few
         eps, in gimbal lock to 16 eps.
 
     Raises
@@ -338,7 +338,8 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
 def _wrapped(angle: Array) -> Array:
     """Return angles between −2π and 2π as they lie in (−π, π]; −π to rounding becomes π."""
     angle = np.where(angle > np.pi, angle - 2 * np.pi, angle)
-    return np.where(angle < -np.pi * (1 - 4 * EPS), angle + 2 * np.pi, angle)
+    angle = np.where(angle < -np.pi * (1 - 4 * EPS), angle + 2 * np.pi, angle)
+    return np.minimum(angle, np.pi)
 
 
 def _turn_about(axis: int, angle: Array) -> Array:

@@ -52,6 +52,7 @@ def draw_moving_frame(ax: Any, data: Table) -> list[Any]:
     artists = [_draw_box(ax, d[1], R[1], np.array([0.7, 0.5, 0.35]))]
     for name, origin, axes in zip(names, d, R, strict=True):
         artists += draw_triad(ax, origin, axes, name)
+        ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center")
     vector = ax.quiver(*d[0], *(d[1] - d[0]), color=COLOURS["reference"], arrow_length_ratio=0.06)
     ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
     ax.set_box_aspect(np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1), zoom=1.3)
@@ -214,12 +215,11 @@ def _heading(direction: Array) -> str:
 
 
 def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
-    """Draw the columns of R as arrows x, y, z from the origin, with their names."""
+    """Draw the columns of R as arrows x, y, z from the origin, labelled with the name."""
     artists = []
     for axis, direction in zip("xyz", R.T, strict=True):
         artists.append(ax.quiver(*origin, *direction, color=COLOURS[axis], lw=2.5))
         ax.text(*(origin + 1.15 * direction), f"${axis}_{name}$", color=COLOURS[axis])
-    ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center")
     return artists
 
 

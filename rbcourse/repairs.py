@@ -33,7 +33,7 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
     Returns
     -------
     dict of str to ndarray
-        At 60 numbers of steps, evenly spread over the powers of ten and multiples of 100 beyond
+        At up to 60 numbers of steps, evenly spread over the powers of ten, beyond 100 multiples of
         it, the defect ‖RᵀR − I‖ of each way, before the repair.
 
     References
@@ -70,7 +70,7 @@ def draw_drift(ax: Axes, data: Table) -> list[Any]:
     ax : Axes
         Where to draw.
     data : mapping of str to array_like
-        A `drift_table`.
+        A `drift_table` of three ways.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def draw_drift(ax: Axes, data: Table) -> list[Any]:
     looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
     lines = [
         ax.loglog(steps, defect, color=colour, ls=dash, label=name.removesuffix(" [1]"))[0]
-        for (name, defect), (colour, dash) in zip(ways, looks, strict=False)
+        for (name, defect), (colour, dash) in zip(ways, looks, strict=True)
     ]
     ax.set(xlabel="products", ylabel="defect ‖RᵀR − I‖", xlim=(1, steps[-1]))
     ax.legend()
@@ -134,7 +134,8 @@ def letter_table(matrices: Mapping[str, Array]) -> Table:
 def draw_letters(axes: Sequence[Axes], data: Table) -> list[Any]:
     """Draw a letter, and what matrices make of it, each on its own axes.
 
-    The first matrix is the given one; its image is repeated behind the others.
+    The first matrix is the given one; its image is repeated behind the others, whose titles say how
+    far their matrix is from it.
 
     Parameters
     ----------
@@ -158,7 +159,8 @@ def draw_letters(axes: Sequence[Axes], data: Table) -> list[Any]:
         artists += ax.fill(*behind.T, color="0.88")
         colour = COLOURS["y"] if _turned(image) else COLOURS["x"]
         artists += ax.fill(*image.T, fill=False, edgecolor=colour, lw=2)
-        ax.set(aspect="equal", title=name, xlabel="x")
+        title = f"{name}: {_distance(image, images):.2f}" if k else name
+        ax.set(aspect="equal", title=title, xlabel="x")
     axes[0].set_ylabel("y")
     return artists
 
@@ -178,8 +180,8 @@ def describe_letters(data: Table) -> str:
     images = _images(data)
     (first, given), *others = images.items()
     said = [
-        f"{name}: {'a turned' if _turned(image) else 'a mirrored'} letter, whose corners are "
-        f"{np.linalg.norm(image - given, axis=1).max():.2f} off at most"
+        f"{name}: a {'turned' if _turned(image) else 'mirrored'} letter, at the distance "
+        f"{_distance(image, images):.2f} from {first}"
         for name, image in others
     ]
     what = "turned" if _turned(given) else "mirrored"
@@ -193,6 +195,12 @@ def _images(data: Table) -> dict[str, Array]:
     return {
         name: np.stack([data[f"{name} x [1]"], data[f"{name} y [1]"]], axis=-1) for name in names
     }
+
+
+def _distance(image: Array, images: dict[str, Array]) -> float:
+    """Return the Frobenius distance of the matrix of an image to that of the first image."""
+    apart = np.linalg.lstsq(_LETTER, image - next(iter(images.values())))[0]
+    return float(np.linalg.norm(apart))
 
 
 def _turned(image: Array) -> bool:

@@ -76,10 +76,11 @@ def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]
         ax.set_title(name)
         behind = strokes[:, 0] @ _EYE < 0
         colours = np.where(behind, _PALE, COLOURS["projection"])
-        lines = ax.add_collection3d(Line3DCollection(strokes, colors=colours, lw=1.6))
+        lines = Line3DCollection(strokes, colors=colours, lw=1.6, zorder=3)
+        ax.add_collection3d(lines)
         dots = [
-            ax.plot([], [], [], "o", ms=5, mew=0, color=colour)[0]
-            for colour in (_PALE, COLOURS["projection"])
+            ax.plot([], [], [], "o", ms=5, mew=0, color=colour, zorder=zorder)[0]
+            for colour, zorder in ((_PALE, 2), (COLOURS["projection"], 4))
         ]
         panels.append((strokes, behind, colours, lines, dots))
 
@@ -109,6 +110,7 @@ def draw_sphere(ax: Any) -> None:
     )
     ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
     ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
+    ax.computed_zorder = False
     ax.view_init(elev=np.degrees(_ELEVATION), azim=np.degrees(_AZIMUTH))
     ax.set_proj_type("ortho")
     ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
@@ -160,7 +162,7 @@ def histogram_table(R: Mapping[str, Array]) -> Table:
         unit = "rad" if column == "angle" else "1"
         table[f"{column} [{unit}]"] = edges = np.linspace(low, high, 21)
         for name, matrices in R.items():
-            counts, _ = np.histogram(_shown(column, matrices), edges)
+            counts, _ = np.histogram(np.clip(_shown(column, matrices), low, high), edges)
             density = counts / (len(matrices) * np.diff(edges))
             table[f"{column}, {name} [1]"] = np.append(density, 0)
     return table
@@ -174,7 +176,7 @@ def draw_histograms(axes: Sequence[Axes], data: Table) -> list[Any]:
     axes : sequence of three Axes
         Where to draw.
     data : mapping of str to array_like, shape (bins + 1,)
-        A `histogram_table`, of up to two samples.
+        A `histogram_table`, of two samples.
 
     Returns
     -------
@@ -185,11 +187,11 @@ def draw_histograms(axes: Sequence[Axes], data: Table) -> list[Any]:
     RR 2.
     """
     artists: list[Any] = []
-    looks = [(COLOURS["projection"], "-"), (COLOURS["optimum"], "-")]
+    colours = COLOURS["projection"], COLOURS["optimum"]
     for ax, (column, (label, limits, law)) in zip(axes, _LAWS.items(), strict=True):
         edges, densities = _bins(data, column)
-        for (name, density), (colour, dash) in zip(densities.items(), looks, strict=False):
-            artists.append(ax.stairs(density[:-1], edges, color=colour, ls=dash, lw=2, label=name))
+        for (name, density), colour in zip(densities.items(), colours, strict=True):
+            artists.append(ax.stairs(density[:-1], edges, color=colour, lw=2, label=name))
         fine = np.linspace(*limits, 201)
         density = np.diff(law(fine)) / np.diff(fine)
         middle = (fine[:-1] + fine[1:]) / 2

@@ -192,6 +192,52 @@ def test_a_hundred_random_rotations_are_shown(quaternion, tmp_path):
     plt.close(again)
 
 
+def strokes_of(figure):
+    """Where v0 and v1 go, as drawn."""
+    return np.array(figure.axes[0].collections[-1]._segments3d)
+
+
+@pytest.mark.source("RR 2.2", "RR Fig. 4", "RR Fig. 5")
+@pytest.mark.parametrize("naive", [True, False])
+def test_what_is_shown_is_what_the_samplers_draw(naive):
+    v0, v1 = np.array([0.0, 0, 1]), np.array([0, 0.2, 1])
+    R = (rb.sample_rotation_naive if naive else rb.sample_rotation)(5, rng=4)
+    figure, animation = rr.visualize(False, naive=naive, rng=4, steps=5)
+    assert np.abs(strokes_of(figure) - np.stack([R @ v0, R @ v1], axis=1)).max() < 8 * EPS
+    assert "random matrices" in animation.alt
+    plt.close(figure)
+    q = (rb.sample_quaternion_naive if naive else rb.sample_quaternion)(5, rng=4)
+    R = rb.matrix_from_quaternion(q)
+    figure, animation = rr.visualize(True, naive=naive, rng=4, steps=5)
+    assert np.abs(strokes_of(figure) - np.stack([R @ v0, R @ v1], axis=1)).max() < 8 * EPS
+    assert "random quaternions" in animation.alt
+    plt.close(figure)
+
+
+def test_uniform_is_what_is_shown_by_default():
+    figure, _ = rr.visualize(False, rng=4, steps=1)
+    assert np.abs(strokes_of(figure)[0, 0] - rb.sample_rotation(rng=4)[:, 2]).max() < 8 * EPS
+    plt.close(figure)
+
+
+def test_many_steps_take_longer():
+    figure, animation = rr.visualize_rotation(np.eye(3), steps=249)
+    assert len(animation.pictures) == 251
+    assert animation.seconds == pytest.approx(251 / 25)
+    plt.close(figure)
+
+
+@pytest.mark.parametrize("shape", ["matrix", "quaternion"])
+def test_what_is_within_the_tolerance_is_shown_as_the_nearest_rotation(shape):
+    q = np.array([0.6, 0.8, 0, 0])
+    R = rb.matrix_from_quaternion(q)
+    given = R + 0.002 * np.diag([1, -1, 2]) @ R if shape == "matrix" else 1.009 * q
+    nearest = rb.project_so(given) if shape == "matrix" else R
+    figure, _ = rr.visualize_rotation(given, steps=1)
+    assert np.abs(strokes_of(figure)[-1, 0] - nearest[:, 2]).max() < 8 * EPS
+    plt.close(figure)
+
+
 @pytest.mark.parametrize(
     "rotation", [rb.exp_so3([0.5, 1, -2]), rb.quaternion_from_rotation_vector([0.5, 1, -2])]
 )
@@ -200,9 +246,8 @@ def test_one_rotation_is_shown_step_by_step(rotation):
     angle = np.degrees(np.linalg.norm([0.5, 1, -2]))
     assert f"A turn of {angle:.0f} degrees carries the pole of a sphere to (" in animation.alt
     assert len(animation.pictures) == 8
-    strokes = figure.axes[0].collections[-1]
-    assert len(strokes._segments3d) == 7
-    start, end = np.array(strokes._segments3d)[[0, -1], 0]
+    assert len(strokes_of(figure)) == 7
+    start, end = strokes_of(figure)[[0, -1], 0]
     assert np.abs(start - [0, 0, 1]).max() == 0
     assert np.abs(end - rb.exp_so3([0.5, 1, -2])[:, 2]).max() < 8 * EPS
     plt.close(figure)

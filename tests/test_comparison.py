@@ -52,7 +52,7 @@ def test_paths_coordinates_and_differences_are_those_of_the_table(ax):
     distance = np.linalg.norm(apart, axis=0)
     said = comparison.describe_coordinates(TABLE)
     assert (
-        f"farthest apart at t = {TIMES[distance.argmax()]:g}, by {distance.max():.2g} rad" in said
+        f"most at t = {TIMES[distance.argmax()]:g}, by {distance.max():.2g} rad in length" in said
     )
 
 

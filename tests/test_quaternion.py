@@ -112,6 +112,11 @@ def test_bad_arguments_are_named():
         rb.slerp([1, 0, 0, 0], [1, 0, 0], 0)
     with pytest.raises(ValueError, match=r"p \(2,\), q \(3,\)"):
         rb.quaternion_multiply(RANDOM[:2], RANDOM[:3])
+    with pytest.raises(ValueError, match=r"q \(2,\), p \(3,\)"):
+        rb.rotate_by_quaternion(RANDOM[:2], np.ones((3, 3)))
+    for atol in (-1e-9, np.nan, [1e-9, 1e-9]):
+        with pytest.raises(ValueError, match="atol: a number from 0 up wanted"):
+            rb.is_unit_quaternion([1, 0, 0, 0], atol)
 
 
 @pytest.mark.source("RR 1.5", "RR (6)", "RR Fig. 2")
@@ -140,6 +145,28 @@ def test_one_of_q_and_minus_q_is_canonical():
         assert np.array_equal(rb.canonical_quaternion(one), one)
         assert np.abs(np.abs(one) - np.abs(q)).max() < 4 * EPS
         assert np.all(one[:, 0] >= 0)
+
+
+def test_of_two_largest_components_the_first_decides():
+    for off, first in [(0, True), (1e-9, True), (-1e-9, True), (1e-7, False)]:
+        q = rb.project_quaternion([0, -1, 1 + off, 0.3])
+        assert (rb.canonical_quaternion(q)[1] > 0) is np.bool_(first)
+
+
+def test_only_rounding_counts_as_a_half_turn():
+    for off in (1e-9, 1e-12, 1e-14):
+        q = np.array([-off, 0.8, 0.6, 0])
+        assert np.array_equal(rb.canonical_quaternion(q), -q)
+    assert np.array_equal(rb.canonical_quaternion([-2e-16, 0.8, 0.6, 0]), [0, 0.8, 0.6, 0])
+    for goal in ([-1e-14, 1, 0, 0], [1e-14, 1, 0, 0]):  # nearly as far both ways
+        sign = np.sign(goal[0])
+        assert np.abs(rb.slerp([1, 0, 0, 0], goal, 1) - sign * np.array(goal)).max() < 4 * EPS
+        assert np.abs(rb.slerp_long([1, 0, 0, 0], goal, 1) + sign * np.array(goal)).max() < 4 * EPS
+    rounded = [-2e-16, 1, 0, 0]
+    assert rb.slerp([1, 0, 0, 0], rounded, 1)[1] > 0
+    assert rb.slerp_long([1, 0, 0, 0], rounded, 1)[1] < 0
+    near = [np.cos(1e-14), np.sin(1e-14), 0, 0]
+    assert np.abs(rb.slerp_long([1, 0, 0, 0], near, 0.5) - [0, -1, 0, 0]).max() < 0.1
 
 
 @pytest.mark.source("BK Remark 7")

@@ -36,10 +36,11 @@ def test_a_first_order_step_stretches():
 
 
 def test_the_drift_is_drawn_and_described():
-    data = repairs.drift_table(200, {"a": (STEP, None), "b": (STEP, rb.project_so)})
+    ways = {"a": (STEP, None), "b": (STEP, rb.project_so), "c": (np.eye(3) + STEP / 9, None)}
+    data = repairs.drift_table(200, ways)
     fig, ax = plt.subplots()
     lines = repairs.draw_drift(ax, data)
-    assert [line.get_label() for line in lines] == ["a", "b"]
+    assert [line.get_label() for line in lines] == ["a", "b", "c"]
     assert np.array_equal(lines[1].get_ydata(), data["b [1]"])
     assert f"After 200 products it is, a: {data['a [1]'][-1]:.0e}" in repairs.describe_drift(data)
     plt.close(fig)
@@ -51,14 +52,15 @@ def test_letters_are_the_images_and_mirrors_are_told_from_turns():
     data = repairs.letter_table(matrices)
     letter = np.stack([data["x [1]"], data["y [1]"]])
     assert np.array_equal([data["M x [1]"], data["M y [1]"]], matrices["M"] @ letter)
+    off = np.linalg.norm(matrices["turned"] - matrices["M"])
     fig, axes = plt.subplots(1, 2)
     behind, given, under, turned = repairs.draw_letters(axes, data)
     assert np.array_equal(behind.get_xy()[: letter.shape[1]], letter.T)
     assert np.array_equal(given.get_xy()[: letter.shape[1]], (matrices["M"] @ letter).T)
     assert np.array_equal(under.get_xy(), given.get_xy())
     assert given.get_edgecolor() != turned.get_edgecolor()
+    assert [ax.get_title() for ax in axes] == ["M", f"turned: {off:.2f}"]
     plt.close(fig)
-    off = np.linalg.norm((matrices["turned"] - matrices["M"]) @ letter, axis=0).max()
     said = repairs.describe_letters(data)
     assert "M makes a mirrored and distorted one" in said
-    assert f"turned: a turned letter, whose corners are {off:.2f} off at most" in said
+    assert f"turned: a turned letter, at the distance {off:.2f} from M" in said

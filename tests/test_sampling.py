@@ -1,5 +1,6 @@
 """Samplers: members of the group, the same draws from the same seed, and their twins."""
 
+import os
 import subprocess
 import sys
 
@@ -86,8 +87,8 @@ def test_the_global_state_is_left_alone(sampler):
 @pytest.mark.source("RR (9)", "RR (10)", "RR (11)", "RR (13)")
 @pytest.mark.parametrize(("sampler", "textbook"), HAAR)
 def test_the_fast_draws_are_those_of_the_textbook(sampler, textbook):
-    want = textbook(np.random.default_rng(5).random((20_000, 3)))
-    assert np.abs(sampler(20_000, rng=5) - want).max() < 8 * EPS
+    want = textbook(np.random.default_rng(5).random((200_000, 3)))
+    assert np.abs(sampler(200_000, rng=5) - want).max() < 16 * EPS
     assert np.abs(sampler(len(CORNERS), rng=Given(CORNERS)) - textbook(CORNERS)).max() < 8 * EPS
 
 
@@ -102,7 +103,7 @@ def test_the_printed_matrix_is_a_reflection_always_and_its_negative_a_rotation()
     R = arvo_rotation(np.stack([x1, x2, z], axis=1))
     assert np.abs(R + M @ B).max() < 8 * EPS
     negated = M @ B @ np.diag([-1, 1, 1])
-    assert np.array_equal(negated, (-M @ B) @ np.diag([1, -1, -1]))
+    assert np.abs(negated - R @ np.diag([1, -1, -1])).max() < 8 * EPS
 
 
 @pytest.mark.source("RR (12)", "RR (13)")
@@ -136,8 +137,9 @@ def test_the_naive_ones_turn_by_their_angles_in_the_printed_order():
 def test_numbers_outside_the_unit_interval_are_refused():
     for textbook in (arvo_rotation, shoemake_quaternion):
         assert len(textbook([[0, 0, 0], [1, 1, 1]])) == 2
-        with pytest.raises(ValueError, match=r"x\[1\] is 1.5, a number in \[0, 1\] is wanted"):
-            textbook([0, 1.5, 0])
+        for wrong in (1.5, -0.1):
+            with pytest.raises(ValueError, match=rf"x\[1\] is {wrong}, a number in \[0, 1\]"):
+                textbook([0, wrong, 0])
         with pytest.raises(ValueError, match=r"x: shape \(\.\.\., 3\) wanted, got \(2,\)"):
             textbook([0, 0])
 
@@ -159,7 +161,7 @@ def test_what_makes_no_random_numbers_is_refused(sampler, rng):
 def test_other_processors_draw_the_same_to_rounding():
     """NumPy told to do without the instructions that make its tangent fast."""
     code = "import rbcourse as rb; print(*map(float, rb.sample_rotation(300, rng=8).ravel()))"
-    slow = {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
+    slow = os.environ | {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, env=slow
     )

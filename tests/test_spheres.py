@@ -1,11 +1,14 @@
 """Random rotations on the sphere: what is drawn is what was computed."""
 
+import io
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from PIL import Image
 
 import rbcourse as rb
-from rbcourse import spheres
+from rbcourse import animate, spheres
 
 R = rb.sample_rotation(50, rng=1)
 V0 = np.array([0.0, 0, 1])
@@ -49,6 +52,19 @@ def test_what_lies_behind_is_pale(panels):
     assert len({tuple(colour) for colour in strokes.get_color()}) == 2
 
 
+def test_frames_are_what_a_full_drawing_gives():
+    fig, ax = plt.subplots(figsize=(3, 3), dpi=60, subplot_kw={"projection": "3d"}, layout="none")
+    one = {key: column for key, column in TABLE.items() if key.startswith("one")}
+    pictures = animate.render(fig, spheres.moving_images([ax], one), 51)
+    for artist in ax.get_children():
+        artist.set_animated(False)
+    full = io.BytesIO()
+    fig.savefig(full, format="png", dpi=60)
+    plt.close(fig)
+    off = np.abs(np.asarray(Image.open(full).convert("RGB"), dtype=int) - pictures[-1]).max()
+    assert off <= 16
+
+
 def test_the_description_counts():
     said = spheres.describe_images(TABLE)
     inside = (np.abs((R @ V0)[:, 2]) < 0.5).sum()
@@ -58,7 +74,10 @@ def test_the_description_counts():
 
 @pytest.mark.source("RR 2")
 def test_histograms_are_densities():
-    many = {"uniform": rb.sample_rotation(5000, rng=2), "e3 up": rb.exp_so3(np.zeros((10, 3)))}
+    rounded = rb.matrix_from_quaternion(rb.quaternion_from_zyx([[k, 0, 0] for k in range(10)]))
+    rounded[:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)  # heights beyond 1, by rounding
+    rounded[0] = np.eye(3)
+    many = {"uniform": rb.sample_rotation(5000, rng=2), "e3 up": rounded}
     data = spheres.histogram_table(many)
     for column, unit in (("angle", "rad"), ("height of e₁", "1"), ("height of e₃", "1")):
         edges = data[f"{column} [{unit}]"]
@@ -73,12 +92,14 @@ def test_histograms_are_densities():
 
 
 def test_histograms_show_the_table_and_the_law():
-    data = spheres.histogram_table({"a": rb.sample_rotation(5000, rng=2)})
+    many = {"a": rb.sample_rotation(5000, rng=2), "b": rb.sample_rotation_naive(5000, rng=2)}
+    data = spheres.histogram_table(many)
     fig, axes = plt.subplots(1, 3)
     artists = spheres.draw_histograms(axes, data)
     for k, column in enumerate(("angle", "height of e₁", "height of e₃")):
-        stairs, law = artists[2 * k : 2 * k + 2]
-        assert np.array_equal(stairs.get_data().values, data[f"{column}, a [1]"][:-1])
+        a, b, law = artists[3 * k : 3 * k + 3]
+        for stairs, name in ((a, "a"), (b, "b")):
+            assert np.array_equal(stairs.get_data().values, data[f"{column}, {name} [1]"][:-1])
         x, y = law.get_data()
         want = (1 - np.cos(x)) / np.pi if k == 0 else np.full_like(x, 0.5)
         assert np.abs(y - want).max() < 1e-4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
-from scipy.stats import kstest
+from scipy.stats import kstest, norm
 
 import rbcourse as rb
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
@@ -131,7 +131,7 @@ def test_p_values_are_uniform_for_uniform_rotations():
     assert set(tests[0]) == ALL
     for name in ALL:
         p = np.array([test[name].p_value for test in tests])
-        for level in (0.05, 0.5):
+        for level in (0.05, 0.5):  # the laws hold for large samples, here to a hundredth
             assert abs((p < level).mean() - level) < 5 * np.sqrt(level * (1 - level) / 2000) + 0.01
 
 
@@ -161,6 +161,18 @@ def test_what_each_statistic_is():
             z, np.arctan2(y, x), bins=[4, 5], range=[[-1, 1], [-np.pi, np.pi]]
         )
         assert tests[name].statistic == pytest.approx(np.sum((counts - 50) ** 2 / 50), rel=1e-12)
+    back = np.swapaxes(R, 1, 2)
+    for name, turn in {
+        "angle to next": back[::2] @ R[1::2],
+        "angle to half": back[:500] @ R[500:],
+    }.items():
+        found = kstest(np.linalg.norm(rb.log_so3(turn), axis=1), angle_law)
+        assert tests[name].statistic == pytest.approx(found.statistic, abs=1e-9)
+        assert tests[name].p_value == pytest.approx(found.pvalue, rel=1e-6)
+    deviation = abs(trace.mean()) * np.sqrt(1000)
+    assert tests["E tr"].p_value == pytest.approx(2 * norm.sf(deviation), rel=1e-9)
+    deviation = abs((trace**2).mean() - 1) * np.sqrt(1000 / 2)
+    assert tests["E tr²"].p_value == pytest.approx(2 * norm.sf(deviation), rel=1e-9)
     nulls = [test.null for test in tests.values()]
     assert nulls[:2] == ["normal, mean 0, sd 0.032", "normal, mean 1, sd 0.045"]
     assert nulls[2:4] == ["Kolmogorov, n = 1000", "χ², 19 degrees of freedom"]
@@ -168,8 +180,17 @@ def test_what_each_statistic_is():
 
 
 def test_poles_and_the_date_line_belong_to_a_cell():
-    poles = rb.matrix_from_zyx([[0, np.pi / 2, 0], [0, -np.pi / 2, 0], [np.pi, 0, 0]] * 40)
-    assert rb.uniformity_tests(poles)["image of e₁"].p_value < 1e-8
+    """40 images of e₁ at each pole, and 40 on the date line: three of the 20 cells are full."""
+    up, down, back = np.eye(3)[[2, 1, 0]], np.eye(3)[[2, 1, 0]] * [[1], [1], [-1]], -np.eye(3)
+    for sign in (0.0, -0.0):
+        date_line = back.copy()
+        date_line[1, 0] = sign
+        R = np.array([up, down, date_line] * 40)
+        expected = 6
+        want = (3 * (40 - expected) ** 2 + 17 * expected**2) / expected
+        found = rb.uniformity_tests(R)["image of e₁"]
+        assert found.statistic == pytest.approx(want, rel=1e-12)
+        assert found.null == "χ², 19 degrees of freedom"
 
 
 def test_bad_arguments_are_named():
