@@ -162,6 +162,20 @@ def test_near_half_turns_converge(short_of):
         assert tumbling.residual < 1e-11
 
 
+@pytest.mark.parametrize("short_of", [0, 1e-9, 1e-6])
+@pytest.mark.parametrize("speeds", [(-0.72, 0.735), (-0.3, 0.31), (-1, 1.02), (-3, 3.1), (2, 2)])
+def test_no_turn_too_many_near_half_turns(short_of, speeds):
+    """Along the axis p(t) is a cubic, and L_a = 2 ∫ p''² has a closed form; σ is the shortest."""
+    angle, (k0, k1) = np.pi - short_of, speeds
+    curve = rb.minimum_acceleration_so3(
+        np.eye(3), rb.exp_so3([0, 0, angle]), [0, 0, k0], [0, 0, k1]
+    )
+    square, cube = 3 * angle - 2 * k0 - k1, k0 + k1 - 2 * angle
+    shortest = 8 * (square**2 + 3 * square * cube + 3 * cube**2)
+    assert rb.acceleration_cost(curve) <= shortest * (1 + 1e-9)
+    assert curve.cost == pytest.approx(rb.acceleration_cost(curve), rel=1e-12)
+
+
 def test_what_fails_from_the_projection_is_reached_by_continuation():
     """Two fast problems from which Newton's method does not find back from the projected cubic."""
     for turn, w0, w1 in (
@@ -197,6 +211,7 @@ def test_no_motion_at_all(solver):
     ("solver", "speed"),
     [
         (rb.minimum_acceleration_so3, 40),
+        (rb.minimum_acceleration_so3, 1e150),
         (rb.minimum_acceleration_so3, 1e160),
         (rb.shoot_minimum_acceleration_so3, 1e160),
     ],
@@ -224,5 +239,10 @@ def test_shapes_and_bad_arguments(solver):
         solver(np.eye(3), np.eye(3), REST, np.zeros((4, 3)))
     with pytest.raises(ValueError, match=r"t is -1\.0"):
         curve(-1)
+    pose, stack = np.eye(4), np.zeros((2, 3))
+    with pytest.raises(ValueError, match=r"A0: shape \(4, 4\) wanted, got \(2, 4, 4\)"):
+        rb.minimum_acceleration_se3([pose, pose], pose, REST, REST, REST, REST)
+    with pytest.raises(ValueError, match=r"d1_dot: shape \(3,\) wanted, got \(2, 3\)"):
+        rb.minimum_acceleration_se3(pose, pose, REST, REST, REST, stack)
     with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted"):
         curve(0, 3)
