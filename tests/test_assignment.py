@@ -229,7 +229,7 @@ def test_many_steps_take_longer():
 
 @pytest.mark.parametrize("shape", ["matrix", "quaternion"])
 def test_what_is_within_the_tolerance_is_shown_as_the_nearest_rotation(shape):
-    q = np.array([0.6, 0.8, 0, 0])
+    q = rb.project_quaternion([0.6, 0.5, 0.4, 0.3])
     R = rb.matrix_from_quaternion(q)
     given = R + 0.002 * np.diag([1, -1, 2]) @ R if shape == "matrix" else 1.009 * q
     nearest = rb.project_so(given) if shape == "matrix" else R

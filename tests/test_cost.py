@@ -73,6 +73,34 @@ def test_a_sharp_turn_off_the_middle_is_not_missed():
     assert rb.acceleration_cost(line) == pytest.approx(want, rel=1e-9)
 
 
+@pytest.mark.parametrize("when", [0.37, 0.61])
+@pytest.mark.parametrize("off", [1e-2, 1e-4, 1e-5])
+def test_a_projected_cubic_that_all_but_jumps_off_the_middle(when, off):
+    """About one axis M is a complex cubic z, here with |z| of the order `off` at `when`."""
+    angle = 2.5
+    t, z = np.polynomial.Polynomial([0, 1]), np.exp(1j * angle)
+    leave, arrive = t - 2 * t**2 + t**3, t**3 - t**2
+    still = 1 + (z - 1) * (3 * t**2 - 2 * t**3)
+    a, b, c = 1j * leave(when), 1j * z * arrive(when), -still(when)
+    k0, k1 = np.linalg.solve([[a.real, b.real], [a.imag, b.imag]], [c.real, c.imag])  # z(when) = 0
+    k0 += off
+    curve = rb.projected_cubic_so3(np.eye(3), rb.exp_so3([0, 0, angle]), [0, 0, k0], [0, 0, k1])
+    z = still + 1j * k0 * leave + 1j * k1 * z * arrive
+    assert curve.margin_time == pytest.approx(when, abs=off)
+    assert curve.margin == pytest.approx(2 * abs(z(float(curve.margin_time))), rel=1e-6)
+
+    def square(u):
+        rate = z.deriv()(u) / z(u)
+        return 2 * (z.deriv(2)(u) / z(u) - rate**2).imag ** 2
+
+    middle, reach = float(curve.margin_time), 2.0 ** -np.arange(1, 36)
+    ends = np.unique(np.clip([*(middle - reach), middle, *(middle + reach)], 0, 1))
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    half = np.diff(ends)[:, None] / 2
+    want = np.sum(half * weights * square(ends[:-1, None] + half * (1 + nodes)))
+    assert rb.acceleration_cost(curve) == pytest.approx(want, rel=1e-8)
+
+
 @pytest.mark.parametrize("speed", [1e3, 1e12, 1e26])
 def test_what_happens_in_the_first_instant_is_not_missed(speed):
     """M(t) = I + t M'(0) + … turns at once: the cost is of the order of the speed cubed."""

@@ -110,10 +110,11 @@ def test_screws_of_what_does_not_turn():
 
 
 def test_what_turns_by_rounding_only_slides():
-    B = Rotation.random(200, rng=RNG).as_matrix()
+    B, C = Rotation.random(400, rng=RNG).as_matrix().reshape(2, 200, 3, 3)
     slide = np.array([3.0, 4, 0])
-    rounded = rb.pose_from_components(B @ np.swapaxes(B, 1, 2), slide)
-    assert np.abs(rounded[:, :3, :3] - np.eye(3)).max() > 0
+    there_and_back = B @ (np.swapaxes(B, 1, 2) @ C) @ np.swapaxes(C, 1, 2)
+    rounded = rb.pose_from_components(there_and_back, slide)
+    assert np.abs(rb.log_so3(there_and_back)).max() > 0
     screw = rb.screw_from_pose(rounded)
     assert np.all(screw.angle == 0)
     assert np.abs(screw.axis - slide / 5).max() < 8 * EPS

@@ -181,7 +181,8 @@ def test_what_each_statistic_is():
 
 def test_poles_and_the_date_line_belong_to_a_cell():
     """40 images of e₁ at each pole, and 40 on the date line: three of the 20 cells are full."""
-    up, down, back = np.eye(3)[[2, 1, 0]], np.eye(3)[[2, 1, 0]] * [[1], [1], [-1]], -np.eye(3)
+    up, down = np.eye(3)[[2, 1, 0]], np.eye(3)[[2, 1, 0]] * [[1], [1], [-1]]
+    back = np.array([[-0.8, 0, 0.6], [0, 1, 0], [0.6, 0, 0.8]])
     for sign in (0.0, -0.0):
         date_line = back.copy()
         date_line[1, 0] = sign
