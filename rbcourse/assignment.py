@@ -295,7 +295,7 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
     Parameters
     ----------
     rotation : array_like, shape (3, 3) or (4,)
-        A rotation matrix or a unit quaternion.
+        A rotation matrix or a unit quaternion, within 0.01; the nearest one is shown.
     steps : int, optional
         In how many equal steps about one axis it is reached.
 
@@ -323,7 +323,7 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
     """
     turn = _rotation_vector(rotation)
     R = exp_so3(np.linspace(0, 1, _count("steps", steps) + 1)[:, None] * turn)
-    place = ", ".join(f"{x:.2f}" for x in R[-1] @ _V0 + 0.0)
+    place = ", ".join(f"{x:.2f}" for x in (R[-1] @ _V0).round(2) + 0.0)
     degrees = np.degrees(np.linalg.norm(turn))
     alt = f"A turn of {degrees:.0f} degrees carries the pole of a sphere to ({place})."
     return _show("rotation", alt, image_table({"one rotation": (R @ _V0, R @ _V1)}))

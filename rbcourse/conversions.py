@@ -231,7 +231,8 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Angles in rad, as `zyx_from_quaternion` returns them, gimbal lock included.
+        Angles in rad, as `zyx_from_quaternion` returns them. They give R back to a few eps, in
+        gimbal lock to 40 eps.
 
     Raises
     ------
@@ -303,7 +304,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3)
         Angles in rad: α and γ in (−π, π], β in [−π/2, π/2]. They give q back to a few
-        eps, in gimbal lock to 16 eps.
+        eps, in gimbal lock to 20 eps.
 
     Raises
     ------

@@ -85,7 +85,7 @@ def describe_moving_frame(data: Table) -> str:
 
 
 def draw_turns(axes: Sequence[Any], data: Table) -> list[Any]:
-    """Draw a box that carries a frame in several orientations, each on its own axes.
+    """Draw a box with its frame in several orientations, each on its own axes; pale: the room's.
 
     Parameters
     ----------
@@ -106,18 +106,11 @@ def draw_turns(axes: Sequence[Any], data: Table) -> list[Any]:
     artists: list[Any] = []
     for ax, name, turned in zip(axes, names, R, strict=True):
         artists.append(_draw_box(ax, np.zeros(3), turned, np.array([0.8, 0.5, 0.15])))
+        for room in 1.3 * np.eye(3):
+            artists += ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
         for axis, direction in zip("xyz", turned.T, strict=True):
-            artists.append(
-                ax.quiver(
-                    0,
-                    0,
-                    0,
-                    *(1.2 * direction),
-                    color=COLOURS[axis],
-                    lw=2.5,
-                    arrow_length_ratio=0.15,
-                )
-            )
+            arrow = {"color": COLOURS[axis], "lw": 2.5, "arrow_length_ratio": 0.15}
+            artists.append(ax.quiver(0, 0, 0, *(1.2 * direction), **arrow))
             ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
         ax.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), zlim=(-1.3, 1.3))
         ax.set_box_aspect((1, 1, 1), zoom=1.4)
@@ -192,11 +185,16 @@ def describe_angles(data: Table) -> str:
     t = np.asarray(data["t [1]"])
     said = []
     for name in _motions(data):
-        alpha = np.degrees(np.unwrap(np.asarray(data[f"{name} α [rad]"])))
-        rate = np.abs(np.diff(alpha) / np.diff(t)).max()
-        beta = np.degrees(np.abs(np.asarray(data[f"{name} β [rad]"])).max())
-        said.append(f"{name}: β reaches {beta:.0f} degrees, α changes by up to {rate:.0f} per unit")
-    return f"ZYX angles of steadily turning bodies over time. {'; '.join(said)} of time."
+        alpha = np.unwrap(np.asarray(data[f"{name} α [rad]"]))
+        share = (alpha - alpha[0]) / (alpha[-1] - alpha[0])
+        early, late = np.interp([0.25, 0.75], share, t)
+        beta = np.degrees(np.asarray(data[f"{name} β [rad]"]))
+        extreme = beta[np.abs(beta).argmax()]
+        said.append(
+            f"{name}: β goes to {extreme:.0f} degrees, and the middle half of α's change takes "
+            f"{100 * (late - early):.1f} % of the time"
+        )
+    return f"ZYX angles of steadily turning bodies over time. {'; '.join(said)}."
 
 
 def _motions(data: Table) -> list[str]:

@@ -41,7 +41,8 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     M, atol = as_array("M", M, "n", "n"), as_tolerance("atol", atol)
     with np.errstate(over="ignore", invalid="ignore"):
         defect = np.abs(np.swapaxes(M, -1, -2) @ M - np.eye(M.shape[-1])).max(axis=(-2, -1))
-        return ((defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol))[()]
+        passes = (defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol)
+    return (passes & np.isfinite(M).all(axis=(-2, -1)))[()]
 
 
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -89,7 +90,7 @@ def project_so(M: ArrayLike) -> Array:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Any matrices, singular and reflected ones too, whose norm is a number: entries below 1e307.
+        Any matrices, singular and reflected ones too.
 
     Returns
     -------
@@ -124,7 +125,9 @@ def project_so(M: ArrayLike) -> Array:
     array([[ 0., -1.],
            [ 1.,  0.]])
     """
-    return project_so_with_gap(as_finite("M", M, "n", "n"))[0]
+    M = as_finite("M", M, "n", "n")
+    _, exponent = np.frexp(np.abs(M).max(axis=(-2, -1), keepdims=True))
+    return project_so_with_gap(np.ldexp(M, -exponent))[0]  # so that nothing overflows
 
 
 def project_so_with_gap(M: Array) -> tuple[Array, Array]:

@@ -159,7 +159,7 @@ def draw_letters(axes: Sequence[Axes], data: Table) -> list[Any]:
         artists += ax.fill(*behind.T, color="0.88")
         colour = COLOURS["y"] if _turned(image) else COLOURS["x"]
         artists += ax.fill(*image.T, fill=False, edgecolor=colour, lw=2)
-        title = f"{name}: {_distance(image, images):.2f}" if k else name
+        title = f"{name}\ndistance {_distance(image, images):.2f}" if k else name
         ax.set(aspect="equal", title=title, xlabel="x")
     axes[0].set_ylabel("y")
     return artists

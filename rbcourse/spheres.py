@@ -187,7 +187,7 @@ def draw_histograms(axes: Sequence[Axes], data: Table) -> list[Any]:
     RR 2.
     """
     artists: list[Any] = []
-    colours = COLOURS["projection"], COLOURS["optimum"]
+    colours = COLOURS["projection"], COLOURS["z"]
     for ax, (column, (label, limits, law)) in zip(axes, _LAWS.items(), strict=True):
         edges, densities = _bins(data, column)
         for (name, density), colour in zip(densities.items(), colours, strict=True):

@@ -84,7 +84,7 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
             height by 5 in longitude; χ² with 19 degrees of freedom (for large n).
         angle to next, angle to half
             As angle, of the turns from each even draw to the next, and from each draw of the first
-            half to its partner in the second: draws that depend on each other show here.
+            half to its partner in the second: draws that depend on these partners show here.
 
     Raises
     ------

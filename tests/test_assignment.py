@@ -90,6 +90,7 @@ def test_what_is_no_member_fails_plainly(check, thing):
 
 def test_infinity_fails_whatever_the_tolerance():
     assert rr.check_SOn(np.full((3, 3), np.inf), np.inf) is False
+    assert rr.check_SOn([[np.inf]], np.inf) is False
     assert rr.check_quaternion([np.inf, 0, 0, 0], np.inf) is False
     for place in ((0, 0), (0, 2), (2, 0)):
         A = np.eye(3)

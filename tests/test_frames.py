@@ -38,7 +38,8 @@ def test_the_moving_frame_shows_both_frames(ax3d):
 def test_turned_boxes_carry_their_frames(ax3d):
     R = rb.exp_so3([[0, 0, np.pi / 2]])
     table = frames.pose_table(["turned"], rb.pose_from_components(R, [0, 0, 0]))
-    box, x, y, z = frames.draw_turns([ax3d], table)
+    box, *room, x, y, z = frames.draw_turns([ax3d], table)
+    assert np.array_equal([np.ptp(line.get_data_3d(), axis=1) for line in room], 2.6 * np.eye(3))
     edges = np.array(box._segments3d)
     assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.6, 0.3]).max() < 1e-15
     for arrow, direction in zip((x, y, z), R[0].T, strict=True):
@@ -53,7 +54,7 @@ def test_turned_boxes_carry_their_frames(ax3d):
 @pytest.mark.source("RR (8)")
 def test_angles_are_drawn_in_degrees_and_described():
     t = np.linspace(0, 1, 11)
-    letters = {"α": t, "β": -t, "γ": 2 * t}
+    letters = {"α": -t, "β": -t, "γ": 2 * t}
     table = {"t [1]": t} | {f"slow {name} [rad]": angle for name, angle in letters.items()}
     fig, ax = plt.subplots()
     lines = frames.draw_angles([ax], table)
@@ -63,4 +64,4 @@ def test_angles_are_drawn_in_degrees_and_described():
     assert ax.get_title() == "slow"
     plt.close(fig)
     said = frames.describe_angles(table)
-    assert "slow: β reaches 57 degrees, α changes by up to 57 per unit of time" in said
+    assert "slow: β goes to -57 degrees, and the middle half of α's change takes 50.0 %" in said

@@ -87,6 +87,13 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
     assert np.abs(rb.project_so(np.arange(1, 10).reshape(3, 3)) - printed).max() < 1e-8
 
 
+def test_no_matrix_is_too_large_or_too_small():
+    M = np.random.default_rng(7).uniform(-1, 1, size=(20, 3, 3))
+    for scale in (2.0**1023, 2.0**-1000):
+        assert np.array_equal(rb.project_so(scale * M), rb.project_so(M))
+    assert_members(rb.project_so(np.full((3, 3), 5e-324)))
+
+
 @pytest.mark.source("BK Prop. 4", "BK Prop. 5", "RR 1.6")
 def test_the_nearest_pose_keeps_the_translation():
     rng = np.random.default_rng(4)
@@ -125,6 +132,9 @@ def test_membership_of_se():
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
 def test_membership_never_fails_on_values(is_member, value):
     assert not is_member(np.full((2, 3, 3), value)).any()
+    if not np.isfinite(value):
+        assert not is_member(np.full((2, 2, 2), value), np.inf).any()
+        assert not rb.is_so([[value]], np.inf)
 
 
 def test_stacks_are_the_stack_of_their_members():

@@ -59,7 +59,7 @@ def test_letters_are_the_images_and_mirrors_are_told_from_turns():
     assert np.array_equal(given.get_xy()[: letter.shape[1]], (matrices["M"] @ letter).T)
     assert np.array_equal(under.get_xy(), given.get_xy())
     assert given.get_edgecolor() != turned.get_edgecolor()
-    assert [ax.get_title() for ax in axes] == ["M", f"turned: {off:.2f}"]
+    assert [ax.get_title() for ax in axes] == ["M", f"turned\ndistance {off:.2f}"]
     plt.close(fig)
     said = repairs.describe_letters(data)
     assert "M makes a mirrored and distorted one" in said
