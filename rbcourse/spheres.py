@@ -99,12 +99,14 @@ def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]
 
 def draw_sphere(ax: Any) -> None:
     """Draw the unit sphere by its meridians and parallels, as `moving_images` looks at it."""
-    longitude, latitude = np.mgrid[0 : 2 * np.pi : 25j, 0 : np.pi : 13j]
+    longitude, latitude = np.mgrid[0 : 2 * np.pi : 61j, 0 : np.pi : 31j]
     across = np.sin(latitude)
     ax.plot_wireframe(
         np.cos(longitude) * across,
         np.sin(longitude) * across,
         np.cos(latitude),
+        rstride=5,
+        cstride=5,
         color="0.85",
         lw=0.5,
     )
