@@ -1,5 +1,11 @@
 """Rigid-body motion, taught by code that runs: rotations, poses, projections and curves."""
 
+from rbcourse.connection import (
+    christoffel,
+    covariant_derivative,
+    geodesic_flow,
+    structure_constants,
+)
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
@@ -13,10 +19,32 @@ from rbcourse.conversions import (
 from rbcourse.cost import acceleration_cost, acceleration_cost_parts
 from rbcourse.curves import Curve, geodesic_so3
 from rbcourse.line import f, line_singular_value, theta
+from rbcourse.metrics import (
+    METRIC_SE3,
+    METRIC_SO3,
+    components_from_tangent,
+    inertia_from_weight,
+    inner_ga,
+    inner_gl,
+    inner_left_invariant,
+    inner_se3,
+    inner_so3,
+    semi_riemannian_metric_se3,
+    tangent_from_components,
+    weight_from_inertia,
+)
 from rbcourse.motions import geodesic_se3, projected_cubic_se3
 from rbcourse.optimum import ConvergenceError
 from rbcourse.projected import projected_cubic_so3, projected_line_so3, projected_quintic_so3
-from rbcourse.projection import is_se, is_so, project_se, project_so
+from rbcourse.projection import (
+    distance_to_so,
+    is_se,
+    is_so,
+    orthonormalize_gram_schmidt,
+    project_se,
+    project_so,
+    project_so_weighted,
+)
 from rbcourse.quaternion import (
     canonical_quaternion,
     is_unit_quaternion,
@@ -64,6 +92,8 @@ __version__ = "0.3.0"
 __all__ = [
     "BASIS_SE3",
     "BASIS_SO3",
+    "METRIC_SE3",
+    "METRIC_SO3",
     "ConvergenceError",
     "Curve",
     "Screw",
@@ -72,14 +102,25 @@ __all__ = [
     "acceleration_cost_parts",
     "adjoint_se3",
     "canonical_quaternion",
+    "christoffel",
+    "components_from_tangent",
     "coordinates_from_pose",
+    "covariant_derivative",
+    "distance_to_so",
     "exp_se3",
     "exp_so3",
     "f",
+    "geodesic_flow",
     "geodesic_se3",
     "geodesic_so3",
     "hat_se3",
     "hat_so3",
+    "inertia_from_weight",
+    "inner_ga",
+    "inner_gl",
+    "inner_left_invariant",
+    "inner_se3",
+    "inner_so3",
     "inverse_se3",
     "is_se",
     "is_so",
@@ -91,11 +132,13 @@ __all__ = [
     "matrix_from_zyx",
     "minimum_acceleration_se3",
     "minimum_acceleration_so3",
+    "orthonormalize_gram_schmidt",
     "pose_from_components",
     "pose_from_coordinates",
     "project_quaternion",
     "project_se",
     "project_so",
+    "project_so_weighted",
     "projected_cubic_se3",
     "projected_cubic_so3",
     "projected_line_so3",
@@ -115,13 +158,17 @@ __all__ = [
     "sample_rotation_naive",
     "screw_from_pose",
     "screw_se3",
+    "semi_riemannian_metric_se3",
     "shoot_minimum_acceleration_so3",
     "slerp",
     "slerp_long",
+    "structure_constants",
+    "tangent_from_components",
     "theta",
     "uniformity_tests",
     "vee_se3",
     "vee_so3",
+    "weight_from_inertia",
     "zyx_from_matrix",
     "zyx_from_quaternion",
 ]

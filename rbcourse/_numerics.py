@@ -71,6 +71,23 @@ def as_unit(name: str, value: ArrayLike, size: int) -> Array:
     return scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
 
 
+def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
+    """Return `as_finite` of square matrices, symmetric but for rounding, made so exactly.
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and the message names the first matrix that is not symmetric.
+    """
+    array = as_finite(name, value, size, size)
+    mirrored = np.swapaxes(array, -1, -2)
+    skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (array - mirrored, array))
+    crooked = skew > 1e-12 * largest
+    if crooked.any():
+        raise ValueError(f"{first_index(name, crooked)} is not symmetric")
+    return (array + mirrored) / 2
+
+
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
     """Return `as_finite` of the arguments, where all entries must lie in [0, 1].
 

@@ -3,7 +3,16 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, as_array, as_finite, as_tolerance
+from rbcourse._numerics import (
+    EPS,
+    Array,
+    as_array,
+    as_finite,
+    as_symmetric,
+    as_tolerance,
+    check_broadcast,
+    first_index,
+)
 
 
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -106,6 +115,8 @@ def project_so(M: ArrayLike) -> Array:
     See Also
     --------
     project_se : The same for poses.
+    project_so_weighted : The same for a body, by mass.
+    distance_to_so : How far it is.
 
     Notes
     -----
@@ -125,9 +136,155 @@ def project_so(M: ArrayLike) -> Array:
     array([[ 0., -1.],
            [ 1.,  0.]])
     """
+    return project_so_with_gap(_scaled(as_finite("M", M, "n", "n")))[0]
+
+
+def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
+    """Return the rotation nearest to M in the norm √tr(XᵀX W): `project_so` of M W.
+
+    Parameters
+    ----------
+    M : array_like, shape (..., n, n)
+        Any matrices, singular and reflected ones too.
+    W : array_like, shape (..., n, n)
+        Weights: symmetric and positive definite. Those of a body are ∫ p pᵀ dm over its points p,
+        body frame.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+        Rotations R, for which tr((M − R)ᵀ(M − R) W) is least: the sum of the squared distances,
+        by mass, from where M puts the points of the body to where R does. L M projects to L R for
+        every rotation L; M L does *not* project to R L, unless L turns W into itself. The factor
+        of `W` does not matter; W = I gives `project_so`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, the two do not fit, or `W` is not
+        symmetric or, to rounding, not positive definite.
+
+    See Also
+    --------
+    weight_from_inertia : Which W induces a given metric on SO(3), and when there is one.
+
+    Notes
+    -----
+    On SO(3), tr(XᵀY W) induces the left-invariant metric G = tr(W) I − W: the inertia of the body.
+
+    Singular set: that of `project_so`, for the matrix M W.
+
+    References
+    ----------
+    BK 4, for metrics that the paper leaves to a later publication.
+
+    Examples
+    --------
+    >>> M = [[1, -0.2], [0, 1]]  # which axis has turned? the one of less weight
+    >>> project_so_weighted(M, np.diag([100, 1])).round(3)
+    array([[ 1.   , -0.002],
+           [ 0.002,  1.   ]])
+    """
     M = as_finite("M", M, "n", "n")
+    W = as_symmetric("W", W, M.shape[-1])
+    check_broadcast(M=(M, 2), W=(W, 2))
+    sizes = np.linalg.eigvalsh(W)
+    refused = ~(sizes[..., 0] > W.shape[-1] * EPS * sizes[..., -1])
+    if refused.any():
+        raise ValueError(f"{first_index('W', refused)} is not positive definite")
+    return project_so_with_gap(_scaled(M) @ _scaled(W))[0]
+
+
+def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
+    """Return the columns of M made orthonormal, from left to right, as Gram and Schmidt do.
+
+    Parameters
+    ----------
+    M : array_like, shape (..., n, n)
+        Matrices of full rank.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+        Q with QᵀQ = I, and QᵀM upper triangular with a positive diagonal: rotations where
+        det M > 0, reflections where it is negative. L M gives L Q for every rotation L; M L does
+        *not* give Q L. The first column keeps its direction, and the last bears all changes.
+
+    Raises
+    ------
+    ValueError
+        If `M` is not finite or not of that shape, or a column depends on those before it, to
+        rounding.
+
+    See Also
+    --------
+    project_so : The nearest rotation, which prefers no column.
+
+    References
+    ----------
+    BK 4, BK Prop. 3.
+
+    Examples
+    --------
+    >>> orthonormalize_gram_schmidt([[1, 0.2], [0, 1]])  # the first column is right already
+    array([[1., 0.],
+           [0., 1.]])
+    """
+    M = as_finite("M", M, "n", "n")
+    n = M.shape[-1]
+    _, exponent = np.frexp(np.abs(M).max(axis=-2, keepdims=True))
+    Q = np.ldexp(M, -exponent)  # so that nothing overflows
+    for j in range(n):
+        earlier, q = Q[..., :j], Q[..., j]
+        size = np.linalg.norm(q, axis=-1)
+        for _ in range(2):  # what rounding leaves of the earlier columns is taken away again
+            q -= (earlier @ (np.swapaxes(earlier, -1, -2) @ q[..., None]))[..., 0]
+        rest = np.linalg.norm(q, axis=-1)
+        dependent = rest <= 4 * n * EPS * size
+        if dependent.any():
+            name = first_index("M", dependent)
+            raise ValueError(f"{name}: column {j} depends on the columns before it")
+        q /= rest[..., None]
+    return Q
+
+
+def distance_to_so(M: ArrayLike) -> Array:
+    """Return ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)², the last σ signed as det M.
+
+    Parameters
+    ----------
+    M : array_like, shape (..., n, n)
+        Any matrices.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        In the Frobenius norm; σ are the singular values, the last one the smallest.
+
+    Raises
+    ------
+    ValueError
+        If `M` is not finite or not of that shape.
+
+    References
+    ----------
+    BK 4, BK Remark 6; where the paper prints the square, and no sign.
+
+    Examples
+    --------
+    >>> float(distance_to_so([[1, 0], [0, -1]]))  # from a mirror every turn is as far
+    2.0
+    """
+    M = as_finite("M", M, "n", "n")
+    d = np.linalg.svd(M, compute_uv=False)
+    d[..., -1] *= np.linalg.slogdet(M).sign
+    return np.hypot.reduce(np.abs(d - 1), axis=-1)
+
+
+def _scaled(M: Array) -> Array:
+    """Return M over a power of two, its largest entry about 1, so that nothing overflows."""
     _, exponent = np.frexp(np.abs(M).max(axis=(-2, -1), keepdims=True))
-    return project_so_with_gap(np.ldexp(M, -exponent))[0]  # so that nothing overflows
+    return np.ldexp(M, -exponent)
 
 
 def project_so_with_gap(M: Array) -> tuple[Array, Array]:

@@ -230,3 +230,18 @@ def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
     guess[4:7] = np.outer(w0, 1 - t) + np.outer(w1, t)
     exact = {"fun_jac": rates_by_y, "bc_jac": misses_by_ends} if jacobians else {}
     return solve_bvp(rates, misses, t, guess, tol=tol, max_nodes=100_000, **exact)
+
+
+def free_body(moments, a, c, t):
+    """Euler's free body by Jacobi's functions: (a cn, b sn, c dn)(λ t), from (a, 0, c) at t = 0.
+
+    For principal moments J1 < J2 < J3 and a, c > 0 with a²J1 (J2 − J1) < c²J3 (J3 − J2).
+    """
+    with mp.workdps(DIGITS):
+        J1, J2, J3, a, c, t = (mp.mpf(float(x)) for x in (*moments, a, c, t))
+        rate = c * mp.sqrt((J3 - J1) * (J3 - J2) / (J1 * J2))
+        b = (J3 - J1) * a * c / (rate * J2)
+        m = (J2 - J1) * a * b / (c * rate * J3)
+        assert m < 1
+        sn, cn, dn = (mp.ellipfun(name, rate * t, m=m) for name in ("sn", "cn", "dn"))
+        return np.array([float(a * cn), float(b * sn), float(c * dn)])

@@ -39,6 +39,16 @@ def test_good_arguments_become_floats_and_are_copied():
     assert numerics.as_finite("x", np.zeros((0, 3, 3)), "n", "n").shape == (0, 3, 3)
 
 
+def test_symmetric_but_for_rounding():
+    given = np.array([[1, 2 + 1e-15], [2, 3]])
+    assert np.array_equal(numerics.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
+    for scale in (1e-200, 1, 1e200):
+        bad = scale * np.array([np.eye(2), [[1, 1e-9], [0, 1]]])
+        with pytest.raises(ValueError, match=r"G\[1\] is not symmetric"):
+            numerics.as_symmetric("G", bad, "n")
+    assert not numerics.as_symmetric("G", np.zeros((2, 2)), 2).any()
+
+
 def test_times_outside_the_unit_interval_are_named():
     assert numerics.as_time([0, 1], 2).shape == (2, 1, 1)
     for bad in (-1e-16, 1.0000000000000002):

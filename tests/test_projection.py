@@ -77,6 +77,136 @@ def test_the_projection_is_invariant_on_both_sides():
     assert np.all(np.abs(rb.project_so(M @ L) - R @ L).max(axis=(-2, -1)) < bound)
 
 
+def weights(n, rng, count=1000):
+    """Random symmetric positive definite matrices, condition numbers up to 1e6."""
+    Q = np.linalg.qr(rng.normal(size=(count, n, n)))[0]
+    sizes = 10.0 ** rng.uniform(-3, 3, size=(count, n))
+    return (Q * sizes[:, None]) @ np.swapaxes(Q, -1, -2)
+
+
+def weighted_distance(M, R, W):
+    """√tr((M − R)ᵀ(M − R) W): by definition, with W as a sum of squares."""
+    return np.linalg.norm((M - R) @ np.linalg.cholesky(W), axis=(-2, -1))
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.source("BK 4")
+def test_the_weighted_projection_is_the_nearest_in_its_own_metric(n):
+    rng = np.random.default_rng(n)
+    W, matrices = weights(n, rng), awkward.matrices(n, rng)
+    W /= np.trace(W, axis1=-2, axis2=-1)[:, None, None]
+    M = np.resize(matrices, (1000, n, n))
+    R = rb.project_so_weighted(M, W)
+    assert_members(R)
+    assert_nearest_of_products(R, M, W)
+    M = rng.normal(size=(1000, n, n))
+    best = weighted_distance(M, rb.project_so_weighted(M, W), W)
+    for other in members(n, rng):
+        assert np.all(best <= weighted_distance(M, other, W) + 1e-9)
+
+
+def assert_nearest_of_products(R, M, W):
+    """RᵀMW symmetric, its two smallest eigenvalues sum to 0 or more; M W is rounded already."""
+    S, n = np.swapaxes(R, -1, -2) @ M @ W, M.shape[-1]
+    size = np.linalg.norm(M, axis=(-2, -1)) * np.linalg.norm(W, axis=(-2, -1))
+    skew = np.linalg.norm(S - np.swapaxes(S, -1, -2), axis=(-2, -1))
+    assert np.all(skew <= 16 * n * EPS * size)
+    assert np.all(oracles.two_smallest_eigenvalues(S) >= -16 * n * EPS * size)
+
+
+@pytest.mark.source("BK 4")
+def test_with_the_identity_as_weight_it_is_the_projection():
+    M = awkward.matrices(3, np.random.default_rng(3))
+    for factor in (1.0, 2.0**900, 2.0**-900):
+        assert np.array_equal(rb.project_so_weighted(M, factor * np.eye(3)), rb.project_so(M))
+
+
+def test_a_weighted_projection_turns_with_its_weight():
+    rng = np.random.default_rng(5)
+    M, W, L = rng.normal(size=(40, 3, 3)), np.diag([1, 2, 5]), members(3, rng)
+    R = rb.project_so_weighted(M, W)
+    turned = np.swapaxes(L, -1, -2) @ W @ L
+    assert np.abs(rb.project_so_weighted(L @ M, W) - L @ R).max() < 1e-12
+    assert np.abs(rb.project_so_weighted(M @ L, turned) - R @ L).max() < 1e-12
+    assert np.abs(rb.project_so_weighted(M @ L, W) - R @ L).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("W", "message"),
+    [
+        (np.diag([1, 1, 0]), "W is not positive definite"),
+        (np.diag([1, 1, -1]), "W is not positive definite"),
+        (np.ones((3, 3)), "W is not positive definite"),
+        (np.zeros((3, 3)), "W is not positive definite"),
+        (np.eye(3) + 1e-9 * np.eye(3, k=1), "W is not symmetric"),
+        (np.eye(2), r"W: shape \(\.\.\., 3, 3\) wanted, got \(2, 2\)"),
+        ([np.eye(3), -np.eye(3)], r"W\[1\] is not positive definite"),
+        (np.full((3, 3), np.inf), r"W\[0, 0\] is inf"),
+    ],
+)
+def test_what_is_no_weight_is_refused(W, message):
+    with pytest.raises(ValueError, match=message):
+        rb.project_so_weighted(np.eye(3), W)
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+@pytest.mark.source("BK 4")
+def test_gram_schmidt_leaves_a_triangle(n):
+    rng = np.random.default_rng(n)
+    M = np.concatenate([rng.normal(size=(40, n, n)), members(n, rng)])
+    nearly_flat = np.diag([1.0] * (n - 1) + [1e-9])
+    M = np.concatenate([M, members(n, rng) @ nearly_flat @ members(n, rng), 1e200 * M, 1e-200 * M])
+    Q = rb.orthonormalize_gram_schmidt(M)
+    assert np.abs(np.swapaxes(Q, -1, -2) @ Q - np.eye(n)).max() < 8 * n * EPS
+    T = np.swapaxes(Q, -1, -2) @ M
+    sizes = np.abs(M).max(axis=-2, keepdims=True)
+    assert np.abs(np.tril(T, -1) / sizes).max() < 8 * n * EPS
+    assert np.all(np.diagonal(T, axis1=-2, axis2=-1) > 0)
+    assert np.array_equal(np.sign(np.linalg.det(Q)), np.linalg.slogdet(M).sign)
+
+
+@pytest.mark.source("BK 4", "BK Prop. 3")
+def test_gram_schmidt_is_invariant_on_the_left_only():
+    rng = np.random.default_rng(3)
+    M, L = rng.normal(size=(40, 3, 3)), members(3, rng)
+    Q = rb.orthonormalize_gram_schmidt(M)
+    assert np.abs(rb.orthonormalize_gram_schmidt(L @ M) - L @ Q).max() < 1e-12
+    assert np.abs(rb.orthonormalize_gram_schmidt(M @ L) - Q @ L).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("M", "message"),
+    [
+        ([[1, 2], [2, 4]], "M: column 1 depends on the columns before it"),
+        (np.arange(1, 10).reshape(3, 3), "M: column 2 depends"),
+        (np.zeros((1, 1)), "M: column 0 depends"),
+        ([np.eye(2), [[0, 1], [0, 1]]], r"M\[1\]: column 0 depends"),
+    ],
+)
+def test_gram_schmidt_refuses_dependent_columns(M, message):
+    with pytest.raises(ValueError, match=message):
+        rb.orthonormalize_gram_schmidt(M)
+
+
+@pytest.mark.parametrize("n", DIMENSIONS)
+@pytest.mark.source("BK Remark 6", "errata 3")
+def test_the_distance_is_the_distance_to_the_nearest(n):
+    M = awkward.matrices(n, np.random.default_rng(n))
+    nearest = np.abs(M - rb.project_so(M))
+    wanted = np.hypot.reduce(nearest.reshape(len(M), -1), axis=-1)
+    assert np.all(np.abs(rb.distance_to_so(M) - wanted) <= 20 * n * EPS * (1 + wanted))
+
+
+@pytest.mark.source("BK Remark 6", "errata 3")
+def test_the_printed_distance_is_its_square_and_forgets_the_sign():
+    for M, corrected in [(np.diag([3.0, 1, 1]), 2), (np.diag([1.0, 1, -1]), 2)]:
+        printed = ((np.linalg.svd(M)[1] - 1) ** 2).sum()
+        others = np.linalg.norm(M - members(3, np.random.default_rng(6)), axis=(-2, -1))
+        assert rb.distance_to_so(M) == pytest.approx(corrected, abs=8 * EPS)
+        assert corrected <= others.min()
+        assert abs(printed - corrected) > 1
+
+
 @pytest.mark.source("RR 1.4", "RR Fig. 1", "errata 21")
 def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
     printed = [
@@ -153,7 +283,7 @@ def test_arguments_are_left_alone():
 
 
 def test_bad_arguments_are_named():
-    for function in (rb.project_so, rb.is_so):
+    for function in (rb.project_so, rb.is_so, rb.orthonormalize_gram_schmidt, rb.distance_to_so):
         with pytest.raises(ValueError, match=r"M: shape \(\.\.\., n, n\) wanted, got \(2, 3\)"):
             function(np.zeros((2, 3)))
     with pytest.raises(ValueError, match=r"B: shape .*n\+1\) wanted, got \(1, 1\)"):

@@ -1,0 +1,243 @@
+from types import SimpleNamespace
+
+import numpy as np
+import oracles
+import pytest
+import scipy.integrate
+
+import rbcourse as rb
+
+EPS = np.finfo(float).eps
+GROUPS = [(rb.BASIS_SO3, 3), (rb.BASIS_SE3, 6)]
+TIMES = np.linspace(0, 10, 21)
+INERTIA = np.diag([1.0, 2, 3])
+
+
+def random_metrics(m, count=100):
+    X = np.random.default_rng(m).normal(size=(count, m, m))
+    return X @ np.swapaxes(X, -1, -2)
+
+
+@pytest.mark.source("BK (2)", "BK (3)", "BK 2.4")
+@pytest.mark.parametrize(("basis", "m"), GROUPS)
+def test_structure_constants_give_the_commutators(basis, m):
+    C = rb.structure_constants(basis)
+    for i, j in np.ndindex(m, m):
+        bracket = basis[i] @ basis[j] - basis[j] @ basis[i]
+        assert np.array_equal(np.einsum("k,kab->ab", C[:, i, j], basis), bracket)
+
+
+def test_structure_constants_in_another_basis():
+    change = np.random.default_rng(0).normal(size=(6, 6))
+    basis = np.einsum("ij,jab->iab", change, rb.BASIS_SE3)
+    C = rb.structure_constants(basis)
+    bracket = basis[1] @ basis[4] - basis[4] @ basis[1]
+    assert np.abs(np.einsum("k,kab->ab", C[:, 1, 4], basis) - bracket).max() < 1e-12
+
+
+@pytest.mark.source("BK 2.4", "BK (8)")
+@pytest.mark.parametrize(("basis", "m"), GROUPS)
+def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(basis, m):
+    G = random_metrics(m)
+    gamma, C = rb.christoffel(G, basis), rb.structure_constants(basis)
+    condition, size = np.linalg.cond(G), np.abs(G).max(axis=(-2, -1))
+    torsion = gamma - np.swapaxes(gamma, -1, -2) - C
+    assert np.all(np.abs(torsion).max(axis=(-3, -2, -1)) < 1e-14 * condition)
+    lowered = np.einsum("bil,bljk->bijk", G, gamma)
+    change = lowered + lowered.transpose(0, 3, 2, 1)  # of ⟨L_i, L_k⟩ along L_j, must be 0
+    assert np.all(np.abs(change).max(axis=(-3, -2, -1)) < 1e-14 * condition * size)
+
+
+@pytest.mark.source("BK (9)", "BK 2.4")
+def test_a_bi_invariant_metric_has_half_the_commutator():
+    C = rb.structure_constants(rb.BASIS_SO3)
+    assert np.array_equal(rb.christoffel(rb.METRIC_SO3, rb.BASIS_SO3), C / 2)
+    C = rb.structure_constants(rb.BASIS_SE3)
+    gamma = rb.christoffel(rb.semi_riemannian_metric_se3(2, 3), rb.BASIS_SE3)
+    assert np.abs(gamma - C / 2).max() < 4 * EPS
+
+
+@pytest.mark.source("BK (9)", "BK (14)")
+def test_the_acceleration_is_the_one_that_the_curves_give():
+    rng = np.random.default_rng(1)
+    A0, A1 = rb.exp_se3(rng.normal(size=(2, 6)))
+    c = rb.projected_cubic_se3(A0, A1, *rng.normal(size=(4, 3)))
+    gamma = rb.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
+    t, h = np.linspace(0.1, 0.9, 9), 1e-4
+    v, v_dot = c(t, 1), (c(t + h, 1) - c(t - h, 1)) / (2 * h)
+    assert np.abs(rb.covariant_derivative(gamma, v, v, v_dot) - c(t, 2)).max() < 1e-5
+
+
+@pytest.mark.source("BK (9)", "BK 2.4")
+def test_the_acceleration_is_the_ambient_one_projected_on_the_tangent_space():
+    """Of (12) and (14), which are induced by a flat metric; R'' by differences, not by Γ."""
+    rng = np.random.default_rng(2)
+    R0, w, a = rb.sample_rotation(rng=3), *rng.normal(size=(2, 3))
+    h = 1e-4
+    before, at, after = (R0 @ rb.exp_so3(w * t + a * t**2 / 2) for t in (-h, 0, h))
+    projected = rb.components_from_tangent(R0, (before - 2 * at + after) / h**2)
+    gamma = rb.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
+    assert np.abs(rb.covariant_derivative(gamma, w, w, a) - projected).max() < 1e-6
+
+
+@pytest.mark.source("BK 2.4")
+@pytest.mark.parametrize(("basis", "m"), GROUPS)
+def test_products_change_as_the_metric_says(basis, m):
+    """d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩, for any metric."""
+    v, x, y, dx, dy = np.random.default_rng(4).normal(size=(5, 100, m))
+    G = random_metrics(m)
+    gamma = rb.christoffel(G, basis)
+    Dx, Dy = rb.covariant_derivative(gamma, v, x, dx), rb.covariant_derivative(gamma, v, y, dy)
+    by_connection = np.einsum("bij,bi,bj->b", G, Dx, y) + np.einsum("bij,bi,bj->b", G, x, Dy)
+    by_components = np.einsum("bij,bi,bj->b", G, dx, y) + np.einsum("bij,bi,bj->b", G, x, dy)
+    bound = 1e-13 * np.linalg.cond(G) * np.linalg.norm(G, axis=(-2, -1))
+    assert np.all(np.abs(by_connection - by_components) < bound)
+
+
+@pytest.mark.source("BK (8)")
+@pytest.mark.parametrize(("m", "start"), [(3, np.eye(3)), (6, np.eye(4))])
+def test_the_energy_is_constant_over_ten_units_of_time(m, start):
+    G, v0 = random_metrics(m, 10) + np.eye(m), np.random.default_rng(5).normal(size=(10, m))
+    _, v = rb.geodesic_flow(G, start, v0, TIMES)
+    energy = np.einsum("tbi,bij,tbj->tb", v, G, v)
+    assert np.abs(energy / energy[0] - 1).max() < 1e-9
+
+
+@pytest.mark.source("BK (8)")
+def test_the_velocity_is_the_velocity_and_the_momentum_stays():
+    """Against central differences, and the conserved momentum in the fixed frame (Noether)."""
+    rng = np.random.default_rng(6)
+    G, v0 = random_metrics(6, 1)[0] + np.eye(6), rng.normal(size=6)
+    A0, t, h = rb.exp_se3(rng.normal(size=6)), np.linspace(-3, 3, 13), 1e-4
+    A, v = rb.geodesic_flow(G, A0, v0, t)
+    ahead, behind = (rb.geodesic_flow(G, A0, v0, t + step)[0] for step in (h, -h))
+    by_differences = rb.components_from_tangent(A, (ahead - behind) / (2 * h))
+    assert np.abs(by_differences - v).max() < 1e-5
+    momentum = np.linalg.solve(np.swapaxes(rb.adjoint_se3(A), -1, -2), (v @ G)[..., None])[..., 0]
+    assert np.abs(momentum - momentum[0]).max() < 1e-10
+    assert rb.is_se(A, 1e-13).all()
+
+
+@pytest.mark.source("BK (8)", "BK 2.4")
+@pytest.mark.parametrize(("a", "c"), [(1, 1), (0.01, 2), (1.5, 1)])
+def test_the_free_body_is_eulers(a, c):
+    _, w = rb.geodesic_flow(INERTIA, np.eye(3), [a, 0, c], TIMES)
+    exact = [oracles.free_body([1, 2, 3], a, c, t) for t in TIMES]
+    assert np.abs(w - exact).max() < 1e-9
+
+
+@pytest.mark.source("BK (8)", "errata 13")
+def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
+    """Read with the frame's symbols, it has ä of coordinates for ẇ, and Γ^i_ik for Γ^i_jk."""
+    gamma = rb.christoffel(INERTIA, rb.BASIS_SO3)
+    w = np.array([1.0, 2, 3])
+    euler = np.linalg.solve(INERTIA, np.cross(INERTIA @ w, w))
+    corrected = -np.einsum("ijk,j,k->i", gamma, w, w)
+    printed = -np.einsum("iik,i,k->i", gamma, w, w)
+    assert np.abs(corrected - euler).max() < 4 * EPS
+    assert np.abs(printed - euler).max() > 1
+    _, after = rb.geodesic_flow(INERTIA, np.eye(3), w, 1e-4)
+    assert np.abs((after - w) / 1e-4 - euler).max() < 1e-2
+    sigma, h = np.array([0.4, -0.3, 0.5]), 1e-4  # coordinates along the geodesic, and their ä
+    ways = rb.geodesic_flow(rb.METRIC_SO3, rb.exp_so3(sigma), w, [-h, 0, h])[0]
+    before, at, ahead = rb.log_so3(ways)
+    velocity, acceleration = (ahead - before) / (2 * h), (before - 2 * at + ahead) / h**2
+    frame = rb.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
+    assert np.abs(acceleration + np.einsum("ijk,j,k->i", frame, velocity, velocity)).max() > 0.1
+
+
+@pytest.mark.source("BK (14)", "BK 2.6")
+def test_geodesics_of_14_turn_steadily_and_run_straight():
+    v0 = np.random.default_rng(7).normal(size=(5, 6))
+    A, v = rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, TIMES)
+    assert np.abs(v[..., :3] - v0[:, :3]).max() < 1e-12
+    straight = TIMES[:, None, None] * v0[:, 3:]
+    assert np.abs(A[..., :3, 3] - straight).max() < 1e-10
+    ends = rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, 0.5)[0]
+    assert (
+        np.abs(
+            rb.geodesic_se3(np.eye(4), ends)(0.5)
+            - rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, 0.25)[0]
+        ).max()
+        < 1e-12
+    )
+
+
+@pytest.mark.source("BK (10)", "BK 2.6")
+def test_geodesics_of_10_are_screws():
+    v0 = np.random.default_rng(8).normal(size=(5, 6))
+    A, v = rb.geodesic_flow(rb.semi_riemannian_metric_se3(2, 3), np.eye(4), v0, TIMES)
+    assert np.abs(v - v0).max() < 1e-11
+    assert np.abs(A - rb.exp_se3(TIMES[:, None, None] * v0)).max() < 1e-10
+
+
+@pytest.mark.source("BK 2.5", "BK 2.6")
+def test_geodesics_of_the_induced_metric_are_one_parameter_subgroups():
+    w = np.array([0.3, -1.2, 2])
+    R, _ = rb.geodesic_flow(rb.METRIC_SO3, np.eye(3), w, TIMES)
+    assert np.abs(R - rb.exp_so3(TIMES[:, None] * w)).max() < 1e-12
+
+
+def test_times_in_any_order_forwards_and_back():
+    start, spin = rb.exp_so3([1, 2, 3]), [0.3, 2, -1]
+    t = np.array([[2.0, -1, 0], [2, 0.5, -3]])
+    R, w = rb.geodesic_flow(INERTIA, start, spin, t)
+    assert R.shape == (2, 3, 3, 3)
+    assert np.array_equal(w[0, 2], spin)
+    assert np.array_equal(w[0, 0], w[1, 0])
+    for i in np.ndindex(2, 3):
+        alone = rb.geodesic_flow(INERTIA, start, spin, t[i])
+        assert np.abs(R[i] - alone[0]).max() < 1e-11
+    back = rb.geodesic_flow(INERTIA, R[0, 0], w[0, 0], -2)
+    assert np.abs(back[0] - start).max() < 1e-11
+    assert rb.geodesic_flow(INERTIA, start, spin, [])[0].shape == (0, 3, 3)
+
+
+def test_slow_and_fast_bodies_run_through_the_same_attitudes():
+    """γ_sv(t) = γ_v(st), in one batch."""
+    scale = np.array([1, 1e-8, 1e8])[:, None]
+    w0 = np.array([0.3, 2, -1])
+    slow = rb.geodesic_flow(INERTIA, np.eye(3), w0, 3)
+    for s in scale[:, 0]:
+        R, w = rb.geodesic_flow(INERTIA, np.eye(3), s * w0, 3 / s)
+        assert np.abs(R - slow[0]).max() < 1e-11
+        assert np.abs(w / s - slow[1]).max() < 1e-11
+    batch = rb.geodesic_flow(INERTIA, np.eye(3), scale[:2] * w0, 3)
+    assert np.abs(batch[0][0] - slow[0]).max() < 1e-11
+
+
+def test_a_body_at_rest_stays():
+    A, v = rb.geodesic_flow(np.eye(6), np.eye(4), np.zeros(6), TIMES)
+    assert np.array_equal(A, np.broadcast_to(np.eye(4), (21, 4, 4)))
+    assert not v.any()
+
+
+def test_an_integration_that_fails_is_no_curve(monkeypatch):
+    failed = SimpleNamespace(success=False, message="the step is too small")
+    monkeypatch.setattr(scipy.integrate, "solve_ivp", lambda *_, **__: failed)
+    with pytest.raises(FloatingPointError, match="no geodesic up to t = 5: the step is too small"):
+        rb.geodesic_flow(INERTIA, np.eye(3), [1, 2, 3], [1, 5])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: rb.structure_constants(np.eye(3)), r"basis: shape \(m, n, n\) wanted"),
+        (lambda: rb.structure_constants([np.eye(2), 2 * np.eye(2)]), "linearly dependent"),
+        (lambda: rb.structure_constants(rb.BASIS_SO3[:2]), "a commutator of two"),
+        (lambda: rb.christoffel(np.eye(6), rb.BASIS_SO3), r"G: shape \(\.\.\., 3, 3\) wanted"),
+        (lambda: rb.christoffel(np.eye(3, k=1), rb.BASIS_SO3), "G is not symmetric"),
+        (lambda: rb.christoffel(np.ones((3, 3)), rb.BASIS_SO3), "G is singular"),
+        (
+            lambda: rb.covariant_derivative(np.zeros((3, 3, 3)), [1, 2], [1, 2], [1, 2]),
+            r"gamma: shape \(\.\.\., 2, 2, 2\) wanted",
+        ),
+        (lambda: rb.geodesic_flow(np.eye(6), np.eye(3), [1, 2, 3], 1), r"G: shape \(\.\.\., 3, 3"),
+        (lambda: rb.geodesic_flow(np.eye(3), np.eye(3), np.ones(6), 1), r"v0: shape \(\.\.\., 3\)"),
+        (lambda: rb.geodesic_flow(np.eye(3), np.eye(2), [1], 1), r"A0: shape \(\.\.\., 3, 3\) or"),
+        (lambda: rb.geodesic_flow(np.eye(3), np.eye(3), [1, 2, 3], [0, np.nan]), r"t\[1\] is nan"),
+    ],
+)
+def test_bad_arguments_are_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

@@ -1,0 +1,193 @@
+import numpy as np
+import pytest
+
+import rbcourse as rb
+
+EPS = np.finfo(float).eps
+RNG = np.random.default_rng(2)
+R = rb.sample_rotation(50, rng=1)
+A = rb.pose_from_components(R, RNG.normal(size=(50, 3)))
+LEFT, RIGHT = rb.sample_rotation(50, rng=2), rb.sample_rotation(50, rng=3)
+MOVE = rb.pose_from_components(LEFT, RNG.normal(size=(50, 3)))
+w, z = RNG.normal(size=(2, 50, 3))
+S, T = RNG.normal(size=(2, 50, 6))
+
+
+def assert_close(value, wanted, scale=100):
+    assert np.abs(value - wanted).max() <= 100 * EPS * scale
+
+
+@pytest.mark.source("BK (11)", "BK (13)", "BK 3.1", "BK 3.2")
+@pytest.mark.parametrize(("inner", "n"), [(rb.inner_gl, 4), (rb.inner_ga, 4), (rb.inner_gl, 1)])
+def test_the_trace_is_the_sum_of_products(inner, n):
+    X, Y = RNG.normal(size=(2, 5, n, n))
+    by_definition = [np.trace(x.T @ y) for x, y in zip(X, Y, strict=True)]
+    assert np.abs(inner(X, Y) - by_definition).max() < 20 * EPS * n * n
+    assert inner(X[0], Y).shape == (5,)
+
+
+@pytest.mark.source("BK Prop. 1", "BK 3.1")
+def test_the_trace_is_invariant_under_rotations_on_both_sides_and_under_nothing_else():
+    X, Y = RNG.normal(size=(2, 50, 3, 3))
+    assert_close(rb.inner_gl(LEFT @ X @ RIGHT, LEFT @ Y @ RIGHT), rb.inner_gl(X, Y))
+    shear = np.eye(3) + np.eye(3, k=1)
+    assert abs(rb.inner_gl(shear @ X, shear @ X) - rb.inner_gl(X, X)).max() > 0.1
+
+
+@pytest.mark.source("BK (12)", "BK Remark 1", "BK 3.1", "errata 1")
+def test_what_the_trace_induces_on_so3():
+    X, Y = rb.tangent_from_components(R, w), rb.tangent_from_components(R, z)
+    assert_close(rb.inner_so3(X, Y), 2 * np.vecdot(w, z))
+    gram = rb.inner_gl(rb.BASIS_SO3[:, None], rb.BASIS_SO3)
+    printed, corrected = np.eye(3), 2 * np.eye(3)
+    assert np.array_equal(gram, corrected)
+    assert not np.array_equal(gram, printed)
+    assert np.array_equal(rb.METRIC_SO3, corrected)
+
+
+@pytest.mark.source("BK (14)", "BK Remark 3", "BK Remark 4", "BK 3.2")
+def test_what_the_trace_induces_on_se3():
+    X, Y = rb.tangent_from_components(A, S), rb.tangent_from_components(A, T)
+    wanted = 2 * np.vecdot(S[:, :3], T[:, :3]) + np.vecdot(S[:, 3:], T[:, 3:])
+    assert_close(rb.inner_se3(X, Y), wanted)
+    assert_close(rb.inner_left_invariant(rb.METRIC_SE3, A, X, Y), wanted)
+    gram = rb.inner_ga(rb.BASIS_SE3[:, None], rb.BASIS_SE3)
+    assert np.array_equal(gram, np.diag([2, 2, 2, 1, 1, 1]))
+    assert np.array_equal(rb.METRIC_SE3, gram)
+
+
+@pytest.mark.source("BK Remark 4")
+def test_on_se3_it_is_invariant_on_the_left_and_on_the_right_under_rotations_only():
+    X, Y = rb.tangent_from_components(A, S), rb.tangent_from_components(A, T)
+    assert_close(rb.inner_se3(MOVE @ X, MOVE @ Y), rb.inner_se3(X, Y), 1000)
+    turn = rb.pose_from_components(RIGHT, np.zeros(3))
+    assert_close(rb.inner_se3(X @ turn, Y @ turn), rb.inner_se3(X, Y), 1000)
+    shift = rb.pose_from_components(np.eye(3), [1, 0, 0])
+    assert abs(rb.inner_se3(X @ shift, Y @ shift) - rb.inner_se3(X, Y)).max() > 0.1
+
+
+def energy(points, masses, velocity):
+    """The kinetic energy of points whose velocities are `velocity` @ (point, 1), times 2."""
+    moved = points @ velocity[:3, :3].T + velocity[:3, 3]
+    return (masses * (moved**2).sum(axis=-1)).sum()
+
+
+@pytest.mark.source("BK Remark 2", "BK Remark 5")
+def test_it_is_the_energy_of_a_ball():
+    """Six equal masses on the axes: the moments of a ball, 2 in all directions, mass 1."""
+    points, masses = np.sqrt(3) * np.concatenate([np.eye(3), -np.eye(3)]), np.full(6, 1 / 6)
+    for X in rb.tangent_from_components(A, S):
+        assert energy(points, masses, X) == pytest.approx(rb.inner_se3(X, X), rel=100 * EPS)
+    for X in rb.tangent_from_components(R, w):
+        turning = np.pad(X, [(0, 1), (0, 1)])
+        assert energy(points, masses, turning) == pytest.approx(rb.inner_so3(X, X), rel=100 * EPS)
+
+
+@pytest.mark.source("BK (4)", "BK (5)", "BK (1)", "BK 2.2")
+@pytest.mark.parametrize(("group", "x", "basis"), [(R, w, rb.BASIS_SO3), (A, S, rb.BASIS_SE3)])
+def test_a_left_invariant_field_is_its_components_times_the_moved_basis(group, x, basis):
+    X = rb.tangent_from_components(group, x)
+    assert_close(X, np.einsum("bi,bjk,ikl->bjl", x, group, basis))
+    assert_close(rb.components_from_tangent(group, X), x, 1000)
+
+
+@pytest.mark.source("BK (4)", "BK 2.2")
+def test_the_field_goes_along_with_the_group():
+    X = rb.tangent_from_components(A, S)
+    assert_close(rb.tangent_from_components(MOVE @ A, S), MOVE @ X, 1000)
+    assert_close(rb.components_from_tangent(MOVE @ A, MOVE @ X), S, 1000)
+
+
+@pytest.mark.source("BK (6)", "BK (7)", "BK 2.3")
+@pytest.mark.parametrize(("group", "left", "x", "y"), [(R, LEFT, w, z), (A, MOVE, S, T)])
+def test_a_left_invariant_metric(group, left, x, y):
+    m = x.shape[-1]
+    G = RNG.normal(size=(50, m, m))
+    G = G @ np.swapaxes(G, -1, -2)
+    X, Y = rb.tangent_from_components(group, x), rb.tangent_from_components(group, y)
+    value = rb.inner_left_invariant(G, group, X, Y)
+    assert_close(value, np.einsum("bi,bij,bj->b", x, G, y), 1000)
+    assert_close(rb.inner_left_invariant(G, left @ group, left @ X, left @ Y), value, 10_000)
+
+
+@pytest.mark.source("BK (10)", "BK 2.6")
+def test_the_indefinite_metric_is_invariant_on_both_sides():
+    G = rb.semi_riemannian_metric_se3(2, 3)
+    assert np.array_equal(
+        G, np.block([[2 * np.eye(3), 3 * np.eye(3)], [3 * np.eye(3), 0 * A[0, :3, :3]]])
+    )
+    eigenvalues = np.linalg.eigvalsh(G)
+    assert (eigenvalues > 0).sum() == (eigenvalues < 0).sum() == 3
+    X, Y = rb.tangent_from_components(A, S), rb.tangent_from_components(A, T)
+    value = rb.inner_left_invariant(G, A, X, Y)
+    for left, right in [(MOVE, np.eye(4)), (np.eye(4), MOVE)]:
+        moved = rb.inner_left_invariant(G, left @ A @ right, left @ X @ right, left @ Y @ right)
+        assert_close(moved, value, 10_000)
+
+
+@pytest.mark.source("BK 3")
+def test_the_weighted_trace_induces_an_inertia():
+    P = RNG.normal(size=(50, 3, 8))
+    W = P @ np.swapaxes(P, -1, -2)
+    X, Y = rb.tangent_from_components(R, w), rb.tangent_from_components(R, z)
+    weighted = np.trace(np.swapaxes(X, -1, -2) @ Y @ W, axis1=-2, axis2=-1)
+    G = rb.inertia_from_weight(W)
+    assert_close(rb.inner_left_invariant(G, R, X, Y), weighted, 1000)
+    assert_close(rb.weight_from_inertia(G), W)
+    by_points = sum(p @ p * np.eye(3) - np.outer(p, p) for p in P[0].T)
+    assert_close(G[0], by_points)
+
+
+@pytest.mark.source("BK 3")
+def test_which_inertias_a_weight_reaches():
+    turned = R[0] @ np.diag([2, 3, 4.9]) @ R[0].T
+    assert np.linalg.eigvalsh(rb.weight_from_inertia(turned))[0] == pytest.approx(0.05)
+    for moments in ([1, 2, 3], [1, 2, 4], [0, 1, 1], [-1, 5, 5], [0, 0, 0]):
+        G = R[0] @ np.diag(moments) @ R[0].T
+        with pytest.raises(ValueError, match="has the principal moments"):
+            rb.weight_from_inertia(G)
+        assert np.linalg.eigvalsh(np.trace(G) / 2 * np.eye(3) - G)[0] < 1e-15
+    with pytest.raises(ValueError, match=r"G\[1\] has the principal moments 1, 2, 3; each must"):
+        rb.weight_from_inertia([np.eye(3), np.diag([1, 2, 3])])
+
+
+def test_stacks_are_the_stack_of_their_members():
+    G = np.diag([1, 2, 3]) * np.ones((4, 1, 1, 1))
+    X = rb.tangent_from_components(R[:5], w[:5])
+    value = rb.inner_left_invariant(G, R[:5], X, X)
+    assert value.shape == (4, 5)
+    assert value[2, 3] == rb.inner_left_invariant(G[0, 0], R[3], X[3], X[3])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: rb.inner_gl(np.eye(2), np.eye(3)), "X and Y: matrices of one size wanted"),
+        (lambda: rb.inner_se3(np.eye(3), np.eye(4)), r"X: shape \(\.\.\., 4, 4\) wanted"),
+        (lambda: rb.inner_ga([[1]], [[1]]), r"X: shape \(\.\.\., n\+1, n\+1\) wanted"),
+        (lambda: rb.tangent_from_components(np.eye(2), [1]), r"A: .* or \(\.\.\., 4, 4\) wanted"),
+        (lambda: rb.tangent_from_components(np.eye(3), np.ones(6)), r"x: shape \(\.\.\., 3\)"),
+        (lambda: rb.components_from_tangent(np.eye(4), np.eye(3)), r"X: shape \(\.\.\., 4, 4\)"),
+        (
+            lambda: rb.inner_left_invariant(np.eye(6), *[np.eye(3)] * 3),
+            r"G: shape \(\.\.\., 3, 3\)",
+        ),
+        (
+            lambda: rb.inner_left_invariant(np.eye(3, k=1), *[np.eye(3)] * 3),
+            "G is not symmetric",
+        ),
+        (lambda: rb.inner_so3(R[:2], R[:3]), "batch shapes do not broadcast"),
+        (lambda: rb.semi_riemannian_metric_se3(0, 1), "alpha: a positive number wanted, got 0"),
+        (lambda: rb.semi_riemannian_metric_se3(1, [1]), r"beta: a positive number wanted, got \[1"),
+        (lambda: rb.inertia_from_weight(np.eye(3, k=1)), "W is not symmetric"),
+    ],
+)
+def test_bad_arguments_are_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_the_metrics_cannot_be_changed_by_accident():
+    for metric in (rb.METRIC_SO3, rb.METRIC_SE3):
+        with pytest.raises(ValueError, match="read-only"):
+            metric[0, 0] = 1
