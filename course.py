@@ -1,4 +1,4 @@
-"""Every task of the course: python course.py figures | test | lab | lint.
+"""Every task of the course: python course.py figures | test | lab | ledger | lint.
 
 The first call makes the environment .venv from environment.txt; later calls use it. When
 environment.txt changes or the folder is moved, .venv is made anew.
@@ -37,6 +37,7 @@ def main():
     tasks.add_parser("test", help="run every test, the lessons too; further words go to pytest")
     lab = tasks.add_parser("lab", help="open the lessons; further words go to JupyterLab")
     lab.add_argument("--edit", action="store_true", help="the originals, not the copies in work/")
+    tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
     if further and known.task not in ("test", "lab"):
@@ -48,6 +49,8 @@ def main():
         run("-m", "pytest", "-n", "auto", "--dist", "loadfile", *further)
     elif known.task == "lab":
         open_lab(known.edit, further)
+    elif known.task == "ledger":
+        run("-m", "rbcourse.ledger")
     else:
         set_up_linters()
         run("-m", "ruff", "check")

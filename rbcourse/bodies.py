@@ -31,8 +31,8 @@ def motion_table(t: ArrayLike, poses: Array) -> Table:
     return {"t [1]": np.asarray(t), **pose_columns(poses)}
 
 
-def draw_cube(ax: Any, pose: Array, side: float) -> Poly3DCollection:
-    """Draw a cube with a square on one of its faces, centred at the origin of its frame.
+def draw_cube(ax: Any, pose: Array, side: float | Array) -> Poly3DCollection:
+    """Draw a cube, or box, with a square on one of its faces, centred at the origin of its frame.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def draw_cube(ax: Any, pose: Array, side: float) -> Poly3DCollection:
         Where to draw.
     pose : ndarray, shape (4, 4)
         Where the cube is.
-    side : float
-        Its edge, in m.
+    side : float or ndarray of shape (3,)
+        Its edge, or the three edges of a box, in m.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def draw_cube(ax: Any, pose: Array, side: float) -> Poly3DCollection:
     return ax.add_collection3d(cube)
 
 
-def move_cube(cube: Poly3DCollection, pose: Array, side: float) -> None:
+def move_cube(cube: Poly3DCollection, pose: Array, side: float | Array) -> None:
     """Move a cube that `draw_cube` has drawn."""
     cube.set_verts(_cube_faces(pose, side))
 
@@ -108,15 +108,14 @@ def set_space(ax: Any, places: Array, side: float) -> None:
 
 
 def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
-    """Draw the paths of the origin in several motions, and its frame at the start and the end.
+    """Draw the paths of the origin in several motions, and its frame at the start and the ends.
 
     Parameters
     ----------
     ax : Axes3D
         Where to draw.
     tables : mapping of str to table
-        A `motion_table` for up to three motions between the same poses at the same times, with
-        their names.
+        A `motion_table` for up to three motions from one pose at the same times, with their names.
 
     Returns
     -------
@@ -132,8 +131,9 @@ def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
         ax.plot(*_poses(table)[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
         for (name, table), (colour, dash) in zip(tables.items(), looks, strict=False)
     ]
-    poses = _poses(next(iter(tables.values())))[[0, -1]]
-    for pose, name in zip(poses, "01", strict=True):
+    first, *others = (_poses(table) for table in tables.values())
+    poses = [*first[[0, -1]], *(A[-1] for A in others if np.abs(A[-1] - first[-1]).max() > 1e-9)]
+    for pose, name in zip(poses, "0111", strict=False):
         draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
     paths = np.array([line.get_data_3d() for line in lines])
     places = np.concatenate(paths, axis=1).T
@@ -172,8 +172,8 @@ def describe_ways(tables: Mapping[str, Table]) -> str:
         steps = np.linalg.norm(np.diff(_poses(table)[:, :3, 3], axis=0), axis=-1)
         lengths.append(f"{name} {steps.sum():.2f} m")
     return (
-        "The paths of the origin of a frame in several motions from one pose to another, and the "
-        f"frame at both ends. Lengths of the paths: {', '.join(lengths)}."
+        "The paths of the origin of a frame in several motions from one pose, and the frame at the "
+        f"ends. Lengths of the paths: {', '.join(lengths)}."
     )
 
 
@@ -262,7 +262,7 @@ def describe_cube_motion(data: Table) -> str:
     )
 
 
-def _cube_faces(pose: Array, side: float) -> Array:
+def _cube_faces(pose: Array, side: float | Array) -> Array:
     """Return the corners of the six faces, and of a square on the face of +z: (7, 4, 3)."""
     around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     faces = np.empty((7, 4, 3))

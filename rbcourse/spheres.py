@@ -12,7 +12,7 @@ from rbcourse.figures import COLOURS, Table
 from rbcourse.uniformity import angle_law
 
 _ELEVATION, _AZIMUTH = np.radians(20), np.radians(-60)
-_EYE = np.array(
+EYE = np.array(
     [
         np.cos(_ELEVATION) * np.cos(_AZIMUTH),
         np.cos(_ELEVATION) * np.sin(_AZIMUTH),
@@ -73,8 +73,10 @@ def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]
     panels = []
     for ax, (name, strokes) in zip(axes, _strokes(data).items(), strict=True):
         draw_sphere(ax)
+        ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
+        ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
         ax.set_title(name)
-        behind = strokes[:, 0] @ _EYE < 0
+        behind = strokes[:, 0] @ EYE < 0
         colours = np.where(behind, _PALE, COLOURS["projection"])
         lines = Line3DCollection(strokes, colors=colours, lw=1.6, zorder=3)
         ax.add_collection3d(lines)
@@ -110,8 +112,6 @@ def draw_sphere(ax: Any) -> None:
         color="0.85",
         lw=0.5,
     )
-    ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
-    ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
     ax.computed_zorder = False
     ax.view_init(elev=np.degrees(_ELEVATION), azim=np.degrees(_AZIMUTH))
     ax.set_proj_type("ortho")

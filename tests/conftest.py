@@ -1,10 +1,6 @@
-import re
-
 import pytest
 
-KEY = re.compile(
-    r"(BK|RR) (\(\d+\)|\d+(\.\d+)?|(Prop\.|Cor\.|Remark|Fig\.) \d+)|errata \d+", re.ASCII
-)
+from rbcourse.ledger import MISPRINTS, SOURCES
 
 
 def pytest_collection_modifyitems(items):
@@ -12,5 +8,5 @@ def pytest_collection_modifyitems(items):
     for item in items:
         for mark in item.iter_markers("source"):
             for key in mark.args:
-                if not KEY.fullmatch(key):
+                if key not in SOURCES["entries"] and key not in MISPRINTS:
                     raise pytest.UsageError(f"{item.nodeid}: {key!r} is no key of a text")

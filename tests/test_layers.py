@@ -36,12 +36,15 @@ LEVELS = {
     "comparison": 9,
     "frames": 9,
     "plots": 9,
+    "shadows": 9,
     "repairs": 9,
     "spheres": 9,
     "bodies": 10,
+    "tumbling": 11,
     "animate": 10,
     "assignment": 11,
     "lessons": 11,
+    "ledger": 12,
 }
 ALLOWED = {
     "figures": {"matplotlib"},
@@ -52,8 +55,11 @@ ALLOWED = {
     "frames": {"matplotlib", "mpl_toolkits"},
     "plots": {"matplotlib"},
     "repairs": {"matplotlib"},
+    "shadows": {"matplotlib"},
     "spheres": {"matplotlib", "mpl_toolkits"},
+    "tumbling": {"matplotlib"},
     "lessons": {"nbformat", "nbclient"},
+    "ledger": {"nbformat"},
 }
 
 

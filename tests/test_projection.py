@@ -235,6 +235,39 @@ def test_the_nearest_pose_keeps_the_translation():
     assert rb.is_se(A, 1e-14).all()
 
 
+@pytest.mark.source("BK 5", "BK Prop. 4", "errata 16")
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_the_nearest_pose_is_the_nearest(n):
+    """Against other poses, and with tr(AᵀA) = n + 1 + dᵀd, where the paper prints 4 + dᵀd."""
+    rng = np.random.default_rng(n)
+    B = np.eye(n + 1) + rng.normal(size=(40, n + 1, n + 1))
+    B[:, -1] = np.eye(n + 1)[-1]
+    A = rb.project_se(B)
+    best = np.linalg.norm(B - A, axis=(-2, -1))
+    for other in members(n, rng):
+        pose = np.eye(n + 1)
+        pose[:n, :n], pose[:n, n] = other, B[0, :n, n] + 0.1 * rng.normal(size=n)
+        assert np.all(best <= np.linalg.norm(B - pose, axis=(-2, -1)) + 1e-12)
+    trace, d = np.trace(np.swapaxes(A, -1, -2) @ A, axis1=-2, axis2=-1), A[:, :n, n]
+    assert np.abs(trace - (n + 1 + np.vecdot(d, d))).max() < 1e-12
+    if n != 3:
+        assert np.abs(trace - (4 + np.vecdot(d, d))).min() > 0.5
+
+
+@pytest.mark.source("BK 5", "BK Prop. 5")
+def test_the_nearest_pose_is_invariant_under_poses_on_the_left_and_rotations_on_the_right():
+    rng = np.random.default_rng(8)
+    B = np.eye(4) + 0.3 * rng.normal(size=(40, 4, 4))
+    B[:, 3] = [0, 0, 0, 1]
+    A, move, turn, shift = rb.project_se(B), *(np.tile(np.eye(4), (3, 40, 1, 1)))
+    move[:, :3, :3], move[:, :3, 3] = members(3, rng), rng.normal(size=(40, 3))
+    turn[:, :3, :3] = members(3, rng)
+    shift[:, 0, 3] = 1
+    assert np.abs(rb.project_se(move @ B) - move @ A).max() < 1e-13
+    assert np.abs(rb.project_se(B @ turn) - A @ turn).max() < 1e-13
+    assert np.abs(rb.project_se(B @ shift) - A @ shift).max() > 0.1
+
+
 @pytest.mark.source("RR 1.1", "RR (1)", "RR (2)", "BK 2.1")
 def test_membership_of_so():
     assert rb.is_so(members(3, np.random.default_rng(0)), 1e-14).all()

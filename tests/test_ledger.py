@@ -1,0 +1,137 @@
+"""The ledger is complete and fresh, and every name in it resolves."""
+
+import importlib
+import re
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pytest
+from nbformat.v4 import new_markdown_cell, new_notebook
+
+from rbcourse import ledger
+
+ROOT = Path(__file__).parents[1]
+FOUND = ledger.collect(ROOT)
+PAGE = (ROOT / "LEDGER.md").read_text("utf-8")
+ENTRIES = ledger.SOURCES["entries"]
+TO_COME = ledger.SOURCES["to_come"]
+
+
+def test_the_stored_ledger_is_fresh():
+    assert ledger.render(FOUND) == PAGE
+
+
+def test_every_entry_that_has_landed_has_function_test_and_lesson():
+    open_entries = {key: FOUND[key].lacks(key) for key in ENTRIES if key not in TO_COME}
+    assert {key: kinds for key, kinds in open_entries.items() if kinds} == {}
+
+
+def test_what_has_landed_is_not_still_to_come():
+    assert [key for key in TO_COME if not FOUND[key].lacks(key)] == []
+    assert set(TO_COME) <= set(ENTRIES)
+    assert set(ledger.SOURCES["prose"]) <= set(ENTRIES)
+
+
+def test_every_misprint_has_a_test():
+    assert [key for key in ledger.MISPRINTS if not FOUND[key].tests] == []
+    assert len(ledger.MISPRINTS) == 21
+
+
+def test_all_of_both_texts_is_listed():
+    """Equations, propositions, corollaries, remarks, figures and sections, by their numbers."""
+    counts = {
+        "BK ({})": 21,
+        "BK Prop. {}": 7,
+        "BK Cor. {}": 2,
+        "BK Remark {}": 7,
+        "BK Fig. {}": 5,
+        "BK 2.{}": 6,
+        "BK 3.{}": 2,
+        "BK 6.{}": 3,
+        "RR ({})": 23,
+        "RR Fig. {}": 9,
+        "RR 1.{}": 6,
+        "RR 2.{}": 2,
+        "RR 3.{}": 3,
+        "RR 4.{}": 3,
+    }
+    wanted = {form.format(i) for form, count in counts.items() for i in range(1, count + 1)}
+    assert wanted <= set(ENTRIES)
+    assert set(ENTRIES) - wanted == {"BK 1", "BK 3", "BK 4", "BK 5", "BK 6", "BK 7", "RR 2"}
+
+
+def test_every_name_in_it_resolves():
+    for name in {name for entry in FOUND.values() for name in entry.functions}:
+        module, function = name.split(".")
+        assert callable(getattr(importlib.import_module(f"rbcourse.{module}"), function))
+    for name in {name for entry in FOUND.values() for name in entry.tests}:
+        file, function = name.split("::")
+        source = (ROOT / "tests" / file).read_text("utf-8")
+        assert len(re.findall(rf"^def {function}\(", source, re.MULTILINE)) == 1, name
+    targets = set(re.findall(r"\]\(([^)]+)\)", PAGE))
+    assert len(targets) > 20
+    for target in targets:
+        assert (ROOT / target).is_file(), target
+
+
+@pytest.fixture
+def course(tmp_path):
+    """A course with one function, one test and one lesson."""
+    for folder in ("rbcourse", "tests", "notebooks"):
+        (tmp_path / folder).mkdir()
+    docstring = "References\n    ----------\n    BK (2), RR 2.\n\n    Notes\n    BK (3)\n"
+    (tmp_path / "rbcourse/so3.py").write_text(f'def turn():\n    """{docstring}"""', "utf-8")
+    test = '@pytest.mark.source("BK (2)", "errata 1")\ndef test_turn():\n    pass\n'
+    (tmp_path / "tests/test_so3.py").write_text(test, "utf-8")
+    cells = [new_markdown_cell("## 3 · Turns (BK (2))\n\nBK (3)"), new_markdown_cell("BK (4)")]
+    nbformat.write(new_notebook(cells=cells), tmp_path / "notebooks/03_turns.ipynb")
+    return tmp_path
+
+
+def test_what_is_collected(course):
+    found = ledger.collect(course)
+    assert found["BK (2)"].functions == ["so3.turn"]
+    assert found["BK (2)"].tests == ["test_so3.py::test_turn"]
+    assert found["BK (2)"].lessons == ["03_turns.ipynb, 3"]
+    assert found["BK (2)"].lacks("BK (2)") == []
+    assert found["RR 2"].functions == ["so3.turn"]
+    assert found["RR 2"].lacks("RR 2") == ["tests", "lessons"]
+    assert found["errata 1"].tests == ["test_so3.py::test_turn"]
+    for key in ("BK (3)", "BK (4)"):
+        assert found[key].lacks(key) == ["functions", "tests", "lessons"]
+    assert found["BK 1"].lacks("BK 1") == ["lessons"]
+
+
+def test_an_unknown_key_is_named(course):
+    cell = new_markdown_cell("## 1 · Turns (BK (99))")
+    nbformat.write(new_notebook(cells=[cell]), course / "notebooks/03_turns.ipynb")
+    with pytest.raises(ValueError, match=r"03_turns\.ipynb, 1: BK \(99\) is no entry"):
+        ledger.collect(course)
+
+
+@pytest.mark.source("errata 4")
+def test_the_printed_numbers_of_the_propositions_repeat_one_and_skip_one():
+    printed = [1, 2, 2, 4, 5, 6, 7]
+    corrected = [int(key.split()[-1]) for key in ENTRIES if key.startswith("BK Prop.")]
+    assert len(set(printed)) < len(printed)
+    assert corrected == list(range(1, 8))
+    assert "invariant" in ENTRIES["BK Prop. 3"]
+
+
+@pytest.mark.source("errata 19")
+def test_the_printed_interpolation_of_the_arm_mixes_the_links():
+    start, goal = np.array([0.1, 0.2]), np.array([1.0, 2.0])
+    printed = [start[0], start[1]]  # of link 0 at t = 0 and 1, by the sentence below (21)
+    corrected = [(1 - t) * start + t * goal for t in (0, 1)]
+    assert printed[1] != goal[0]
+    assert np.array_equal(corrected, [start, goal])
+
+
+@pytest.mark.source("errata 20")
+def test_a_configuration_of_the_arm_is_no_planar_pose():
+    pose, joints = np.zeros(3), np.zeros(2)  # x, y, θ; and what (22) and (23) advance
+    velocity = np.array([1.0, -0.5])
+    assert np.array_equal(joints + velocity * 2, [2, -1])
+    with pytest.raises(ValueError, match="broadcast"):
+        pose + velocity * 2
