@@ -87,7 +87,7 @@ from rbcourse.so3 import (
 )
 from rbcourse.uniformity import UniformityTest, uniformity_tests
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 __all__ = [
     "BASIS_SE3",

@@ -34,6 +34,10 @@ def coordinate_table(curves: Mapping[str, Curve], t: ArrayLike) -> Table:
     Returns
     -------
     dict of str to ndarray
+
+    References
+    ----------
+    BK 6.2, BK (21).
     """
     table = {"t [1]": np.asarray(t)}
     for name, curve in curves.items():

@@ -168,7 +168,7 @@ def moving_book(ax: Any, R: Array, edges: ArrayLike) -> Callable[[int], list[Any
     Parameters
     ----------
     ax : Axes3D
-        Where to draw; what stays is the vertical line.
+        Where to draw; the vertical line is the angular momentum, which stays.
     R : ndarray, shape (times, 3, 3)
         Its orientations.
     edges : array_like, shape (3,)
@@ -184,6 +184,7 @@ def moving_book(ax: Any, R: Array, edges: ArrayLike) -> Callable[[int], list[Any
     edges = np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
+    ax.text(0, 0, -1.1 * reach, "  angular momentum", color="0.45", fontsize=10)
     book = draw_cube(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
@@ -216,10 +217,11 @@ def describe_book(data: Table) -> str:
     """
     t, height = np.asarray(data["t [1]"]), np.asarray(data["R32 [1]"])
     turned = t[1:][np.diff(np.sign(height)) != 0]
+    start = "up" if height[0] > 0 else "down"
+    often = "once" if len(turned) == 1 else f"{len(turned)} times"
     return (
-        "A book spins freely, with a pin in its middle axis. The pin starts "
-        f"{'up' if height[0] > 0 else 'down'}, and turns over {len(turned)} times, at t = "
-        f"{', '.join(f'{x:.1f}' for x in turned)}."
+        f"A book spins freely, with a pin in its middle axis. The pin starts {start}, and turns "
+        f"over {often}, at t = {', '.join(f'{x:.1f}' for x in turned)}."
     )
 
 
@@ -235,5 +237,6 @@ def _directions(data: Table) -> Array:
 
 
 def _goes_round(path: Array) -> int:
-    """Return the axis along which the component of a path keeps away from 0."""
-    return int(np.abs(path).min(axis=0).argmax())
+    """Return the axis along which the component of a path keeps its sign, the farthest from 0."""
+    low, high = path.min(axis=0), path.max(axis=0)
+    return int(np.where(low * high > 0, np.abs(path).min(axis=0), 0).argmax())

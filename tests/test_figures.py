@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import oracles
 import pytest
+from scipy.integrate import solve_ivp
 
 import rbcourse as rb
 from rbcourse import figures
@@ -316,3 +317,102 @@ def test_the_drift_of_lesson_4():
     assert np.allclose(first, expected, rtol=0.02)
     assert data["rounded step, repaired [1]"].max() < 1e-5
     assert data["rounded step [1]"][-1] > 1e-3
+
+
+@pytest.mark.source("BK Prop. 2", "BK 4")
+def test_the_data_of_the_shadows():
+    """z to z/|z| by the nearest rotation, to (z + m)/|z + m| by Gram–Schmidt, |m| = 0.35."""
+    data = numbers("lesson04_shadows")
+    M, nearest, gram_schmidt = (
+        data[f"{name} x [1]"] + 1j * data[f"{name} y [1]"]
+        for name in ("M", "nearest rotation", "Gram–Schmidt")
+    )
+    assert np.abs(nearest - M / abs(M)).max() < 1e-11
+    assert np.abs(abs(gram_schmidt) - 1).max() < 1e-11
+    missed = np.abs((M * gram_schmidt.conj()).imag)  # from M to the line of the answer
+    assert missed.max() < 0.35 + 1e-11
+    assert len(M) == 24
+
+
+@pytest.mark.source("BK Prop. 3")
+def test_the_data_of_the_frames():
+    frame, nearest, gram_schmidt = numbers("lesson04_frames").values()
+    assert np.ptp(nearest) < 1e-11
+    assert nearest[0] == pytest.approx(np.arctan2(0.5 + 0.1, 1.1 + 0.8), abs=1e-11)
+    x, y = np.array([[1.1, -0.1], [0.5, 0.8]]) @ [np.cos(frame), np.sin(frame)]  # first column
+    assert np.abs(np.exp(1j * gram_schmidt) - np.exp(1j * (np.arctan2(y, x) - frame))).max() < 1e-10
+
+
+EDGES = np.array([0.20, 0.13, 0.03])
+MOMENTS = 0.5 / 12 * (EDGES @ EDGES - EDGES**2)
+
+
+def euler(start, t):
+    """Euler's equation by SciPy, for the book of lesson 8."""
+    return solve_ivp(
+        lambda _, w: np.cross(MOMENTS * w, w) / MOMENTS,
+        (0, t[-1]),
+        start,
+        "DOP853",
+        t_eval=t,
+        rtol=1e-12,
+        atol=1e-13,
+    ).y
+
+
+@pytest.mark.source("BK (8)")
+def test_the_data_of_the_spins():
+    data = numbers("lesson08_spins")
+    for k in range(3):
+        w = np.array([data[f"axis {k + 1} w{i} [rad]"] for i in (1, 2, 3)])
+        start = np.where(np.arange(3) == k, 4, 0.03)
+        assert np.abs(w - euler(start, data["t [1]"])).max() < 1e-8
+
+
+@pytest.mark.source("BK (8)")
+def test_the_data_of_the_book():
+    """It turns, at first about its middle axis, which is up; the momentum stays."""
+    data = numbers("lesson08_book")
+    R = np.stack([data[f"R{i}{j} [1]"] for i in (1, 2, 3) for j in (1, 2, 3)], axis=-1)
+    R, t = R.reshape(-1, 3, 3), data["t [1]"]
+    assert rb.is_so(R, 1e-11).all()
+    assert np.abs(R[0] - [[1, 0, 0], [0, 0, -1], [0, 1, 0]]).max() < 1e-11
+    momentum = np.einsum("tij,jt->ti", R, MOMENTS[:, None] * euler([0.03, 4, 0.03], t))
+    assert np.abs(momentum - momentum[0]).max() < 1e-9
+    assert (data["R32 [1]"] < -0.99).any()
+
+
+@pytest.mark.source("BK (8)")
+def test_the_data_of_the_momenta():
+    data = numbers("lesson08_momenta")
+    L = np.stack([data[f"{axis} [1]"] for axis in "xyz"], axis=-1).reshape(24, -1, 3)
+    assert np.abs(np.linalg.norm(L, axis=-1) - 1).max() < 1e-11
+    energy = (L**2 / MOMENTS).sum(axis=-1)
+    assert np.abs(energy / energy[:, :1] - 1).max() < 1e-10
+    back = np.linalg.norm(L[:, 40:] - L[:, :1], axis=-1).min(axis=1)
+    assert back.max() < 0.1  # all paths are closed, within a step
+
+
+@pytest.mark.source("BK (10)", "BK (14)", "BK 2.6")
+def test_the_data_of_the_three_ways_straight_on():
+    data = numbers("lesson08_ways")
+    t = data["metric (14) t [1]"]
+    paths = {
+        name: np.array([data[f"{name} {axis} [m]"] for axis in "xyz"])
+        for name in ("metric (14)", "metric (10)", "off centre")
+    }
+    still = 0 * t
+    assert np.abs(paths["metric (14)"] - [1.8 * t, still, t]).max() < 1e-10
+    circle = [0.9 * np.sin(2 * t), 0.9 * (1 - np.cos(2 * t)), t]
+    assert np.abs(paths["metric (10)"] - circle).max() < 1e-10
+    centre = paths["off centre"] + 0.5 * np.array([np.cos(2 * t), np.sin(2 * t), still])
+    assert np.abs(centre - [0.5 + 1.8 * t, t, t]).max() < 1e-10
+
+
+@pytest.mark.source("BK 2.6")
+def test_the_data_of_the_cube_of_the_start():
+    data = numbers("lesson00_cubes")
+    angle = 2 * data["t [1]"]
+    circle = [6 * np.sin(angle), 6 * (1 - np.cos(angle)), 7 * data["t [1]"]]
+    assert np.abs(np.array([data[f"{axis} [m]"] for axis in "xyz"]) - circle).max() < 1e-10
+    assert np.abs(data["R21 [1]"] - np.sin(angle)).max() < 1e-11

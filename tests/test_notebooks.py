@@ -164,6 +164,20 @@ def test_what_is_no_fault():
     assert list(faults(lesson(output=plain("difference < 1e-14, 1.0e-09, -0.5")))) == []
 
 
+START = (ROOT / "notebooks" / "00_start_here.ipynb").read_text("utf-8")
+
+
+@pytest.mark.parametrize("path", LESSONS[1:], ids=lambda path: path.stem)
+def test_every_lesson_is_announced_with_the_minutes_that_it_gives_itself(path):
+    head = nbformat.read(path, as_version=4).cells[0].source
+    (time,) = re.findall(r"^\| Time \| (.*) \|$", head, re.MULTILINE)
+    minutes = " + ".join(re.findall(r"(\d+) (?:minutes|more)", time))
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert f"({path.name}) |" in START
+    assert re.search(rf"\({path.name}\) \|[^|]*\| {re.escape(minutes)} \|", START)
+    assert re.search(rf"\(notebooks/{path.name}\) \|[^|]*\| {re.escape(minutes)} \|", readme)
+
+
 def test_stored_lessons_are_fresh(run):
     """To the byte, except for pictures: another processor may draw a pixel differently."""
     path, again, _ = run

@@ -33,6 +33,7 @@ def test_the_cubic_is_the_papers():
 @pytest.mark.parametrize(
     ("make", "count", "order"), [(cubic_coefficients, 4, 2), (quintic_coefficients, 6, 3)]
 )
+@pytest.mark.source("BK 6")
 def test_both_are_optimal(make, count, order):
     """The derivative that counts is orthogonal to that of any change which keeps the ends."""
     best = Polynomial(make(*RNG.normal(size=count))).deriv(order)
