@@ -104,6 +104,7 @@ def set_space(ax: Any, places: Array, side: float) -> None:
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_major_locator(MultipleLocator(4))
     ax.set_box_aspect(high - low, zoom=0.97)
+    ax.set_proj_type("ortho")  # in perspective the square can sink into its face
     ax.view_init(elev=18, azim=-22)  # never behind the square of BK Fig. 5
 
 

@@ -129,7 +129,7 @@ def render(found: dict[str, Entry]) -> str:
     ]
     for text, title in SOURCES["texts"].items():
         rows = [
-            (key.removeprefix(f"{text} "), what, *map(_links, _folders(found[key])))
+            (key, what, *map(_links, _folders(found[key])))
             for key, what in SOURCES["entries"].items()
             if key.startswith(text) and key not in SOURCES["to_come"]
         ]
@@ -140,7 +140,13 @@ def render(found: dict[str, Entry]) -> str:
         for key, row in MISPRINTS.items()
         for entry in [found[key]]
     ]
-    lines += ["", "## Misprints", "", "Each test shows that what is printed does not hold.", ""]
+    lines += [
+        "",
+        "## Misprints",
+        "",
+        "The tests show that one does not hold, and the other does.",
+        "",
+    ]
     lines += _table(("", "where", "as printed in our copy", "what holds", "tests"), rows)
     lines += ["", "## Still to come", "", ", ".join(SOURCES["to_come"]) + ".", ""]
     return "\n".join(lines)
@@ -151,7 +157,7 @@ def _folders(entry: Entry) -> list[list[tuple[str, str]]]:
     functions = [(name, f"rbcourse/{name.split('.')[0]}.py") for name in entry.functions]
     tests = [(name, f"tests/{name.split('::')[0]}") for name in entry.tests]
     lessons = [
-        (f"{name[:2]}, {place}", f"notebooks/{name}")
+        (f"{name[:2]} {'§ ' * place.isdigit()}{place}", f"notebooks/{name}")
         for name, place in (lesson.split(", ", 1) for lesson in entry.lessons)
     ]
     return [functions, tests, lessons]

@@ -184,7 +184,7 @@ def moving_book(ax: Any, R: Array, edges: ArrayLike) -> Callable[[int], list[Any
     edges = np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
-    ax.text(0, 0, -1.1 * reach, "  angular momentum", color="0.45", fontsize=10)
+    ax.text(0, 0, -1.1 * reach, "  angular momentum", color="0.45", fontsize=12)
     book = draw_cube(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
