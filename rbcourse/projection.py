@@ -278,7 +278,7 @@ def distance_to_so(M: ArrayLike) -> Array:
     M = as_finite("M", M, "n", "n")
     d = np.linalg.svd(M, compute_uv=False)
     d[..., -1] *= np.linalg.slogdet(M).sign
-    return np.hypot.reduce(np.abs(d - 1), axis=-1)
+    return np.hypot.reduce(d - 1, axis=-1)
 
 
 def _scaled(M: Array) -> Array:

@@ -86,6 +86,26 @@ def test_ways_are_the_paths_and_differ_in_colour_and_dashes(axes):
     assert len({line.get_linestyle() for line in lines}) == 2
 
 
+def test_the_frame_is_drawn_at_the_start_and_once_at_each_end(axes):
+    bodies.draw_ways(axes[0], MOTIONS)
+    other = bodies.motion_table(TIMES, rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES))
+    bodies.draw_ways(axes[1], {**MOTIONS, "back": other})
+    assert [len(ax.texts) for ax in axes] == [2 * 3, 3 * 3]
+
+
+def test_the_square_is_seen_on_the_face_that_is_turned_to_the_eye():
+    """From slightly above: in perspective it would sink into the top."""
+    turns = rb.exp_so3(np.outer(np.linspace(0, 6, 20), [0, 0, 1]))
+    for R in turns:
+        fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "3d"})
+        motion = bodies.motion_table([0], rb.pose_from_components(R, [[0, 0, 0]]))
+        bodies.draw_cube_motion(ax, motion, 2.0)
+        fig.canvas.draw()
+        red, green, blue = np.moveaxis(np.asarray(fig.canvas.buffer_rgba())[..., :3], -1, 0)
+        assert ((red > 180) & (green < 130) & (blue < 60)).any()
+        plt.close(fig)
+
+
 def test_straight_ways_can_be_drawn(axes):
     bodies.draw_ways(axes[0], {"geodesic": MOTIONS["geodesic"]})
     assert np.isfinite([axes[0].elev, axes[0].azim]).all()

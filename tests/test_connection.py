@@ -206,6 +206,13 @@ def test_slow_and_fast_bodies_run_through_the_same_attitudes():
     assert np.abs(batch[0][0] - slow[0]).max() < 1e-11
 
 
+def test_what_starts_beside_the_group_is_put_on_it():
+    start = rb.exp_so3([1, 2, 3]) + 1e-3
+    R, _ = rb.geodesic_flow(INERTIA, start, [0.3, 2, -1], TIMES)
+    assert np.abs(R[0] - rb.project_so(start)).max() < 4 * EPS
+    assert np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max() < 10 * EPS
+
+
 def test_a_body_at_rest_stays():
     A, v = rb.geodesic_flow(np.eye(6), np.eye(4), np.zeros(6), TIMES)
     assert np.array_equal(A, np.broadcast_to(np.eye(4), (21, 4, 4)))
@@ -231,6 +238,14 @@ def test_an_integration_that_fails_is_no_curve(monkeypatch):
         (
             lambda: rb.covariant_derivative(np.zeros((3, 3, 3)), [1, 2], [1, 2], [1, 2]),
             r"gamma: shape \(\.\.\., 2, 2, 2\) wanted",
+        ),
+        (
+            lambda: rb.covariant_derivative(np.zeros((2, 1, 1, 1)), [[1]] * 3, [1], [1]),
+            r"broadcast: gamma \(2,\), v \(3,\), x \(\), x_dot \(\)",
+        ),
+        (
+            lambda: rb.geodesic_flow(np.eye(3), [np.eye(3)] * 2, np.ones((3, 3)), 1),
+            r"broadcast: G \(\), A0 \(2,\), v0 \(3,\)",
         ),
         (lambda: rb.geodesic_flow(np.eye(6), np.eye(3), [1, 2, 3], 1), r"G: shape \(\.\.\., 3, 3"),
         (lambda: rb.geodesic_flow(np.eye(3), np.eye(3), np.ones(6), 1), r"v0: shape \(\.\.\., 3\)"),

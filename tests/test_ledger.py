@@ -82,7 +82,8 @@ def course(tmp_path):
         (tmp_path / folder).mkdir()
     docstring = "References\n    ----------\n    BK (2), RR 2.\n\n    Notes\n    BK (3)\n"
     (tmp_path / "rbcourse/so3.py").write_text(f'def turn():\n    """{docstring}"""', "utf-8")
-    test = '@pytest.mark.source("BK (2)", "errata 1")\ndef test_turn():\n    pass\n'
+    mark = '@pytest.mark.source("BK (2)", "errata 1")'
+    test = mark + '\n@pytest.mark.parametrize("key", ["BK (3)"])\ndef test_turn():\n    pass\n'
     (tmp_path / "tests/test_so3.py").write_text(test, "utf-8")
     cells = [new_markdown_cell("## 3 · Turns (BK (2))\n\nBK (3)"), new_markdown_cell("BK (4)")]
     nbformat.write(new_notebook(cells=cells), tmp_path / "notebooks/03_turns.ipynb")

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -140,8 +142,10 @@ def test_the_weighted_trace_induces_an_inertia():
 
 @pytest.mark.source("BK 3")
 def test_which_inertias_a_weight_reaches():
-    turned = R[0] @ np.diag([2, 3, 4.9]) @ R[0].T
-    assert np.linalg.eigvalsh(rb.weight_from_inertia(turned))[0] == pytest.approx(0.05)
+    for slack in (0.1, 1e-12):
+        turned = R[0] @ np.diag([2, 3, 5 - slack]) @ R[0].T
+        least = np.linalg.eigvalsh(rb.weight_from_inertia(turned))[0]
+        assert least == pytest.approx(slack / 2, abs=40 * EPS)
     for moments in ([1, 2, 3], [1, 2, 4], [0, 1, 1], [-1, 5, 5], [0, 0, 0]):
         G = R[0] @ np.diag(moments) @ R[0].T
         with pytest.raises(ValueError, match="has the principal moments"):
@@ -163,27 +167,37 @@ def test_stacks_are_the_stack_of_their_members():
     ("call", "message"),
     [
         (lambda: rb.inner_gl(np.eye(2), np.eye(3)), "X and Y: matrices of one size wanted"),
-        (lambda: rb.inner_se3(np.eye(3), np.eye(4)), r"X: shape \(\.\.\., 4, 4\) wanted"),
-        (lambda: rb.inner_ga([[1]], [[1]]), r"X: shape \(\.\.\., n\+1, n\+1\) wanted"),
-        (lambda: rb.tangent_from_components(np.eye(2), [1]), r"A: .* or \(\.\.\., 4, 4\) wanted"),
-        (lambda: rb.tangent_from_components(np.eye(3), np.ones(6)), r"x: shape \(\.\.\., 3\)"),
-        (lambda: rb.components_from_tangent(np.eye(4), np.eye(3)), r"X: shape \(\.\.\., 4, 4\)"),
+        (lambda: rb.inner_se3(np.eye(3), np.eye(4)), "X: shape (..., 4, 4) wanted"),
+        (lambda: rb.inner_ga([[1]], [[1]]), "X: shape (..., n+1, n+1) wanted"),
+        (
+            lambda: rb.tangent_from_components(np.eye(2), [1]),
+            "A: shape (..., 3, 3) or (..., 4, 4) wanted",
+        ),
+        (lambda: rb.tangent_from_components(np.eye(3), np.ones(6)), "x: shape (..., 3)"),
+        (lambda: rb.components_from_tangent(np.eye(4), np.eye(3)), "X: shape (..., 4, 4)"),
         (
             lambda: rb.inner_left_invariant(np.eye(6), *[np.eye(3)] * 3),
-            r"G: shape \(\.\.\., 3, 3\)",
+            "G: shape (..., 3, 3)",
         ),
         (
             lambda: rb.inner_left_invariant(np.eye(3, k=1), *[np.eye(3)] * 3),
             "G is not symmetric",
         ),
-        (lambda: rb.inner_so3(R[:2], R[:3]), "batch shapes do not broadcast"),
+        (lambda: rb.inner_so3(R[:2], R[:3]), "broadcast: X (2,), Y (3,)"),
+        (lambda: rb.tangent_from_components(R[:2], w[:3]), "broadcast: A (2,), x (3,)"),
+        (lambda: rb.components_from_tangent(R[:2], R[:3]), "broadcast: A (2,), X (3,)"),
+        (
+            lambda: rb.inner_left_invariant(np.ones((4, 1, 1)) * np.eye(3), R[0], R[:2], R[:2]),
+            "broadcast: G (4,), X (2,), Y (2,)",
+        ),
+        (lambda: rb.inner_se3(np.eye(4), np.eye(3)), "Y: shape (..., 4, 4) wanted"),
         (lambda: rb.semi_riemannian_metric_se3(0, 1), "alpha: a positive number wanted, got 0"),
-        (lambda: rb.semi_riemannian_metric_se3(1, [1]), r"beta: a positive number wanted, got \[1"),
+        (lambda: rb.semi_riemannian_metric_se3(1, [1]), "beta: a positive number wanted, got [1"),
         (lambda: rb.inertia_from_weight(np.eye(3, k=1)), "W is not symmetric"),
     ],
 )
 def test_bad_arguments_are_named(call, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=re.escape(message)):
         call()
 
 

@@ -141,12 +141,13 @@ def test_a_weighted_projection_turns_with_its_weight():
         (np.eye(3) + 1e-9 * np.eye(3, k=1), "W is not symmetric"),
         (np.eye(2), r"W: shape \(\.\.\., 3, 3\) wanted, got \(2, 2\)"),
         ([np.eye(3), -np.eye(3)], r"W\[1\] is not positive definite"),
+        (np.ones((2, 1, 1)) * np.eye(3), r"broadcast: M \(4,\), W \(2,\)"),
         (np.full((3, 3), np.inf), r"W\[0, 0\] is inf"),
     ],
 )
 def test_what_is_no_weight_is_refused(W, message):
     with pytest.raises(ValueError, match=message):
-        rb.project_so_weighted(np.eye(3), W)
+        rb.project_so_weighted([np.eye(3)] * 4, W)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -163,6 +164,12 @@ def test_gram_schmidt_leaves_a_triangle(n):
     assert np.abs(np.tril(T, -1) / sizes).max() < 8 * n * EPS
     assert np.all(np.diagonal(T, axis1=-2, axis2=-1) > 0)
     assert np.array_equal(np.sign(np.linalg.det(Q)), np.linalg.slogdet(M).sign)
+
+
+def test_gram_schmidt_of_columns_of_any_size():
+    M = np.array([[3, 1, 0], [4, 0, 0], [0, 0, 2]]) * [1e-200, 1, 1e200]
+    wanted = np.array([[0.6, 0.8, 0], [0.8, -0.6, 0], [0, 0, 1]])
+    assert np.abs(rb.orthonormalize_gram_schmidt(M) - wanted).max() < 4 * EPS
 
 
 @pytest.mark.source("BK 4", "BK Prop. 3")
@@ -194,6 +201,7 @@ def test_the_distance_is_the_distance_to_the_nearest(n):
     M = awkward.matrices(n, np.random.default_rng(n))
     nearest = np.abs(M - rb.project_so(M))
     wanted = np.hypot.reduce(nearest.reshape(len(M), -1), axis=-1)
+    assert rb.distance_to_so(1e200 * np.eye(n)) == pytest.approx(np.sqrt(n) * 1e200)
     assert np.all(np.abs(rb.distance_to_so(M) - wanted) <= 20 * n * EPS * (1 + wanted))
 
 
