@@ -85,7 +85,13 @@ def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
     crooked = skew > 1e-12 * largest
     if crooked.any():
         raise ValueError(f"{first_index(name, crooked)} is not symmetric")
-    return (array + mirrored) / 2
+    return array / 2 + mirrored / 2
+
+
+def scaled(matrix: Array) -> Array:
+    """Return matrices over powers of two, their largest entries about 1: nothing overflows."""
+    _, exponent = np.frexp(np.abs(matrix).max(axis=(-2, -1), keepdims=True))
+    return np.ldexp(matrix, -exponent)
 
 
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:

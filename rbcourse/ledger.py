@@ -91,7 +91,7 @@ def _functions(root: Path) -> Iterator[tuple[str, str]]:
 def _tests(root: Path) -> Iterator[tuple[str, str]]:
     for path in sorted((root / "tests").glob("test_*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef):
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 marks = [m for m in map(ast.unparse, node.decorator_list) if "mark.source(" in m]
                 yield f"{path.name}::{node.name}", " ".join(marks)
 

@@ -7,7 +7,15 @@ frame: an angular velocity on SO(3), a twist (ω, v) on SE(3), both in the body 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import EPS, Array, as_finite, as_symmetric, check_broadcast, first_index
+from rbcourse._numerics import (
+    EPS,
+    Array,
+    as_finite,
+    as_symmetric,
+    check_broadcast,
+    first_index,
+    scaled,
+)
 from rbcourse.se3 import hat_se3, inverse_se3, vee_se3
 from rbcourse.so3 import hat_so3, vee_so3
 
@@ -394,16 +402,16 @@ def weight_from_inertia(G: ArrayLike) -> Array:
            [0. , 0. , 0.5]])
     """
     G = as_symmetric("G", G, 3)
-    moments = np.linalg.eigvalsh(G)
+    moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
     refused = ~(slack > 8 * EPS * np.abs(moments).max(axis=-1))
     if refused.any():
-        least, middle, largest = moments[refused][0]
+        least, middle, largest = np.linalg.eigvalsh(G[refused][0])
         raise ValueError(
             f"{first_index('G', refused)} has the principal moments {least:.6g}, {middle:.6g}, "
             f"{largest:.6g}; each must be less than the sum of the other two"
         )
-    return _trace_times_identity(G) / 2 - G
+    return _trace_times_identity(G / 2) - G
 
 
 def as_group(name: str, value: ArrayLike) -> tuple[Array, int]:

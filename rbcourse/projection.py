@@ -12,6 +12,7 @@ from rbcourse._numerics import (
     as_tolerance,
     check_broadcast,
     first_index,
+    scaled,
 )
 
 
@@ -136,7 +137,7 @@ def project_so(M: ArrayLike) -> Array:
     array([[ 0., -1.],
            [ 1.,  0.]])
     """
-    return project_so_with_gap(_scaled(as_finite("M", M, "n", "n")))[0]
+    return project_so_with_gap(scaled(as_finite("M", M, "n", "n")))[0]
 
 
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
@@ -188,11 +189,12 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     M = as_finite("M", M, "n", "n")
     W = as_symmetric("W", W, M.shape[-1])
     check_broadcast(M=(M, 2), W=(W, 2))
+    W = scaled(W)
     sizes = np.linalg.eigvalsh(W)
     refused = ~(sizes[..., 0] > W.shape[-1] * EPS * sizes[..., -1])
     if refused.any():
         raise ValueError(f"{first_index('W', refused)} is not positive definite")
-    return project_so_with_gap(_scaled(M) @ _scaled(W))[0]
+    return project_so_with_gap(scaled(M) @ W)[0]
 
 
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
@@ -279,12 +281,6 @@ def distance_to_so(M: ArrayLike) -> Array:
     d = np.linalg.svd(M, compute_uv=False)
     d[..., -1] *= np.linalg.slogdet(M).sign
     return np.hypot.reduce(d - 1, axis=-1)
-
-
-def _scaled(M: Array) -> Array:
-    """Return M over a power of two, its largest entry about 1, so that nothing overflows."""
-    _, exponent = np.frexp(np.abs(M).max(axis=(-2, -1), keepdims=True))
-    return np.ldexp(M, -exponent)
 
 
 def project_so_with_gap(M: Array) -> tuple[Array, Array]:

@@ -67,6 +67,7 @@ def draw_shadows(axes: Sequence[Axes], data: Table) -> list[Any]:
         artists += ax.plot(*start.T, "o", ms=5, color=_COLOURS[name])
         ways = np.stack([start, _points(data, name)])
         artists += ax.plot(*ways.transpose(2, 0, 1), color=_COLOURS[name], lw=1.5)
+        ax.plot(*ways[1].T, "o", ms=4, mfc="white", mec=_COLOURS[name])
         ax.plot(0, 0, "+", color="0.3", ms=9)
         ax.set(aspect="equal", title=name, xlabel="(a + d)/2", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes[0].set_ylabel("(c − b)/2")
@@ -90,8 +91,8 @@ def describe_shadows(data: Table) -> str:
     return (
         f"{len(start)} matrices as dots in a plane in which the rotations are the unit circle, "
         "and lines from each to what a repair makes of it. To the nearest rotation the lines run "
-        f"along the rays from the origin. By Gram–Schmidt they end beside, by up to {off:.0f} "
-        "degrees."
+        "along the rays from the origin. With Gram–Schmidt they miss the ray by up to "
+        f"{off:.0f} degrees."
     )
 
 

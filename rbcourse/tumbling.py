@@ -46,10 +46,6 @@ def draw_spins(axes: Sequence[Axes], data: Table) -> list[Any]:
     Returns
     -------
     list of Line2D
-
-    References
-    ----------
-    BK (8).
     """
     lines: list[Any] = []
     t = np.asarray(data["t [1]"])
@@ -57,6 +53,7 @@ def draw_spins(axes: Sequence[Axes], data: Table) -> list[Any]:
         for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True)):
             lines += ax.plot(t, w[:, i], color=COLOURS[axis], ls=dash, label=f"ω{'₁₂₃'[i]}")
         ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]))
+        ax.set_xticks(np.linspace(t[0], t[-1], 5))
     axes[0].set_ylabel("rad per unit time")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
     return lines
@@ -121,10 +118,6 @@ def draw_momenta(ax: Any, data: Table) -> list[Any]:
     Returns
     -------
     list of Line3D
-
-    References
-    ----------
-    BK (8).
     """
     draw_sphere(ax)
     lines: list[Any] = []
@@ -132,7 +125,8 @@ def draw_momenta(ax: Any, data: Table) -> list[Any]:
         axis = _goes_round(path)
         near_middle = np.abs(path[:, 1]).max() > 0.99
         colour = COLOURS["optimum"] if near_middle else COLOURS["xyz"[axis]]
-        front = (path @ EYE > 0)[:, None]
+        seen = path @ EYE > 0
+        front = (seen | np.roll(seen, 1))[:, None]  # each piece begins where the last one ended
         ax.plot(*np.where(front, np.nan, path).T, color=colour, lw=0.8, alpha=0.4, zorder=2)
         lines += ax.plot(*np.where(front, path, np.nan).T, color=colour, lw=2, zorder=3)
     for name, end in zip("123", np.diag(np.sign(EYE)), strict=True):
@@ -162,15 +156,15 @@ def describe_momenta(data: Table) -> str:
     )
 
 
-def moving_book(ax: Any, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
+def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[Any]]:
     """Draw a book in its first orientation, with a pin in its middle axis; return what turns it.
 
     Parameters
     ----------
     ax : Axes3D
         Where to draw; the vertical line is the angular momentum, which stays.
-    R : ndarray, shape (times, 3, 3)
-        Its orientations.
+    data : mapping of str to array_like, shape (times,)
+        A `bodies.motion_table`: its orientations; where it is does not matter.
     edges : array_like, shape (3,)
         Its edges along its axes, in m; the pin is along the second.
 
@@ -179,12 +173,14 @@ def moving_book(ax: Any, R: Array, edges: ArrayLike) -> Callable[[int], list[Any
     callable
         ``update(i)`` turns the book to orientation i and returns what moves.
     """
+    t, edges = np.asarray(data["t [1]"]), np.asarray(edges)
+    R = np.stack([data[f"R{i}{j} [1]"] for i in "123" for j in "123"], axis=-1).reshape(-1, 3, 3)
     poses = np.broadcast_to(np.eye(4), (len(R), 4, 4)).copy()
     poses[:, :3, :3] = R
-    edges = np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
-    ax.text(0, 0, -1.1 * reach, "  angular momentum", color="0.45", fontsize=12)
+    ax.text2D(0.98, 0.02, "angular momentum", color="0.45", ha="right", transform=ax.transAxes)
+    clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
     book = draw_cube(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
@@ -197,8 +193,9 @@ def moving_book(ax: Any, R: Array, edges: ArrayLike) -> Callable[[int], list[Any
         move_cube(book, poses[i], edges)
         ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
         pin.set_data_3d(*ends.T)
+        clock.set_text(f"t = {t[i]:.1f}")
         away = R[i, :, 1] @ EYE < 0  # the pin leaves the book on its far side
-        return [pin, book] if away else [book, pin]
+        return [clock, pin, book] if away else [clock, book, pin]
 
     return update
 

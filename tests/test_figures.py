@@ -412,7 +412,7 @@ def test_the_data_of_the_three_ways_straight_on():
 @pytest.mark.source("BK 2.6")
 def test_the_data_of_the_cube_of_the_start():
     data = numbers("lesson00_cubes")
-    angle = 2 * data["t [1]"]
+    angle = 3 * data["t [1]"]
     circle = [6 * np.sin(angle), 6 * (1 - np.cos(angle)), 7 * data["t [1]"]]
     assert np.abs(np.array([data[f"{axis} [m]"] for axis in "xyz"]) - circle).max() < 1e-10
     assert np.abs(data["R21 [1]"] - np.sin(angle)).max() < 1e-11

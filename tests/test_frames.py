@@ -15,6 +15,7 @@ def ax3d():
     plt.close(fig)
 
 
+@pytest.mark.source("BK Fig. 1")
 def test_the_moving_frame_shows_both_frames(ax3d):
     poses = np.stack([np.eye(4), np.eye(4)])
     poses[1, :3, :3], poses[1, :3, 3] = rb.exp_so3([0, 0, np.pi / 2]), [1, 2, 3]

@@ -29,8 +29,11 @@ def test_every_entry_that_has_landed_has_function_test_and_lesson():
 
 def test_what_has_landed_is_not_still_to_come():
     assert [key for key in TO_COME if not FOUND[key].lacks(key)] == []
+    planar, arm = range(14, 20), range(20, 24)
+    later = {f"RR ({i})" for i in (*planar, *arm)} | {f"RR Fig. {i}" for i in range(6, 10)}
+    assert set(TO_COME) <= later | {f"RR {k}.{i}" for k in (3, 4) for i in (1, 2, 3)}
     assert set(TO_COME) <= set(ENTRIES)
-    assert set(ledger.SOURCES["prose"]) <= set(ENTRIES)
+    assert ledger.SOURCES["prose"] == ["BK 1", "BK 7"]
 
 
 def test_every_misprint_has_a_test():
@@ -84,6 +87,7 @@ def course(tmp_path):
     (tmp_path / "rbcourse/so3.py").write_text(f'def turn():\n    """{docstring}"""', "utf-8")
     mark = '@pytest.mark.source("BK (2)", "errata 1")'
     test = mark + '\n@pytest.mark.parametrize("key", ["BK (3)"])\ndef test_turn():\n    pass\n'
+    test += '@pytest.mark.source("BK (3)")\ndef not_a_test():\n    pass\n'
     (tmp_path / "tests/test_so3.py").write_text(test, "utf-8")
     cells = [new_markdown_cell("## 3 · Turns (BK (2))\n\nBK (3)"), new_markdown_cell("BK (4)")]
     nbformat.write(new_notebook(cells=cells), tmp_path / "notebooks/03_turns.ipynb")
@@ -117,22 +121,37 @@ def test_the_printed_numbers_of_the_propositions_repeat_one_and_skip_one():
     corrected = [int(key.split()[-1]) for key in ENTRIES if key.startswith("BK Prop.")]
     assert len(set(printed)) < len(printed)
     assert corrected == list(range(1, 8))
-    assert "invariant" in ENTRIES["BK Prop. 3"]
+    for number, word in {2: "nearest", 3: "invariant"}.items():
+        assert any(word in name for name in FOUND[f"BK Prop. {number}"].tests)
 
 
 @pytest.mark.source("errata 19")
 def test_the_printed_interpolation_of_the_arm_mixes_the_links():
+    """The first index counts the links in the formula, start and goal in the sentence below it."""
     start, goal = np.array([0.1, 0.2]), np.array([1.0, 2.0])
-    printed = [start[0], start[1]]  # of link 0 at t = 0 and 1, by the sentence below (21)
-    corrected = [(1 - t) * start + t * goal for t in (0, 1)]
-    assert printed[1] != goal[0]
-    assert np.array_equal(corrected, [start, goal])
+
+    def blend(theta, t):  # (20) and (21)
+        return (1 - t) * theta[:, 0] + t * theta[:, 1]
+
+    printed, corrected = np.array([start, goal]), np.transpose([start, goal])
+    assert np.array_equal([blend(corrected, t) for t in (0, 1)], [start, goal])
+    assert not np.array_equal(blend(printed, 0), start)
+    assert not np.array_equal(blend(printed, 1), goal)
 
 
 @pytest.mark.source("errata 20")
 def test_a_configuration_of_the_arm_is_no_planar_pose():
-    pose, joints = np.zeros(3), np.zeros(2)  # x, y, θ; and what (22) and (23) advance
-    velocity = np.array([1.0, -0.5])
-    assert np.array_equal(joints + velocity * 2, [2, -1])
+    """Two configurations take the tip to one place, and most planar poses are out of reach."""
+
+    def tip(theta0, theta1):
+        return 2 * np.exp(1j * theta0) + 1.5 * np.exp(1j * (theta0 + theta1))
+
+    place = tip(0.3, 0.8)
+    mirrored = 2 * np.angle(place) - 0.3, -0.8
+    assert abs(tip(*mirrored) - place) < 1e-15
+    turned = np.linspace(-np.pi, np.pi, 181)
+    assert abs(tip(*np.meshgrid(turned, turned))).max() < 3.5 + 1e-12
+    q0, velocity, duration = np.array([0.3, 0.8]), np.array([1.0, -0.5]), 2  # (22), (23)
+    assert (q0 + velocity * duration).shape == (2,)
     with pytest.raises(ValueError, match="broadcast"):
-        pose + velocity * 2
+        np.zeros(3) + velocity * duration  # x, y, θ

@@ -94,18 +94,39 @@ def test_theta_leaves_the_unit_interval_where_f_does():
     assert want[0] < 0 < 1 < want[1]
 
 
-@pytest.mark.source("BK Prop. 6", "errata 5", "errata 7")
-def test_the_printed_sign_and_eigenvectors_of_N_in_the_proof():
+@pytest.mark.source("BK Prop. 6", "errata 5")
+def test_the_printed_sign_of_N_in_the_proof():
     w = np.array([0.3, -1.2, 0.8])
     a, W, R2 = np.linalg.norm(w), rb.hat_so3(w), oracles.exp_so3(w)
     N = 2 * np.eye(3) - R2 - R2.T
     printed = (1 - np.cos(a)) / a**2 * (W @ W + (W @ W).T)
     assert np.abs(N + printed).max() < 8 * EPS
     assert np.abs(N - printed).max() > 1
-    for x, y, z in (w, [0, 1, 0]):
-        denominators = [x**2 + z**2, x**2 * y**2 + (x**2 + z**2) ** 2 + y**2 * z**2]
-        assert (min(denominators) == 0) == (x == z == 0)
-    assert np.abs(np.linalg.eigvalsh(N) - 2 * (1 - np.cos(a)) * np.array([0, 1, 1])).max() < 8 * EPS
+    assert (
+        np.abs(
+            N @ printed_eigenvectors(w)[1:].T - 2 * (1 - np.cos(a)) * printed_eigenvectors(w)[1:].T
+        ).max()
+        < 8 * EPS
+    )
+
+
+def printed_eigenvectors(w):
+    x, y, z = w
+    second = np.array([-z, 0, x]) / np.sqrt(z**2 + x**2)
+    third = np.array([-y * x, z**2 + x**2, -z * y])
+    third = third / np.sqrt(y**2 * x**2 + (z**2 + x**2) ** 2 + z**2 * y**2)
+    return np.array([w / np.linalg.norm(w), second, third])
+
+
+@pytest.mark.source("BK Prop. 6", "errata 7")
+def test_the_printed_eigenvectors_of_N_are_undefined_where_any_pair_serves():
+    w = np.array([0, 1.2, 0])
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(printed_eigenvectors(w)[1:]).any(axis=1).all()
+    R2 = oracles.exp_so3(w)
+    N, turn = 2 * np.eye(3) - R2 - R2.T, oracles.exp_so3([0, 0.7, 0])
+    for across in (np.eye(3)[[0, 2]], np.eye(3)[[0, 2]] @ turn.T):
+        assert np.abs(N @ across.T - 2 * (1 - np.cos(1.2)) * across.T).max() < 8 * EPS
 
 
 @pytest.mark.source("BK Prop. 6", "BK (15)", "errata 6")

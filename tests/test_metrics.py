@@ -155,6 +155,15 @@ def test_which_inertias_a_weight_reaches():
         rb.weight_from_inertia([np.eye(3), np.diag([1, 2, 3])])
 
 
+def test_no_metric_is_too_large_or_too_small():
+    for size in (1e-300, 1e307):
+        G = size * np.diag([2.0, 3, 4])
+        assert np.allclose(rb.weight_from_inertia(G), size * np.diag([2.5, 1.5, 0.5]), rtol=4 * EPS)
+    X, Y = rb.hat_so3([1e-200, 0, 0]), rb.hat_so3([1e-100, 0, 0])
+    value = rb.inner_left_invariant(1e308 * np.eye(3), np.eye(3), X, Y)
+    assert value == pytest.approx(1e8, rel=1e-12)
+
+
 def test_stacks_are_the_stack_of_their_members():
     G = np.diag([1, 2, 3]) * np.ones((4, 1, 1, 1))
     X = rb.tangent_from_components(R[:5], w[:5])

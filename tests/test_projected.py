@@ -34,7 +34,7 @@ QUINTICS = rb.projected_quintic_so3(R0, R1, W0, W1, B0, B1)
 GAPS = oracles.two_smallest_eigenvalues(transposed(CUBICS(TIMES)) @ cubic_of_matrices(TIMES))
 
 
-@pytest.mark.source("BK 6.2", "BK Prop. 2")
+@pytest.mark.source("BK 6", "BK 6.2", "BK Prop. 2")
 def test_the_cubic_is_projected_to_the_nearest_rotation():
     R, M = CUBICS(TIMES), cubic_of_matrices(TIMES)
     S = transposed(R) @ M
@@ -73,7 +73,8 @@ def test_the_ends_are_met_to_the_rounding_of_the_coefficients():
 def test_the_printed_end_condition_and_group_do_not_hold():
     """The second derivative at the end is not the one that is prescribed; and R0 ŵ0 is singular."""
     M2, M3 = CUBICS.coefficients[2:]
-    assert np.abs(2 * M2 + 6 * M3 - R1 @ rb.hat_so3(W1)).max() > 1
+    missed = np.abs(2 * M2 + 6 * M3 - R1 @ rb.hat_so3(W1)).max(axis=(-2, -1))
+    assert np.all(missed > 0.1)
     assert np.abs(np.linalg.det(CUBICS.coefficients[1])).max() < 1e-13 * 64
 
 

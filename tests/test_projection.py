@@ -117,7 +117,7 @@ def assert_nearest_of_products(R, M, W):
 @pytest.mark.source("BK 4")
 def test_with_the_identity_as_weight_it_is_the_projection():
     M = awkward.matrices(3, np.random.default_rng(3))
-    for factor in (1.0, 2.0**900, 2.0**-900):
+    for factor in (1.0, 2.0**1023, 2.0**-1000):
         assert np.array_equal(rb.project_so_weighted(M, factor * np.eye(3)), rb.project_so(M))
 
 
@@ -140,7 +140,7 @@ def test_a_weighted_projection_turns_with_its_weight():
         (np.zeros((3, 3)), "W is not positive definite"),
         (np.eye(3) + 1e-9 * np.eye(3, k=1), "W is not symmetric"),
         (np.eye(2), r"W: shape \(\.\.\., 3, 3\) wanted, got \(2, 2\)"),
-        ([np.eye(3), -np.eye(3)], r"W\[1\] is not positive definite"),
+        ([np.eye(3), -np.eye(3), np.eye(3), np.eye(3)], r"W\[1\] is not positive definite"),
         (np.ones((2, 1, 1)) * np.eye(3), r"broadcast: M \(4,\), W \(2,\)"),
         (np.full((3, 3), np.inf), r"W\[0, 0\] is inf"),
     ],
@@ -222,7 +222,12 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
         [0.38914789, -0.38759388, 0.83566435],
         [0.5310153, 0.83566435, 0.1403134],
     ]
-    assert np.abs(rb.project_so(np.arange(1, 10).reshape(3, 3)) - printed).max() < 1e-8
+    M = np.arange(1.0, 10).reshape(3, 3)
+    R = rb.project_so(M)
+    assert np.abs(R - printed).max() < 1e-8
+    assert_nearest(R, M)
+    assert np.linalg.matrix_rank(M) == 2
+    assert oracles.two_smallest_eigenvalues((R.T @ M)[None]) > 1  # so there is no other
 
 
 def test_no_matrix_is_too_large_or_too_small():

@@ -24,7 +24,9 @@ def rates(curve):
 
 @pytest.mark.source("BK 2.6", "errata 15")
 def test_first_definition_the_inverse_times_the_rate_is_constant():
-    """As printed, without the dot, A⁻¹A = I is constant for every curve."""
+    """As printed, without the dot, A⁻¹A = I is constant for every curve, no screws too."""
+    for curve in (SCREWS, GEODESICS):
+        assert np.abs(rb.inverse_se3(curve(TIMES)) @ curve(TIMES) - np.eye(4)).max() < 1e-13
     S = rb.inverse_se3(SCREWS(TIMES)) @ rates(SCREWS)
     assert np.abs(S - S[0]).max() < 1e-11
     S = rb.inverse_se3(GEODESICS(TIMES)) @ rates(GEODESICS)
@@ -61,6 +63,8 @@ def test_fourth_definition_the_tangents_belong_to_a_left_invariant_field():
 
     assert carried_defect(SCREWS) < 1e-11
     assert carried_defect(GEODESICS) > 0.1
+    A = GEODESICS(TIMES)  # as printed, without the dot, every curve passes
+    assert np.abs(A @ rb.inverse_se3(A[:1]) @ A[:1] - A).max() < 1e-13
 
 
 @pytest.mark.source("errata 15")

@@ -27,6 +27,18 @@ def test_the_basis_is_the_hats_of_the_axes():
         rb.BASIS_SO3[0] = 0
 
 
+@pytest.mark.source("BK 2.1", "BK (2)", "errata 12")
+def test_what_is_printed_without_hats_is_no_basis_of_so3():
+    """L_i⁰ = e_i, as printed, are vectors; and ω̂, printed as of se(3), is no 4 × 4 matrix."""
+    printed, corrected = np.eye(3), rb.BASIS_SO3
+    assert printed[0].shape != corrected[0].shape
+    assert np.array_equal(corrected, -np.swapaxes(corrected, -1, -2))  # of so(3)
+    w = np.array([1.0, 2, 3])
+    assert np.array_equal(np.tensordot(w, corrected, 1) @ [4, 5, 6], np.cross(w, [4, 5, 6]))
+    with pytest.raises(ValueError, match="4, 4"):
+        rb.vee_se3(rb.hat_so3(w))
+
+
 @pytest.mark.source("BK 2.5")
 def test_exp_is_the_rotation_by_its_length():
     R = rb.exp_so3(VECTORS)

@@ -65,7 +65,9 @@ def test_a_negated_column_is_uniform_too():
     assert failed(R @ np.diag([1, -1, -1])) == set()
 
 
+@pytest.mark.source("errata 17")
 def test_a_million_naive_draws_fail():
+    """Matrices and quaternions alike, though they take their angles the other way round."""
     for R in (
         rb.sample_rotation_naive(MILLION, rng=1),
         random_matrices(rb.sample_quaternion_naive(MILLION, rng=1)),
