@@ -18,12 +18,12 @@ from rbcourse.conversions import (
 )
 from rbcourse.cost import acceleration_cost, acceleration_cost_parts
 from rbcourse.curves import Curve, geodesic_so3
+from rbcourse.inertia import inertia_from_weight, weight_from_inertia
 from rbcourse.line import f, line_singular_value, theta
 from rbcourse.metrics import (
     METRIC_SE3,
     METRIC_SO3,
     components_from_tangent,
-    inertia_from_weight,
     inner_ga,
     inner_gl,
     inner_left_invariant,
@@ -31,7 +31,6 @@ from rbcourse.metrics import (
     inner_so3,
     semi_riemannian_metric_se3,
     tangent_from_components,
-    weight_from_inertia,
 )
 from rbcourse.motions import geodesic_se3, projected_cubic_se3
 from rbcourse.optimum import ConvergenceError

@@ -179,7 +179,15 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
     poses[:, :3, :3] = R
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
-    ax.text2D(0.98, 0.02, "angular momentum", color="0.45", ha="right", transform=ax.transAxes)
+    ax.text2D(
+        0.98,
+        0.02,
+        "angular momentum",
+        color="0.45",
+        fontsize=11,
+        ha="right",
+        transform=ax.transAxes,
+    )
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
     book = draw_cube(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]

@@ -15,6 +15,7 @@ LEVELS = {
     "_numerics": 0,
     "quaternion": 1,
     "projection": 1,
+    "inertia": 1,
     "line": 1,
     "polynomials": 1,
     "conversions": 2,

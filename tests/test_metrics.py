@@ -127,38 +127,7 @@ def test_the_indefinite_metric_is_invariant_on_both_sides():
         assert_close(moved, value, 10_000)
 
 
-@pytest.mark.source("BK 3")
-def test_the_weighted_trace_induces_an_inertia():
-    P = RNG.normal(size=(50, 3, 8))
-    W = P @ np.swapaxes(P, -1, -2)
-    X, Y = rb.tangent_from_components(R, w), rb.tangent_from_components(R, z)
-    weighted = np.trace(np.swapaxes(X, -1, -2) @ Y @ W, axis1=-2, axis2=-1)
-    G = rb.inertia_from_weight(W)
-    assert_close(rb.inner_left_invariant(G, R, X, Y), weighted, 1000)
-    assert_close(rb.weight_from_inertia(G), W)
-    by_points = sum(p @ p * np.eye(3) - np.outer(p, p) for p in P[0].T)
-    assert_close(G[0], by_points)
-
-
-@pytest.mark.source("BK 3")
-def test_which_inertias_a_weight_reaches():
-    for slack in (0.1, 1e-12):
-        turned = R[0] @ np.diag([2, 3, 5 - slack]) @ R[0].T
-        least = np.linalg.eigvalsh(rb.weight_from_inertia(turned))[0]
-        assert least == pytest.approx(slack / 2, abs=40 * EPS)
-    for moments in ([1, 2, 3], [1, 2, 4], [0, 1, 1], [-1, 5, 5], [0, 0, 0]):
-        G = R[0] @ np.diag(moments) @ R[0].T
-        with pytest.raises(ValueError, match="has the principal moments"):
-            rb.weight_from_inertia(G)
-        assert np.linalg.eigvalsh(np.trace(G) / 2 * np.eye(3) - G)[0] < 1e-15
-    with pytest.raises(ValueError, match=r"G\[1\] has the principal moments 1, 2, 3; each must"):
-        rb.weight_from_inertia([np.eye(3), np.diag([1, 2, 3])])
-
-
 def test_no_metric_is_too_large_or_too_small():
-    for size in (1e-300, 1e307):
-        G = size * np.diag([2.0, 3, 4])
-        assert np.allclose(rb.weight_from_inertia(G), size * np.diag([2.5, 1.5, 0.5]), rtol=4 * EPS)
     X, Y = rb.hat_so3([1e-200, 0, 0]), rb.hat_so3([1e-100, 0, 0])
     value = rb.inner_left_invariant(1e308 * np.eye(3), np.eye(3), X, Y)
     assert value == pytest.approx(1e8, rel=1e-12)
@@ -202,7 +171,6 @@ def test_stacks_are_the_stack_of_their_members():
         (lambda: rb.inner_se3(np.eye(4), np.eye(3)), "Y: shape (..., 4, 4) wanted"),
         (lambda: rb.semi_riemannian_metric_se3(0, 1), "alpha: a positive number wanted, got 0"),
         (lambda: rb.semi_riemannian_metric_se3(1, [1]), "beta: a positive number wanted, got [1"),
-        (lambda: rb.inertia_from_weight(np.eye(3, k=1)), "W is not symmetric"),
     ],
 )
 def test_bad_arguments_are_named(call, message):
