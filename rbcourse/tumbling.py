@@ -130,7 +130,8 @@ def draw_momenta(ax: Any, data: Table) -> list[Any]:
         ax.plot(*np.where(front, np.nan, path).T, color=colour, lw=0.8, alpha=0.4, zorder=2)
         lines += ax.plot(*np.where(front, path, np.nan).T, color=colour, lw=2, zorder=3)
     for name, end in zip("123", np.diag(np.sign(EYE)), strict=True):
-        ax.text(*(1.2 * end), name, ha="center", va="center", zorder=4)
+        ax.text(*(1.15 * end), name, ha="center", va="center", zorder=4)
+        ax.text(*(-1.15 * end), name, ha="center", va="center", zorder=1, color="0.6")
     return lines
 
 
@@ -181,7 +182,7 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
     ax.text2D(
         0.98,
-        0.02,
+        0.93,
         "angular momentum",
         color="0.45",
         fontsize=11,
