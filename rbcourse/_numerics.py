@@ -72,25 +72,25 @@ def as_unit(name: str, value: ArrayLike, size: int) -> Array:
 
 
 def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
-    """Return `as_finite` of square matrices, symmetric but for rounding, made so exactly.
+    """Return `as_finite` of square matrices that are symmetric, to 1e-12 of the largest entry.
 
     Raises
     ------
     ValueError
         As `as_finite`; and the message names the first matrix that is not symmetric.
     """
-    array = as_finite(name, value, size, size)
-    mirrored = np.swapaxes(array, -1, -2)
-    skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (array - mirrored, array))
+    half = as_finite(name, value, size, size) / 2  # so that nothing overflows
+    mirrored = np.swapaxes(half, -1, -2)
+    skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (half - mirrored, half))
     crooked = skew > 1e-12 * largest
     if crooked.any():
         raise ValueError(f"{first_index(name, crooked)} is not symmetric")
-    return array / 2 + mirrored / 2
+    return half + mirrored
 
 
-def scaled(matrix: Array) -> Array:
-    """Return matrices over powers of two, their largest entries about 1: nothing overflows."""
-    _, exponent = np.frexp(np.abs(matrix).max(axis=(-2, -1), keepdims=True))
+def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
+    """Return matrices, or columns, over powers of two; the largest entries are in [0.5, 1)."""
+    _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))
     return np.ldexp(matrix, -exponent)
 
 

@@ -31,35 +31,35 @@ def motion_table(t: ArrayLike, poses: Array) -> Table:
     return {"t [1]": np.asarray(t), **pose_columns(poses)}
 
 
-def draw_cube(ax: Any, pose: Array, side: float | Array) -> Poly3DCollection:
-    """Draw a cube, or box, with a square on one of its faces, centred at the origin of its frame.
+def draw_box(ax: Any, pose: Array, edges: float | Array) -> Poly3DCollection:
+    """Draw a box with a rectangle on one of its faces, centred at the origin of its frame.
 
     Parameters
     ----------
     ax : Axes3D
         Where to draw.
     pose : ndarray, shape (4, 4)
-        Where the cube is.
-    side : float or ndarray of shape (3,)
-        Its edge, or the three edges of a box, in m.
+        Where the box is.
+    edges : float or ndarray of shape (3,)
+        Its three edges, or the one of a cube, in m.
 
     Returns
     -------
     Poly3DCollection
-        Six faces and the square; `move_cube` moves it.
+        Six faces and the rectangle; `move_box` moves it.
 
     References
     ----------
     BK Fig. 5.
     """
     fill = ["0.86", "0.93", "0.98"] * 2 + [COLOURS["x"]]  # a shade for each direction
-    cube = Poly3DCollection(_cube_faces(pose, side), facecolors=fill, edgecolors="0.3", lw=0.8)
-    return ax.add_collection3d(cube)
+    box = Poly3DCollection(_box_faces(pose, edges), facecolors=fill, edgecolors="0.3", lw=0.8)
+    return ax.add_collection3d(box)
 
 
-def move_cube(cube: Poly3DCollection, pose: Array, side: float | Array) -> None:
-    """Move a cube that `draw_cube` has drawn."""
-    cube.set_verts(_cube_faces(pose, side))
+def move_box(box: Poly3DCollection, pose: Array, edges: float | Array) -> None:
+    """Move a box that `draw_box` has drawn."""
+    box.set_verts(_box_faces(pose, edges))
 
 
 def draw_cube_motion(ax: Any, data: Table, side: float) -> list[Any]:
@@ -83,8 +83,8 @@ def draw_cube_motion(ax: Any, data: Table, side: float) -> list[Any]:
     ----------
     BK Fig. 5.
     """
-    poses = _poses(data)
-    cubes = [draw_cube(ax, pose, side) for pose in poses]
+    poses = poses_from_table(data)
+    cubes = [draw_box(ax, pose, side) for pose in poses]
     set_space(ax, poses[:, :3, 3], side)
     return [*cubes, draw_centre_path(ax, poses[:, :3, 3])]
 
@@ -129,11 +129,14 @@ def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
     """
     looks = [(COLOURS["optimum"], "-"), (COLOURS["screw"], "--"), (COLOURS["reference"], ":")]
     lines = [
-        ax.plot(*_poses(table)[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
+        ax.plot(*poses_from_table(table)[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
         for (name, table), (colour, dash) in zip(tables.items(), looks, strict=False)
     ]
-    first, *others = (_poses(table) for table in tables.values())
-    poses = [*first[[0, -1]], *(A[-1] for A in others if np.abs(A[-1] - first[-1]).max() > 1e-9)]
+    ways = [poses_from_table(table) for table in tables.values()]
+    poses = [ways[0][0]]
+    for A in ways:
+        if all(np.abs(A[-1] - other).max() > 1e-9 for other in poses[1:]):
+            poses.append(A[-1])
     for pose, name in zip(poses, "0111", strict=False):
         draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
     paths = np.array([line.get_data_3d() for line in lines])
@@ -170,7 +173,7 @@ def describe_ways(tables: Mapping[str, Table]) -> str:
     """
     lengths = []
     for name, table in tables.items():
-        steps = np.linalg.norm(np.diff(_poses(table)[:, :3, 3], axis=0), axis=-1)
+        steps = np.linalg.norm(np.diff(poses_from_table(table)[:, :3, 3], axis=0), axis=-1)
         lengths.append(f"{name} {steps.sum():.2f} m")
     return (
         "The paths of the origin of a frame in several motions from one pose, and the frame at the "
@@ -197,8 +200,8 @@ def moving_cubes(
     callable
         ``update(i)`` moves all cubes to row i of their tables and returns them.
     """
-    motions = [_poses(table) for table in tables.values()]
-    cubes = [draw_cube(ax, poses[0], side) for ax, poses in zip(axes, motions, strict=True)]
+    motions = [poses_from_table(table) for table in tables.values()]
+    cubes = [draw_box(ax, poses[0], side) for ax, poses in zip(axes, motions, strict=True)]
     for ax, name, poses in zip(axes, tables, motions, strict=True):
         set_space(ax, poses[:, :3, 3], side)
         if np.ptp(poses[:, :3, 3], axis=0).any():
@@ -208,7 +211,7 @@ def moving_cubes(
 
     def update(i: int) -> list[Any]:
         for cube, poses in zip(cubes, motions, strict=True):
-            move_cube(cube, poses[i], side)
+            move_box(cube, poses[i], side)
         return cubes
 
     return update
@@ -227,10 +230,10 @@ def describe_moving_cubes(tables: Mapping[str, Table]) -> str:
     str
     """
     (first, table), *others = tables.items()
-    t, R = np.asarray(table["t [1]"]), np.swapaxes(_poses(table)[:, :3, :3], -1, -2)
+    t, R = np.asarray(table["t [1]"]), np.swapaxes(poses_from_table(table)[:, :3, :3], -1, -2)
     said = f"Cubes with a square on one face move side by side: {', '.join(tables)}."
     for name, other in others:
-        apart = np.degrees(np.linalg.norm(log_so3(R @ _poses(other)[:, :3, :3]), axis=-1))
+        apart = np.degrees(np.linalg.norm(log_so3(R @ poses_from_table(other)[:, :3, :3]), axis=-1))
         said += (
             f" The orientations of {first} and {name} differ most at t = {t[apart.argmax()]:.2f}, "
             f"by {apart.max():.0f} degrees."
@@ -252,7 +255,7 @@ def describe_cube_motion(data: Table) -> str:
     -------
     str
     """
-    poses = _poses(data)
+    poses = poses_from_table(data)
     R = poses[:, :3, :3]
     steps = np.degrees(np.linalg.norm(log_so3(np.swapaxes(R[:-1], -1, -2) @ R[1:]), axis=-1))
     ends = " to ".join("(" + ", ".join(f"{x:g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
@@ -263,8 +266,8 @@ def describe_cube_motion(data: Table) -> str:
     )
 
 
-def _cube_faces(pose: Array, side: float | Array) -> Array:
-    """Return the corners of the six faces, and of a square on the face of +z: (7, 4, 3)."""
+def _box_faces(pose: Array, edges: float | Array) -> Array:
+    """Return the corners of the six faces, and of a rectangle on the face of +z: (7, 4, 3)."""
     around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     faces = np.empty((7, 4, 3))
     for k in range(6):
@@ -272,11 +275,12 @@ def _cube_faces(pose: Array, side: float | Array) -> Array:
         faces[k, :, axis] = sign
         faces[k][:, [(axis + 1) % 3, (axis + 2) % 3]] = around
     faces[6] = faces[2] * [0.5, 0.5, 1.02]
-    placed: Array = pose[:3, 3] + side / 2 * faces @ pose[:3, :3].T
+    placed: Array = pose[:3, 3] + edges / 2 * faces @ pose[:3, :3].T
     return placed
 
 
-def _poses(data: Table) -> Array:
+def poses_from_table(data: Table) -> Array:
+    """Return the poses, shape (times, 4, 4), of a `motion_table`."""
     columns = [np.asarray(column) for name, column in data.items() if name[0] in "xyzR"]
     poses = np.zeros((len(columns[0]), 4, 4))
     poses[:, :3, 3] = np.stack(columns[:3], axis=-1)

@@ -14,7 +14,7 @@ from rbcourse._numerics import (
     first_index,
     scaled,
 )
-from rbcourse.metrics import as_group
+from rbcourse.metrics import as_rotation_or_pose
 from rbcourse.projection import project_se, project_so
 from rbcourse.se3 import BASIS_SE3
 from rbcourse.so3 import BASIS_SO3
@@ -36,8 +36,8 @@ def structure_constants(basis: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        If `basis` is not finite or not of that shape, its matrices are linearly dependent, or a
-        commutator of two of them is no combination of them.
+        If `basis` is not finite or not of that shape, its matrices are linearly dependent, to one
+        part in a million, or a commutator of two of them is, to rounding, no combination of them.
 
     References
     ----------
@@ -54,16 +54,17 @@ def structure_constants(basis: ArrayLike) -> Array:
         raise ValueError(f"basis: shape (m, n, n) wanted, got {L.shape}")
     m = len(L)
     _, exponents = np.frexp(np.abs(L).max(axis=(1, 2)))
-    N = np.ldexp(L, -exponents[:, None, None])  # so that no size matters
+    N = scaled(L)  # so that no size matters
     columns = N.reshape(m, -1).T
-    if np.linalg.matrix_rank(columns) < m:
-        raise ValueError("basis: the matrices are linearly dependent")
+    condition = np.linalg.cond(columns)
+    if not condition < 1e6:
+        raise ValueError("basis: the matrices are linearly dependent, to one part in a million")
     products = N[:, None] @ N
     brackets = (products - products.swapaxes(0, 1)).reshape(m * m, -1).T
     C = np.zeros((m, m * m))
-    for _ in range(3):  # the normal equations, and twice what they leave
+    for _ in range(3):  # the normal equations, exact for the standard bases, and what they leave
         C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
-    if np.abs(columns @ C - brackets).max() > 1e-9:
+    if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
         raise ValueError("basis: a commutator of two of the matrices is no combination of them")
     k, i, j = np.ix_(exponents, exponents, exponents)
     return np.ldexp(C.reshape(m, m, m), i + j - k)
@@ -120,7 +121,7 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     m = len(C)
     G = scaled(as_symmetric("G", G, m))  # its size does not matter
     sizes = np.abs(np.linalg.eigvalsh(G))
-    singular = sizes.min(axis=-1) <= EPS * sizes.max(axis=-1)
+    singular = sizes.min(axis=-1) <= m * EPS * sizes.max(axis=-1)
     if singular.any():
         raise ValueError(f"{first_index('G', singular)} is singular")
     lowered = np.einsum("mki,...mj->...kij", C, G)  # ⟨[L_k, L_i], L_j⟩
@@ -166,13 +167,10 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
     >>> covariant_derivative(gamma, S, S, np.zeros(6)) + 0.0  # ω × v, to its centre
     array([0., 0., 0., 0., 6., 0.])
     """
-    v, x = as_finite("v", v, "n"), as_finite("x", x, "n")
+    v = as_finite("v", v, "n")
     m = v.shape[-1]
-    gamma, x, x_dot = (
-        as_finite("gamma", gamma, m, m, m),
-        as_finite("x", x, m),
-        as_finite("x_dot", x_dot, m),
-    )
+    gamma = as_finite("gamma", gamma, m, m, m)
+    x, x_dot = as_finite("x", x, m), as_finite("x_dot", x_dot, m)
     check_broadcast(gamma=(gamma, 3), v=(v, 1), x=(x, 1), x_dot=(x_dot, 1))
     return x_dot + np.einsum("...ijk,...j,...k->...i", gamma, v, x)
 
@@ -214,13 +212,14 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
 
     Notes
     -----
-    Singular set: none, every geodesic goes on for ever. Of an indefinite metric, the velocity may
-    grow exponentially.
+    Singular set: none. The momentum in the fixed frame is constant, so that no velocity reaches
+    infinity in finite time. On SE(3), of an indefinite metric, it may grow exponentially; where it
+    leaves the range of the floating-point numbers the integration fails.
 
-    Solves A' = A hat(v) and (8) in the form v'_i = −Γ_ijk v_j v_k, Euler's equations, by
-    an eighth-order Runge–Kutta method at a relative tolerance of 3e-14. The steps, which
-    all members of a batch share, are some tenths of a rad: the time that it takes is in proportion
-    to the angle through which the fastest one turns.
+    Solves A' = A hat(v) and (8) in the form v'_i = −Γ_ijk v_j v_k, on SO(3) Euler's equations, by
+    an eighth-order Runge–Kutta method at a relative tolerance of 3e-14. The members of a batch of
+    N share its steps, a tenth of a rad where all moments are alike and shorter otherwise, and its
+    tolerance: that of a single one may be up to √N times larger.
 
     References
     ----------
@@ -234,35 +233,37 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     >>> w[:, 1].round(1)  # it flips
     array([ 3., -3.])
     """
-    A0, m = as_group("A0", A0)
+    A0, m = as_rotation_or_pose("A0", A0)
     G, v0, times = as_symmetric("G", G, m), as_finite("v0", v0, m), as_finite("t", t)
     batch = check_broadcast(G=(G, 2), A0=(A0, 2), v0=(v0, 1))
     basis, project = (BASIS_SO3, project_so) if m == 3 else (BASIS_SE3, project_se)
     gamma = christoffel(G, basis)
     A0 = np.broadcast_to(project(A0), batch + A0.shape[-2:])
     v0 = np.broadcast_to(v0, (*batch, m))
-    last = float(np.abs(times).max(initial=0))
+    speed = float(np.abs(v0).max(initial=0)) or 1.0
+    v0, times = v0 / speed, times * speed  # γ_sv(t) = γ_v(st)
 
     def flow(_: float, state: Array) -> Array:
         A, v = state[: A0.size].reshape(A0.shape), state[A0.size :].reshape(v0.shape)
         turning = np.einsum("...ijk,...j,...k->...i", gamma, v, v)
         return _joined(A @ np.tensordot(v, basis, 1), -turning)
 
-    states = _integrate(flow, _joined(A0, v0), _joined(*_sizes(A0, v0, last)), times.ravel())
+    scales = _joined(*_scales(A0, v0, np.abs(times).max(initial=0)))
+    states = _integrate(flow, _joined(A0, v0), scales, times.ravel())
     A, v = states[:, : A0.size], states[:, A0.size :]
-    return project(A.reshape(times.shape + A0.shape)), v.reshape(times.shape + v0.shape)
+    return project(A.reshape(times.shape + A0.shape)), speed * v.reshape(times.shape + v0.shape)
 
 
-def _sizes(A0: Array, v0: Array, last: float) -> tuple[Array, Array]:
+def _scales(A0: Array, v0: Array, last: float) -> tuple[Array, Array]:
     """Return how large the entries of A and v are: those of ω, v and d each in their own unit."""
     speeds = np.abs(v0).reshape(*v0.shape[:-1], v0.shape[-1] // 3, 3).max(axis=-1)
     speeds = np.where(speeds == 0, speeds.max(axis=-1, keepdims=True), speeds)
-    speeds = np.where(speeds == 0, 1.0, speeds)
-    sizes = np.ones(A0.shape)
+    speeds = np.where(speeds < 1e-200, 1.0, speeds)  # at rest
+    scales = np.ones(A0.shape)
     if A0.shape[-1] == 4:
         path = np.abs(A0[..., :3, 3]).max(axis=-1) + last * speeds[..., 1]
-        sizes[..., :3, 3] = path[..., None]
-    return sizes, np.repeat(speeds, 3, axis=-1)
+        scales[..., :3, 3] = path[..., None]
+    return scales, np.repeat(speeds, 3, axis=-1)
 
 
 def _joined(A: Array, v: Array) -> Array:
@@ -270,7 +271,7 @@ def _joined(A: Array, v: Array) -> Array:
 
 
 def _integrate(
-    flow: Callable[[float, Array], Array], start: Array, sizes: Array, times: Array
+    flow: Callable[[float, Array], Array], start: Array, scales: Array, times: Array
 ) -> Array:
     """Return the states at the times, a row for each; they are `start` at t = 0."""
     from scipy.integrate import solve_ivp
@@ -278,14 +279,14 @@ def _integrate(
     states = np.broadcast_to(start, (len(times), len(start))).copy()
     for side in (times > 0, times < 0):
         stops, where = np.unique(times[side], return_inverse=True)
-        if not (stops.size and start.size):
+        if stops.size == 0:
             continue
         order = np.argsort(np.abs(stops))
         end = float(stops[order[-1]])
         way = solve_ivp(
-            flow, (0.0, end), start, "DOP853", stops[order], rtol=3e-14, atol=1e-14 * sizes
+            flow, (0.0, end), start, "DOP853", stops[order], rtol=3e-14, atol=1e-14 * scales
         )
         if not way.success:
-            raise FloatingPointError(f"no geodesic up to t = {end:.6g}: {way.message}")
+            raise FloatingPointError(f"a geodesic cannot be followed to its end: {way.message}")
         states[side] = way.y.T[np.argsort(order)][where]
     return states

@@ -71,7 +71,7 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     -----
     Every solid body satisfies the inequality. A flat one reaches equality: its W is singular, and
     tr(XᵀY W) no metric on the matrices. A G that violates it belongs to no body, and no positive
-    W induces it.
+    definite W induces it.
 
     References
     ----------
@@ -87,7 +87,7 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     G = as_symmetric("G", G, 3)
     moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
-    refused = ~(slack > 8 * EPS * np.abs(moments).max(axis=-1))
+    refused = ~(slack > 16 * EPS * np.abs(moments).max(axis=-1))
     if refused.any():
         least, middle, largest = np.linalg.eigvalsh(G[refused][0])
         raise ValueError(

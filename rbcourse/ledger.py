@@ -50,8 +50,8 @@ class Entry:
 def collect(root: Path) -> dict[str, Entry]:
     """Return where each entry and each misprint is to be found.
 
-    Functions come from the References of the docstrings, tests from their marks ``source``,
-    lessons from the keys in their headings.
+    Functions come from the References of their docstrings, constants from what stands below them,
+    tests from their marks ``source``, lessons from the keys in their headings.
 
     Parameters
     ----------
@@ -81,11 +81,14 @@ def collect(root: Path) -> dict[str, Entry]:
 
 def _functions(root: Path) -> Iterator[tuple[str, str]]:
     for path in sorted((root / "rbcourse").glob("*.py")):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        for node, below in zip(body, [*body[1:], None], strict=True):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 docstring = ast.get_docstring(node) or ""
                 _, _, references = docstring.partition("References\n----------\n")
                 yield f"{path.stem}.{node.name}", references.partition("\n\n")[0]
+            elif isinstance(node, ast.Assign) and isinstance(below, ast.Expr):
+                yield f"{path.stem}.{ast.unparse(node.targets[0])}", ast.unparse(below)
 
 
 def _tests(root: Path) -> Iterator[tuple[str, str]]:
@@ -129,22 +132,21 @@ def render(found: dict[str, Entry]) -> str:
     ]
     for text, title in SOURCES["texts"].items():
         rows = [
-            (key, what, *map(_links, _folders(found[key])))
+            (key, what, *map(_links, _places(found[key])))
             for key, what in SOURCES["entries"].items()
             if key.startswith(text) and key not in SOURCES["to_come"]
         ]
         lines += ["", f"## {text}: {title}", ""]
-        lines += _table(("", "what", "functions", "tests", "lessons"), rows)
+        lines += _table(("", "what", "code", "tests", "lessons"), rows)
     rows = [
-        (key.split()[1], row["where"], row["printed"], row["holds"], _links(_folders(entry)[1]))
-        for key, row in MISPRINTS.items()
-        for entry in [found[key]]
+        (number, row["where"], row["printed"], row["holds"], _links(_places(found[key])[1]))
+        for number, (key, row) in enumerate(MISPRINTS.items(), start=1)
     ]
     lines += [
         "",
         "## Misprints",
         "",
-        "The tests show that one does not hold, and the other does.",
+        "The tests show that the one does not hold, and the other does. (21 only looks like one.)",
         "",
     ]
     lines += _table(("", "where", "as printed in our copy", "what holds", "tests"), rows)
@@ -152,7 +154,7 @@ def render(found: dict[str, Entry]) -> str:
     return "\n".join(lines)
 
 
-def _folders(entry: Entry) -> list[list[tuple[str, str]]]:
+def _places(entry: Entry) -> list[list[tuple[str, str]]]:
     """Return name and file of what was found, of each of the three kinds."""
     functions = [(name, f"rbcourse/{name.split('.')[0]}.py") for name in entry.functions]
     tests = [(name, f"tests/{name.split('::')[0]}") for name in entry.tests]
@@ -167,9 +169,9 @@ def _links(found: list[tuple[str, str]]) -> str:
     return "<br>".join(f"[{name.rpartition('::')[2]}]({file})" for name, file in found)
 
 
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    head = list(head)
-    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+def _table(head: tuple[str, ...], rows: Iterable[Iterable[object]]) -> list[str]:
+    lines = head, ["---"] * len(head), *rows
+    return [f"| {' | '.join(map(str, cells))} |" for cells in lines]
 
 
 def main() -> None:

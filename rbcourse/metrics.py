@@ -13,7 +13,7 @@ from rbcourse._numerics import (
     as_symmetric,
     check_broadcast,
 )
-from rbcourse.se3 import hat_se3, inverse_se3, vee_se3
+from rbcourse.se3 import hat_se3
 from rbcourse.so3 import hat_so3, vee_so3
 
 METRIC_SO3 = 2 * np.eye(3)
@@ -46,8 +46,8 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
 
     Notes
     -----
-    Invariant under rotations on either side, ``inner_gl(L @ X @ R, L @ Y @ R)`` is the same; not
-    under other matrices.
+    Invariant under rotations, and mirrors, on either side: ``inner_gl(L @ X @ R, L @ Y @ R)`` is
+    the same. Not under other matrices.
 
     References
     ----------
@@ -192,14 +192,14 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     >>> tangent_from_components(A, [0, 0, 0, 1, 0, 0])[:3, 3] + 0.0  # ahead is the body's x axis
     array([0., 1., 0.])
     """
-    A, size = as_group("A", A)
+    A, size = as_rotation_or_pose("A", A)
     x = as_finite("x", x, size)
     check_broadcast(A=(A, 2), x=(x, 1))
     return A @ (hat_so3(x) if size == 3 else hat_se3(x))
 
 
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
-    """Return the components x of a tangent vector X at A: vee(A⁻¹ X).
+    """Return the components x of a tangent vector X at A: vee(A⁻¹ X), with Rᵀ for R⁻¹.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3) or (..., 6)
-        Angular velocities, or twists (ω, v), body frame: of X = A', those of `hat_se3` in BK (1).
+        Angular velocities, or twists (ω, v), body frame. Those of A' are the velocity of BK (1).
 
     Raises
     ------
@@ -232,12 +232,10 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     >>> components_from_tangent(R, tangent_from_components(R, [1, 2, 3]))
     array([1., 2., 3.])
     """
-    A, size = as_group("A", A)
+    A, _ = as_rotation_or_pose("A", A)
     X = as_finite("X", X, *A.shape[-2:])
     check_broadcast(A=(A, 2), X=(X, 2))
-    if size == 3:
-        return vee_so3(np.swapaxes(A, -1, -2) @ X)
-    return vee_se3(inverse_se3(A) @ X)
+    return _components(A, X)
 
 
 def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike) -> Array:
@@ -277,9 +275,11 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     >>> float(inner_left_invariant(np.diag([1, 2, 3]), np.eye(3), X, X))
     27.0
     """
-    G = as_symmetric("G", G, as_group("A", A)[1])
-    x, y = components_from_tangent(A, X), components_from_tangent(A, Y)
-    check_broadcast(G=(G, 2), X=(x, 1), Y=(y, 1))
+    A, size = as_rotation_or_pose("A", A)
+    G = as_symmetric("G", G, size)
+    X, Y = as_finite("X", X, *A.shape[-2:]), as_finite("Y", Y, *A.shape[-2:])
+    check_broadcast(G=(G, 2), A=(A, 2), X=(X, 2), Y=(Y, 2))
+    x, y = _components(A, X), _components(A, Y)
     return np.vecdot(x, (G @ y[..., None])[..., 0])
 
 
@@ -320,7 +320,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     return np.kron([[alpha, beta], [beta, 0.0]], np.eye(3))
 
 
-def as_group(name: str, value: ArrayLike) -> tuple[Array, int]:
+def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
     """Return matrices of SO(3) or SE(3), told by their size, and the dimension of the group.
 
     Raises
@@ -332,6 +332,12 @@ def as_group(name: str, value: ArrayLike) -> tuple[Array, int]:
     if A.shape[-1] not in (3, 4):
         raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) wanted, got {A.shape}")
     return A, 3 if A.shape[-1] == 3 else 6
+
+
+def _components(A: Array, X: Array) -> Array:
+    in_body = np.swapaxes(A[..., :3, :3], -1, -2) @ X[..., :3, :]
+    w = vee_so3(in_body[..., :3])
+    return w if A.shape[-1] == 3 else np.concatenate([w, in_body[..., 3]], axis=-1)
 
 
 def _trace(X: Array, Y: Array) -> Array:

@@ -148,8 +148,8 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     M : array_like, shape (..., n, n)
         Any matrices, singular and reflected ones too.
     W : array_like, shape (..., n, n)
-        Weights: symmetric and positive definite. Those of a body are ∫ p pᵀ dm over its points p,
-        body frame.
+        Weights: symmetric, to 1e-12 of the largest entry, and positive definite. Those of a body
+        are ∫ p pᵀ dm over its points p, body frame.
 
     Returns
     -------
@@ -210,7 +210,8 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     ndarray, shape (..., n, n)
         Q with QᵀQ = I, and QᵀM upper triangular with a positive diagonal: rotations where
         det M > 0, reflections where it is negative. L M gives L Q for every rotation L; M L does
-        *not* give Q L. The first column keeps its direction, and the last bears all changes.
+        *not* give Q L. The first column keeps its direction; each of the others bears the
+        changes that those before it ask for.
 
     Raises
     ------
@@ -234,8 +235,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     """
     M = as_finite("M", M, "n", "n")
     n = M.shape[-1]
-    _, exponent = np.frexp(np.abs(M).max(axis=-2, keepdims=True))
-    Q = np.ldexp(M, -exponent)  # so that nothing overflows
+    Q = scaled(M, axis=-2)
     for j in range(n):
         earlier, q = Q[..., :j], Q[..., j]
         size = np.linalg.norm(q, axis=-1)

@@ -117,7 +117,7 @@ def frame_table(M: Array, angles: ArrayLike) -> Table:
     table = {"frame [rad]": angles}
     for name, fix in _REPAIRS.items():
         R = fix(M @ L) @ np.swapaxes(L, -1, -2)
-        table[f"{name} [rad]"] = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+        table[f"{name} [rad]"] = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
     return table
 
 

@@ -11,12 +11,12 @@ from rbcourse._numerics import Array
 from rbcourse.figures import COLOURS, Table
 from rbcourse.uniformity import angle_law
 
-_ELEVATION, _AZIMUTH = np.radians(20), np.radians(-60)
+ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
 EYE = np.array(
     [
-        np.cos(_ELEVATION) * np.cos(_AZIMUTH),
-        np.cos(_ELEVATION) * np.sin(_AZIMUTH),
-        np.sin(_ELEVATION),
+        np.cos(ELEVATION) * np.cos(AZIMUTH),
+        np.cos(ELEVATION) * np.sin(AZIMUTH),
+        np.sin(ELEVATION),
     ]
 )
 _PALE = "#E9CFDE"  # the colour of what lies behind
@@ -113,7 +113,7 @@ def draw_sphere(ax: Any) -> None:
         lw=0.5,
     )
     ax.computed_zorder = False
-    ax.view_init(elev=np.degrees(_ELEVATION), azim=np.degrees(_AZIMUTH))
+    ax.view_init(elev=np.degrees(ELEVATION), azim=np.degrees(AZIMUTH))
     ax.set_proj_type("ortho")
     ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     ax.set_box_aspect((1, 1, 1), zoom=1.4)

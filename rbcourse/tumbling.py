@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
-from rbcourse.bodies import draw_cube, move_cube
+from rbcourse.bodies import draw_box, move_box, poses_from_table
 from rbcourse.figures import COLOURS, Table
-from rbcourse.spheres import EYE, draw_sphere
+from rbcourse.spheres import AZIMUTH, ELEVATION, EYE, draw_sphere
 
 
 def spin_table(t: ArrayLike, spins: Mapping[str, Array]) -> Table:
@@ -74,7 +74,7 @@ def describe_spins(data: Table) -> str:
     said = []
     for name, w in _spins(data).items():
         main = w[:, np.abs(w[0]).argmax()]
-        flips = np.count_nonzero(np.diff(np.sign(main)))
+        flips = np.count_nonzero(np.diff(main > 0))
         said.append(f"{name}: it changes its sign {flips} times" if flips else f"{name}: it stays")
     return (
         "The three components of the angular velocity of a free body over time, for spins that "
@@ -88,7 +88,7 @@ def momentum_table(moments: ArrayLike, w: Array) -> Table:
     Parameters
     ----------
     moments : array_like, shape (3,)
-        Principal moments of inertia.
+        Principal moments of inertia, the second one between the others.
     w : ndarray, shape (times, paths, 3)
         Angular velocities in the body frame.
 
@@ -123,7 +123,7 @@ def draw_momenta(ax: Any, data: Table) -> list[Any]:
     lines: list[Any] = []
     for path in _directions(data):
         axis = _goes_round(path)
-        near_middle = np.abs(path[:, 1]).max() > 0.99
+        near_middle = _comes_near_axis_2(path)
         colour = COLOURS["optimum"] if near_middle else COLOURS["xyz"[axis]]
         seen = path @ EYE > 0
         front = (seen | np.roll(seen, 1))[:, None]  # each piece begins where the last one ended
@@ -149,7 +149,7 @@ def describe_momenta(data: Table) -> str:
     """
     paths = _directions(data)
     rounds = [_goes_round(path) for path in paths]
-    near = sum(np.abs(path[:, 1]).max() > 0.99 for path in paths)
+    near = sum(_comes_near_axis_2(path) for path in paths)
     return (
         f"{len(rounds)} paths of the angular momentum on a sphere that is fixed in the body: "
         f"{rounds.count(0)} go round axis 1, {rounds.count(2)} round axis 3, "
@@ -174,10 +174,8 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
     callable
         ``update(i)`` turns the book to orientation i and returns what moves.
     """
-    t, edges = np.asarray(data["t [1]"]), np.asarray(edges)
-    R = np.stack([data[f"R{i}{j} [1]"] for i in "123" for j in "123"], axis=-1).reshape(-1, 3, 3)
-    poses = np.broadcast_to(np.eye(4), (len(R), 4, 4)).copy()
-    poses[:, :3, :3] = R
+    t, poses, edges = np.asarray(data["t [1]"]), poses_from_table(data), np.asarray(edges)
+    poses[:, :3, 3] = 0
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
     ax.text2D(
@@ -190,20 +188,20 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
         transform=ax.transAxes,
     )
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
-    book = draw_cube(ax, poses[0], edges)
+    book = draw_box(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
     ax.set_box_aspect((1, 1, 1), zoom=1.5)
     ax.set_axis_off()
     ax.set_proj_type("ortho")  # in perspective the square on the cover can sink into it
-    ax.view_init(elev=15, azim=-40)
+    ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
 
     def update(i: int) -> list[Any]:
-        move_cube(book, poses[i], edges)
-        ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
+        move_box(book, poses[i], edges)
+        ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], poses[i, :3, 1])
         pin.set_data_3d(*ends.T)
         clock.set_text(f"t = {t[i]:.1f}")
-        away = R[i, :, 1] @ EYE < 0  # the pin leaves the book on its far side
+        away = poses[i, :3, 1] @ EYE < 0  # the pin leaves the book on its far side
         return [clock, pin, book] if away else [clock, book, pin]
 
     return update
@@ -222,13 +220,10 @@ def describe_book(data: Table) -> str:
     str
     """
     t, height = np.asarray(data["t [1]"]), np.asarray(data["R32 [1]"])
-    turned = t[1:][np.diff(np.sign(height)) != 0]
     start = "up" if height[0] > 0 else "down"
-    often = "once" if len(turned) == 1 else f"{len(turned)} times"
-    return (
-        f"A book spins freely, with a pin in its middle axis. The pin starts {start}, and turns "
-        f"over {often}, at t = {', '.join(f'{x:.1f}' for x in turned)}."
-    )
+    over = ", ".join(f"{x:.1f}" for x in t[1:][np.diff(height > 0)])
+    fate = f"turns over at t = {over}" if over else "stays there"
+    return f"A book spins freely, with a pin in its middle axis. It starts {start}, and {fate}."
 
 
 def _spins(data: Table) -> dict[str, Array]:
@@ -240,6 +235,10 @@ def _spins(data: Table) -> dict[str, Array]:
 
 def _directions(data: Table) -> Array:
     return np.stack([data[f"{axis} [1]"] for axis in "xyz"], axis=-1)
+
+
+def _comes_near_axis_2(path: Array) -> bool:
+    return bool(np.abs(path[:, 1]).max() > 0.99)
 
 
 def _goes_round(path: Array) -> int:

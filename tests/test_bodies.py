@@ -38,7 +38,7 @@ def test_a_motion_table_holds_the_poses():
 
 @pytest.mark.source("BK Fig. 5")
 def test_a_cube_has_six_faces_and_a_square_on_one(axes):
-    in_body = corners(bodies.draw_cube(axes[0], np.eye(4), 2.0))
+    in_body = corners(bodies.draw_box(axes[0], np.eye(4), 2.0))
     faces, square = in_body[:6], in_body[6]
     assert np.all(np.abs(faces) == 1)
     centres = {tuple(face.mean(axis=0)) for face in faces}
@@ -52,7 +52,7 @@ def test_a_cube_has_six_faces_and_a_square_on_one(axes):
 @pytest.mark.source("BK Fig. 5")
 def test_cubes_are_where_the_poses_are(axes):
     *cubes, stars = bodies.draw_cube_motion(axes[0], MOTIONS["screw"], 2.0)
-    in_body = corners(bodies.draw_cube(axes[1], np.eye(4), 2.0))
+    in_body = corners(bodies.draw_box(axes[1], np.eye(4), 2.0))
     assert len(cubes) == 6
     for cube, A in zip(cubes, SCREW(TIMES), strict=True):
         assert np.abs(corners(cube) - (in_body @ A[:3, :3].T + A[:3, 3])).max() < 1e-14
@@ -65,7 +65,7 @@ def test_cubes_are_where_the_poses_are(axes):
 
 def test_moving_cubes_move(axes):
     update = bodies.moving_cubes(axes, MOTIONS, side=1.5)
-    in_body = corners(bodies.draw_cube(axes[0], np.eye(4), 1.5))
+    in_body = corners(bodies.draw_box(axes[0], np.eye(4), 1.5))
     for i in (0, 3, 5):
         for cube, curve in zip(update(i), (GEODESIC, SCREW), strict=True):
             A = curve(TIMES[i])

@@ -38,7 +38,7 @@ def test_what_has_landed_is_not_still_to_come():
 
 def test_every_misprint_has_a_test():
     assert [key for key in ledger.MISPRINTS if not FOUND[key].tests] == []
-    assert len(ledger.MISPRINTS) == 21
+    assert len(ledger.MISPRINTS) == 22
 
 
 def test_all_of_both_texts_is_listed():
@@ -67,7 +67,7 @@ def test_all_of_both_texts_is_listed():
 def test_every_name_in_it_resolves():
     for name in {name for entry in FOUND.values() for name in entry.functions}:
         module, function = name.split(".")
-        assert callable(getattr(importlib.import_module(f"rbcourse.{module}"), function))
+        assert hasattr(importlib.import_module(f"rbcourse.{module}"), function), name
     for name in {name for entry in FOUND.values() for name in entry.tests}:
         file, function = name.split("::")
         source = (ROOT / "tests" / file).read_text("utf-8")
@@ -84,7 +84,8 @@ def course(tmp_path):
     for folder in ("rbcourse", "tests", "notebooks"):
         (tmp_path / folder).mkdir()
     docstring = "References\n    ----------\n    BK (2), RR 2.\n\n    Notes\n    BK (3)\n"
-    (tmp_path / "rbcourse/so3.py").write_text(f'def turn():\n    """{docstring}"""', "utf-8")
+    code = f'def turn():\n    """{docstring}"""\n\nBASIS = 1\n"""Three turns (BK (2))."""\n'
+    (tmp_path / "rbcourse/so3.py").write_text(code, "utf-8")
     mark = '@pytest.mark.source("BK (2)", "errata 1")'
     test = mark + '\n@pytest.mark.parametrize("key", ["BK (3)"])\ndef test_turn():\n    pass\n'
     test += '@pytest.mark.source("BK (3)")\ndef not_a_test():\n    pass\n'
@@ -96,7 +97,7 @@ def course(tmp_path):
 
 def test_what_is_collected(course):
     found = ledger.collect(course)
-    assert found["BK (2)"].functions == ["so3.turn"]
+    assert found["BK (2)"].functions == ["so3.turn", "so3.BASIS"]
     assert found["BK (2)"].tests == ["test_so3.py::test_turn"]
     assert found["BK (2)"].lessons == ["03_turns.ipynb, 3"]
     assert found["BK (2)"].lacks("BK (2)") == []

@@ -15,8 +15,8 @@ w, z = RNG.normal(size=(2, 50, 3))
 S, T = RNG.normal(size=(2, 50, 6))
 
 
-def assert_close(value, wanted, scale=100):
-    assert np.abs(value - wanted).max() <= 100 * EPS * scale
+def assert_close(value, wanted, units=400):
+    assert np.abs(value - wanted).max() <= units * EPS
 
 
 @pytest.mark.source("BK (11)", "BK (13)", "BK 3.1", "BK 3.2")
@@ -29,7 +29,7 @@ def test_the_trace_is_the_sum_of_products(inner, n):
 
 
 @pytest.mark.source("BK Prop. 1", "BK 3.1")
-def test_the_trace_is_invariant_under_rotations_on_both_sides_and_under_nothing_else():
+def test_the_trace_is_invariant_under_rotations_on_both_sides_and_not_under_a_shear():
     X, Y = RNG.normal(size=(2, 50, 3, 3))
     assert_close(rb.inner_gl(LEFT @ X @ RIGHT, LEFT @ Y @ RIGHT), rb.inner_gl(X, Y))
     shear = np.eye(3) + np.eye(3, k=1)
@@ -61,9 +61,9 @@ def test_what_the_trace_induces_on_se3():
 @pytest.mark.source("BK Remark 4")
 def test_on_se3_it_is_invariant_on_the_left_and_on_the_right_under_rotations_only():
     X, Y = rb.tangent_from_components(A, S), rb.tangent_from_components(A, T)
-    assert_close(rb.inner_se3(MOVE @ X, MOVE @ Y), rb.inner_se3(X, Y), 1000)
+    assert_close(rb.inner_se3(MOVE @ X, MOVE @ Y), rb.inner_se3(X, Y))
     turn = rb.pose_from_components(RIGHT, np.zeros(3))
-    assert_close(rb.inner_se3(X @ turn, Y @ turn), rb.inner_se3(X, Y), 1000)
+    assert_close(rb.inner_se3(X @ turn, Y @ turn), rb.inner_se3(X, Y))
     shift = rb.pose_from_components(np.eye(3), [1, 0, 0])
     assert abs(rb.inner_se3(X @ shift, Y @ shift) - rb.inner_se3(X, Y)).max() > 0.1
 
@@ -90,14 +90,14 @@ def test_it_is_the_energy_of_a_ball():
 def test_a_left_invariant_field_is_its_components_times_the_moved_basis(group, x, basis):
     X = rb.tangent_from_components(group, x)
     assert_close(X, np.einsum("bi,bjk,ikl->bjl", x, group, basis))
-    assert_close(rb.components_from_tangent(group, X), x, 1000)
+    assert_close(rb.components_from_tangent(group, X), x)
 
 
 @pytest.mark.source("BK (4)", "BK 2.2")
 def test_the_field_goes_along_with_the_group():
     X = rb.tangent_from_components(A, S)
-    assert_close(rb.tangent_from_components(MOVE @ A, S), MOVE @ X, 1000)
-    assert_close(rb.components_from_tangent(MOVE @ A, MOVE @ X), S, 1000)
+    assert_close(rb.tangent_from_components(MOVE @ A, S), MOVE @ X)
+    assert_close(rb.components_from_tangent(MOVE @ A, MOVE @ X), S)
 
 
 @pytest.mark.source("BK (6)", "BK (7)", "BK 2.3")
@@ -108,8 +108,8 @@ def test_a_left_invariant_metric(group, left, x, y):
     G = G @ np.swapaxes(G, -1, -2)
     X, Y = rb.tangent_from_components(group, x), rb.tangent_from_components(group, y)
     value = rb.inner_left_invariant(G, group, X, Y)
-    assert_close(value, np.einsum("bi,bij,bj->b", x, G, y), 1000)
-    assert_close(rb.inner_left_invariant(G, left @ group, left @ X, left @ Y), value, 10_000)
+    assert_close(value, np.einsum("bi,bij,bj->b", x, G, y))
+    assert_close(rb.inner_left_invariant(G, left @ group, left @ X, left @ Y), value, 4000)
 
 
 @pytest.mark.source("BK (10)", "BK 2.6")
@@ -124,7 +124,14 @@ def test_the_indefinite_metric_is_invariant_on_both_sides():
     value = rb.inner_left_invariant(G, A, X, Y)
     for left, right in [(MOVE, np.eye(4)), (np.eye(4), MOVE)]:
         moved = rb.inner_left_invariant(G, left @ A @ right, left @ X @ right, left @ Y @ right)
-        assert_close(moved, value, 10_000)
+        assert_close(moved, value, 4000)
+
+
+def test_what_sticks_out_of_the_tangent_space_is_dropped():
+    X = rb.tangent_from_components(A, S)
+    X[:, 3] = [1, 2, 3, 4]
+    X[:, :3, :3] += A[:, :3, :3] @ np.diag([1, 2, 3])
+    assert_close(rb.components_from_tangent(A, X), S)
 
 
 def test_no_metric_is_too_large_or_too_small():
@@ -166,9 +173,17 @@ def test_stacks_are_the_stack_of_their_members():
         (lambda: rb.components_from_tangent(R[:2], R[:3]), "broadcast: A (2,), X (3,)"),
         (
             lambda: rb.inner_left_invariant(np.ones((4, 1, 1)) * np.eye(3), R[0], R[:2], R[:2]),
-            "broadcast: G (4,), X (2,), Y (2,)",
+            "broadcast: G (4,), A (), X (2,), Y (2,)",
         ),
         (lambda: rb.inner_se3(np.eye(4), np.eye(3)), "Y: shape (..., 4, 4) wanted"),
+        (
+            lambda: rb.inner_left_invariant(np.eye(3), R[0], R[0], np.full((3, 3), np.nan)),
+            "Y[0, 0] is nan",
+        ),
+        (
+            lambda: rb.inner_left_invariant(np.eye(3), R[0], R[0], np.eye(4)),
+            "Y: shape (..., 3, 3) wanted",
+        ),
         (lambda: rb.semi_riemannian_metric_se3(0, 1), "alpha: a positive number wanted, got 0"),
         (lambda: rb.semi_riemannian_metric_se3(1, [1]), "beta: a positive number wanted, got [1"),
     ],

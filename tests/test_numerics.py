@@ -42,6 +42,10 @@ def test_good_arguments_become_floats_and_are_copied():
 def test_symmetric_but_for_rounding():
     given = np.array([[1, 2 + 1e-15], [2, 3]])
     assert np.array_equal(numerics.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
+    nearly = numerics.as_symmetric("G", [[1, 1], [1 + 5e-13, 1]], 2)
+    assert np.array_equal(nearly, nearly.T)
+    with pytest.raises(ValueError, match="G is not symmetric"):
+        numerics.as_symmetric("G", 1.5e308 * np.array([[1, 1], [-1, 1]]), 2)
     for scale in (1e-200, 1, 1e200):
         bad = scale * np.array([np.eye(2), [[1, 1e-9], [0, 1]]])
         with pytest.raises(ValueError, match=r"G\[1\] is not symmetric"):

@@ -131,6 +131,11 @@ def test_a_weighted_projection_turns_with_its_weight():
     assert np.abs(rb.project_so_weighted(M @ L, W) - R @ L).max() > 0.1
 
 
+def test_a_weight_may_be_all_but_flat():
+    R = rb.project_so_weighted([[1, -0.2], [0, 1]], np.diag([1, 1e-12]))
+    assert np.abs(R - np.eye(2)).max() < 1e-12
+
+
 @pytest.mark.parametrize(
     ("W", "message"),
     [
@@ -155,7 +160,7 @@ def test_what_is_no_weight_is_refused(W, message):
 def test_gram_schmidt_leaves_a_triangle(n):
     rng = np.random.default_rng(n)
     M = np.concatenate([rng.normal(size=(40, n, n)), members(n, rng)])
-    nearly_flat = np.diag([1.0] * (n - 1) + [1e-9])
+    nearly_flat = np.diag([1.0] * (n - 1) + [1e-12])
     M = np.concatenate([M, members(n, rng) @ nearly_flat @ members(n, rng), 1e200 * M, 1e-200 * M])
     Q = rb.orthonormalize_gram_schmidt(M)
     assert np.abs(np.swapaxes(Q, -1, -2) @ Q - np.eye(n)).max() < 8 * n * EPS

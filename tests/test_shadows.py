@@ -65,6 +65,10 @@ def test_descriptions_give_numbers():
     off = np.degrees(np.abs(np.angle((z + m) / z))).max()
     assert f"{len(M)} matrices" in shadows.describe_shadows(TABLE)
     assert f"by up to {off:.0f} degrees" in shadows.describe_shadows(TABLE)
+    far = shadows.frame_table(np.array([[-1, 0.3], [0.3, -1]]), np.linspace(0, 6, 50))
+    assert "nearest rotation finds 180.0 degrees in every" in shadows.describe_frames(far).replace(
+        "-", ""
+    )
     said = shadows.describe_frames(shadows.frame_table(np.diag([2.0, 1]), [0, np.pi / 4]))
     assert "nearest rotation finds 0.0 degrees in every frame" in said
     assert "Gram–Schmidt finds -18.4 to 0.0 degrees" in said
