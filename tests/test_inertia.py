@@ -39,8 +39,8 @@ def test_which_inertias_a_weight_reaches():
 
 def test_no_inertia_is_too_large_or_too_small():
     for size in (1e-300, 3e307):
-        G = size * np.diag([2.0, 3, 4])
-        assert np.allclose(rb.weight_from_inertia(G), size * np.diag([2.5, 1.5, 0.5]), rtol=4 * EPS)
+        W = rb.weight_from_inertia(size * np.diag([2.0, 3, 4]))
+        assert np.abs(W / size - np.diag([2.5, 1.5, 0.5])).max() < 8 * EPS
 
 
 def test_bad_arguments_are_named():
