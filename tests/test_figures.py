@@ -365,7 +365,7 @@ def test_the_data_of_the_spins():
     data = numbers("lesson08_spins")
     for k in range(3):
         w = np.array([data[f"axis {k + 1} w{i} [rad]"] for i in (1, 2, 3)])
-        start = np.where(np.arange(3) == k, 4, 0.03)
+        start = np.where(np.arange(3) == k, 4, 0.2)
         assert np.abs(w - euler(start, data["t [1]"])).max() < 1e-8
 
 
@@ -377,7 +377,7 @@ def test_the_data_of_the_book():
     R, t = R.reshape(-1, 3, 3), data["t [1]"]
     assert rb.is_so(R, 1e-11).all()
     assert np.abs(R[0] - [[1, 0, 0], [0, 0, -1], [0, 1, 0]]).max() < 1e-11
-    momentum = np.einsum("tij,jt->ti", R, MOMENTS[:, None] * euler([0.03, 4, 0.03], t))
+    momentum = np.einsum("tij,jt->ti", R, MOMENTS[:, None] * euler([0.2, 4, 0.2], t))
     assert np.abs(momentum - momentum[0]).max() < 1e-9
     assert (data["R32 [1]"] < -0.99).any()
 
