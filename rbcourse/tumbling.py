@@ -130,8 +130,8 @@ def draw_momenta(ax: Any, data: Table) -> list[Any]:
         ax.plot(*np.where(front, np.nan, path).T, color=colour, lw=0.8, alpha=0.4, zorder=2)
         lines += ax.plot(*np.where(front, path, np.nan).T, color=colour, lw=2, zorder=3)
     for name, end in zip("123", np.diag(np.sign(EYE)), strict=True):
-        ax.text(*(1.19 * end), name, ha="center", va="center", zorder=4)
-        ax.text(*(-1.19 * end), name, ha="center", va="center", zorder=1, color="0.6")
+        ax.text(*end, name, ha="center", va="center", zorder=4)
+        ax.text(*-end, name, ha="center", va="center", zorder=1, color="0.6")
     return lines
 
 
