@@ -30,7 +30,7 @@ class Entry:
     Attributes
     ----------
     functions : list of str
-        Such as ``so3.hat_so3``, within `rbcourse`.
+        Such as ``so3.hat_so3``, within `rbcourse`; constants too, such as ``so3.BASIS_SO3``.
     tests : list of str
         Such as ``test_so3.py::test_hat``, within tests/.
     lessons : list of str

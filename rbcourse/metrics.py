@@ -7,12 +7,7 @@ frame: an angular velocity on SO(3), a twist (ω, v) on SE(3), both in the body 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import (
-    Array,
-    as_finite,
-    as_symmetric,
-    check_broadcast,
-)
+from rbcourse._numerics import Array, as_finite, as_symmetric, check_broadcast
 from rbcourse.se3 import hat_se3
 from rbcourse.so3 import hat_so3, vee_so3
 

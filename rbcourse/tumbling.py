@@ -163,9 +163,10 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
     Parameters
     ----------
     ax : Axes3D
-        Where to draw; the vertical line is the angular momentum, which stays.
+        Where to draw. A vertical line is called its angular momentum.
     data : mapping of str to array_like, shape (times,)
-        A `bodies.motion_table`: its orientations; where it is does not matter.
+        A `bodies.motion_table`: its orientations, such that the angular momentum is vertical; where
+        it is does not matter.
     edges : array_like, shape (3,)
         Its edges along its axes, in m; the pin is along the second.
 
@@ -178,15 +179,8 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
     poses[:, :3, 3] = 0
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
-    ax.text2D(
-        0.98,
-        0.93,
-        "angular momentum",
-        color="0.45",
-        fontsize=11,
-        ha="right",
-        transform=ax.transAxes,
-    )
+    label = {"color": "0.45", "fontsize": 11, "ha": "right", "transform": ax.transAxes}
+    ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
     book = draw_box(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
