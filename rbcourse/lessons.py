@@ -66,8 +66,11 @@ def execute(path: Path, figures: Path) -> str:
         extra_arguments=["--log-level=ERROR"],
         resources={"metadata": {"path": str(path.parent)}},
     )
-    with tempfile.TemporaryDirectory() as no_profile:
-        own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": no_profile}
+    kernel = client.create_kernel_manager()
+    with tempfile.TemporaryDirectory() as folder:
+        if os.name != "nt":  # by files: a port found free may be taken before the kernel takes it
+            kernel.transport, kernel.ip = "ipc", os.path.join(folder, "kernel")
+        own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": folder}
         client.execute(env={**os.environ, **own})
     return normalised(notebook)
 
