@@ -1,5 +1,12 @@
 """Rigid-body motion, taught by code that runs: rotations, poses, projections and curves."""
 
+from rbcourse.arm import (
+    Posture,
+    arm_forward_kinematics,
+    arm_tip_jacobian,
+    interpolate_joints,
+    propagate_joints,
+)
 from rbcourse.connection import (
     christoffel,
     covariant_derivative,
@@ -34,6 +41,17 @@ from rbcourse.metrics import (
 )
 from rbcourse.motions import geodesic_se3, projected_cubic_se3
 from rbcourse.optimum import ConvergenceError
+from rbcourse.planar import (
+    compose_planar,
+    exp_planar,
+    interpolate_planar,
+    inverse_planar,
+    log_planar,
+    matrix_from_planar,
+    planar_from_matrix,
+    propagate_planar,
+)
+from rbcourse.plans import load_path, load_plan, save_path, save_plan
 from rbcourse.projected import projected_cubic_so3, projected_line_so3, projected_quintic_so3
 from rbcourse.projection import (
     distance_to_so,
@@ -86,7 +104,7 @@ from rbcourse.so3 import (
 )
 from rbcourse.uniformity import UniformityTest, uniformity_tests
 
-__version__ = "0.4.0"
+__version__ = "0.5.0"
 
 __all__ = [
     "BASIS_SE3",
@@ -95,17 +113,22 @@ __all__ = [
     "METRIC_SO3",
     "ConvergenceError",
     "Curve",
+    "Posture",
     "Screw",
     "UniformityTest",
     "acceleration_cost",
     "acceleration_cost_parts",
     "adjoint_se3",
+    "arm_forward_kinematics",
+    "arm_tip_jacobian",
     "canonical_quaternion",
     "christoffel",
     "components_from_tangent",
+    "compose_planar",
     "coordinates_from_pose",
     "covariant_derivative",
     "distance_to_so",
+    "exp_planar",
     "exp_se3",
     "exp_so3",
     "f",
@@ -120,18 +143,26 @@ __all__ = [
     "inner_left_invariant",
     "inner_se3",
     "inner_so3",
+    "interpolate_joints",
+    "interpolate_planar",
+    "inverse_planar",
     "inverse_se3",
     "is_se",
     "is_so",
     "is_unit_quaternion",
     "line_singular_value",
+    "load_path",
+    "load_plan",
+    "log_planar",
     "log_se3",
     "log_so3",
+    "matrix_from_planar",
     "matrix_from_quaternion",
     "matrix_from_zyx",
     "minimum_acceleration_se3",
     "minimum_acceleration_so3",
     "orthonormalize_gram_schmidt",
+    "planar_from_matrix",
     "pose_from_components",
     "pose_from_coordinates",
     "project_quaternion",
@@ -142,6 +173,8 @@ __all__ = [
     "projected_cubic_so3",
     "projected_line_so3",
     "projected_quintic_so3",
+    "propagate_joints",
+    "propagate_planar",
     "quaternion_conjugate",
     "quaternion_from_matrix",
     "quaternion_from_rotation_vector",
@@ -155,6 +188,8 @@ __all__ = [
     "sample_quaternion_naive",
     "sample_rotation",
     "sample_rotation_naive",
+    "save_path",
+    "save_plan",
     "screw_from_pose",
     "screw_se3",
     "semi_riemannian_metric_se3",

@@ -54,6 +54,21 @@ def as_finite(name: str, value: ArrayLike, *core: int | str) -> Array:
     return array
 
 
+def as_single(name: str, value: ArrayLike, *core: int | str) -> Array:
+    """Return `as_finite` of one array of the shape `core`, no stack of them.
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and if there are more axes.
+    """
+    array = as_finite(name, value, *core)
+    if array.ndim > len(core):
+        wanted = ", ".join(map(str, core))
+        raise ValueError(f"{name}: shape ({wanted}) wanted, got {array.shape}")
+    return array
+
+
 def as_unit(name: str, value: ArrayLike, size: int) -> Array:
     """Return `as_finite` of vectors, each over its norm.
 
@@ -140,6 +155,13 @@ def as_tolerance(name: str, value: float) -> float:
     if tolerance.ndim or not tolerance >= 0:
         raise ValueError(f"{name}: a number from 0 up wanted, got {value!r}")
     return float(tolerance)
+
+
+def as_count(name: str, value: int) -> int:
+    """Return a count, or raise a ValueError if it is not an integer from 1 up."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
+        raise ValueError(f"{name}: an integer from 1 up wanted, got {value!r}")
+    return int(value)
 
 
 def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:

@@ -134,7 +134,7 @@ def render(found: dict[str, Entry]) -> str:
         rows = [
             (key, what, *map(_links, _places(found[key])))
             for key, what in SOURCES["entries"].items()
-            if key.startswith(text) and key not in SOURCES["to_come"]
+            if key.startswith(text)
         ]
         lines += ["", f"## {text}: {title}", ""]
         lines += _table(("", "what", "code", "tests", "lessons"), rows)
@@ -150,7 +150,7 @@ def render(found: dict[str, Entry]) -> str:
         "",
     ]
     lines += _table(("", "where", "as printed in our copy", "what holds", "tests"), rows)
-    lines += ["", "## Still to come", "", ", ".join(SOURCES["to_come"]) + ".", ""]
+    lines.append("")
     return "\n".join(lines)
 
 

@@ -1,0 +1,200 @@
+"""An arm in the plane: links in a row, each turned by its joint against the one before it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array, as_finite, as_single
+from rbcourse.plans import Plan, interpolate, propagate
+
+LINKS = (2.0, 1.5)
+"""The lengths of the links in the report, in m (RR 4)."""
+
+
+class Posture(NamedTuple):
+    """Where the parts of an arm are.
+
+    Parameters
+    ----------
+    joints : ndarray, shape (..., n + 1, 2)
+        The joints in order, the first one at the origin; then the tip. In m, world frame.
+    frames : ndarray, shape (..., n, 3)
+        The frames of the links: poses (x, y, theta) at their centres, x along the link.
+    """
+
+    joints: Array
+    frames: Array
+
+
+def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
+    """Return where the joints, the tip and the frames of the links are.
+
+    Parameters
+    ----------
+    q : array_like, shape (..., n)
+        Joint angles, in rad: the first against the world's x axis, the others each against the
+        link before. The heading of a link is the sum of the angles up to its own.
+    lengths : array_like, shape (n,), optional
+        Lengths of the links, in m, above 0.
+
+    Returns
+    -------
+    Posture
+        ``joints``, shape (..., n + 1, 2), the tip last, and ``frames``, shape (..., n, 3), the
+        planar poses of the links at their centres.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, there is not one length for each angle, or one is not
+        above 0.
+
+    See Also
+    --------
+    arm_tip_jacobian : How fast the tip goes.
+    matrix_from_planar : The frames as matrices.
+
+    References
+    ----------
+    RR 4.
+
+    Examples
+    --------
+    >>> arm_forward_kinematics([0, np.pi / 2]).joints.round(12)
+    array([[0. , 0. ],
+           [2. , 0. ],
+           [2. , 1.5]])
+    """
+    q = as_finite("q", q, "n")
+    heading = np.cumsum(q, axis=-1)
+    along = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    links = _lengths(lengths, q.shape[-1])[:, None] * along
+    ends = np.cumsum(links, axis=-2)
+    joints = np.concatenate([np.zeros_like(ends[..., :1, :]), ends], axis=-2)
+    frames = np.concatenate([ends - links / 2, heading[..., None]], axis=-1)
+    return Posture(joints, frames)
+
+
+def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
+    """Return the matrix that takes joint velocities to the velocity of the tip.
+
+    Parameters
+    ----------
+    q : array_like, shape (..., n)
+        Joint angles, in rad, as for `arm_forward_kinematics`.
+    lengths : array_like, shape (n,), optional
+        Lengths of the links, in m, above 0.
+
+    Returns
+    -------
+    ndarray, shape (..., 2, n)
+        In m/rad, world frame. Column k is the vector from joint k to the tip, turned by a quarter
+        to the left.
+
+    Raises
+    ------
+    ValueError
+        As for `arm_forward_kinematics`.
+
+    Notes
+    -----
+    Singular set: where all links lie on one line through the first joint, stretched or folded, the
+    tip cannot move along that line, and the rank is 1 (0 where no joint moves the tip).
+
+    References
+    ----------
+    RR 4.
+
+    Examples
+    --------
+    >>> arm_tip_jacobian([0, np.pi / 2]).round(12)
+    array([[-1.5, -1.5],
+           [ 2. ,  0. ]])
+    """
+    joints = arm_forward_kinematics(q, lengths).joints
+    reach = joints[..., -1:, :] - joints[..., :-1, :]
+    return np.stack([-reach[..., 1], reach[..., 0]], axis=-2)
+
+
+def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
+    """Return the path that takes each joint angle evenly from its start to its goal.
+
+    Parameters
+    ----------
+    start, goal : array_like, shape (..., n)
+        Joint angles, in rad. Turns count: a joint goes as far as the two numbers say.
+    steps : int, optional
+        How many equal steps, from 1 up.
+
+    Returns
+    -------
+    ndarray, shape (steps + 1, ..., n)
+        The first state is the start, the last one the goal, exactly.
+
+    Raises
+    ------
+    ValueError
+        If the angles are not finite, start and goal differ in their number, the batches do not
+        broadcast, or `steps` is not an integer from 1 up.
+
+    References
+    ----------
+    RR 4.1, RR (20), RR (21), with errata 19.
+
+    Examples
+    --------
+    >>> interpolate_joints([0, 0], [1, -2], steps=2)
+    array([[ 0. ,  0. ],
+           [ 0.5, -1. ],
+           [ 1. , -2. ]])
+    """
+    start = as_finite("start", start, "n")
+    return interpolate(start, as_finite("goal", goal, start.shape[-1]), steps)
+
+
+def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
+    """Return the path that a plan makes an arm go, one state more than commands.
+
+    Parameters
+    ----------
+    start : array_like, shape (..., n)
+        Joint angles, in rad.
+    plan : iterable of (velocity, duration)
+        Velocities of the n joints, in rad/s; durations from 0 up, in s. The empty plan leaves the
+        start alone, and a command of no duration repeats the state.
+
+    Returns
+    -------
+    ndarray, shape (commands + 1, ..., n)
+        The first state is the start, exactly. Turns add up.
+
+    Raises
+    ------
+    ValueError
+        If the start is not finite, or a command is none; the message says which and why.
+
+    See Also
+    --------
+    save_plan, load_plan : Plans as files.
+
+    References
+    ----------
+    RR 4.2, RR (22), RR (23), with errata 20.
+
+    Examples
+    --------
+    >>> propagate_joints([0, 0], [([0.5, 0], 2), ([0, -1], 1)])
+    array([[ 0.,  0.],
+           [ 1.,  0.],
+           [ 1., -1.]])
+    """
+    return propagate(as_finite("start", start, "n"), plan)
+
+
+def _lengths(lengths: ArrayLike, n: int) -> Array:
+    checked = as_single("lengths", lengths, n)
+    if not (checked > 0).all():
+        i = int(np.argmin(checked))
+        raise ValueError(f"lengths[{i}] is {checked[i]}, a length above 0 is wanted")
+    return checked

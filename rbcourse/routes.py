@@ -1,0 +1,175 @@
+"""A rectangle on its way through the plane: artists on axes that the caller owns."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.figures import COLOURS, Table
+from rbcourse.planar import compose_planar
+from rbcourse.plans import STATES, as_path
+
+_OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
+_NOSE = np.array([[0.8, -1, 0], [2, 0, 0], [0.8, 1, 0]]) / 4
+"""A body of length 1, half as wide, and the mark on its front; it heads along its x axis."""
+
+
+def route_table(path: ArrayLike) -> dict[str, Array]:
+    """Return a path of planar poses as a table: one row for each.
+
+    Parameters
+    ----------
+    path : array_like, shape (states, 3)
+        Poses (x, y, theta): m, m, rad.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    return dict(zip(STATES["planar"], as_path(path).T, strict=True))
+
+
+def named_routes(routes: Mapping[str, Table]) -> dict[str, ArrayLike]:
+    """Return route tables of one length as one table, each column with the name of its route."""
+    return {f"{name} {key}": x for name, data in routes.items() for key, x in data.items()}
+
+
+def draw_route(
+    ax: Axes, data: Table, length: float, shown: Iterable[int], colour: str = COLOURS["z"]
+) -> list[Any]:
+    """Draw the way of a rectangle's centre, and the rectangle at some of its poses.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw; it is made to show all of it, lengths equal on both axes.
+    data : mapping of str to array_like, shape (states,)
+        A `route_table`.
+    length : float
+        How long the rectangle is, in m. It is half as wide, and a mark shows its front.
+    shown : iterable of int
+        At which states it is drawn.
+    colour : str, optional
+        Its colour.
+
+    Returns
+    -------
+    list of artists
+        The way; then outline and mark for each.
+
+    References
+    ----------
+    RR 3.3.
+    """
+    path = _path(data)
+    artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["x"], zorder=2)
+    for i in shown:
+        artists += draw_body(ax, path[i], length, colour)
+    show_plane(ax, [data], length)
+    return artists
+
+
+def moving_route(
+    ax: Axes, data: Table, length: float, shown: Iterable[int]
+) -> Callable[[int], list[Any]]:
+    """Draw a rectangle, pale, at some of its poses; return what moves it along its way.
+
+    Parameters
+    ----------
+    ax, data, length, shown
+        As for `draw_route`.
+
+    Returns
+    -------
+    callable
+        ``update(i)`` moves the rectangle to state i, draws the way of its centre up to there, and
+        returns the artists that move.
+
+    References
+    ----------
+    RR 3.3, RR Fig. 6, RR Fig. 7.
+    """
+    path = _path(data)
+    for i in shown:
+        draw_body(ax, path[i], length, "0.75", fill="none")
+    (way,) = ax.plot([], [], color=COLOURS["x"], zorder=2)
+    body = draw_body(ax, path[0], length, COLOURS["z"])
+    show_plane(ax, [data], length)
+
+    def update(i: int) -> list[Any]:
+        way.set_data(*path[: i + 1, :2].T)
+        move_body(body, path[i], length)
+        return [*body, way]
+
+    return update
+
+
+def draw_body(
+    ax: Axes, pose: Array, length: float, colour: str, *, fill: str = "#D6E6F2", ls: str = "-"
+) -> list[Any]:
+    """Draw a rectangle with a mark on its front at a pose; `move_body` moves it."""
+    corners, nose = _placed(pose, length)
+    outline = ax.fill(*corners.T, facecolor=fill, edgecolor=colour, lw=1.5, ls=ls, zorder=1.5)
+    return [*outline, *ax.plot(*nose.T, color=colour, lw=1.5, ls=ls, zorder=1.6)]
+
+
+def move_body(body: Sequence[Any], pose: Array, length: float) -> None:
+    """Move a rectangle that `draw_body` has drawn."""
+    corners, nose = _placed(pose, length)
+    body[0].set_xy(corners)
+    body[1].set_data(*nose.T)
+
+
+def show_plane(ax: Axes, routes: Iterable[Table], length: float) -> None:
+    """Make axes show all places that a rectangle passes, with equal lengths on both."""
+    places = np.concatenate([_path(data)[:, :2] for data in routes])
+    margin = 0.75 * length
+    (left, low), (right, high) = places.min(axis=0) - margin, places.max(axis=0) + margin
+    ax.set(xlim=(left, right), ylim=(low, high), xlabel="x (m)", ylabel="y (m)")
+    ax.set_aspect("equal")
+
+
+def describe_route(data: Table) -> str:
+    """Return in words how a rectangle goes.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (states,)
+        A `route_table`.
+
+    Returns
+    -------
+    str
+    """
+    path = _path(data)
+    steps = np.diff(path, axis=0)
+    way = np.hypot(steps[:, 0], steps[:, 1]).sum()
+    turns = np.degrees(steps[:, 2])
+    sides = {"left": turns[turns > 0].sum(), "right": -turns[turns < 0].sum()}
+    said = [f"{angle:.0f} degrees to the {side}" for side, angle in sides.items() if angle > 0.5]
+    return (
+        f"A rectangle goes from {_said(path[0])}, to {_said(path[-1])}. "
+        f"On its way of {way:.1f} m it turns by {' and '.join(said) or '0 degrees'}."
+    )
+
+
+def describe_routes(routes: Mapping[str, Table]) -> str:
+    """Return in words how rectangles go, with the names of their ways."""
+    return " ".join(f"{name}: {describe_route(data)}" for name, data in routes.items())
+
+
+def _path(data: Table) -> Array:
+    return np.stack([np.asarray(data[key], dtype=float) for key in STATES["planar"]], axis=-1)
+
+
+def _placed(pose: Array, length: float) -> tuple[Array, Array]:
+    corners, nose = (compose_planar(pose, length * part)[:, :2] for part in (_OUTLINE, _NOSE))
+    return corners, nose
+
+
+def _said(pose: Array) -> str:
+    x, y = (f"{value:.1f}" for value in pose[:2].round(1) + 0.0)
+    return f"({x}, {y}) m, heading {np.degrees(pose[2]).round() + 0.0:.0f} degrees"
