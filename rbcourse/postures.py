@@ -13,7 +13,7 @@ from rbcourse.arm import LINKS, arm_forward_kinematics
 from rbcourse.figures import COLOURS, Table
 from rbcourse.plans import as_path
 
-_LOOKS = [(COLOURS["x"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
+_LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
 
 
 def arm_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> dict[str, Array]:
@@ -83,6 +83,7 @@ def draw_posture(ax: Axes, data: Table) -> list[Any]:
             }
             artists.append(ax.quiver(*centre, *arrow, color=COLOURS[axis], **style))
     ax.annotate("tip", joints[-1], (8, 8), textcoords="offset points")
+    ax.margins(0.15)
     ax.set(xlabel="x (m)", ylabel="y (m)")
     ax.set_aspect("equal")
     return artists
@@ -117,7 +118,7 @@ def moving_arm(ax: Axes, data: Table, shown: Iterable[int]) -> Callable[[int], l
     for i in shown:
         ax.plot(*joints[i].T, "o-", color="0.82", lw=3, ms=6, zorder=1.5)
     (links,) = ax.plot([], [], "o-", color=COLOURS["z"], lw=4, ms=8, zorder=3)
-    (way,) = ax.plot([], [], color=COLOURS["x"], lw=2.5, zorder=4)
+    (way,) = ax.plot([], [], color=COLOURS["path"], lw=2.5, zorder=4)
 
     def update(i: int) -> list[Any]:
         links.set_data(*joints[i].T)
@@ -194,6 +195,50 @@ def show_reach(ax: Axes, data: Table) -> None:
     ax.set_aspect("equal")
 
 
+def describe_posture(data: Table) -> str:
+    """Return in words what `draw_posture` shows.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (1,)
+        An `arm_table`.
+
+    Returns
+    -------
+    str
+    """
+    (q,), (joints,) = _angles(data), _joints(data)
+    places = ", ".join(map(_point, joints))
+    return (
+        "An arm, each link with the x and y axes of its frame at its centre. Its joint angles are "
+        f"{_listed(np.degrees(q), 0)} degrees, each against the link before; its joints, and "
+        f"then its tip, are at {places} m."
+    )
+
+
+def describe_ways(ways: Mapping[str, Table]) -> str:
+    """Return in words what `draw_arm_ways` and `draw_joint_ways` show.
+
+    Parameters
+    ----------
+    ways : mapping of str to mapping of str to array_like
+        As for these.
+
+    Returns
+    -------
+    str
+    """
+    said = [
+        f"{name}: the tip covers {_length(_joints(data)[:, -1]):.1f} m, the joint angles "
+        f"{np.degrees(_length(_angles(data))):.0f} degrees"
+        for name, data in ways.items()
+    ]
+    return (
+        "Ways of an arm between two configurations, drawn by its tip in the room, and in the "
+        f"plane of its joint angles. {'; '.join(said)}."
+    )
+
+
 def describe_arm(data: Table) -> str:
     """Return in words how an arm goes.
 
@@ -208,13 +253,12 @@ def describe_arm(data: Table) -> str:
     """
     angles, joints = _angles(data), _joints(data)
     tip = joints[:, -1]
-    way = np.linalg.norm(np.diff(tip, axis=0), axis=1).sum()
     lengths = np.linalg.norm(np.diff(joints[0], axis=0), axis=1)
     return (
-        f"An arm with links of {_listed(lengths, '.1f')} m turns its joints from "
-        f"{_listed(np.degrees(angles[0]), '.0f')} to {_listed(np.degrees(angles[-1]), '.0f')} "
-        f"degrees. Its tip goes from ({_listed(tip[0], '.1f', ', ')}) m to "
-        f"({_listed(tip[-1], '.1f', ', ')}) m, on a way of {way:.1f} m that is drawn in red."
+        f"An arm with links of {_listed(lengths, 1)} m turns its joints from "
+        f"{_listed(np.degrees(angles[0]), 0)} to {_listed(np.degrees(angles[-1]), 0)} degrees. "
+        f"Its tip goes from {_point(tip[0])} m to {_point(tip[-1])} m, on a way of "
+        f"{_length(tip):.1f} m that is drawn in red."
     )
 
 
@@ -229,5 +273,15 @@ def _joints(data: Table) -> Array:
     return np.concatenate([np.zeros_like(ends[:, :1]), ends], axis=1)
 
 
-def _listed(values: Array, form: str, between: str = " and ") -> str:
-    return between.join(f"{value.round(int(form[1])) + 0.0:{form}}" for value in values)
+def _length(places: Array) -> float:
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+
+def _listed(values: Array, digits: int) -> str:
+    *others, last = (f"{value.round(digits) + 0.0:.{digits}f}" for value in values)
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _point(place: Array) -> str:
+    x, y = place.round(1) + 0.0
+    return f"({x:.1f}, {y:.1f})"

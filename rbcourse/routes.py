@@ -37,9 +37,7 @@ def named_routes(routes: Mapping[str, Table]) -> dict[str, ArrayLike]:
     return {f"{name} {key}": x for name, data in routes.items() for key, x in data.items()}
 
 
-def draw_route(
-    ax: Axes, data: Table, length: float, shown: Iterable[int], colour: str = COLOURS["z"]
-) -> list[Any]:
+def draw_route(ax: Axes, data: Table, length: float, shown: Iterable[int]) -> list[Any]:
     """Draw the way of a rectangle's centre, and the rectangle at some of its poses.
 
     Parameters
@@ -52,8 +50,6 @@ def draw_route(
         How long the rectangle is, in m. It is half as wide, and a mark shows its front.
     shown : iterable of int
         At which states it is drawn.
-    colour : str, optional
-        Its colour.
 
     Returns
     -------
@@ -65,10 +61,46 @@ def draw_route(
     RR 3.3.
     """
     path = _path(data)
-    artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["x"], zorder=2)
+    artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["path"], zorder=2)
     for i in shown:
-        artists += draw_body(ax, path[i], length, colour)
+        artists += draw_body(ax, path[i], length, COLOURS["z"])
     show_plane(ax, [data], length)
+    return artists
+
+
+def draw_compared(
+    ax: Axes, routes: Mapping[str, Table], length: float, shown: Iterable[int]
+) -> list[Any]:
+    """Draw two rectangles on their ways, the second dashed, at the same states.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw; it is made to show both, lengths equal on both axes.
+    routes : mapping of str to mapping of str to array_like
+        Two names, and a `route_table` for each.
+    length : float
+        How long the rectangles are, in m.
+    shown : iterable of int
+        At which states they are drawn.
+
+    Returns
+    -------
+    list of artists
+        For each: the way of its centre; then outline and mark at each state.
+
+    References
+    ----------
+    RR 3.3.
+    """
+    artists: list[Any] = []
+    looks = (COLOURS["z"], "#D6E6F2", "-"), (COLOURS["x"], "none", "--")
+    for (name, data), (colour, fill, ls) in zip(routes.items(), looks, strict=True):
+        path = _path(data)
+        artists += ax.plot(*path[:, :2].T, color=colour, ls=ls, lw=1.5, zorder=2, label=name)
+        for i in shown:
+            artists += draw_body(ax, path[i], length, colour, fill=fill, ls=ls)
+    show_plane(ax, routes.values(), length)
     return artists
 
 
@@ -95,7 +127,7 @@ def moving_route(
     path = _path(data)
     for i in shown:
         draw_body(ax, path[i], length, "0.75", fill="none")
-    (way,) = ax.plot([], [], color=COLOURS["x"], zorder=2)
+    (way,) = ax.plot([], [], color=COLOURS["path"], zorder=2)
     body = draw_body(ax, path[0], length, COLOURS["z"])
     show_plane(ax, [data], length)
 
@@ -154,6 +186,30 @@ def describe_route(data: Table) -> str:
         f"A rectangle goes from {_said(path[0])}, to {_said(path[-1])}. "
         f"On its way of {way:.1f} m it turns by {' and '.join(said) or '0 degrees'}."
     )
+
+
+def describe_compared(data: Table) -> str:
+    """Return in words what `draw_compared` shows on several axes.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (states,)
+        The `named_routes` of an even number of ways; each two neighbours are compared.
+
+    Returns
+    -------
+    str
+    """
+    names = [key.removesuffix(" x [m]") for key in data if key.endswith(" x [m]")]
+    places = [np.stack([data[f"{name} {axis} [m]"] for axis in "xy"], axis=-1) for name in names]
+    apart = [
+        np.linalg.norm(a - b, axis=1).max() for a, b in zip(places[::2], places[1::2], strict=True)
+    ]
+    said = [
+        f"{one} and {other} are apart by {distance:.1f} m at most"
+        for one, other, distance in zip(names[::2], names[1::2], apart, strict=True)
+    ]
+    return f"Rectangles on two ways each. {'; '.join(said)}."
 
 
 def describe_routes(routes: Mapping[str, Table]) -> str:

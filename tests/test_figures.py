@@ -417,3 +417,115 @@ def test_the_data_of_the_cube_of_the_start():
     circle = [6 * np.sin(angle), 6 * (1 - np.cos(angle)), 7 * data["t [1]"]]
     assert np.abs(np.array([data[f"{axis} [m]"] for axis in "xyz"]) - circle).max() < 1e-10
     assert np.abs(data["R21 [1]"] - np.sin(angle)).max() < 1e-11
+
+
+def route(data, name=""):
+    return np.stack([data[f"{name}{key}"] for key in ("x [m]", "y [m]", "theta [rad]")], axis=-1)
+
+
+@pytest.mark.source("RR Fig. 6", "RR (14)", "RR (15)", "RR (16)")
+def test_the_data_of_report_fig6():
+    t = np.linspace(0, 1, 51)
+    even = np.transpose([6 * t, 3 * t, np.pi / 2 * t])
+    assert np.abs(route(numbers("report_fig6")) - even).max() < 1e-11
+
+
+@pytest.mark.source("RR Fig. 7", "RR (17)", "RR (18)", "RR (19)")
+def test_the_data_of_report_fig7():
+    """Right for 3 s, turn for 1 s, along the diagonal for 2 s, right while turning for 3 s."""
+    t = np.arange(91) / 10
+    x = np.interp(t, [0, 3, 4, 6, 9], [0, 3, 3, 5, 8])
+    y = np.interp(t, [0, 4, 6, 9], [0, 0, 2, 2])
+    theta = np.interp(t, [0, 3, 4, 6, 9], np.radians([0, 0, 45, 45, -90]))
+    assert np.abs(route(numbers("report_fig7")) - np.transpose([x, y, theta])).max() < 1e-11
+
+
+@pytest.mark.source("RR (16)")
+def test_the_data_of_the_long_way_and_the_short_way():
+    data, t = numbers("lesson01_ways"), np.linspace(0, 1, 49)
+    for name, end in {"as the numbers say": -170, "the short way": 190}.items():
+        even = np.transpose([6 - 6 * t, 0 * t, np.radians(170 + (end - 170) * t)])
+        assert np.abs(route(data, f"{name} ") - even).max() < 1e-11
+
+
+@pytest.mark.source("RR 3.2")
+def test_the_data_of_the_two_frames():
+    data, t = numbers("lesson01_frames"), np.linspace(0, 2 * np.pi, 65)
+    assert np.abs(route(data, "world ") - np.transpose([t, 0 * t, t])).max() < 1e-10
+    circle = np.transpose([np.sin(t), 1 - np.cos(t), t])
+    assert np.abs(route(data, "body ") - circle).max() < 1e-10
+
+
+@pytest.mark.source("RR 3.1")
+def test_the_data_of_what_is_straight():
+    """By the corner: the corner runs straight. The screw: every point keeps its distance from one
+    centre, found here from the start and the goal alone."""
+    data, t = numbers("lesson01_straight"), np.linspace(0, 1, 41)
+    by = {
+        f"{way} {point}": route(data, f"{way} by the {point} ")
+        for way in ("blended", "screw")
+        for point in ("centre", "corner")
+    }
+    goal = np.array([5, 1, np.radians(150)])
+    assert np.abs(by["blended centre"] - t[:, None] * goal).max() < 1e-10
+    corner = {
+        name: path[:, :2] @ [1, 1j] + np.exp(1j * path[:, 2]) * (-1 - 0.5j)
+        for name, path in by.items()
+    }
+    straight = corner["blended corner"]
+    assert np.abs(straight - (straight[0] + t * (straight[-1] - straight[0]))).max() < 1e-10
+    for path in by.values():
+        assert np.abs(path[[0, -1]] - [[0, 0, 0], goal]).max() < 1e-10
+        assert np.abs(path[:, 2] - t * goal[2]).max() < 1e-10
+    centre = (5 + 1j) / (1 - np.exp(1j * goal[2]))
+    for points in (by["screw centre"][:, :2] @ [1, 1j], corner["screw corner"]):
+        turned = centre + np.exp(1j * t * goal[2]) * (points[0] - centre)
+        assert np.abs(points - turned).max() < 1e-10
+    assert np.abs(by["screw centre"] - by["screw corner"]).max() < 1e-10
+    apart = np.abs((by["blended centre"] - by["blended corner"])[:, :2] @ [1, 1j]).max()
+    assert apart == pytest.approx(abs(-1 - 0.5j) * (1 - np.cos(goal[2] / 2)), abs=1e-3)
+
+
+def configurations(data, name=""):
+    """The angles of a path of the arm, after a check that its ends belong to them."""
+    theta0, theta1 = (data[f"{name}theta{i} [rad]"] for i in (0, 1))
+    elbow = 2 * np.exp(1j * theta0)
+    tip = elbow + 1.5 * np.exp(1j * (theta0 + theta1))
+    for k, place in ((1, elbow), (2, tip)):
+        assert np.abs(data[f"{name}x{k} [m]"] + 1j * data[f"{name}y{k} [m]"] - place).max() < 1e-10
+    return np.degrees(np.transpose([theta0, theta1])), tip
+
+
+@pytest.mark.source("RR 4")
+def test_the_data_of_the_posture():
+    angles, _ = configurations(numbers("lesson02_posture"))
+    assert np.abs(angles - [[30, 45]]).max() < 1e-9
+
+
+@pytest.mark.source("RR Fig. 8", "RR (20)", "RR (21)")
+def test_the_data_of_report_fig8():
+    angles, tip = configurations(numbers("report_fig8"))
+    assert np.abs(angles - np.linspace([-20, 110], [130, -60], 61)).max() < 1e-9
+    assert abs(tip).max() > 3.499  # touches the circle
+
+
+@pytest.mark.source("RR Fig. 9", "RR (22)", "RR (23)")
+def test_the_data_of_report_fig9():
+    """45 degrees a second: the shoulder, the elbow, both opposite ways; three arcs of the tip."""
+    t = np.arange(91) / 10
+    angles, tip = configurations(numbers("report_fig9"))
+    shoulder = np.interp(t, [0, 3, 6, 9], [0, 135, 135, 0])
+    elbow = np.interp(t, [0, 3, 6, 9], [0, 0, 135, 270])
+    assert np.abs(angles - np.transpose([shoulder, elbow])).max() < 1e-9
+    centres = 0, 2 * np.exp(0.75j * np.pi), -1.5j
+    for part, centre, radius in zip((0, 30, 60), centres, (3.5, 1.5, 2), strict=True):
+        assert np.abs(abs(tip[part : part + 31] - centre) - radius).max() < 1e-10
+
+
+@pytest.mark.source("RR 4.1")
+def test_the_data_of_the_two_spaces():
+    data, t = numbers("lesson02_two_spaces"), np.linspace(0, 1, 401)
+    angles, tip = configurations(data, "straight for the motors ")
+    assert np.abs(angles - np.transpose([150 * t, 0 * t + 60])).max() < 1e-9
+    _, line = configurations(data, "straight for the hand ")
+    assert np.abs(line - (tip[0] + t * (tip[-1] - tip[0]))).max() < 1e-3
