@@ -528,4 +528,4 @@ def test_the_data_of_the_two_spaces():
     angles, tip = configurations(data, "straight for the motors ")
     assert np.abs(angles - np.transpose([150 * t, 0 * t + 60])).max() < 1e-9
     _, line = configurations(data, "straight for the hand ")
-    assert np.abs(line - (tip[0] + t * (tip[-1] - tip[0]))).max() < 1e-3
+    assert np.abs(line - (tip[0] + t * (tip[-1] - tip[0]))).max() < 2e-4
