@@ -12,12 +12,12 @@ Rng: TypeAlias = "np.random.Generator | int | None"  # loads no numpy.random
 EPS = float(np.finfo(np.float64).eps)
 
 
-def as_array(name: str, value: ArrayLike, *core: int | str) -> Array:
+def as_array(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
     """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
 
     A letter in `core` stands for any size from 1 up, the same at each of its places, and "n+1" for
     any from 2 up: ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes
-    are batch axes.
+    are batch axes; with ``stacked=False`` there may be none.
 
     Raises
     ------
@@ -34,14 +34,14 @@ def as_array(name: str, value: ArrayLike, *core: int | str) -> Array:
         ) from error
     if given.dtype.kind not in "biuf":
         raise ValueError(f"{name}: real numbers wanted, got dtype {given.dtype}")
-    if not _has_core(given.shape, core):
-        wanted = ", ".join(["...", *map(str, core)])
+    if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
+        wanted = ", ".join([*["..."] * stacked, *map(str, core)])
         raise ValueError(f"{name}: shape ({wanted}) wanted, got {given.shape}")
     array: Array = given.astype(np.float64)
     return array
 
 
-def as_finite(name: str, value: ArrayLike, *core: int | str) -> Array:
+def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
     """Return `as_array` of the arguments, where no entry may be NaN or infinite.
 
     Raises
@@ -49,7 +49,7 @@ def as_finite(name: str, value: ArrayLike, *core: int | str) -> Array:
     ValueError
         As `as_array`; and the message names the first entry that is not finite.
     """
-    array = as_array(name, value, *core)
+    array = as_array(name, value, *core, stacked=stacked)
     _check_all(np.isfinite(array), name, array, "a finite number")
     return array
 
@@ -60,13 +60,9 @@ def as_single(name: str, value: ArrayLike, *core: int | str) -> Array:
     Raises
     ------
     ValueError
-        As `as_finite`; and if there are more axes.
+        As `as_finite`.
     """
-    array = as_finite(name, value, *core)
-    if array.ndim > len(core):
-        wanted = ", ".join(map(str, core))
-        raise ValueError(f"{name}: shape ({wanted}) wanted, got {array.shape}")
-    return array
+    return as_finite(name, value, *core, stacked=False)
 
 
 def as_unit(name: str, value: ArrayLike, size: int) -> Array:

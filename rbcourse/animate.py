@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,7 +82,7 @@ class Animation:
             for picture in self.pictures[self.still % 2 :: 2]
         ]
         return _PLAYER.substitute(
-            name=self.name,
+            name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
             caption=self.caption or self.name,
             alt=html.escape(self.alt),
             still=sources[self.still // 2],
@@ -118,7 +119,7 @@ def animate(
     fig : Figure
         The figure, with everything on it that does not move. The axes must not change.
     name : str
-        What the animation is called: a word that no other one on the page has.
+        What the animation is called: a word.
     alt : str
         A sentence or two that say what is to be seen.
     update : callable

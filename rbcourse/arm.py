@@ -99,8 +99,8 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
     Notes
     -----
-    Singular set: where all links lie on one line through the first joint, stretched or folded, the
-    tip cannot move along that line, and the rank is 1 (0 where no joint moves the tip).
+    Singular set: where all links lie on one line, stretched or folded, the tip cannot move along
+    it, and the rank is 1.
 
     References
     ----------

@@ -144,5 +144,37 @@ def csv_text(data: Table) -> str:
     return text.getvalue()
 
 
+def named_tables(tables: Mapping[str, Table]) -> dict[str, ArrayLike]:
+    """Return tables as one, each column with the name of its table before its own.
+
+    Parameters
+    ----------
+    tables : mapping of str to mapping of str to array_like
+        Tables whose columns have one shape.
+
+    Returns
+    -------
+    dict of str to array_like
+
+    Examples
+    --------
+    >>> named_tables({"there": {"x [m]": [0, 1]}, "back": {"x [m]": [1, 0]}})
+    {'there x [m]': [0, 1], 'back x [m]': [1, 0]}
+    """
+    return {f"{name} {key}": x for name, table in tables.items() for key, x in table.items()}
+
+
+def in_words(value: float, scale: float) -> str:
+    """Return a number as text, with three digits of the scale that it is seen on.
+
+    Examples
+    --------
+    >>> in_words(6.7082, 10), in_words(-1e-17, 10), in_words(3.14159e-6, 5e-6)
+    ('6.7', '0', '3.14e-06')
+    """
+    digits = 2 - int(np.floor(np.log10(scale))) if scale > 0 else 0
+    return f"{np.round(float(value), digits) + 0.0:.10g}"
+
+
 def _cell(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.12g}"

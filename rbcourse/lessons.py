@@ -67,12 +67,32 @@ def execute(path: Path, figures: Path) -> str:
         resources={"metadata": {"path": str(path.parent)}},
     )
     kernel = client.create_kernel_manager()
-    with tempfile.TemporaryDirectory() as folder:
-        if os.name != "nt":  # by files: a port found free may be taken before the kernel takes it
-            kernel.transport, kernel.ip = "ipc", os.path.join(folder, "kernel")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        for name, value in kernel_address(folder).items():
+            setattr(kernel, name, value)
         own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": folder}
         client.execute(env={**os.environ, **own})
     return normalised(notebook)
+
+
+def kernel_address(folder: str) -> dict[str, str]:
+    """Return where a kernel shall listen, as settings of its manager.
+
+    At files, except on Windows: a port that is found free may be taken by another program before
+    the kernel takes it.
+
+    Parameters
+    ----------
+    folder : str
+        For the files; its name must be short, 80 characters at most.
+
+    Returns
+    -------
+    dict of str to str
+    """
+    if os.name == "nt":
+        return {}
+    return {"transport": "ipc", "ip": os.path.join(folder, "kernel")}
 
 
 def normalised(notebook: NotebookNode) -> str:

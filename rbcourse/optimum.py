@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebint, chebvander
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite
+from rbcourse._numerics import Array, as_single
 from rbcourse.curves import Curve, geodesic_so3
 from rbcourse.polynomials import cubic_coefficients, polynomial
 from rbcourse.projected import ProjectedPolynomial
@@ -269,13 +269,3 @@ def _continue(solver: Solver, ends: Ends) -> MinimumAcceleration:
             if share == 1:
                 return curve
             guess, done, step = curve, share, 2 * step
-
-
-def as_single(name: str, value: ArrayLike, *core: int) -> Array:
-    """Return `as_finite` of the arguments, or raise a ValueError if it is a stack of them."""
-    array = as_finite(name, value, *core)
-    if array.ndim > len(core):
-        raise ValueError(
-            f"{name}: shape {core} wanted, got {array.shape}; give one curve at a time"
-        )
-    return array

@@ -7,7 +7,7 @@ after another turn. A twist is (vx, vy, omega), in the order of the poses.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, check_broadcast, sinc
+from rbcourse._numerics import Array, as_finite, check_broadcast, scaled, sinc
 from rbcourse.plans import Plan, interpolate, propagate
 
 
@@ -87,7 +87,9 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     array([4.    , 5.    , 1.5708])
     """
     A = as_finite("A", A, 3, 3)
-    theta = np.arctan2(A[..., 1, 0] - A[..., 0, 1], A[..., 0, 0] + A[..., 1, 1])
+    block = scaled(A[..., :2, :2])  # so that nothing overflows
+    sine, cosine = block[..., 1, 0] - block[..., 0, 1], block[..., 0, 0] + block[..., 1, 1]
+    theta = np.arctan2(sine + 0.0, cosine + 0.0)  # without the sign of a zero
     return np.concatenate([A[..., :2, 2], theta[..., None]], axis=-1)
 
 
@@ -170,8 +172,8 @@ def exp_planar(S: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        (x, y, omega): an arc of the angle omega was run through. Its chord is shorter than the
-        arc by sin(omega/2) / (omega/2), and points half-way between the headings at its ends.
+        (x, y, omega): an arc of the angle omega was run through. (x, y) is its chord, that is
+        (vx, vy), turned by omega/2, times sin(omega/2) / (omega/2).
 
     Raises
     ------
@@ -223,8 +225,8 @@ def log_planar(pose: ArrayLike) -> Array:
 
     Notes
     -----
-    Singular set: half-turns, which two twists reach; theta decides: π is to the left, −π to the
-    right.
+    Singular set: half-turns, which two twists reach. π itself is to the left, −π to the right;
+    beyond, rounding decides.
 
     References
     ----------
@@ -236,7 +238,7 @@ def log_planar(pose: ArrayLike) -> Array:
     array([3.1416, 0.    , 3.1416])
     """
     pose = as_finite("pose", pose, 3)
-    turn = pose[..., 2:] - _full_turns(pose[..., 2:])
+    turn = _short(pose[..., 2:])
     chord = _rotated(-turn[..., 0] / 2, pose[..., :2])
     return np.concatenate([chord / sinc(turn / 2), turn], axis=-1)
 
@@ -253,7 +255,8 @@ def interpolate_planar(
     steps : int, optional
         How many equal steps, from 1 up.
     shortest : bool, optional
-        Whether to turn the short way, by π at most, whatever full turns the two angles differ by.
+        Whether to turn the short way, by π at most (but for rounding), whatever full turns the
+        two angles differ by.
         By default theta goes from its start to its goal as given.
 
     Returns
@@ -277,8 +280,8 @@ def interpolate_planar(
     The place goes straight at constant speed and the body turns at a constant rate. Which point
     of the body is called its place makes a difference.
 
-    Singular set of `shortest`: angles that differ by half a turn; either way is as short, and the
-    given angles decide: from 0, π is to the left and −π to the right.
+    Singular set of `shortest`: angles that differ by half a turn, where either way is as short.
+    From 0, π is to the left and −π to the right; beyond, rounding decides.
 
     References
     ----------
@@ -294,8 +297,9 @@ def interpolate_planar(
     start, goal = as_finite("start", start, 3), as_finite("goal", goal, 3)
     check_broadcast(start=(start, 1), goal=(goal, 1))
     if shortest:
-        full = _full_turns(goal[..., 2] - start[..., 2])
-        goal = np.stack(np.broadcast_arrays(goal[..., 0], goal[..., 1], goal[..., 2] - full), -1)
+        turn = goal[..., 2] - start[..., 2]
+        theta = np.where(np.abs(turn) <= np.pi, goal[..., 2], start[..., 2] + _short(turn))
+        goal = np.stack(np.broadcast_arrays(goal[..., 0], goal[..., 1], theta), axis=-1)
     return interpolate(start, goal, steps)
 
 
@@ -331,7 +335,8 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     Notes
     -----
     In the world's frame a command adds velocity times duration. In the body's it is a constant
-    twist, and the body runs through an arc, or a line: `exp_planar`, no small steps.
+    twist, and the body runs through an arc, or a line: `exp_planar`, no small steps. The path has
+    the ends of the commands only; cut a command into shorter ones to see what is between them.
 
     References
     ----------
@@ -359,6 +364,6 @@ def _rotated(theta: Array, vector: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def _full_turns(angle: Array) -> Array:
-    """Return the multiple of 2π nearest to an angle: 0 for what is π at most."""
-    return 2 * np.pi * np.round(angle / (2 * np.pi))
+def _short(angle: Array) -> Array:
+    """Return angles without their full turns; what is within π is left alone."""
+    return np.where(np.abs(angle) <= np.pi, angle, np.arctan2(np.sin(angle), np.cos(angle)))

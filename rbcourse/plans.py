@@ -5,6 +5,7 @@ A plan is a list of commands (velocity, duration). A path is an array of states,
 
 import csv
 import io
+import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TypeAlias
@@ -26,6 +27,7 @@ VELOCITIES = {
 }
 """The columns of a plan before the duration, for each frame of the plane, and for joints."""
 DURATION = "duration [s]"
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def as_plan(plan: Plan, size: int | str) -> Commands:
@@ -57,18 +59,21 @@ def as_plan(plan: Plan, size: int | str) -> Commands:
     ValueError: plan[1] duration is -2.0, a duration from 0 up is wanted
     """
     try:
-        commands = list(plan)
+        commands = iter(plan)
     except TypeError as error:
         raise ValueError(f"plan: a list of (velocity, duration) wanted, got {plan!r}") from error
     return [_command(f"plan[{i}]", command, size) for i, command in enumerate(commands)]
 
 
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
-    """Return (1 − t) start + t goal at steps + 1 even times t in [0, 1], time first."""
+    """Return (1 − t) start + t goal at steps + 1 even times t in [0, 1], time first.
+
+    What is the same at both ends stays the same, which rounding would not grant.
+    """
     t = np.linspace(0, 1, as_count("steps", steps) + 1)
     batch = check_broadcast(start=(start, 1), goal=(goal, 1))
     t = t.reshape(-1, *[1] * (len(batch) + 1))
-    return (1 - t) * start + t * goal
+    return np.where(start == goal, start, (1 - t) * start + t * goal)
 
 
 def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = np.add) -> Array:
@@ -144,9 +149,12 @@ def load_plan(file: str | Path, kind: str) -> Commands:
     """
     commands = []
     for line, row in _read(file, kind, VELOCITIES, [DURATION]):
-        if row[-1] < 0:
-            raise ValueError(f"{line}, {DURATION}: a number from 0 up wanted, got {row[-1]}")
-        commands.append((np.array(row[:-1]), row[-1]))
+        *velocity, duration = row
+        if not velocity:
+            raise ValueError(f"{line}: a velocity wanted, there is no column for it")
+        if duration < 0:
+            raise ValueError(f"{line}, {DURATION}: a number from 0 up wanted, got {duration}")
+        commands.append((np.array(velocity), duration))
     return commands
 
 
@@ -228,15 +236,18 @@ def _command(name: str, command: tuple[ArrayLike, float], size: int | str) -> tu
         velocity, duration = command
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: (velocity, duration) wanted, got {command!r}") from error
-    checked = as_single(f"{name} duration", duration)
-    if checked < 0:
-        raise ValueError(f"{name} duration is {checked}, a duration from 0 up is wanted")
-    return as_single(f"{name} velocity", velocity, size), float(checked)
+    d = float(as_single(f"{name} duration", duration))
+    if d < 0:
+        raise ValueError(f"{name} duration is {d}, a duration from 0 up is wanted")
+    v = as_single(f"{name} velocity", velocity, size)
+    if np.abs(v).max() > np.finfo(float).max / max(d, 1.0):
+        raise ValueError(f"{name}: velocity times duration is beyond all numbers")
+    return v, d
 
 
 def _names(kind: str, columns: dict[str, list[str]], joints: int) -> list[str]:
     """Return the names of the columns of a kind, those of joints numbered."""
-    if kind not in columns:
+    if kind not in list(columns):
         wanted = ", ".join(map(repr, columns))
         raise ValueError(f"kind: one of {wanted} wanted, got {kind!r}")
     if kind == "joints":
@@ -260,11 +271,12 @@ def _read(
     lines = _lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
     names = _names(kind, columns, len(header) - len(last)) + last
-    if header != names:
-        raise ValueError(f"{place}: {', '.join(names)} wanted, got {', '.join(header)}")
+    if header != names or not header:
+        wanted, got = (", ".join(cells) or "nothing" for cells in (names, header))
+        raise ValueError(f"{place}: {wanted} wanted, got {got[:200]}")
     for place, row in lines:
         if len(row) != len(names):
-            raise ValueError(f"{place}: {len(names)} numbers wanted, got {len(row)}")
+            raise ValueError(f"{place}: numbers wanted: {len(names)}, got: {len(row)}")
         yield place, [_number(f"{place}, {name}", x) for name, x in zip(names, row, strict=True)]
 
 
@@ -274,21 +286,18 @@ def _lines(file: str | Path) -> Iterator[tuple[str, list[str]]]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
+        line = len(re.split(rb"\r\n|\n|\r", content[: error.start]))
         raise ValueError(f"{file}, line {line}: no text in UTF-8") from error
-    reader = csv.reader(io.StringIO(text.rstrip(), newline=""), strict=True)
-    try:
-        for row in reader:
-            yield f"{file}, line {reader.line_num}", [cell.strip() for cell in row]
-    except csv.Error as error:
-        raise ValueError(f"{file}, line {reader.line_num}: {error}") from error
+    for line, cells in enumerate(re.split("\r\n|\n|\r", text.rstrip(" \t\r\n")), start=1):
+        try:
+            row = next(csv.reader([cells], strict=True), [])
+        except csv.Error as error:
+            raise ValueError(f"{file}, line {line}: {error}") from error
+        yield f"{file}, line {line}", [cell.strip(" \t") for cell in row]
 
 
 def _number(place: str, cell: str) -> float:
-    try:
-        number = float(cell.replace("_", " "))
-    except ValueError:
-        number = np.nan
+    number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
-        raise ValueError(f"{place}: a finite number wanted, got {cell!r}")
+        raise ValueError(f"{place}: a finite number wanted, got {cell[:40]!r}")
     return number

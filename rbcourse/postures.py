@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics
-from rbcourse.figures import COLOURS, Table
+from rbcourse.figures import COLOURS, Table, in_words
 from rbcourse.plans import as_path
 
 _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
@@ -59,33 +59,50 @@ def draw_posture(ax: Axes, data: Table) -> list[Any]:
     RR 4.
     """
     (q,), (joints,) = _angles(data), _joints(data)
+    headings = np.append(0, np.cumsum(q))
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.6)
-    before = 0.0
-    for i, (joint, angle) in enumerate(zip(joints[:-1], q, strict=True)):
+    for i, (joint, before, after) in enumerate(
+        zip(joints[:-1], headings[:-1], headings[1:], strict=True)
+    ):
         ax.annotate(f"J{i}", joint, (-8, -22), textcoords="offset points", ha="right")
-        along = np.array([np.cos(before), np.sin(before)])
-        ax.plot(*np.transpose([joint, joint + 0.9 * along]), color="0.6", lw=1, ls="--")
-        span = sorted(np.degrees([before, before + angle]))
-        ax.add_patch(Arc(joint, 1.2, 1.2, theta1=span[0], theta2=span[1], lw=1.5, color="0.3"))
-        middle = before + angle / 2
-        x, y = joint + 0.8 * np.array([np.cos(middle), np.sin(middle)])
+        ax.plot(*np.transpose([joint, joint + 0.9 * _towards(before)]), color="0.6", lw=1, ls="--")
+        low, high = sorted(np.degrees([before, after]))
+        ax.add_patch(Arc(joint, 1.2, 1.2, theta1=low, theta2=high, lw=1.5, color="0.3"))
+        x, y = joint + 0.8 * _towards((before + after) / 2)
         ax.text(x, y, f"$θ_{i}$", ha="center", va="center")
-        before += angle
-        centre = joints[i : i + 2].mean(axis=0)
-        for axis, heading in zip("xy", (before, before + np.pi / 2), strict=True):
-            arrow = 0.45 * np.array([np.cos(heading), np.sin(heading)])
-            style: Any = {
-                "angles": "xy",
-                "scale_units": "xy",
-                "scale": 1,
-                "zorder": 4,
-                "width": 0.008,
-            }
-            artists.append(ax.quiver(*centre, *arrow, color=COLOURS[axis], **style))
+        artists += _draw_frame(ax, joints[i : i + 2].mean(axis=0), after)
     ax.annotate("tip", joints[-1], (8, 8), textcoords="offset points")
     ax.margins(0.15)
     ax.set(xlabel="x (m)", ylabel="y (m)")
     ax.set_aspect("equal")
+    return artists
+
+
+def draw_tip_velocities(ax: Axes, data: Table) -> list[Any]:
+    """Draw an arm, and at its tip the columns of the Jacobian as arrows.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw; it is made to show all that the arm can reach.
+    data : mapping of str to array_like, shape (1,)
+        An `arm_table`.
+
+    Returns
+    -------
+    list of artists
+        The links; then an arrow for each joint, half as long as the tip goes for each radian.
+
+    References
+    ----------
+    RR 4.
+    """
+    show_reach(ax, data)
+    (joints,) = _joints(data)
+    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.6)
+    for i, column in enumerate(_columns(joints).T):
+        colour = _LOOKS[i % len(_LOOKS)][0]
+        artists.append(_draw_arrow(ax, joints[-1], column / 2, colour, f"motor {i} runs"))
     return artists
 
 
@@ -153,7 +170,7 @@ def draw_arm_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
         ax.plot(*_joints(first)[i].T, "o-", color="0.75", lw=4, ms=8, zorder=1.5)
     return [
         ax.plot(*_joints(data)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
-        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS, strict=False)
+        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
     ]
 
 
@@ -177,7 +194,7 @@ def draw_joint_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
     """
     lines = [
         ax.plot(*np.degrees(_angles(data)).T, color=colour, ls=ls, label=name)[0]
-        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS, strict=False)
+        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
     ]
     ax.set(xlabel="$θ_0$ (degrees)", ylabel="$θ_1$ (degrees)")
     ax.legend()
@@ -186,7 +203,7 @@ def draw_joint_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
 
 def show_reach(ax: Axes, data: Table) -> None:
     """Make axes show all that an arm can reach; dotted circles bound it."""
-    lengths = np.linalg.norm(np.diff(_joints(data)[0], axis=0), axis=1)
+    lengths = _lengths(_joints(data))
     outer, inner = lengths.sum(), max(0.0, 2 * lengths.max() - lengths.sum())
     for radius in (outer, inner):
         ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))
@@ -208,10 +225,10 @@ def describe_posture(data: Table) -> str:
     str
     """
     (q,), (joints,) = _angles(data), _joints(data)
-    places = ", ".join(map(_point, joints))
+    places = ", ".join(_said(place, _lengths(joints[None]).sum()) for place in joints)
     return (
         "An arm, each link with the x and y axes of its frame at its centre. Its joint angles are "
-        f"{_listed(np.degrees(q), 0)} degrees, each against the link before; its joints, and "
+        f"{_degrees(q)} degrees, each against the link before; its joints, and "
         f"then its tip, are at {places} m."
     )
 
@@ -229,7 +246,7 @@ def describe_ways(ways: Mapping[str, Table]) -> str:
     str
     """
     said = [
-        f"{name}: the tip covers {_length(_joints(data)[:, -1]):.1f} m, the joint angles "
+        f"{name}: the tip covers {_length(_joints(data)[:, -1]):.1f} m, the point of the angles "
         f"{np.degrees(_length(_angles(data))):.0f} degrees"
         for name, data in ways.items()
     ]
@@ -252,13 +269,37 @@ def describe_arm(data: Table) -> str:
     str
     """
     angles, joints = _angles(data), _joints(data)
-    tip = joints[:, -1]
-    lengths = np.linalg.norm(np.diff(joints[0], axis=0), axis=1)
+    lengths, tip = _lengths(joints), joints[:, -1]
+    reach = lengths.sum()
+    turned = np.abs(np.diff(angles, axis=0)).sum(axis=0)
+    start, end = (_said(place, reach) for place in tip[[0, -1]])
     return (
-        f"An arm with links of {_listed(lengths, 1)} m turns its joints from "
-        f"{_listed(np.degrees(angles[0]), 0)} to {_listed(np.degrees(angles[-1]), 0)} degrees. "
-        f"Its tip goes from {_point(tip[0])} m to {_point(tip[-1])} m, on a way of "
-        f"{_length(tip):.1f} m that is drawn in red."
+        f"An arm with links of {_listed([in_words(x, reach) for x in lengths])} m turns its joints "
+        f"from {_degrees(angles[0])} to {_degrees(angles[-1])} degrees, by {_degrees(turned)} "
+        f"degrees in all. From state to state its tip covers {in_words(_length(tip), reach)} m, "
+        f"from {start} to {end} m; its way is drawn in red."
+    )
+
+
+def describe_tip_velocities(postures: Mapping[str, Table]) -> str:
+    """Return in words what `draw_tip_velocities` shows on several axes.
+
+    Parameters
+    ----------
+    postures : mapping of str to mapping of str to array_like
+        An `arm_table` of one row for each name.
+
+    Returns
+    -------
+    str
+    """
+    said = []
+    for name, data in postures.items():
+        x, y = _columns(_joints(data)[0])
+        said.append(f"{name}: they point to {_degrees(np.arctan2(y, x))} degrees")
+    return (
+        "An arm, with an arrow at its tip for each joint: where the tip goes when only the motor "
+        f"of that joint runs. {'; '.join(said)}."
     )
 
 
@@ -273,15 +314,47 @@ def _joints(data: Table) -> Array:
     return np.concatenate([np.zeros_like(ends[:, :1]), ends], axis=1)
 
 
+def _columns(joints: Array) -> Array:
+    """Return the columns of the Jacobian: from each joint to the tip, turned to the left."""
+    x, y = (joints[-1] - joints[:-1]).T
+    return np.array([-y, x])
+
+
+def _draw_frame(ax: Axes, origin: Array, heading: float) -> list[Any]:
+    along, left = 0.45 * _towards(heading), 0.45 * _towards(heading + np.pi / 2)
+    for axis, (x, y) in {"x": origin + along - 0.3 * left, "y": origin + 1.3 * left}.items():
+        ax.text(x, y, axis, color=COLOURS[axis], ha="center", va="center")
+    return [
+        _draw_arrow(ax, origin, arrow, COLOURS[axis]) for axis, arrow in (("x", along), ("y", left))
+    ]
+
+
+def _draw_arrow(ax: Axes, start: Array, along: Array, colour: str, label: str | None = None) -> Any:
+    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 4, "width": 0.008}
+    return ax.quiver(*start, *along, color=colour, label=label, **style)
+
+
+def _towards(heading: float) -> Array:
+    return np.array([np.cos(heading), np.sin(heading)])
+
+
 def _length(places: Array) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
-def _listed(values: Array, digits: int) -> str:
-    *others, last = (f"{value.round(digits) + 0.0:.{digits}f}" for value in values)
+def _lengths(joints: Array) -> Array:
+    return np.linalg.norm(np.diff(joints[0], axis=0), axis=1)
+
+
+def _listed(said: Iterable[str]) -> str:
+    *others, last = said
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _point(place: Array) -> str:
-    x, y = place.round(1) + 0.0
-    return f"({x:.1f}, {y:.1f})"
+def _degrees(angles: Array) -> str:
+    return _listed(f"{angle:.0f}" for angle in np.degrees(angles).round() + 0.0)
+
+
+def _said(place: Array, scale: float) -> str:
+    x, y = (in_words(value, scale) for value in place)
+    return f"({x}, {y})"

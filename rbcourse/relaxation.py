@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, as_single
 from rbcourse.motions import RigidMotion, cubic_ends
 from rbcourse.optimum import (
     ConvergenceError,
@@ -11,7 +11,6 @@ from rbcourse.optimum import (
     Guess,
     MinimumAcceleration,
     along,
-    as_single,
     first_guess,
     grid,
     hats,

@@ -110,20 +110,26 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
         Poses (x, y, theta): m, m, rad; one may be all.
     length : float, optional
         How long the rectangle is, in m; by default a fifth of the larger extent of the path, and
-        1 for a path that stays where it is.
+        1 for a path that stays where it is (but for rounding).
 
     Returns
     -------
     figure : Figure
         The whole way, and the rectangle at its end; pale at its start and on its way.
     animation : Animation
-        A frame for each state, or for 100 of them. A notebook shows a player;
+        A frame for each state, or for 50 of them. A notebook shows a player;
         ``animation.save(path)`` writes a GIF.
 
     Raises
     ------
     ValueError
-        If `path` is no such array, or the length is not above 0.
+        If `path` is no such array, or the length is not above 0, or less than 1e-9 of the
+        distance from the origin.
+
+    Notes
+    -----
+    Lines join the states. To see the arc that a command in the frame of the body runs through,
+    cut it into shorter ones first.
 
     References
     ----------
@@ -133,15 +139,16 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
     --------
     >>> figure, animation = visualize_path([[0, 0, 0], [4, 2, 1]])
     >>> animation
-    path: A rectangle goes from (0.0, 0.0) m, heading 0 degrees, to (4.0, 2.0) m, heading 57
-    degrees. On its way of 4.5 m it turns by 57 degrees to the left.
+    path: A rectangle goes from (0, 0) m, heading 0 degrees, to (4, 2) m, heading 57 degrees. From
+    state to state its centre covers 4.47 m, and it turns by 57 degrees to the left.
     >>> plt.close(figure)
     """
     states = as_single("path", path, "states", 3)
+    extent, far = np.ptp(states[:, :2], axis=0).max(), np.abs(states[:, :2]).max()
     if length is None:
-        length = float(np.ptp(states[:, :2], axis=0).max() / 5) or 1.0
-    if not as_single("length", length) > 0:
-        raise ValueError(f"length: a number above 0 wanted, got {length!r}")
+        length = extent / 5 if extent > max(1e-9 * far, 1e-12) else max(1.0, 1e-6 * far)
+    if not as_single("length", length) > 1e-9 * far:
+        raise ValueError(f"length: above 0 wanted, and enough to be seen, got {length!r}")
     data = route_table(states)
     return _show("path", describe_route(data), len(states), moving_route, data, length)
 
@@ -178,7 +185,8 @@ def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Ar
     >>> interpolate_arm([0, 0], [1, -2])[5]
     array([ 0.5, -1. ])
     """
-    return interpolate_joints(as_single("start", start, "n"), as_single("goal", goal, "n"), steps)
+    start = as_single("start", start, "n")
+    return interpolate_joints(start, as_single("goal", goal, start.size), steps)
 
 
 def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
@@ -233,7 +241,7 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     figure : Figure
         The whole way of the tip, and the arm at its end; pale at its start and on its way.
     animation : Animation
-        A frame for each state, or for 100 of them. A notebook shows a player;
+        A frame for each state, or for 50 of them. A notebook shows a player;
         ``animation.save(path)`` writes a GIF.
 
     Raises
@@ -249,9 +257,9 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     --------
     >>> figure, animation = visualize_arm_path([[0, 0], [0, 1.57]])
     >>> animation
-    arm_path: An arm with links of 2.0 and 1.5 m turns its joints from 0 and 0 to 0 and 90
-    degrees. Its tip goes from (3.5, 0.0) m to (2.0, 1.5) m, on a way of 2.1 m that is drawn in
-    red.
+    arm_path: An arm with links of 2 and 1.5 m turns its joints from 0 and 0 to 0 and 90 degrees,
+    by 0 and 90 degrees in all. From state to state its tip covers 2.12 m, from (3.5, 0) to
+    (2, 1.5) m; its way is drawn in red.
     >>> plt.close(figure)
     """
     states = as_path(path)
@@ -262,11 +270,11 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
 def _show(
     name: str, alt: str, states: int, moving: Callable[..., Any], data: Any, *more: float
 ) -> tuple[Figure, Animation]:
-    """Show a path; six states of it pale, at even distances, and 100 as frames."""
+    """Show a path; six states of it pale, at even distances, and 50 as frames."""
     pale, frames = (
-        np.linspace(0, states - 1, min(count, states)).round().astype(int) for count in (6, 100)
+        np.linspace(0, states - 1, min(count, states)).round().astype(int) for count in (6, 50)
     )
-    fig, ax = plt.subplots(figsize=(6, 4.5), dpi=80)
+    fig, ax = plt.subplots(figsize=(5.5, 4.2), dpi=80)
     update = moving(ax, data, *more, pale)
     animation = animate(fig, name, alt, lambda i: update(frames[i]), len(frames))
     return fig, animation

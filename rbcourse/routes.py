@@ -8,13 +8,14 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
-from rbcourse.figures import COLOURS, Table
+from rbcourse.figures import COLOURS, Table, in_words
 from rbcourse.planar import compose_planar
 from rbcourse.plans import STATES, as_path
 
 _OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
 _NOSE = np.array([[0.8, -1, 0], [2, 0, 0], [0.8, 1, 0]]) / 4
 """A body of length 1, half as wide, and the mark on its front; it heads along its x axis."""
+_FILL = "#D6E6F2"
 
 
 def route_table(path: ArrayLike) -> dict[str, Array]:
@@ -30,11 +31,6 @@ def route_table(path: ArrayLike) -> dict[str, Array]:
     dict of str to ndarray
     """
     return dict(zip(STATES["planar"], as_path(path).T, strict=True))
-
-
-def named_routes(routes: Mapping[str, Table]) -> dict[str, ArrayLike]:
-    """Return route tables of one length as one table, each column with the name of its route."""
-    return {f"{name} {key}": x for name, data in routes.items() for key, x in data.items()}
 
 
 def draw_route(ax: Axes, data: Table, length: float, shown: Iterable[int]) -> list[Any]:
@@ -64,12 +60,18 @@ def draw_route(ax: Axes, data: Table, length: float, shown: Iterable[int]) -> li
     artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["path"], zorder=2)
     for i in shown:
         artists += draw_body(ax, path[i], length, COLOURS["z"])
+    for word, (x, y, _) in {"start": path[0], "goal": path[-1]}.items():
+        ax.annotate(word, (x, y), (0, 3), textcoords="offset points", ha="center")
     show_plane(ax, [data], length)
     return artists
 
 
 def draw_compared(
-    ax: Axes, routes: Mapping[str, Table], length: float, shown: Iterable[int]
+    ax: Axes,
+    routes: Mapping[str, Table],
+    length: float,
+    shown: Iterable[int],
+    points: Sequence[ArrayLike] = ((0, 0), (0, 0)),
 ) -> list[Any]:
     """Draw two rectangles on their ways, the second dashed, at the same states.
 
@@ -83,22 +85,26 @@ def draw_compared(
         How long the rectangles are, in m.
     shown : iterable of int
         At which states they are drawn.
+    points : two array_like, shape (2,), optional
+        Of each the point, in the frame of the body, whose way is drawn; by default the centre.
 
     Returns
     -------
     list of artists
-        For each: the way of its centre; then outline and mark at each state.
+        For each: the way of its point, with dots at the states; then outline and mark at each.
 
     References
     ----------
     RR 3.3.
     """
     artists: list[Any] = []
-    looks = (COLOURS["z"], "#D6E6F2", "-"), (COLOURS["x"], "none", "--")
-    for (name, data), (colour, fill, ls) in zip(routes.items(), looks, strict=True):
-        path = _path(data)
-        artists += ax.plot(*path[:, :2].T, color=colour, ls=ls, lw=1.5, zorder=2, label=name)
-        for i in shown:
+    looks = (COLOURS["z"], _FILL, "-"), (COLOURS["x"], "none", "--")
+    states = list(shown)
+    for (name, data), point, look in zip(routes.items(), points, looks, strict=True):
+        path, (colour, fill, ls) = _path(data), look
+        way = compose_planar(path, np.append(point, 0))[:, :2]
+        artists += ax.plot(*way.T, "o", ls=ls, color=colour, label=name, markevery=states)
+        for i in states:
             artists += draw_body(ax, path[i], length, colour, fill=fill, ls=ls)
     show_plane(ax, routes.values(), length)
     return artists
@@ -129,18 +135,20 @@ def moving_route(
         draw_body(ax, path[i], length, "0.75", fill="none")
     (way,) = ax.plot([], [], color=COLOURS["path"], zorder=2)
     body = draw_body(ax, path[0], length, COLOURS["z"])
+    for artist in body:
+        artist.set_zorder(3)
     show_plane(ax, [data], length)
 
     def update(i: int) -> list[Any]:
         way.set_data(*path[: i + 1, :2].T)
         move_body(body, path[i], length)
-        return [*body, way]
+        return [way, *body]
 
     return update
 
 
 def draw_body(
-    ax: Axes, pose: Array, length: float, colour: str, *, fill: str = "#D6E6F2", ls: str = "-"
+    ax: Axes, pose: Array, length: float, colour: str, *, fill: str = _FILL, ls: str = "-"
 ) -> list[Any]:
     """Draw a rectangle with a mark on its front at a pose; `move_body` moves it."""
     corners, nose = _placed(pose, length)
@@ -178,37 +186,35 @@ def describe_route(data: Table) -> str:
     """
     path = _path(data)
     steps = np.diff(path, axis=0)
-    way = np.hypot(steps[:, 0], steps[:, 1]).sum()
     turns = np.degrees(steps[:, 2])
     sides = {"left": turns[turns > 0].sum(), "right": -turns[turns < 0].sum()}
     said = [f"{angle:.0f} degrees to the {side}" for side, angle in sides.items() if angle > 0.5]
+    scale = max(np.abs(path[:, :2]).max(), 1e-12)  # below, it is rounding
+    way = in_words(np.hypot(steps[:, 0], steps[:, 1]).sum(), scale)
+    start, end = (_said(pose, scale) for pose in path[[0, -1]])
     return (
-        f"A rectangle goes from {_said(path[0])}, to {_said(path[-1])}. "
-        f"On its way of {way:.1f} m it turns by {' and '.join(said) or '0 degrees'}."
+        f"A rectangle goes from {start}, to {end}. From state to state its centre covers {way} m, "
+        f"and it turns by {' and '.join(said) or 'less than a degree'}."
     )
 
 
-def describe_compared(data: Table) -> str:
+def describe_compared(panels: Mapping[str, Mapping[str, Table]]) -> str:
     """Return in words what `draw_compared` shows on several axes.
 
     Parameters
     ----------
-    data : mapping of str to array_like, shape (states,)
-        The `named_routes` of an even number of ways; each two neighbours are compared.
+    panels : mapping of str to mapping of str to mapping of str to array_like
+        For each of the axes its name, and its two routes.
 
     Returns
     -------
     str
     """
-    names = [key.removesuffix(" x [m]") for key in data if key.endswith(" x [m]")]
-    places = [np.stack([data[f"{name} {axis} [m]"] for axis in "xy"], axis=-1) for name in names]
-    apart = [
-        np.linalg.norm(a - b, axis=1).max() for a, b in zip(places[::2], places[1::2], strict=True)
-    ]
-    said = [
-        f"{one} and {other} are apart by {distance:.1f} m at most"
-        for one, other, distance in zip(names[::2], names[1::2], apart, strict=True)
-    ]
+    said = []
+    for title, routes in panels.items():
+        one, other = (_path(data)[:, :2] for data in routes.values())
+        apart = in_words(np.linalg.norm(one - other, axis=1).max(), np.abs(one).max())
+        said.append(f"{title}: {' and '.join(routes)}, apart by {apart} m at most")
     return f"Rectangles on two ways each. {'; '.join(said)}."
 
 
@@ -226,6 +232,6 @@ def _placed(pose: Array, length: float) -> tuple[Array, Array]:
     return corners, nose
 
 
-def _said(pose: Array) -> str:
-    x, y = (f"{value:.1f}" for value in pose[:2].round(1) + 0.0)
+def _said(pose: Array, scale: float) -> str:
+    x, y = (in_words(value, scale) for value in pose[:2])
     return f"({x}, {y}) m, heading {np.degrees(pose[2]).round() + 0.0:.0f} degrees"

@@ -502,6 +502,13 @@ def test_the_data_of_the_posture():
     assert np.abs(angles - [[30, 45]]).max() < 1e-9
 
 
+@pytest.mark.source("RR 4")
+def test_the_data_of_the_arrows():
+    for name, elbow in {"elbow at 90° ": 90, "elbow at 10° ": 10}.items():
+        angles, _ = configurations(numbers("lesson02_arrows"), name)
+        assert np.abs(angles - [[20, elbow]]).max() < 1e-9
+
+
 @pytest.mark.source("RR Fig. 8", "RR (20)", "RR (21)")
 def test_the_data_of_report_fig8():
     angles, tip = configurations(numbers("report_fig8"))

@@ -21,7 +21,7 @@ def test_the_stored_ledger_is_fresh():
 
 
 def test_every_entry_has_function_test_and_lesson():
-    assert {key: FOUND[key].lacks(key) for key in ENTRIES if FOUND[key].lacks(key)} == {}
+    assert {key: lacks for key in ENTRIES if (lacks := FOUND[key].lacks(key))} == {}
     assert ledger.SOURCES["prose"] == ["BK 1", "BK 7"]
 
 

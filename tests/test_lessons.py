@@ -1,8 +1,10 @@
 """The machinery that runs, stores and copies lessons."""
 
+import os
 import re
 
 import nbformat
+import nbval.kernel
 import pytest
 from nbclient.exceptions import CellExecutionError
 from nbformat.sign import NotebookNotary
@@ -27,6 +29,16 @@ def test_runs_give_the_same_bytes(tmp_path):
     assert "0x0>" in first
     assert f"{1:032x}" in first
     assert f"{2:032x}" in first
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there kernels listen at ports")
+def test_kernels_listen_at_files(tmp_path):
+    source = (
+        "import ipykernel, json\nprint(json.loads(ipykernel.get_connection_info())['transport'])"
+    )
+    ran = lessons.execute(notebook_at(tmp_path / "01_kernel.ipynb", source), tmp_path)
+    assert nbformat.reads(ran, as_version=4).cells[0].outputs[0].text == "ipc\n"
+    assert nbval.kernel.KernelManager(kernel_name="python3").transport == "ipc"
 
 
 def test_a_slider_gives_the_same_bytes_and_its_references_hold(tmp_path):

@@ -95,7 +95,7 @@ def test_rotation_and_translation_broadcast():
 def test_bad_arguments_are_named():
     rest = np.zeros(3)
     for make in (rb.projected_cubic_se3, rb.minimum_acceleration_se3):
-        with pytest.raises(ValueError, match=r"A0: shape \(\.\.\., 4, 4\) wanted, got \(3, 3\)"):
+        with pytest.raises(ValueError, match=r"A0: shape \(.*4, 4\) wanted, got \(3, 3\)"):
             make(np.eye(3), np.eye(4), rest, rest, rest, rest)
         with pytest.raises(ValueError, match=r"d1_dot\[0\] is inf"):
             make(np.eye(4), np.eye(4), rest, rest, rest, [np.inf, 0, 0])

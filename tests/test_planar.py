@@ -60,7 +60,11 @@ def test_of_a_matrix_that_is_no_pose_the_nearest_rotation_counts():
         theta = rb.planar_from_matrix(A)[2]
         nearest = rb.project_so(block)
         assert np.abs(nearest - rb.matrix_from_planar([0, 0, theta])[:2, :2]).max() < 1e-13
-    assert rb.planar_from_matrix(np.diag([1.0, -1, 1]))[2] == 0
+    for mirrored in (np.diag([1.0, -1, 1]), [[0, 1, 0], [1, 0, 0], [0, 0, 1]], np.zeros((3, 3))):
+        for sign in (1, -1):  # of zeros too
+            assert rb.planar_from_matrix(sign * np.asarray(mirrored, dtype=float))[2] == 0
+    huge = np.array([[1e308, -1.7e308, 0], [1.7e308, 1e308, 0], [0, 0, 1]])
+    assert rb.planar_from_matrix(huge)[2] == pytest.approx(np.arctan2(1.7, 1))
 
 
 @pytest.mark.source("RR 3.2")
@@ -77,7 +81,7 @@ def test_composition_and_inverse_are_those_of_the_matrices():
 @pytest.mark.source("RR 3.2")
 @pytest.mark.parametrize("S", TWISTS)
 def test_the_exponential_is_that_of_the_matrix(S):
-    """SciPy's own error grows with the twist, to 5e-14 here; the power series has none."""
+    """Of small twists SciPy's too; its error grows with the twist, to 5e-14 here."""
     ours = rb.exp_planar(S)
     assert np.abs(rb.matrix_from_planar(ours) - oracles.expm(hat(S))).max() < 8 * EPS
     assert ours[2] == S[2]
@@ -106,6 +110,14 @@ def test_the_logarithm_undoes_the_exponential():
     assert [rb.log_planar([0, 2, w])[2] for w in (np.pi, -np.pi)] == [np.pi, -np.pi]
 
 
+def test_the_logarithm_forgets_any_number_of_turns():
+    for theta in [*(k * np.pi for k in range(-41, 42)), 1e6, -2.3e6, 1e15]:
+        twist = rb.log_planar([1, 2, theta])
+        assert abs(twist[2]) <= np.pi
+        turned = rb.matrix_from_planar(rb.exp_planar(twist))
+        assert np.abs(turned - rb.matrix_from_planar([1, 2, theta])).max() < 16 * EPS
+
+
 @pytest.mark.source("RR (14)", "RR (15)", "RR (16)")
 @pytest.mark.parametrize("steps", [1, 10, 37])
 def test_poses_are_blended_evenly(steps):
@@ -118,8 +130,19 @@ def test_poses_are_blended_evenly(steps):
     assert rb.interpolate_planar(POSES[0], POSES[1]).shape == (11, 3)
 
 
+def test_the_ends_of_a_blend_are_exact():
+    start, goal = POSES[:100], 1e16 * POSES[100:]
+    for one, other in ((start, goal), (goal, start), (start, start)):
+        path = rb.interpolate_planar(one, other, steps=7)
+        assert np.array_equal(path[0], one)
+        assert np.array_equal(path[-1], other)
+
+
 @pytest.mark.source("RR (16)")
 def test_theta_goes_as_far_as_the_numbers_say_or_the_short_way():
+    for k in (-41, -5, -3, 3, 5, 17, 41):
+        path = rb.interpolate_planar([0, 0, 0.25], [0, 0, 0.25 + k * np.pi], shortest=True)
+        assert abs(abs(path[-1, 2] - 0.25) - np.pi) < 8 * (1 + abs(k)) * EPS
     start, goal = np.radians([[0, 0, 170], [0, 0, -170]])
     assert np.degrees(np.ptp(rb.interpolate_planar(start, goal)[:, 2])) == pytest.approx(340)
     short = rb.interpolate_planar(start, goal, shortest=True)[:, 2]
@@ -142,8 +165,9 @@ def test_the_short_way_leaves_a_short_way_alone():
 
 def test_the_same_pose_may_be_start_and_goal():
     path = rb.interpolate_planar(POSES[0], POSES[0], steps=3)
-    assert np.abs(path - POSES[0]).max() < 4 * EPS
-    assert path.shape == (4, 3)
+    assert np.array_equal(path, [POSES[0]] * 4)
+    turned = rb.interpolate_planar([1.1, 0.7, 0], [1.1, 0.7, 6], steps=50)
+    assert np.array_equal(turned[:, :2], [[1.1, 0.7]] * 51)
 
 
 @pytest.mark.source("RR (17)", "RR (18)", "RR (19)")
@@ -177,6 +201,8 @@ def test_in_the_body_many_small_steps_come_to_the_same():
     small = np.array([c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1]])
     place = np.array([1, 2]) + small.sum(axis=1) * duration / count
     path = rb.propagate_planar([1, 2, 0.3], [(velocity, duration)], frame="body")
+    bound = np.hypot(*velocity[:2]) * velocity[2] * duration**2 / (2 * count)
+    assert np.linalg.norm(path[-1, :2] - place) < bound < 1.5e-4
     assert np.abs(path[-1, :2] - place).max() < 1e-4
     pieces = [(velocity, duration / 1000)] * 1000
     fine = rb.propagate_planar([1, 2, 0.3], pieces, frame="body")
@@ -217,9 +243,10 @@ def test_no_commands_leave_the_start_alone(frame):
         ([([1, np.nan, 0], 1)], "plan[0] velocity[1] is nan, a finite number is wanted"),
         ([([1, 0, 0], np.inf)], "plan[0] duration is inf, a finite number is wanted"),
         ([([1, 0, 0], np.nan)], "plan[0] duration is nan, a finite number is wanted"),
-        ([([1, 0], 1)], "plan[0] velocity: shape (..., 3) wanted, got (2,)"),
+        ([([1, 0], 1)], "plan[0] velocity: shape (3) wanted, got (2,)"),
         ([([[1, 0, 0]], 1)], "plan[0] velocity: shape (3) wanted, got (1, 3)"),
-        ([([1, 0, 0], [1, 2])], "plan[0] duration: "),
+        ([([1, 0, 0], [1, 2])], "plan[0] duration: shape () wanted, got (2,)"),
+        ([([1e300, 0, 0], 1e300)], "plan[0]: velocity times duration is beyond all numbers"),
         ([[1, 0, 0]], "plan[0]: (velocity, duration) wanted, got [1, 0, 0]"),
         ([7], "plan[0]: (velocity, duration) wanted, got 7"),
         (7, "plan: a list of (velocity, duration) wanted, got 7"),

@@ -52,7 +52,11 @@ def test_files_are_plain(tmp_path):
 
 
 def test_what_a_spreadsheet_writes_is_read(tmp_path):
-    text = "\ufeff" + PLAN.replace("\n", "\r\n") + '"1", 2 ,3e0,+.5\r\n-1,0,0,0\r\n\r\n'
+    text = (
+        "\ufeff"
+        + PLAN.replace(",", " , ").replace("\n", "\r\n")
+        + '"1", 2 ,3e0,+.5\r\n-1,0,0,0\r\n\r\n'
+    )
     (tmp_path / "plan.csv").write_bytes(text.encode())
     plan = rb.load_plan(tmp_path / "plan.csv", "world")
     assert same(plan, [([1, 2, 3], 0.5), ([-1, 0, 0], 0)])
@@ -66,9 +70,11 @@ def test_what_a_spreadsheet_writes_is_read(tmp_path):
         (PLAN.replace("world", "body"), "line 1: vx world [m/s], "),
         (PLAN.replace(",vtheta [rad/s]", ""), "line 1: vx world [m/s], "),
         (PLAN.replace("[rad/s]", "[deg/s]"), "line 1: vx world [m/s], "),
-        (PLAN + "1,0,0,2\n1,0,0\n", "line 3: 4 numbers wanted, got 3"),
-        (PLAN + "1,0,0,2,\n", "line 2: 4 numbers wanted, got 5"),
-        (PLAN + "1,0,0,2\n\n1,0,0,2\n", "line 3: 4 numbers wanted, got 0"),
+        (PLAN + "1,0,0,2\n1,0,0\n", "line 3: numbers wanted: 4, got: 3"),
+        (PLAN + "1,0,0,2,\n", "line 2: numbers wanted: 4, got: 5"),
+        (PLAN + "1,0,0,2\n\n1,0,0,2\n", "line 3: numbers wanted: 4, got: 0"),
+        (PLAN.replace("\n", "\r") + "1,0,0,2\r1;0;0;2\r", "line 3: numbers wanted: 4, got: 1"),
+        ("\n" + PLAN, "line 1: vx world [m/s], "),
         (PLAN + "1,0,0,\n", "line 2, duration [s]: a finite number wanted, got ''"),
         (PLAN + "1,x,0,2\n", "line 2, vy world [m/s]: a finite number wanted, got 'x'"),
         (
@@ -78,8 +84,13 @@ def test_what_a_spreadsheet_writes_is_read(tmp_path):
         (PLAN + "1e999,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '1e999'"),
         (PLAN + "1_0,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '1_0'"),
         (PLAN + "1,0,0,2\n1,0,0,-2\n", "line 3, duration [s]: a number from 0 up wanted, got -2.0"),
-        (PLAN + '1,0,0,2\n"1,0,0,2\n', "line 3: unexpected end of data"),
+        (PLAN + "1,0,0,2\n1,0,0,١\n", "line 3, duration [s]: a finite number wanted, got '١'"),
+        (PLAN + "1\xa0,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '1\\xa0'"),
+        (PLAN + "0x1,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '0x1'"),
+        (PLAN + "x" * 90, "line 2: numbers wanted: 4, got: 1"),
+        (PLAN + '1,0,0,2\n"1,0,0,2\n1,0,0,2\n', "line 3: unexpected end of data"),
         (PLAN + "1,0,0,2\n\udcff,0,0,2\n", "line 3: no text in UTF-8"),
+        (PLAN.replace("\n", "\r") + "1,0,0,2\r\udcff,0,0,2\r", "line 3: no text in UTF-8"),
     ],
 )
 def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, text, reason):
@@ -117,10 +128,22 @@ def test_what_is_none_is_not_written(tmp_path):
         (lambda: rb.save_path(file, np.zeros((0, 3)), "planar"), r"^path: shape"),
         (lambda: rb.save_path(file, [[1, np.nan, 3]], "planar"), r"^path\[0, 1\] is nan"),
         (lambda: rb.save_path(file, [[1, 2, 3]], "world"), r"^kind: one of 'planar', 'joints'"),
+        (lambda: rb.save_plan(file, [], ["world"]), r"^kind: one of .* wanted, got \['world'\]"),
     ):
         with pytest.raises(ValueError, match=message):
             call()
         assert not file.exists()
+
+
+def test_joints_need_columns(tmp_path):
+    file = tmp_path / "file.csv"
+    file.write_text("duration [s]\n1\n", "utf-8")
+    with pytest.raises(ValueError, match="line 2: a velocity wanted, there is no column for it"):
+        rb.load_plan(file, "joints")
+    file.write_text("", "utf-8")
+    for load in (rb.load_plan, rb.load_path):
+        with pytest.raises(ValueError, match=r"line 1: .* wanted, got nothing$"):
+            load(file, "joints")
 
 
 def test_an_unknown_kind_is_refused_by_readers_too(tmp_path):

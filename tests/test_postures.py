@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Arc, Circle
 
+import rbcourse as rb
 from rbcourse import postures
 
 PATH = np.array([[0.2, 0.5], [1.0, -0.5], [-2.0, 3.0], [4.0, 0.1]])
@@ -62,7 +63,35 @@ def test_a_posture_shows_links_angles_and_frames(axes, q):
     for arc, before, angle in zip(arcs, [0, q[0]], q, strict=True):
         assert arc.theta2 - arc.theta1 == pytest.approx(abs(np.degrees(angle)))
         assert np.degrees(before) in (pytest.approx(arc.theta1), pytest.approx(arc.theta2))
-    assert [text.get_text() for text in axes[0].texts] == ["J0", "$θ_0$", "J1", "$θ_1$", "tip"]
+    names = ["J0", "$θ_0$", "x", "y", "J1", "$θ_1$", "x", "y", "tip"]
+    assert [text.get_text() for text in axes[0].texts] == names
+    middles = headings - np.array(q) / 2
+    for k, (joint, middle) in enumerate(zip(joints[:2], middles, strict=True)):
+        assert complex(*axes[0].texts[4 * k].xy) == joint
+        label = axes[0].texts[4 * k + 1].get_position()
+        assert abs(label @ np.array([1, 1j]) - joint - 0.8 * np.exp(1j * middle)) < 1e-14
+
+
+@pytest.mark.source("RR 4")
+@pytest.mark.parametrize("q", [[0.5, 1.5], [0.2, 0.1, 0.3]])
+def test_the_arrows_at_the_tip_are_the_columns_of_the_jacobian(axes, q):
+    lengths = [2, 1.5, 1][: len(q)]
+    links, *arrows = postures.draw_tip_velocities(axes[0], postures.arm_table([q], lengths))
+    assert np.abs(drawn(links) - ends(q, lengths)).max() < 1e-14
+    J = rb.arm_tip_jacobian(q, lengths)
+    for arrow, column in zip(arrows, J.T, strict=True):
+        assert abs(arrow.XY[0] @ [1, 1j] - ends(q, lengths)[-1]) < 1e-14
+        assert np.abs([arrow.U[0], arrow.V[0]] - column / 2).max() < 1e-14
+    assert [arrow.get_label() for arrow in arrows] == [f"motor {i} runs" for i in range(len(q))]
+    said = postures.describe_tip_velocities({"here": postures.arm_table([q], lengths)})
+    first = np.degrees(np.arctan2(J[1, 0], J[0, 0]))
+    assert f"here: they point to {first:.0f}" in said
+
+
+def assert_reach_is_seen(ax):
+    circles = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    assert [circle.radius for circle in circles] == pytest.approx([3.5, 0.5])
+    assert ax.get_xlim()[1] > 3.5
 
 
 @pytest.mark.source("RR 4.3", "RR Fig. 8", "RR Fig. 9")
@@ -72,6 +101,7 @@ def test_the_arm_moves_and_its_tip_leaves_a_curve(axes):
         links, way = update(i)
         assert np.abs(drawn(links) - ends(PATH[i])).max() < 1e-14
         assert np.abs(drawn(way) - [ends(q)[-1] for q in PATH[: i + 1]]).max() < 1e-14
+    assert_reach_is_seen(axes[0])
     pale = axes[0].lines[:2]
     for line, i in zip(pale, (0, 2), strict=True):
         assert np.abs(drawn(line) - ends(PATH[i])).max() < 1e-14
@@ -100,18 +130,28 @@ def test_ways_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
             assert np.abs(drawn(line) - [place(q) for q in path]).max() < 1e-12
         assert [line.get_label() for line in lines] == ["one", "other"]
         assert lines[0].get_linestyle() != lines[1].get_linestyle()
+    assert_reach_is_seen(axes[0])
+    for line, i in zip(axes[0].lines[:2], (0, -1), strict=True):
+        assert np.abs(drawn(line) - ends(PATH[i])).max() < 1e-14
+    for draw in (postures.draw_arm_ways, postures.draw_joint_ways):
+        with pytest.raises(ValueError, match="shorter"):
+            draw(axes[0], dict.fromkeys("abcd", TABLE))
 
 
 def test_descriptions_give_numbers():
     tips = np.array([ends(q)[-1] for q in PATH])
+    covered = np.abs(np.diff(tips)).sum()
     said = postures.describe_arm(TABLE)
-    assert "links of 2.0 and 1.5 m turns its joints from 11 and 29 to 229 and 6 degrees" in said
-    assert f"goes from ({tips[0].real:.1f}, {tips[0].imag:.1f}) m to (" in said
-    assert f"on a way of {np.abs(np.diff(tips)).sum():.1f} m" in said
-    said = postures.describe_posture(postures.arm_table([[0, np.pi / 2]]))
-    assert "joint angles are 0 and 90 degrees" in said
-    assert "at (0.0, 0.0), (2.0, 0.0), (2.0, 1.5) m" in said
+    assert "links of 2 and 1.5 m turns its joints from 11 and 29 to 229 and 6 degrees" in said
+    turned = np.degrees(np.abs(np.diff(PATH, axis=0)).sum(axis=0))
+    assert f"by {turned[0]:.0f} and {turned[1]:.0f} degrees in all" in said
+    assert (
+        f"its tip covers {covered:.2f} m, from ({tips[0].real:.2f}, {tips[0].imag:.2f}) to ("
+        in said
+    )
+    said = postures.describe_posture(postures.arm_table([[-0.5, np.pi / 2]]))
+    assert "joint angles are -29 and 90 degrees" in said
+    assert f"at (0, 0), ({2 * np.cos(0.5):.2f}, {-2 * np.sin(0.5):.2f}), (" in said
     said = postures.describe_ways({"one": TABLE})
     angles = np.degrees(np.linalg.norm(np.diff(PATH, axis=0), axis=1).sum())
-    covered = np.abs(np.diff(tips)).sum()
-    assert f"one: the tip covers {covered:.1f} m, the joint angles {angles:.0f} degrees." in said
+    assert f"one: the tip covers {covered:.1f} m, the point of the angles {angles:.0f} deg" in said

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 import rbcourse as rb
 from rbcourse import assignment as rr
+from rbcourse.figures import COLOURS
 
 RNG = np.random.default_rng(9)
 PATH, ARM_PATH = RNG.uniform(-3, 3, (12, 3)), RNG.uniform(-3, 3, (12, 2))
@@ -49,7 +50,8 @@ def test_a_path_is_shown(states, tmp_path):
     assert len(animation.pictures) == states
     assert animation.alt.startswith("A rectangle goes from (")
     (ax,) = figure.axes
-    assert np.array_equal(np.transpose(ax.lines[-2].get_data()), PATH[:states, :2])
+    way = next(line for line in ax.lines if line.get_color() == COLOURS["path"])
+    assert np.array_equal(np.transpose(way.get_data()), PATH[:states, :2])
     animation.save(tmp_path / "path.gif")
     assert (tmp_path / "path.gif").stat().st_size < 500_000
     assert "<input" in animation._repr_html_()
@@ -62,7 +64,7 @@ def test_an_arm_path_is_shown(states, tmp_path):
     figure, animation = rr.visualize_arm_path(ARM_PATH[:states])
     assert isinstance(figure, Figure)
     assert len(animation.pictures) == states
-    assert animation.alt.startswith("An arm with links of 2.0 and 1.5 m turns its joints from")
+    assert animation.alt.startswith("An arm with links of 2 and 1.5 m turns its joints from")
     links, way = figure.axes[0].lines[-2:]
     tip = rb.arm_forward_kinematics(ARM_PATH[:states]).joints
     assert np.array_equal(np.transpose(way.get_data()), tip[:, -1])
@@ -75,20 +77,70 @@ def test_an_arm_path_is_shown(states, tmp_path):
     plt.close(figure)
 
 
-def test_of_a_long_path_a_hundred_states_are_frames_and_all_are_drawn():
-    t = np.linspace(0, 7, 2501)
-    figure, animation = rr.visualize_path(np.transpose([t, np.sin(t), t]))
-    assert len(animation.pictures) == 100
-    assert len(figure.axes[0].lines[-2].get_xdata()) == 2501
-    assert "to (7.0, 0.7) m" in animation.alt
+def test_of_a_long_path_fifty_states_are_frames_and_all_are_drawn(tmp_path):
+    noise = RNG.uniform(-1, 1, (2501, 3)) * [1.4, 1, 3]
+    figure, animation = rr.visualize_path(noise, length=1.5)
+    assert len(animation.pictures) == 50
+    way = next(line for line in figure.axes[0].lines if line.get_color() == COLOURS["path"])
+    assert len(way.get_xdata()) == 2501
+    animation.save(tmp_path / "path.gif")
+    assert (tmp_path / "path.gif").stat().st_size < 500_000
+    plt.close(figure)
+
+
+def place_of(body):
+    """The centre of a rectangle, as drawn."""
+    return body.get_xy()[:4].mean(axis=0)
+
+
+def test_six_states_are_pale_and_the_last_is_on_top():
+    figure, _ = rr.visualize_path(PATH)
+    *pale, body = figure.axes[0].patches
+    shown = [0, 2, 4, 7, 9, 11]
+    for ghost, i in zip(pale, shown, strict=True):
+        assert np.abs(place_of(ghost) - PATH[i, :2]).max() < 1e-14
+    assert np.abs(place_of(body) - PATH[-1, :2]).max() < 1e-14
+    assert all(body.get_zorder() > other.get_zorder() for other in figure.axes[0].lines[:-1])
+    plt.close(figure)
+    figure, _ = rr.visualize_arm_path(ARM_PATH)
+    for line, i in zip(figure.axes[0].lines[:-2], shown, strict=True):
+        wanted = rb.arm_forward_kinematics(ARM_PATH[i]).joints
+        assert np.abs(np.transpose(line.get_data()) - wanted).max() < 1e-14
+    plt.close(figure)
+
+
+def length_of(figure):
+    corners = figure.axes[0].patches[-1].get_xy()
+    return np.linalg.norm(corners[1] - corners[0])
+
+
+@pytest.mark.parametrize("place", [[0, 0], [1.1, 0.7], [1e6, -2e6]])
+def test_a_body_that_turns_on_the_spot_is_seen(place):
+    """Though rounding moves the one that is driven round a circle, and no wrong words are said."""
+    spin = rr.interpolate_rigid_body([*place, 0], [*place, 6], steps=50)
+    circle = [([2 * np.pi, 0, 2 * np.pi], 1)] * 2
+    driven = rr.forward_propagate_rigid_body([*place, 0], circle, frame="body")
+    for path in (spin, driven):
+        figure, animation = rr.visualize_path(path)
+        assert length_of(figure) == pytest.approx(max(1, 1e-6 * np.abs(place).max()))
+        assert len(set(np.asarray(animation.pictures[0]).ravel())) > 10
+        assert "its centre covers 0 m" in animation.alt
+        plt.close(figure)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1, 1e6])
+def test_the_rectangle_is_a_fifth_of_the_extent_and_the_words_have_the_scale(size):
+    figure, animation = rr.visualize_path(size * np.array([[0, 0, 0], [2, 1, 0]]))
+    assert length_of(figure) == pytest.approx(2 * size / 5)
+    assert f"to ({2 * size:.10g}, {size:.10g}) m" in animation.alt
     plt.close(figure)
 
 
 def test_more_links_need_their_lengths():
     figure, animation = rr.visualize_arm_path(RNG.normal(size=(3, 4)), lengths=[1, 2, 3, 4])
-    assert "links of 1.0, 2.0, 3.0 and 4.0 m" in animation.alt
+    assert "links of 1, 2, 3 and 4 m" in animation.alt
     plt.close(figure)
-    with pytest.raises(ValueError, match=r"^lengths: shape \(\.\.\., 4\) wanted, got \(2,\)"):
+    with pytest.raises(ValueError, match=r"^lengths: shape \(4\) wanted, got \(2,\)"):
         rr.visualize_arm_path(RNG.normal(size=(3, 4)))
 
 
@@ -103,18 +155,22 @@ def test_the_rectangle_is_as_long_as_told(length):
 
 def test_bad_input_is_named_and_no_figure_stays_open():
     for call, message in (
-        (lambda: rr.interpolate_rigid_body([0, 0], [1, 1, 1]), r"^start_pose: shape \(\.\.\., 3\)"),
+        (lambda: rr.interpolate_rigid_body([0, 0], [1, 1, 1]), r"^start_pose: shape \(3\)"),
         (lambda: rr.interpolate_rigid_body([0, 0, 0], [[1, 1, 1]]), r"^goal_pose: shape \(3\)"),
         (lambda: rr.forward_propagate_rigid_body([0, 0, np.nan], []), r"^start_pose\[2\] is nan"),
         (lambda: rr.forward_propagate_rigid_body([0, 0, 0], [([1, 0], 1)]), r"^plan\[0\] velocity"),
-        (lambda: rr.interpolate_arm([0, 0], [1, 1, 1]), r"^goal: shape \(\.\.\., 2\) wanted"),
+        (lambda: rr.interpolate_arm([0, 0], [1, 1, 1]), r"^goal: shape \(2\) wanted"),
         (lambda: rr.interpolate_arm([[0, 0]], [1, 1]), r"^start: shape \(n\) wanted"),
         (lambda: rr.forward_propagate_arm([[0, 0]], []), r"^start_pose: shape \(n\) wanted"),
         (lambda: rr.visualize_path(np.zeros((0, 3))), r"^path: shape"),
         (lambda: rr.visualize_path([0, 0, 0]), r"^path: shape"),
         (lambda: rr.visualize_path([[0, 0]]), r"^path: shape"),
         (lambda: rr.visualize_path([[0, 0, np.inf]]), r"^path\[0, 2\] is inf"),
-        (lambda: rr.visualize_path([[0, 0, 0]], length=0), r"^length: a number above 0 wanted"),
+        (
+            lambda: rr.visualize_path([[0, 0, 0]], length=0),
+            r"^length: above 0 wanted, and enough to",
+        ),
+        (lambda: rr.visualize_path([[1e17, 0, 0]], length=1), r"^length: above 0 wanted, and"),
         (lambda: rr.visualize_path([[0, 0, 0]], length=np.nan), r"^length is nan"),
         (lambda: rr.visualize_arm_path(np.zeros((0, 2))), r"^path: shape"),
         (lambda: rr.visualize_arm_path([0, 0]), r"^path: shape"),
