@@ -82,8 +82,12 @@ def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = 
     Each comes of the one before it by ``move(state, velocity * duration)``.
     """
     path = [start]
-    for velocity, duration in as_plan(plan, start.shape[-1]):
-        path.append(move(path[-1], velocity * duration))
+    for i, (velocity, duration) in enumerate(as_plan(plan, start.shape[-1])):
+        try:
+            with np.errstate(over="raise"):
+                path.append(move(path[-1], velocity * duration))
+        except FloatingPointError as error:
+            raise ValueError(f"plan[{i}] leads beyond all numbers") from error
     return np.array(path)
 
 
@@ -152,9 +156,7 @@ def load_plan(file: str | Path, kind: str) -> Commands:
         *velocity, duration = row
         if not velocity:
             raise ValueError(f"{line}: a velocity wanted, there is no column for it")
-        if duration < 0:
-            raise ValueError(f"{line}, {DURATION}: a number from 0 up wanted, got {duration}")
-        commands.append((np.array(velocity), duration))
+        commands.append(_command(f"{line}:", (velocity, duration), "n"))
     return commands
 
 
@@ -239,10 +241,7 @@ def _command(name: str, command: tuple[ArrayLike, float], size: int | str) -> tu
     d = float(as_single(f"{name} duration", duration))
     if d < 0:
         raise ValueError(f"{name} duration is {d}, a duration from 0 up is wanted")
-    v = as_single(f"{name} velocity", velocity, size)
-    if np.abs(v).max() > np.finfo(float).max / max(d, 1.0):
-        raise ValueError(f"{name}: velocity times duration is beyond all numbers")
-    return v, d
+    return as_single(f"{name} velocity", velocity, size), d
 
 
 def _names(kind: str, columns: dict[str, list[str]], joints: int) -> list[str]:
@@ -272,8 +271,8 @@ def _read(
     place, header = next(lines, (f"{file}, line 1", []))
     names = _names(kind, columns, len(header) - len(last)) + last
     if header != names or not header:
-        wanted, got = (", ".join(cells) or "nothing" for cells in (names, header))
-        raise ValueError(f"{place}: {wanted} wanted, got {got[:200]}")
+        wanted = ", ".join(names) or columns[kind][0].format(0)
+        raise ValueError(f"{place}: {wanted} wanted, got {', '.join(header)[:200]!r}")
     for place, row in lines:
         if len(row) != len(names):
             raise ValueError(f"{place}: numbers wanted: {len(names)}, got: {len(row)}")

@@ -146,7 +146,7 @@ def moving_arm(ax: Axes, data: Table, shown: Iterable[int]) -> Callable[[int], l
 
 
 def draw_arm_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
-    """Draw the ways of the tip of an arm, and the arm, pale, at the ends of the first of them.
+    """Draw the ways of the tip of an arm; pale, the arm at their ends, and half-way of the last.
 
     Parameters
     ----------
@@ -164,10 +164,13 @@ def draw_arm_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
     ----------
     RR 4.3.
     """
-    first = next(iter(ways.values()))
-    show_reach(ax, first)
-    for i in (0, -1):
-        ax.plot(*_joints(first)[i].T, "o-", color="0.75", lw=4, ms=8, zorder=1.5)
+    *_, last = ways.values()
+    show_reach(ax, last)
+    joints = _joints(last)
+    for i in (0, len(joints) // 2, -1):
+        ax.plot(*joints[i].T, "o-", color="0.75", lw=4, ms=8, zorder=1.5)
+    for i, word in ((0, "start"), (-1, "goal")):
+        ax.annotate(word, joints[i, -1], (0, -18), textcoords="offset points", ha="center")
     return [
         ax.plot(*_joints(data)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
         for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
@@ -228,7 +231,7 @@ def describe_posture(data: Table) -> str:
     places = ", ".join(_said(place, _lengths(joints[None]).sum()) for place in joints)
     return (
         "An arm, each link with the x and y axes of its frame at its centre. Its joint angles are "
-        f"{_degrees(q)} degrees, each against the link before; its joints, and "
+        f"{_degrees(q)} degrees, each measured from the link before; its joints, and "
         f"then its tip, are at {places} m."
     )
 
@@ -274,7 +277,7 @@ def describe_arm(data: Table) -> str:
     turned = np.abs(np.diff(angles, axis=0)).sum(axis=0)
     start, end = (_said(place, reach) for place in tip[[0, -1]])
     return (
-        f"An arm with links of {_listed([in_words(x, reach) for x in lengths])} m turns its joints "
+        f"An arm with links of {_listed(in_words(x, x) for x in lengths)} m turns its joints "
         f"from {_degrees(angles[0])} to {_degrees(angles[-1])} degrees, by {_degrees(turned)} "
         f"degrees in all. From state to state its tip covers {in_words(_length(tip), reach)} m, "
         f"from {start} to {end} m; its way is drawn in red."
@@ -298,8 +301,8 @@ def describe_tip_velocities(postures: Mapping[str, Table]) -> str:
         x, y = _columns(_joints(data)[0])
         said.append(f"{name}: they point to {_degrees(np.arctan2(y, x))} degrees")
     return (
-        "An arm, with an arrow at its tip for each joint: where the tip goes when only the motor "
-        f"of that joint runs. {'; '.join(said)}."
+        "An arm, with an arrow at its tip for each joint: how fast the tip goes when only the "
+        f"motor of that joint runs, at half its length. {'; '.join(said)}."
     )
 
 

@@ -17,7 +17,7 @@ from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.planar import interpolate_planar, propagate_planar
 from rbcourse.plans import Plan, as_path
 from rbcourse.postures import arm_table, describe_arm, moving_arm
-from rbcourse.routes import describe_route, moving_route, route_table
+from rbcourse.routes import describe_route, extent_of, moving_route, route_table
 
 
 def interpolate_rigid_body(
@@ -110,20 +110,21 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
         Poses (x, y, theta): m, m, rad; one may be all.
     length : float, optional
         How long the rectangle is, in m; by default a fifth of the larger extent of the path, and
-        1 for a path that stays where it is (but for rounding).
+        1 for a path that stays where it is, but for rounding (1e-12 of a metre or of its distance
+        from the origin).
 
     Returns
     -------
     figure : Figure
         The whole way, and the rectangle at its end; pale at its start and on its way.
     animation : Animation
-        A frame for each state, or for 50 of them. A notebook shows a player;
+        A frame for each state, or for 40 of them. A notebook shows a player;
         ``animation.save(path)`` writes a GIF.
 
     Raises
     ------
     ValueError
-        If `path` is no such array, or the length is not above 0, or less than 1e-9 of the
+        If `path` is no such array, or the length is not above 0, or less than 1e-13 of the
         distance from the origin.
 
     Notes
@@ -144,10 +145,10 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
     >>> plt.close(figure)
     """
     states = as_single("path", path, "states", 3)
-    extent, far = np.ptp(states[:, :2], axis=0).max(), np.abs(states[:, :2]).max()
+    far = np.abs(states[:, :2]).max()
     if length is None:
-        length = extent / 5 if extent > max(1e-9 * far, 1e-12) else max(1.0, 1e-6 * far)
-    if not as_single("length", length) > 1e-9 * far:
+        length = extent_of(states) / 5 or max(1.0, 1e-12 * far)
+    if not as_single("length", length) > 1e-13 * far:
         raise ValueError(f"length: above 0 wanted, and enough to be seen, got {length!r}")
     data = route_table(states)
     return _show("path", describe_route(data), len(states), moving_route, data, length)
@@ -241,7 +242,7 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     figure : Figure
         The whole way of the tip, and the arm at its end; pale at its start and on its way.
     animation : Animation
-        A frame for each state, or for 50 of them. A notebook shows a player;
+        A frame for each state, or for 40 of them. A notebook shows a player;
         ``animation.save(path)`` writes a GIF.
 
     Raises
@@ -270,11 +271,11 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
 def _show(
     name: str, alt: str, states: int, moving: Callable[..., Any], data: Any, *more: float
 ) -> tuple[Figure, Animation]:
-    """Show a path; six states of it pale, at even distances, and 50 as frames."""
+    """Show a path; six states of it pale, at even distances, and 40 as frames."""
     pale, frames = (
-        np.linspace(0, states - 1, min(count, states)).round().astype(int) for count in (6, 50)
+        np.linspace(0, states - 1, min(count, states)).round().astype(int) for count in (6, 40)
     )
-    fig, ax = plt.subplots(figsize=(5.5, 4.2), dpi=80)
+    fig, ax = plt.subplots(figsize=(5.5, 4.2), dpi=72)
     update = moving(ax, data, *more, pale)
     animation = animate(fig, name, alt, lambda i: update(frames[i]), len(frames))
     return fig, animation

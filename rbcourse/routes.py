@@ -172,6 +172,16 @@ def show_plane(ax: Axes, routes: Iterable[Table], length: float) -> None:
     ax.set_aspect("equal")
 
 
+def extent_of(path: Array) -> float:
+    """Return the larger extent of a path; 0 for less than 1e-12 of its distance, or of a metre.
+
+    Less is rounding: of a body that stays on the spot, or comes back to it.
+    """
+    places = path[:, :2]
+    extent = float(np.ptp(places, axis=0).max())
+    return extent if extent > 1e-12 * max(1.0, np.abs(places).max()) else 0.0
+
+
 def describe_route(data: Table) -> str:
     """Return in words how a rectangle goes.
 
@@ -189,12 +199,12 @@ def describe_route(data: Table) -> str:
     turns = np.degrees(steps[:, 2])
     sides = {"left": turns[turns > 0].sum(), "right": -turns[turns < 0].sum()}
     said = [f"{angle:.0f} degrees to the {side}" for side, angle in sides.items() if angle > 0.5]
-    scale = max(np.abs(path[:, :2]).max(), 1e-12)  # below, it is rounding
-    way = in_words(np.hypot(steps[:, 0], steps[:, 1]).sum(), scale)
-    start, end = (_said(pose, scale) for pose in path[[0, -1]])
+    extent = extent_of(path)
+    way = np.hypot(steps[:, 0], steps[:, 1]).sum() if extent else 0.0
+    start, end = (_said(pose, extent or 1.0) for pose in path[[0, -1]])
     return (
-        f"A rectangle goes from {start}, to {end}. From state to state its centre covers {way} m, "
-        f"and it turns by {' and '.join(said) or 'less than a degree'}."
+        f"A rectangle goes from {start}, to {end}. From state to state its centre covers "
+        f"{in_words(way, way)} m, and it turns by {' and '.join(said) or 'less than a degree'}."
     )
 
 
@@ -213,8 +223,8 @@ def describe_compared(panels: Mapping[str, Mapping[str, Table]]) -> str:
     said = []
     for title, routes in panels.items():
         one, other = (_path(data)[:, :2] for data in routes.values())
-        apart = in_words(np.linalg.norm(one - other, axis=1).max(), np.abs(one).max())
-        said.append(f"{title}: {' and '.join(routes)}, apart by {apart} m at most")
+        apart = in_words(np.linalg.norm(one - other, axis=1).max(), extent_of(one))
+        said.append(f"{title}: {' and '.join(routes)}, the centres apart by {apart} m at most")
     return f"Rectangles on two ways each. {'; '.join(said)}."
 
 

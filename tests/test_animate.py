@@ -116,6 +116,17 @@ def test_the_player_starts_with_the_still_frame(still, count, shown):
     plt.close(fig)
 
 
+def test_two_players_of_one_name_do_not_meet():
+    pages = []
+    for alt in ("one", "other"):
+        fig, update = cube()
+        pages.append(animate.animate(fig, "cube", alt, update, 2)._repr_html_())
+        plt.close(fig)
+    one, other = (re.search(r'id="(\w+)"', page)[1] for page in pages)
+    assert one != other
+    assert f'querySelectorAll("#{one}")' in pages[0]
+
+
 def test_the_files_are_saved_and_the_figure_closed(tmp_path, monkeypatch):
     animation = save(tmp_path, monkeypatch)
     names = {"cube.gif", "cube.png", "cube.pdf", "cube.csv"}

@@ -107,6 +107,7 @@ def test_the_logarithm_undoes_the_exponential():
     assert np.abs(full - full.round()).max() < 4 * EPS
     assert np.abs(rb.log_planar(POSES)[:, 2]).max() <= np.pi
     assert np.array_equal(rb.log_planar([1, 2, 0]), [1, 2, 0])
+    assert np.array_equal(rb.log_planar(short)[:, 2], short[:, 2])
     assert [rb.log_planar([0, 2, w])[2] for w in (np.pi, -np.pi)] == [np.pi, -np.pi]
 
 
@@ -161,6 +162,8 @@ def test_the_short_way_leaves_a_short_way_alone():
             rb.interpolate_planar([0, 0, 0], [1, 2, goal], shortest=flag) for flag in (False, True)
         )
         assert np.array_equal(plain, short)
+    start, goal = POSES[:, None] * [1, 1, 0.3], POSES * [1, 1, 0.3]
+    assert np.array_equal(rb.interpolate_planar(start, goal, 1, shortest=True)[1, 0], goal)
 
 
 def test_the_same_pose_may_be_start_and_goal():
@@ -246,7 +249,8 @@ def test_no_commands_leave_the_start_alone(frame):
         ([([1, 0], 1)], "plan[0] velocity: shape (3) wanted, got (2,)"),
         ([([[1, 0, 0]], 1)], "plan[0] velocity: shape (3) wanted, got (1, 3)"),
         ([([1, 0, 0], [1, 2])], "plan[0] duration: shape () wanted, got (2,)"),
-        ([([1e300, 0, 0], 1e300)], "plan[0]: velocity times duration is beyond all numbers"),
+        ([([1e300, 0, 0], 1e300)], "plan[0] leads beyond all numbers"),
+        ([([0, 1e308, 0], 1), ([0, 1e308, 0], 1)], "plan[1] leads beyond all numbers"),
         ([[1, 0, 0]], "plan[0]: (velocity, duration) wanted, got [1, 0, 0]"),
         ([7], "plan[0]: (velocity, duration) wanted, got 7"),
         (7, "plan: a list of (velocity, duration) wanted, got 7"),

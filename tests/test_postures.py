@@ -66,6 +66,8 @@ def test_a_posture_shows_links_angles_and_frames(axes, q):
     names = ["J0", "$θ_0$", "x", "y", "J1", "$θ_1$", "x", "y", "tip"]
     assert [text.get_text() for text in axes[0].texts] == names
     middles = headings - np.array(q) / 2
+    for line, joint, heading in zip(axes[0].lines[1:], joints[:2], [0, q[0]], strict=True):
+        assert np.abs(drawn(line) - joint - [0, 0.9 * np.exp(1j * heading)]).max() < 1e-14
     for k, (joint, middle) in enumerate(zip(joints[:2], middles, strict=True)):
         assert complex(*axes[0].texts[4 * k].xy) == joint
         label = axes[0].texts[4 * k + 1].get_position()
@@ -131,8 +133,11 @@ def test_ways_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
         assert [line.get_label() for line in lines] == ["one", "other"]
         assert lines[0].get_linestyle() != lines[1].get_linestyle()
     assert_reach_is_seen(axes[0])
-    for line, i in zip(axes[0].lines[:2], (0, -1), strict=True):
-        assert np.abs(drawn(line) - ends(PATH[i])).max() < 1e-14
+    last = PATH[::-1] + 0.3
+    for line, i in zip(axes[0].lines[:3], (0, 2, 3), strict=True):
+        assert np.abs(drawn(line) - ends(last[i])).max() < 1e-14
+    for text, i in zip(axes[0].texts, (0, 3), strict=True):
+        assert abs(complex(*text.xy) - ends(last[i])[-1]) < 1e-14
     for draw in (postures.draw_arm_ways, postures.draw_joint_ways):
         with pytest.raises(ValueError, match="shorter"):
             draw(axes[0], dict.fromkeys("abcd", TABLE))

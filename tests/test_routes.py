@@ -84,8 +84,13 @@ def test_two_ways_are_compared(ax):
         assert one.get_linestyle() != other.get_linestyle()
     assert [artists[0].get_label(), artists[3].get_label()] == ["one", "other"]
     assert ax.get_ylim()[1] > 4.5
+    way = routes.draw_compared(ax, pair, 1, shown=[1])[3]
+    assert np.abs(np.transpose(way.get_data()) - raised[:, :2]).max() < 1e-14
     said = routes.describe_compared({"here": pair})
-    assert said == "Rectangles on two ways each. here: one and other, apart by 2 m at most."
+    assert (
+        said
+        == "Rectangles on two ways each. here: one and other, the centres apart by 2 m at most."
+    )
 
 
 def test_the_description_says_from_where_to_where_and_how_it_turns():
