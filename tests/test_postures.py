@@ -154,6 +154,8 @@ def test_descriptions_give_numbers():
         f"its tip covers {covered:.2f} m, from ({tips[0].real:.2f}, {tips[0].imag:.2f}) to ("
         in said
     )
+    unequal = postures.arm_table([[0, 0]], [1e-3, 1000])
+    assert "links of 0.001 and 1000 m" in postures.describe_arm(unequal)
     said = postures.describe_posture(postures.arm_table([[-0.5, np.pi / 2]]))
     assert "joint angles are -29 and 90 degrees" in said
     assert f"at (0, 0), ({2 * np.cos(0.5):.2f}, {-2 * np.sin(0.5):.2f}), (" in said
