@@ -131,11 +131,11 @@ def test_a_body_that_turns_on_the_spot_is_seen(place):
         plt.close(figure)
 
 
-@pytest.mark.parametrize("far", [0, 1000, 1e9])
-@pytest.mark.parametrize("size", [1e-6, 0.25, 1e6])
+@pytest.mark.parametrize(
+    ("size", "far"),
+    [(1e-6, 0), (0.25, 0), (1e6, 0), (1e-6, 1000), (0.25, 1000), (0.25, 1e9), (1e6, 1e9)],
+)
 def test_the_rectangle_is_a_fifth_of_the_extent_and_the_words_have_the_scale(size, far):
-    if size < 1e-12 * far:
-        pytest.skip("the size is lost in rounding")
     path = np.array([[far, 0, 0], [far + 2 * size, size, 0]])
     figure, animation = rr.visualize_path(path)
     extent = path[1, 0] - far
