@@ -1,4 +1,4 @@
-"""An arm in the plane: links in a row, each turned by its joint against the one before it."""
+"""An arm in the plane: links in a row, each turned by its joint from the one before it."""
 
 from typing import NamedTuple
 
@@ -33,7 +33,7 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     Parameters
     ----------
     q : array_like, shape (..., n)
-        Joint angles, in rad: the first against the world's x axis, the others each against the
+        Joint angles, in rad: the first measured from the world's x axis, the others each from the
         link before. The heading of a link is the sum of the angles up to its own.
     lengths : array_like, shape (n,), optional
         Lengths of the links, in m, above 0.

@@ -29,7 +29,7 @@ COLOURS = {
     "projection": "#CC79A7",
     "screw": "#E69F00",
     "reference": "#808080",
-    "path": "#CC3311",
+    "path": "#BB0000",
 }
 """The same meaning has the same colour everywhere; all can be told apart when colour-blind."""
 

@@ -256,8 +256,7 @@ def interpolate_planar(
         How many equal steps, from 1 up.
     shortest : bool, optional
         Whether to turn the short way, by π at most (but for rounding), whatever full turns the
-        two angles differ by.
-        By default theta goes from its start to its goal as given.
+        two angles differ by. By default theta goes from its start to its goal as given.
 
     Returns
     -------
@@ -295,8 +294,8 @@ def interpolate_planar(
            [4.        , 2.        , 3.14159265]])
     """
     start, goal = as_finite("start", start, 3), as_finite("goal", goal, 3)
-    check_broadcast(start=(start, 1), goal=(goal, 1))
     if shortest:
+        check_broadcast(start=(start, 1), goal=(goal, 1))
         turn = goal[..., 2] - start[..., 2]
         theta = np.where(np.abs(turn) <= np.pi, goal[..., 2], start[..., 2] + _short(turn))
         goal = np.stack(np.broadcast_arrays(goal[..., 0], goal[..., 1], theta), axis=-1)

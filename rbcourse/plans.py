@@ -119,7 +119,7 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     ----------
     RR 3.2, RR 4.2.
     """
-    commands = as_plan(plan, "n")
+    commands = as_plan(plan, "n")  # how many joints there are, the first of them tells
     names = _names(kind, VELOCITIES, commands[0][0].size if commands else 0)
     rows = [[*velocity, duration] for velocity, duration in as_plan(commands, len(names))]
     _write(file, [*names, DURATION], rows)
@@ -152,7 +152,7 @@ def load_plan(file: str | Path, kind: str) -> Commands:
     RR 3.2, RR 4.2.
     """
     commands = []
-    for line, row in _read(file, kind, VELOCITIES, [DURATION]):
+    for line, row in _read(file, kind, VELOCITIES, DURATION):
         *velocity, duration = row
         if not velocity:
             raise ValueError(f"{line}: a velocity wanted, there is no column for it")
@@ -187,7 +187,7 @@ def save_path(file: str | Path, path: ArrayLike, kind: str) -> None:
     """
     states = as_path(path)
     names = _names(kind, STATES, states.shape[1])
-    _write(file, names, as_single("path", states, "N", len(names)).tolist())
+    _write(file, names, as_single("path", states, "states", len(names)).tolist())
 
 
 def load_path(file: str | Path, kind: str) -> Array:
@@ -263,13 +263,12 @@ def _write(file: str | Path, names: list[str], rows: list[list[float]]) -> None:
 
 
 def _read(
-    file: str | Path, kind: str, columns: dict[str, list[str]], last: list[str] | None = None
+    file: str | Path, kind: str, columns: dict[str, list[str]], *last: str
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the place and the numbers of each line below the first, which has to fit the kind."""
-    last = last or []
     lines = _lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
-    names = _names(kind, columns, len(header) - len(last)) + last
+    names = [*_names(kind, columns, len(header) - len(last)), *last]
     if header != names or not header:
         wanted = ", ".join(names) or columns[kind][0].format(0)
         raise ValueError(f"{place}: {wanted} wanted, got {', '.join(header)[:200]!r}")

@@ -249,13 +249,14 @@ def describe_ways(ways: Mapping[str, Table]) -> str:
     str
     """
     said = [
-        f"{name}: the tip covers {_length(_joints(data)[:, -1]):.1f} m, the point of the angles "
+        f"{name}: {_length(_joints(data)[:, -1]):.1f} m and "
         f"{np.degrees(_length(_angles(data))):.0f} degrees"
         for name, data in ways.items()
     ]
+    start, goal = map(_degrees, _angles(next(iter(ways.values())))[[0, -1]])
     return (
-        "Ways of an arm between two configurations, drawn by its tip in the room, and in the "
-        f"plane of its joint angles. {'; '.join(said)}."
+        f"Ways of an arm from joint angles of {start} to {goal} degrees: of its tip in the room, "
+        f"and in the plane of the angles. How long they are: {'; '.join(said)}."
     )
 
 

@@ -161,4 +161,5 @@ def test_descriptions_give_numbers():
     assert f"at (0, 0), ({2 * np.cos(0.5):.2f}, {-2 * np.sin(0.5):.2f}), (" in said
     said = postures.describe_ways({"one": TABLE})
     angles = np.degrees(np.linalg.norm(np.diff(PATH, axis=0), axis=1).sum())
-    assert f"one: the tip covers {covered:.1f} m, the point of the angles {angles:.0f} deg" in said
+    assert "from joint angles of 11 and 29 to 229 and 6 degrees" in said
+    assert f"one: {covered:.1f} m and {angles:.0f} degrees." in said
