@@ -3,6 +3,7 @@
 from rbcourse.arm import (
     Posture,
     arm_forward_kinematics,
+    arm_inverse_kinematics,
     arm_tip_jacobian,
     interpolate_joints,
     propagate_joints,
@@ -120,6 +121,7 @@ __all__ = [
     "acceleration_cost_parts",
     "adjoint_se3",
     "arm_forward_kinematics",
+    "arm_inverse_kinematics",
     "arm_tip_jacobian",
     "canonical_quaternion",
     "christoffel",

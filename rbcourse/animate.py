@@ -209,21 +209,42 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
         In RGB.
     """
     before: Any = fig.canvas
+    paint = painter(fig, update(0))
+    drawn = [paint(update(i)) for i in range(frames)]
+    fig.set_canvas(before)
+    return drawn
+
+
+def painter(fig: Figure, moving: Sequence[Any]) -> Callable[[Sequence[Any]], Image.Image]:
+    """Draw what does not move, once; return what draws moving artists over it.
+
+    Parameters
+    ----------
+    fig : Figure
+        The figure. Its canvas is replaced, its axes must not change.
+    moving : sequence of artists
+        All that will move.
+
+    Returns
+    -------
+    callable
+        ``paint(artists)`` returns the picture with these of them, in RGB.
+    """
     canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
-    for artist in update(0):
+    for artist in moving:
         artist.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(fig.bbox)
-    drawn = []
-    for i in range(frames):
+
+    def paint(artists: Sequence[Any]) -> Image.Image:
         canvas.restore_region(background)
-        for artist in update(i):
+        for artist in artists:
             if hasattr(artist, "do_3d_projection"):
                 artist.do_3d_projection()
-            artist.axes.draw_artist(artist)
-        drawn.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
-    fig.set_canvas(before)
-    return drawn
+            artist.draw(canvas.get_renderer())
+        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+    return paint
 
 
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:

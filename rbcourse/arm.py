@@ -117,6 +117,58 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     return np.stack([-reach[..., 1], reach[..., 0]], axis=-2)
 
 
+def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
+    """Return the two sets of joint angles that bring the tip of a two-link arm to a place.
+
+    Parameters
+    ----------
+    tip : array_like, shape (..., 2)
+        Where the tip is to be, in m, world frame.
+    lengths : array_like, shape (2,), optional
+        Lengths of the links, in m, above 0.
+
+    Returns
+    -------
+    ndarray, shape (..., 2, 2)
+        The two solutions, and for each its joint angles in [−π, π], in rad: the first has its
+        elbow angle in [0, π], the second is its mirror image, with the opposite one.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, the lengths are not two above 0, or the tip is out of reach.
+
+    Notes
+    -----
+    Singular set: where the links lie on one line both solutions are the same. Where equal links
+    fold up, the tip is at the base whatever the first angle is; then that is ∓π/2.
+
+    References
+    ----------
+    RR 4.
+
+    Examples
+    --------
+    >>> np.degrees(arm_inverse_kinematics([2, 1.5])).round(2)
+    array([[  0.  ,  90.  ],
+           [ 73.74, -90.  ]])
+    """
+    tip, (a, b) = as_finite("tip", tip, 2), _lengths(lengths, 2)
+    r = np.hypot(tip[..., 0], tip[..., 1])
+    slack = 4 * np.finfo(float).eps * (a + b)  # the rounding of a tip that was computed
+    out = (r > a + b + slack) | (r < abs(a - b) - slack)
+    if out.any():
+        reach = f"{abs(a - b):.4g} to {a + b:.4g} m"
+        raise ValueError(f"tip: {reach} from the base wanted, got {r[out].flat[0]:.4g} m")
+    beyond, within = (a + b - r) * (a + b + r), (r - abs(a - b)) * (r + abs(a - b))
+    half = np.arctan2(np.sqrt(np.maximum(beyond, 0)), np.sqrt(np.maximum(within, 0)))
+    elbow = 2 * np.stack([half, -half], axis=-1)
+    towards = np.arctan2(tip[..., 1], tip[..., 0])[..., None]
+    shoulder = towards - np.arctan2(b * np.sin(elbow), a + b * np.cos(elbow))
+    turns = np.round(shoulder / (2 * np.pi))
+    return np.stack([shoulder - 2 * np.pi * turns, elbow], axis=-1)
+
+
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
     """Return the path that takes each joint angle evenly from its start to its goal.
 

@@ -62,6 +62,7 @@ def execute(path: Path, figures: Path) -> str:
         kernel_name=KERNEL["name"],
         record_timing=False,
         coalesce_streams=True,
+        store_widget_state=False,
         timeout=120,
         extra_arguments=["--log-level=ERROR"],
         resources={"metadata": {"path": str(path.parent)}},
@@ -99,7 +100,8 @@ def normalised(notebook: NotebookNode) -> str:
     """Return a notebook as text without what differs from run to run or machine to machine.
 
     Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
-    random ids of 32 hexadecimal digits are numbered in the order of appearance.
+    random ids of 32 hexadecimal digits are numbered in the order of appearance. Of a widget, which
+    lives with its kernel, the still is stored that it gives beside itself.
 
     Parameters
     ----------
@@ -114,15 +116,13 @@ def normalised(notebook: NotebookNode) -> str:
     notebook.metadata.language_info = {"name": "python"}
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     for output in (output for cell in cells for output in cell.outputs):
+        output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)
         for texts, key in ((output, "text"), (output.get("data", {}), "text/plain")):
             if key in texts:
                 texts[key] = re.sub(r"0x[0-9a-fA-F]{6,16}", "0x0", texts[key])
-    widgets = notebook.metadata.get("widgets", {})
-    *outputs, widgets = _with_numbered_ids([*(cell.outputs for cell in cells), widgets])
-    for cell, ran in zip(cells, outputs, strict=True):
+    notebook.metadata.pop("widgets", None)
+    for cell, ran in zip(cells, _with_numbered_ids([c.outputs for c in cells]), strict=True):
         cell.outputs = ran
-    if widgets:
-        notebook.metadata.widgets = widgets
     return nbformat.writes(notebook) + "\n"
 
 

@@ -179,7 +179,7 @@ def moving_book(ax: Any, data: Table, edges: ArrayLike) -> Callable[[int], list[
     poses[:, :3, 3] = 0
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
-    label = {"color": "0.45", "fontsize": 11, "ha": "right", "transform": ax.transAxes}
+    label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
     ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
     book = draw_box(ax, poses[0], edges)

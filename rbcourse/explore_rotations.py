@@ -1,0 +1,237 @@
+"""Explorers of rotations: one orientation in many words, projections, and random rotations."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from rbcourse._numerics import Array
+from rbcourse.bodies import draw_box, move_box
+from rbcourse.conversions import matrix_from_zyx, quaternion_from_matrix
+from rbcourse.explorer import (
+    Explorer,
+    choice,
+    look,
+    new_figure,
+    new_line,
+    new_space,
+    numbers,
+    slider,
+)
+from rbcourse.figures import COLOURS
+from rbcourse.projection import orthonormalize_gram_schmidt, project_so
+from rbcourse.sampling import sample_rotation, sample_rotation_naive
+from rbcourse.se3 import pose_from_components
+from rbcourse.so3 import log_so3
+from rbcourse.spheres import EYE, draw_sphere
+from rbcourse.uniformity import uniformity_tests
+
+_BOX = np.array([1.3, 0.8, 0.25])
+_PALE = "#E9CFDE"
+_SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}
+_MOST = 2000
+_EDGES = np.linspace(-1, 1, 21)
+
+
+def rotation_explorer() -> Explorer:
+    """Return an explorer of orientations: three angles, and what else says the same.
+
+    A box with its axes. Dashed: the axes of the three turns, of the first one z of the room, of the
+    second the y that the first has turned, of the third the body's own x. Dotted: the axis of the
+    one turn that does it all. Controls: ``alpha beta gamma``, the ZYX angles in degrees; ``beta``
+    plays.
+
+    References
+    ----------
+    RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5.
+    """
+    with look():
+        fig = new_figure()
+        ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.3)
+        artists: dict[str, Any] = {"box": draw_box(ax, np.eye(4), _BOX)}
+        artists["box"].set_alpha(0.75)
+        looks = {"first turn": "z", "second turn": "y", "third turn": "x"}
+        artists |= {
+            name: new_line(ax, ls="--", color=COLOURS[axis], lw=1.5, label=f"{name}'s axis")
+            for name, axis in looks.items()
+        }
+        artists["axis"] = new_line(ax, ls=":", color="black", lw=3, label="axis of it all")
+        artists |= _axes_of(ax, "body", "-", 3.5)
+        _legend(fig, [artists[name] for name in (*looks, "axis")])
+    controls = {
+        "alpha": slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
+        "beta": slider("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
+        "gamma": slider("roll γ (°)", 40.0, -180.0, 180.0, 1.0),
+    }
+
+    def show(alpha: float, beta: float, gamma: float) -> dict[str, str]:
+        angles = np.radians([alpha, beta, gamma])
+        R = matrix_from_zyx(angles)
+        move_box(artists["box"], pose_from_components(R, np.zeros(3)), _BOX)
+        _move_axes(artists, "body", R)
+        second = matrix_from_zyx(angles * [1, 0, 0])[:, 1]
+        turns = {"first turn": np.array([0, 0, 1]), "second turn": second, "third turn": R[:, 0]}
+        for name, axis in turns.items():
+            artists[name].set_data_3d(*np.outer(axis, [-1.25, 1.05]))
+        r = log_so3(R)
+        angle = float(np.linalg.norm(r))
+        axis = r / angle if angle > 0 else np.zeros(3)
+        artists["axis"].set_data_3d(*np.outer(axis, [-1.25, 1.25]))
+        said = {
+            "matrix": _lines(R),
+            "quaternion": numbers(quaternion_from_matrix(R), 3),
+            "axis": numbers(axis, 3) if angle > 0 else "any",
+            "angle": f"{np.degrees(angle):.1f}°",
+        }
+        if abs(beta) == 90:
+            sum_or_difference = f"γ {'−' if beta > 0 else '+'} α"
+            value = gamma - np.sign(beta) * alpha
+            said["gimbal lock"] = (
+                f"two axes coincide: only\n{sum_or_difference} = {value:.0f}° counts"
+            )
+        return said
+
+    return Explorer("An orientation", fig, artists, controls, show, plays="beta")
+
+
+def projection_explorer() -> Explorer:
+    """Return an explorer of repairs: a matrix pulled away from SO(3), and what two make of it.
+
+    Grey: the columns of I + pull · E. Full: the nearest rotation. Dashed: Gram–Schmidt. Controls:
+    the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it ``pull``s, which plays.
+
+    References
+    ----------
+    BK 4, BK Prop. 2, RR 1.4.
+    """
+    with look():
+        fig = new_figure()
+        ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.5)
+        artists = {
+            **_axes_of(ax, "M", "-", 7, colour="0.75"),
+            **_axes_of(ax, "nearest", "-", 3.5),
+            **_axes_of(ax, "Gram–Schmidt", "--", 2),
+        }
+        handles = [artists[f"{name} z"] for name in ("M", "nearest", "Gram–Schmidt")]
+        for handle, name in zip(handles, ("M", "nearest", "Gram–Schmidt"), strict=True):
+            handle.set_label(name)
+        _legend(fig, handles)
+    controls = {
+        "e12": slider("y leans on x (1)", 0.8, -1.0, 1.0, 0.05),
+        "e23": slider("z leans on y (1)", 0.0, -1.0, 1.0, 0.05),
+        "e33": slider("z is stretched (1)", 0.0, -2.0, 1.0, 0.05),
+        "pull": slider("pull (1)", 0.0, 0.0, 1.0, 0.01),
+    }
+
+    def show(e12: float, e23: float, e33: float, pull: float) -> dict[str, str]:
+        M = np.eye(3) + pull * np.array([[0, e12, 0], [0, 0, e23], [0, 0, e33]])
+        R, G = project_so(M), orthonormalize_gram_schmidt(M)
+        for name, matrix in (("M", M), ("nearest", R), ("Gram–Schmidt", G)):
+            _move_axes(artists, name, matrix)
+        singular = np.linalg.svd(M, compute_uv=False)
+        det = float(np.linalg.det(M))
+        said = {
+            "M": _lines(M),
+            "determinant": f"{det:.2f}",
+            "singular values": numbers(singular, 3),
+            "‖M − nearest‖": f"{np.linalg.norm(M - R):.3f}",
+            "‖M − Gram–Schmidt‖": f"{np.linalg.norm(M - G):.3f}",
+            "angle between": f"{np.degrees(np.linalg.norm(log_so3(R.T @ G))):.1f}°"
+            if det > 0
+            else "none: Gram–Schmidt\ngives a mirror",
+        }
+        if singular[1] + np.sign(det) * singular[2] < 1e-9:
+            said["nearest?"] = "several are equally near"
+        return said
+
+    return Explorer("Two repairs", fig, artists, controls, show, plays="pull")
+
+
+def random_explorer() -> Explorer:
+    """Return an explorer of random rotations: where they carry e₁, and how sure one can be.
+
+    Controls: the ``sampler``, "three angles" or "uniform"; the ``number`` of rotations, which
+    plays: always the first of the same 2000; and the ``seed`` of these.
+
+    References
+    ----------
+    RR 2, RR 2.1, RR 2.2.
+    """
+    with look():
+        fig = new_figure()
+        ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="3d")
+        draw_sphere(ax)
+        fig.text(0.26, 0.91, "images of e₁", ha="center")
+        colours = {"behind": _PALE, "before": COLOURS["projection"]}
+        artists = {
+            name: new_line(ax, marker="o", ls="", ms=4, mew=0, color=colour)
+            for name, colour in colours.items()
+        }
+        side = fig.add_axes((0.62, 0.19, 0.36, 0.69))
+        side.set(
+            xlim=(0, 2),
+            ylim=(-1, 1),
+            yticks=[-1, -0.5, 0, 0.5, 1],
+            title="their heights",
+            xlabel="density",
+        )
+        side.axvline(0.5, color="black", ls="--", lw=1.5)
+        artists["histogram"] = side.stairs(
+            np.zeros(20), _EDGES, orientation="horizontal", color=COLOURS["projection"], lw=2
+        )
+    controls = {
+        "sampler": choice("sampler", list(_SAMPLERS)),
+        "number": slider("number (1)", 100.0, 20.0, _MOST, 20.0),
+        "seed": slider("seed (1)", 0.0, 0.0, 20.0, 1.0),
+    }
+
+    def show(sampler: str, number: float, seed: float) -> dict[str, str]:
+        R = _sample(sampler, int(seed))[: int(number)]
+        points = R[:, :, 0]
+        behind = points @ EYE < 0
+        artists["behind"].set_data_3d(*points[behind].T)
+        artists["before"].set_data_3d(*points[~behind].T)
+        counts, _ = np.histogram(np.clip(points[:, 2], -1, 1), _EDGES)
+        artists["histogram"].set_data(counts / (len(R) * np.diff(_EDGES)), _EDGES)
+        caps = np.mean(np.abs(points[:, 2]) > 0.5)
+        said = {"|height| > ½": f"{caps:.1%}; if uniform, 50 %"}
+        if len(R) < 100:
+            return {**said, "p-values": "from 100 rotations on"}
+        tests = uniformity_tests(R)
+        return said | {
+            f"p, {name}": f"{tests[name].p_value:.1e}" for name in ("image of e₁", "angle")
+        }
+
+    return Explorer("Random rotations", fig, artists, controls, show, plays="number", seconds=10)
+
+
+@lru_cache(maxsize=8)
+def _sample(sampler: str, seed: int) -> Array:
+    return _SAMPLERS[sampler](_MOST, rng=seed)
+
+
+def _axes_of(ax: Any, name: str, dash: str, lw: float, colour: str | None = None) -> dict[str, Any]:
+    """Draw three axes, to be moved by `_move_axes`; coloured ones have their letters."""
+    artists: dict[str, Any] = {}
+    for axis in "xyz":
+        style = {"color": colour or COLOURS[axis], "lw": lw, "ls": dash}
+        artists[f"{name} {axis}"] = new_line(ax, **style)
+        if not colour and dash == "-":
+            style = {"color": COLOURS[axis], "ha": "center", "va": "center"}
+            artists[f"{name} {axis} letter"] = ax.text(0, 0, 0, axis, **style)
+    return artists
+
+
+def _move_axes(artists: dict[str, Any], name: str, M: Array) -> None:
+    for axis, column in zip("xyz", M.T, strict=True):
+        artists[f"{name} {axis}"].set_data_3d(*np.outer(column, [0, 1]))
+        if f"{name} {axis} letter" in artists:
+            artists[f"{name} {axis} letter"].set_position_3d(1.15 * column)
+
+
+def _legend(fig: Any, handles: list[Any]) -> None:
+    fig.legend(handles=handles, loc="lower left", ncols=2, handlelength=1.6, columnspacing=1)
+
+
+def _lines(M: Array) -> str:
+    return "\n".join("  ".join(f"{value:6.3f}" for value in row) for row in M.round(3) + 0.0)

@@ -1,0 +1,57 @@
+"""Every slider of an explorer over its whole range, and pairs of extremes."""
+
+from itertools import combinations
+
+import numpy as np
+from PIL import Image
+
+_BLANK = Image.new("RGB", (1, 1))
+
+
+def settings(explorer):
+    """Every setting to try: one control at a time over its range, then ends in pairs."""
+    ranges = {name: _range(control) for name, control in explorer.controls.items()}
+    for name, values in ranges.items():
+        yield from ({name: value} for value in values)
+    for (one, first), (other, second) in combinations(ranges.items(), 2):
+        yield from (
+            {one: a, other: b} for a in (first[0], first[-1]) for b in (second[0], second[-1])
+        )
+
+
+def sweep(explorer, **base):
+    """Put each setting on top of these values; give all values, of those that can be served.
+
+    Pictures are made for the ends of ranges and for pairs only.
+    """
+    first, paint = explorer.values | base, explorer._paint
+    for setting in settings(explorer):
+        ends = all(value in _ends(explorer.controls[name]) for name, value in setting.items())
+        explorer._paint = paint if ends else lambda artists: _BLANK
+        explorer.put(**first | setting)
+        if not explorer.notice.value.startswith('<b role="alert">Nothing'):
+            yield explorer.values
+    explorer._paint = paint
+
+
+def points(artist):
+    """The points of a line in the plane or in space, shape (n, 2) or (n, 3)."""
+    if hasattr(artist, "get_data_3d"):
+        return np.stack(artist.get_data_3d(), axis=-1)
+    return np.stack(artist.get_data(), axis=-1)
+
+
+def corners(box):
+    """The corners of the first six faces of a box, shape (6, 4, 3)."""
+    return np.asarray(box._faces)[:6]
+
+
+def _range(control):
+    if hasattr(control, "options"):
+        return list(control.options)
+    steps = round((control.max - control.min) / control.step)
+    return [control.min + i * control.step for i in range(steps)] + [control.max]
+
+
+def _ends(control):
+    return [_range(control)[0], _range(control)[-1]]

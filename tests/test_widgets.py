@@ -1,0 +1,82 @@
+"""Every explorer: complete, readable, and safe wherever its sliders are."""
+
+import re
+
+import ipywidgets
+import numpy as np
+import pytest
+from sweeps import settings
+
+from rbcourse import widgets
+from rbcourse.explorer import LABELS
+
+
+@pytest.fixture(scope="module", params=widgets.__all__)
+def explorer(request):
+    return getattr(widgets, request.param)()
+
+
+def test_there_are_ten():
+    assert len(widgets.__all__) == 10
+    assert widgets.__all__ == sorted(widgets.__all__)
+
+
+def test_it_shows_something_before_it_is_touched(explorer):
+    assert len(explorer.picture.png) > 5_000
+    assert explorer.notice.value == ""
+    assert explorer.said.value.count("<tr") >= 2
+    assert not explorer.play.playing
+
+
+def test_every_label_has_its_unit(explorer):
+    for control in explorer.controls.values():
+        if isinstance(control, ipywidgets.FloatSlider):
+            assert re.search(r"\((1|°|°/s|m|m/s|rad|s)\)$", control.description), (
+                control.description
+            )
+
+
+def test_the_keyboard_reaches_every_control(explorer):
+    reached = (ipywidgets.FloatSlider, ipywidgets.ToggleButtons)
+    assert all(isinstance(control, reached) for control in explorer.controls.values())
+    assert all(
+        control.continuous_update
+        for control in explorer.controls.values()
+        if hasattr(control, "step")
+    )
+
+
+def test_every_setting_gives_a_picture_and_says_something(explorer):
+    """Each slider at eight places, and all pairs of ends, drawn in full."""
+    first = explorer.values
+    chosen = [s for i, s in enumerate(settings(explorer)) if len(s) == 2 or i % 13 == 0]
+    for setting in chosen:
+        explorer.put(**first | setting)
+        assert explorer.picture.png.startswith(b"\x89PNG")
+        assert explorer.said.value.count("<tr") >= 2 or explorer.notice.value, setting
+        assert not re.search(r"\bnan\b", explorer.said.value), setting
+        assert not re.search(r"-0\.?0*(?![.\d])", explorer.said.value), setting
+    explorer.restart()
+
+
+def test_all_letters_are_large_enough(explorer):
+    from matplotlib.text import Text
+
+    for text in explorer._fig.findobj(Text):
+        if text.get_visible() and text.get_text().strip():
+            assert text.get_fontsize() >= LABELS, text.get_text()
+
+
+def test_every_artist_is_on_the_figure_and_named_once(explorer):
+    artists = list(explorer.artists.values())
+    assert len({id(artist) for artist in artists}) == len(artists)
+    assert all(artist.get_figure() is explorer._fig for artist in artists)
+
+
+def test_playing_runs_through_the_whole_range(explorer):
+    seen = []
+    for step in np.linspace(0, explorer.play.max, 5).astype(int):
+        explorer.play.value = int(step)
+        seen.append(explorer.picture.png)
+    assert len(set(seen)) >= 4
+    explorer.restart()
