@@ -17,6 +17,7 @@ from rbcourse.so3 import exp_so3, log_so3
 
 _TIMES = np.linspace(0, 1, 61)
 _SIGMA = np.pi / 6 * np.array([1, 2, 3])
+_SIDE = 2.5
 _WAYS = {"optimum": "-", "projection": "--"}
 
 
@@ -78,7 +79,7 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: two cubes on their ways, the optimum and the projection.
 
-    The ends are the paper's, but for three that can be changed. Controls: the ``turn``, as a share
+    The ends are the paper's, but for three that can be changed; pale, the goal. Controls: the ``turn``, as a share
     of the paper's; ``spin``, the last component of ω(1) in rad; ``rise``, that of the velocity at
     the end in m; and the time ``t``, which plays.
 
@@ -97,8 +98,10 @@ def cube_explorer() -> Explorer:
             ax.set_proj_type("ortho")
             ax.view_init(elev=18, azim=-22)
             style = {"color": "black", "lw": 1, "ls": _WAYS[way]}
-            artists |= {f"{way} way": new_line(ax, **style)}
-            artists |= {way: draw_box(ax, np.eye(4), 2.5)}
+            artists[f"{way} way"] = new_line(ax, **style)
+            artists[f"{way} goal"] = draw_box(ax, np.eye(4), _SIDE)
+            artists[f"{way} goal"].set_alpha(0.25)
+            artists[way] = draw_box(ax, np.eye(4), _SIDE)
             fig.text(left + 0.25, 0.94, way, ha="center")
     controls = {
         "turn": slider("turn (1)", 1.0, 0.0, 1.15, 0.05),
@@ -115,7 +118,8 @@ def cube_explorer() -> Explorer:
         }
         for way, curve in curves.items():
             artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
-            move_box(artists[way], curve(t), 2.5)
+            move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
+            move_box(artists[way], curve(t), _SIDE)
         costs = {way: float(acceleration_cost_parts(curve)[0]) for way, curve in curves.items()}
         now = {way: curve(t)[None, :3, :3] for way, curve in curves.items()}
         return {**_compared(costs, "rotation, "), "apart now": _apart(now)}

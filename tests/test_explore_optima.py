@@ -71,11 +71,11 @@ def test_both_cubes_their_ways_and_their_costs(cubes):
             "projection": rb.projected_cubic_se3(*ends),
         }
         for name, curve in curves.items():
-            pose = curve(v["t"])
-            faces = corners(cubes.artists[name])
-            assert np.abs(faces.mean(axis=(0, 1)) - pose[:3, 3]).max() < 1e-11
-            out = faces.mean(axis=1)[:3] - pose[:3, 3]
-            assert np.abs(out - 1.25 * pose[:3, :3].T).max() < 1e-11
+            for box, pose in ((name, curve(v["t"])), (f"{name} goal", A1)):
+                faces = corners(cubes.artists[box])
+                assert np.abs(faces.mean(axis=(0, 1)) - pose[:3, 3]).max() < 1e-11
+                out = faces.mean(axis=1)[:3] - pose[:3, 3]
+                assert np.abs(out - 1.25 * pose[:3, :3].T).max() < 1e-11
             way = points(cubes.artists[f"{name} way"])
             assert np.abs(way - curve(TIMES)[:, :3, 3]).max() < 1e-11
             cost = float(rb.acceleration_cost_parts(curve)[0])

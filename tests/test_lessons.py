@@ -1,7 +1,6 @@
 """The machinery that runs, stores and copies lessons."""
 
 import os
-import re
 
 import nbformat
 import nbval.kernel

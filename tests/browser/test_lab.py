@@ -1,0 +1,52 @@
+"""Every lesson in JupyterLab, as a person finds it: before it is run, after, and its sliders."""
+
+from pages import SEEN, centre, explorer_in_lab, move_every_slider, open_in_lab, run_all, walk
+
+
+def test_a_lesson_is_whole_before_and_after_it_is_run(lesson, lab, page, picture):
+    open_in_lab(page, lab(f"workspaces/{lesson}/tree/{lesson}.ipynb"))
+    faults = set()
+    page.set_viewport_size({"width": 1280, "height": 3000})
+    walk(page, lambda: faults.update(page.evaluate(SEEN)))
+    run_all(page)
+    walk(page, lambda: faults.update(page.evaluate(SEEN)))
+    assert not faults
+    page.set_viewport_size({"width": 1280, "height": 800})
+    explorer = explorer_in_lab(page)
+    move_every_slider(page, explorer)
+    for width, height in ((1280, 800), (1024, 768)):
+        page.set_viewport_size({"width": width, "height": height})
+        centre(page, explorer)
+        picture(f"lab_{lesson}_{width}")
+
+
+def test_play_pause_and_reset_work_from_the_keyboard(lab, page):
+    open_in_lab(page, lab("workspaces/play/tree/02_two_link_arm.ipynb"))
+    run_all(page)
+    explorer = explorer_in_lab(page)
+    time, play = explorer.locator(".widget-readout").last, explorer.locator("button").first
+    assert time.inner_text() == "0.00"
+    play.press("Enter")
+    page.wait_for_timeout(1500)
+    play.press("Enter")
+    page.wait_for_timeout(300)
+    paused = time.inner_text()
+    assert 0.1 < float(paused) < 0.9
+    page.wait_for_timeout(500)
+    assert time.inner_text() == paused
+    explorer.get_by_role("button", name="Reset").press("Enter")
+    page.wait_for_timeout(500)
+    assert time.inner_text() == "0.00"
+
+
+def test_a_click_brings_the_hand_there_or_says_why_not(lab, page):
+    open_in_lab(page, lab("workspaces/click/tree/02_two_link_arm.ipynb"))
+    run_all(page)
+    explorer = explorer_in_lab(page)
+    image = explorer.locator("img")
+    box = image.bounding_box()
+    image.click(position={"x": 0.3 * box["width"], "y": 0.3 * box["height"]})
+    page.wait_for_timeout(500)
+    assert explorer.locator(".widget-readout").last.inner_text() == "1.00"
+    image.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
+    explorer.get_by_text("from the base wanted").wait_for(timeout=3000)

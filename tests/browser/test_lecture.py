@@ -1,0 +1,65 @@
+"""Every lesson in the lecture view: large letters, question and explorer on one screen."""
+
+import re
+
+from pages import SEEN, move_every_slider
+from servers import serving
+
+SMALL = """(least) => {
+  const found = [];
+  const walker = document.createTreeWalker(document.querySelector("#rendered_cells"), 4);
+  while (walker.nextNode()) {
+    const text = walker.currentNode, box = text.parentElement;
+    const apart = ".lecture-code, mjx-container, script, style, sup, sub";
+    if (!text.textContent.trim() || box.closest(apart)) continue;
+    const printed = box.closest("pre, code") ? 20 : least;
+    if (parseFloat(getComputedStyle(box).fontSize) < printed)
+      found.push(getComputedStyle(box).fontSize + " " + text.textContent.trim().slice(0, 40));
+  }
+  return found;
+}"""
+
+
+def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, picture):
+    course, env = home
+    words = ["rbcourse.lecture", lesson[:2], "--no-browser"]
+    with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
+        page.set_viewport_size({"width": 1024, "height": 768})
+        page.goto(found[1], timeout=120_000)
+        explorer = page.locator(".rbcourse-explorer")
+        explorer.wait_for(timeout=60_000)
+        page.wait_for_timeout(1500)
+        assert not page.evaluate(SEEN)
+        assert not page.evaluate(SMALL, 24)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 1024
+        if lesson[:2] != "00":
+            look_at_question_and_explorer(page, explorer)
+        move_every_slider(page, explorer)
+        for width, height in ((1280, 800), (1024, 768)):
+            page.set_viewport_size({"width": width, "height": height})
+            to_question(page)
+            page.wait_for_timeout(500)
+            picture(f"lecture_{lesson}_{width}")
+
+
+def to_question(page):
+    """Scroll to the last heading before the explorer."""
+    return page.evaluate(
+        """() => {
+            const explorer = document.querySelector(".rbcourse-explorer");
+            const before = [...document.querySelectorAll("h1, h2, h3")].filter((heading) =>
+                heading.compareDocumentPosition(explorer) & Node.DOCUMENT_POSITION_FOLLOWING);
+            const heading = before.at(-1);
+            heading.scrollIntoView();
+            return heading.innerText;
+        }"""
+    )
+
+
+def look_at_question_and_explorer(page, explorer):
+    assert re.match(r"Poll \d", to_question(page))
+    page.wait_for_timeout(300)
+    box = explorer.locator("img").bounding_box()
+    assert box["y"] >= 0
+    assert box["y"] + box["height"] <= 768
+    assert 18 * box["width"] / 560 >= 18
