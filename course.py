@@ -1,4 +1,4 @@
-"""Every task of the course: python course.py figures | test | lab | ledger | lint.
+"""Every task of the course: python course.py figures | test | lab | lecture | ledger | lint.
 
 The first call makes the environment .venv from environment.txt; later calls use it. When
 environment.txt changes or the folder is moved, .venv is made anew.
@@ -37,6 +37,10 @@ def main():
     tasks.add_parser("test", help="run every test, the lessons too; further words go to pytest")
     lab = tasks.add_parser("lab", help="open the lessons; further words go to JupyterLab")
     lab.add_argument("--edit", action="store_true", help="the originals, not the copies in work/")
+    lecture = tasks.add_parser("lecture", help="show a lesson to a class, large and without code")
+    lecture.add_argument("lesson", help="its number: 01")
+    lecture.add_argument("--check", action="store_true", help="try it before class; show nothing")
+    lecture.add_argument("--no-browser", action="store_true", help="print the address only")
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
@@ -49,6 +53,11 @@ def main():
         run("-m", "pytest", "-n", "auto", "--dist", "loadfile", *further)
     elif known.task == "lab":
         open_lab(known.edit, further)
+    elif known.task == "lecture":
+        if known.check:
+            run("-m", "rbcourse.rehearsal", known.lesson)
+        else:
+            run("-m", "rbcourse.lecture", known.lesson, *["--no-browser"] * known.no_browser)
     elif known.task == "ledger":
         run("-m", "rbcourse.ledger")
     else:

@@ -52,6 +52,8 @@ LEVELS = {
     "report_rotations": 11,
     "assignment": 12,
     "lessons": 11,
+    "lecture": 12,
+    "rehearsal": 13,
     "ledger": 12,
     "explorer": 11,
     "explore_curves": 12,
@@ -77,6 +79,8 @@ ALLOWED = {
     "spheres": {"matplotlib", "mpl_toolkits"},
     "tumbling": {"matplotlib"},
     "lessons": {"nbformat", "nbclient"},
+    "lecture": {"nbformat", "tornado", "traitlets", "voila"},
+    "rehearsal": {"nbformat", "tornado"},
     "ledger": {"nbformat"},
 }
 
