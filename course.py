@@ -1,4 +1,4 @@
-"""Every task of the course: python course.py figures | test | lab | lecture | ledger | lint.
+"""Every task of the course: figures, test, lab, lecture, browser, ledger, lint.
 
 The first call makes the environment .venv from environment.txt; later calls use it. When
 environment.txt changes or the folder is moved, .venv is made anew.
@@ -27,6 +27,7 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 UV = shutil.which("uv")
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
 
 
 def main():
@@ -41,10 +42,11 @@ def main():
     lecture.add_argument("lesson", help="its number: 01")
     lecture.add_argument("--check", action="store_true", help="try it before class; show nothing")
     lecture.add_argument("--no-browser", action="store_true", help="print the address only")
+    tasks.add_parser("browser", help="try every lesson in Chromium; further words go to pytest")
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
-    if further and known.task not in ("test", "lab"):
+    if further and known.task not in ("test", "lab", "browser"):
         parser.error("%s takes no %s" % (known.task, " ".join(further)))
     set_up()
     if known.task == "figures":
@@ -58,10 +60,12 @@ def main():
             run("-m", "rbcourse.rehearsal", known.lesson)
         else:
             run("-m", "rbcourse.lecture", known.lesson, *["--no-browser"] * known.no_browser)
+    elif known.task == "browser":
+        look_in_browser(further)
     elif known.task == "ledger":
         run("-m", "rbcourse.ledger")
     else:
-        set_up_linters()
+        set_up_extra("lint")
         run("-m", "ruff", "check")
         run("-m", "ruff", "format", "--check")
         run("-m", "mypy")
@@ -84,18 +88,34 @@ def run(*words):
 
 
 def open_lab(edit, further):
-    """Open JupyterLab; it asks for no news, and a root user need not be told what he is."""
+    """Open JupyterLab; a root user need not be told what he is."""
     if not edit:
         run("-m", "rbcourse.lessons", "copy")
+    keep_lab_quiet()
+    words = ["--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work"))]
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        words.append("--allow-root")
+    run("-m", "jupyterlab", *(words + further))
+
+
+def keep_lab_quiet():
+    """Tell JupyterLab to ask for no news."""
     settings = VENV / "share" / "jupyter" / "lab" / "settings"
     settings.mkdir(parents=True, exist_ok=True)
     quiet = {"fetchNews": "false", "checkForUpdates": False}
     overrides = {"@jupyterlab/apputils-extension:notification": quiet}
     (settings / "overrides.json").write_text(json.dumps(overrides))
-    words = ["--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work"))]
-    if hasattr(os, "geteuid") and os.geteuid() == 0:
-        words.append("--allow-root")
-    run("-m", "jupyterlab", *(words + further))
+
+
+def look_in_browser(further):
+    """Try every lesson in a browser; then, with nothing beside it, how fast its pictures follow."""
+    set_up_extra("browser")
+    os.environ["CHROMIUM"] = find_chromium()
+    keep_lab_quiet()
+    folder = Path("tests") / "browser"
+    lessons = [str(folder / "test_lab.py"), str(folder / "test_lecture.py")]
+    run("-m", "pytest", "-n", "auto", *(lessons + further))
+    run("-m", "pytest", str(folder / "test_speed.py"), *further)
 
 
 def set_up():
@@ -126,15 +146,31 @@ def set_up():
     print(" done.", flush=True)
 
 
-def set_up_linters():
-    """Install the linters at the versions of pyproject.toml."""
-    stamp = VENV / "linters-by-course.txt"
+def set_up_extra(name):
+    """Install what a task needs besides, at the versions of pyproject.toml."""
+    stamp = VENV / ("%s-by-course.txt" % name)
     wanted = fingerprint(ROOT / "pyproject.toml")
     if not stamp.exists() or stamp.read_text() != wanted:
-        print("Installing the linters", end="", flush=True)
-        install("-e", ".[lint]")
+        print("Installing what %s needs" % name, end="", flush=True)
+        install("-e", ".[%s]" % name)
         stamp.write_text(wanted)
         print(" done.", flush=True)
+
+
+def find_chromium():
+    """Return the path of a Chromium; it is installed where Debian's packages are to be had."""
+    there = [os.environ.get("CHROMIUM")] + [shutil.which(name) for name in CHROMIUM]
+    if any(there):
+        return next(filter(None, there))
+    if not shutil.which("apt-get"):
+        sys.exit("No Chromium or Chrome is found: install one, and name it in CHROMIUM.")
+    print("Installing Chromium", end="", flush=True)
+    root = [] if os.geteuid() == 0 else ["sudo"]
+    apt_get = root + ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "--yes"]
+    patiently(*(apt_get + ["update"]))
+    patiently(*(apt_get + ["install", "--no-install-recommends", "chromium"]))
+    print(" done.", flush=True)
+    return shutil.which("chromium")
 
 
 def install(*words):

@@ -50,7 +50,7 @@ def minimum_acceleration_explorer() -> Explorer:
             ax.plot([], [], color="0.3", ls=dash, label=way)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
-        "s": slider("displacement s (1)", 1.0, 0.05, 1.5, 0.05),
+        "s": slider("way s (1)", 1.0, 0.05, 1.5, 0.05),
         "extra": slider("extra ω(1) (rad)", 1.0, -6.0, 6.0, 0.25),
         "t": slider("time t (1)", 0.0, 0.0, 1.0, 0.01),
     }
@@ -95,6 +95,7 @@ def cube_explorer() -> Explorer:
             ax.set(xlim=(-3, 11), ylim=(-3, 13), zlim=(-4, 14))
             ax.set(xticklabels=[], yticklabels=[], zticklabels=[])
             ax.set_box_aspect((14, 16, 18), zoom=1.0)
+            ax.patch.set_visible(False)  # the two overlap a little
             ax.set_proj_type("ortho")
             ax.view_init(elev=18, azim=-22)
             style = {"color": "black", "lw": 1, "ls": _WAYS[way]}

@@ -12,7 +12,7 @@ from rbcourse.planar import propagate_planar
 from rbcourse.postures import arm_table, show_reach
 from rbcourse.routes import draw_body, move_body
 
-_STEPS = 64
+_STEPS = 80
 _HALF = 2.0
 _BODY = 0.9
 _FRAMES = {"world": (COLOURS["z"], "#D6E6F2", "-"), "body": (COLOURS["x"], "none", "--")}

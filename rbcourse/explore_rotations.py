@@ -117,9 +117,9 @@ def projection_explorer() -> Explorer:
             handle.set_label(name)
         _legend(fig, handles)
     controls = {
-        "e12": slider("y leans on x (1)", 0.8, -1.0, 1.0, 0.05),
-        "e23": slider("z leans on y (1)", 0.0, -1.0, 1.0, 0.05),
-        "e33": slider("z is stretched (1)", 0.0, -2.0, 1.0, 0.05),
+        "e12": slider("y leans (1)", 0.8, -1.0, 1.0, 0.05),
+        "e23": slider("z leans (1)", 0.0, -1.0, 1.0, 0.05),
+        "e33": slider("z stretched (1)", 0.0, -2.0, 1.0, 0.05),
         "pull": slider("pull (1)", 0.0, 0.0, 1.0, 0.01),
     }
 
@@ -131,11 +131,10 @@ def projection_explorer() -> Explorer:
         singular = np.linalg.svd(M, compute_uv=False)
         det = float(np.linalg.det(M))
         said = {
-            "M": _lines(M),
             "determinant": f"{det:.2f}",
-            "singular values": numbers(singular, 3),
-            "‖M − nearest‖": f"{np.linalg.norm(M - R):.3f}",
-            "‖M − Gram–Schmidt‖": f"{np.linalg.norm(M - G):.3f}",
+            "singular values": numbers(singular, 2),
+            "M to nearest": f"{np.linalg.norm(M - R):.3f}",
+            "M to Gram–Schmidt": f"{np.linalg.norm(M - G):.3f}",
             "angle between": f"{np.degrees(np.linalg.norm(log_so3(R.T @ G))):.1f}°"
             if det > 0
             else "none: Gram–Schmidt\ngives a mirror",
@@ -234,4 +233,6 @@ def _legend(fig: Any, handles: list[Any]) -> None:
 
 
 def _lines(M: Array) -> str:
-    return "\n".join("  ".join(f"{value:6.3f}" for value in row) for row in M.round(3) + 0.0)
+    """Return a matrix as lines, in which all numbers are equally wide."""
+    rows = (numbers(row, 3).split(", ") for row in M)
+    return "\n".join("  ".join(x.rjust(6, "\u2007") for x in row) for row in rows)

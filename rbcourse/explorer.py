@@ -228,7 +228,7 @@ def look() -> Any:
 
 def new_figure() -> Figure:
     """Return a figure for an explorer; to be used within `look`."""
-    fig = Figure(figsize=(5.6, 4.2), dpi=DPI)
+    fig = Figure(figsize=(5.6, 3.8), dpi=DPI)
     fig.set_layout_engine("none")
     return fig
 
@@ -261,7 +261,7 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
         max=high,
         step=step,
         readout_format=f".{digits}f",
-        style={"description_width": "8em"},
+        style={"description_width": "7.5em"},
         layout={"width": "auto"},
     )
 
@@ -271,13 +271,14 @@ def choice(label: str, options: Any) -> Any:
     return ipywidgets.ToggleButtons(
         options=options,
         description=label,
-        style={"description_width": "8em", "button_width": "auto"},
+        style={"description_width": "7.5em", "button_width": "auto"},
     )
 
 
 def numbers(values: Any, digits: int) -> str:
-    """Return numbers as text, with commas between them, and without a minus before nothing."""
-    return ", ".join(f"{x:.{digits}f}" for x in np.round(np.atleast_1d(values), digits) + 0.0)
+    """Return numbers as text, with commas between them, and without a minus before zero."""
+    rounded = np.round(np.atleast_1d(values), digits) + 0.0
+    return ", ".join(f"{x:.{digits}f}".replace("-", "−") for x in rounded)
 
 
 def _table(said: Mapping[str, str]) -> str:

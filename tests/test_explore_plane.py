@@ -32,7 +32,7 @@ def test_both_bodies_are_where_the_plan_leads_them(plan):
         for frame in ("world", "body"):
             end = rb.propagate_planar([0, 0, 0], commands(v), frame=frame)[-1]
             way = points(plan.artists[f"{frame} way"])
-            assert len(way) == round(v["t"] * 16) + 1
+            assert len(way) == round(v["t"] * 20) + 1
             assert np.abs(way[-1] - end[:2]).max() < 1e-12
             corners = plan.artists[f"{frame} outline"].get_xy()[:4]
             assert np.abs(corners.mean(axis=0) - end[:2]).max() < 1e-12
@@ -54,7 +54,7 @@ def test_the_way_of_the_body_is_the_one_of_all_times_before(plan):
     plan.put(**v)
     for frame in ("world", "body"):
         for k, place in enumerate(points(plan.artists[f"{frame} way"])):
-            states = rb.propagate_planar([0, 0, 0], commands(v | {"t": k / 16}), frame=frame)
+            states = rb.propagate_planar([0, 0, 0], commands(v | {"t": k / 20}), frame=frame)
             assert np.abs(place - states[-1, :2]).max() < 1e-12
 
 

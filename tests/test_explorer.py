@@ -49,8 +49,8 @@ def pixels(explorer):
 
 def darkest(explorer):
     """The place of the dot, in shares of the picture, from the left and from the top."""
-    rows, columns = np.nonzero(pixels(explorer)[10:350, 70:500] < 50)
-    return (columns.mean() + 70) / 560, (rows.mean() + 10) / 420
+    rows, columns = np.nonzero(pixels(explorer)[10:315, 70:500] < 50)
+    return (columns.mean() + 70) / 560, (rows.mean() + 10) / 380
 
 
 def test_it_shows_something_before_it_is_touched(explorer):
@@ -105,7 +105,7 @@ def test_play_and_slider_move_together(explorer):
 
 def test_what_cannot_be_served_is_said_and_nothing_that_moves_is_drawn(explorer):
     explorer.controls["x"].value = FAR
-    assert (pixels(explorer)[10:350, 70:500] >= 50).all()
+    assert (pixels(explorer)[10:315, 70:500] >= 50).all()
     assert "too &lt;far&gt;" in explorer.notice.value
     assert 'role="alert"' in explorer.notice.value
     assert explorer.picture.alt == "A dot. Nothing to show here: x: too <far>"
@@ -130,7 +130,7 @@ def test_a_click_is_given_in_the_pixels_of_the_figure(explorer):
     seen = []
     explorer._point = lambda x, y: seen.append((x, y)) or {}
     explorer.picture.place = [0.25, 0.1]
-    assert seen == [(0.25 * 560, 0.9 * 420)]
+    assert seen == [(0.25 * 560, 0.9 * 380)]
 
 
 def test_a_click_sets_controls_or_says_why_not(explorer):
@@ -147,7 +147,7 @@ def test_a_click_sets_controls_or_says_why_not(explorer):
 def test_on_finer_screens_the_picture_is_finer_and_shows_the_same(explorer, density, factor):
     explorer.picture.density = density
     height, width = pixels(explorer).shape
-    assert (width, height) == (560 * factor, 420 * factor)
+    assert (width, height) == (560 * factor, 380 * factor)
     assert explorer.picture.width == 560
     explorer.controls["x"].value = 7.0
     columns = np.nonzero(pixels(explorer) < 50)[1]

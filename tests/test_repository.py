@@ -239,4 +239,5 @@ def test_the_wheel_carries_types_and_style(wheel):
     names = ZipFile(wheel).namelist()
     assert "rbcourse/py.typed" in names
     assert "rbcourse/rbcourse.mplstyle" in names
+    assert "rbcourse/lecture_view/index.html.j2" in names
     assert not [name for name in names if name.startswith(("tests", "notebooks"))]

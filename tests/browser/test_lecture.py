@@ -12,7 +12,7 @@ SMALL = """(least) => {
     const text = walker.currentNode, box = text.parentElement;
     const apart = ".lecture-code, mjx-container, script, style, sup, sub";
     if (!text.textContent.trim() || box.closest(apart)) continue;
-    const printed = box.closest("pre, code") ? 20 : least;
+    const printed = box.closest("pre, code, .rbcourse-panel") ? 20 : least;
     if (parseFloat(getComputedStyle(box).fontSize) < printed)
       found.push(getComputedStyle(box).fontSize + " " + text.textContent.trim().slice(0, 40));
   }
@@ -59,7 +59,8 @@ def to_question(page):
 def look_at_question_and_explorer(page, explorer):
     assert re.match(r"Poll \d", to_question(page))
     page.wait_for_timeout(300)
-    box = explorer.locator("img").bounding_box()
-    assert box["y"] >= 0
-    assert box["y"] + box["height"] <= 768
-    assert 18 * box["width"] / 560 >= 18
+    for part in ("img", ".rbcourse-panel"):
+        box = explorer.locator(part).bounding_box()
+        assert 0 <= box["x"] <= box["x"] + box["width"] <= 1024
+        assert 0 <= box["y"] <= box["y"] + box["height"] <= 768
+    assert explorer.locator("img").bounding_box()["width"] == 560  # so that letters have 18 px
