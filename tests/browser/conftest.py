@@ -26,10 +26,11 @@ def pytest_addoption(parser):
 
 
 @pytest.fixture(scope="session")
-def chromium():
-    """The browser; course.py names it."""
+def context():
+    """A browser that keeps what it has loaded, as a person's does; course.py names it."""
     with sync_playwright() as playwright:
-        yield playwright.chromium.launch(executable_path=os.environ["CHROMIUM"], args=QUIET)
+        chromium = playwright.chromium.launch(executable_path=os.environ["CHROMIUM"], args=QUIET)
+        yield chromium.new_context()
 
 
 @pytest.fixture(scope="session")
@@ -60,16 +61,16 @@ def lab(home):
 
 
 @pytest.fixture
-def page(chromium):
+def page(context):
     """A page that must ask nobody outside this machine, and log no error."""
-    context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page, faults = context.new_page(), []
+    page.set_viewport_size({"width": 1280, "height": 800})
     local = ("http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:")
     page.on("request", lambda r: r.url.startswith(local) or faults.append(f"asked {r.url}"))
     page.on("pageerror", lambda error: faults.append(f"error {error}"))
     page.on("console", lambda m: m.type == "error" and faults.append(f"console {m.text}"))
     yield page
-    context.close()
+    page.close()
     assert faults == []
 
 
@@ -80,13 +81,16 @@ def pytest_generate_tests(metafunc):
 
 
 @pytest.fixture
-def picture(page, request):
-    """Keep a picture of the page, where they are wanted."""
+def pictures(page, request):
+    """Keep pictures of the page in two sizes, where they are wanted."""
     folder = request.config.getoption("--screenshots")
 
-    def keep(name):
-        if folder:
-            page.screenshot(path=Path(folder) / f"{name}.png")
+    def keep(name, place):
+        for width, height in ((1280, 800), (1024, 768)) if folder else ():
+            page.set_viewport_size({"width": width, "height": height})
+            place()
+            page.wait_for_timeout(500)
+            page.screenshot(path=Path(folder) / f"{name}_{width}.png")
 
     return keep
 
@@ -97,4 +101,4 @@ def pytest_terminal_summary(terminalreporter):
     if rows:
         head = f"{'explorer':26}{'median':>10}{'longest':>10}{'held':>10}{'last after':>12}"
         terminalreporter.write_line("From key press to changed picture")
-        terminalreporter.write_line("\n".join([head, *sorted(set(rows))]))
+        terminalreporter.write_line("\n".join([head, *rows]))

@@ -97,7 +97,7 @@ def press(page, explorer, handle, key):
     page.evaluate("pictures.length = 0")
     handle.focus()
     page.keyboard.press(key)
-    end = time.monotonic() + 2
+    end = time.monotonic() + 0.7
     while time.monotonic() < end and not page.evaluate("pictures.length"):
         page.wait_for_timeout(10)
     page.wait_for_timeout(60)

@@ -3,7 +3,7 @@
 from pages import SEEN, centre, explorer_in_lab, move_every_slider, open_in_lab, run_all, walk
 
 
-def test_a_lesson_is_whole_before_and_after_it_is_run(lesson, lab, page, picture):
+def test_a_lesson_is_whole_before_and_after_it_is_run(lesson, lab, page, pictures):
     open_in_lab(page, lab(f"workspaces/{lesson}/tree/{lesson}.ipynb"))
     faults = set()
     page.set_viewport_size({"width": 1280, "height": 3000})
@@ -14,10 +14,7 @@ def test_a_lesson_is_whole_before_and_after_it_is_run(lesson, lab, page, picture
     page.set_viewport_size({"width": 1280, "height": 800})
     explorer = explorer_in_lab(page)
     move_every_slider(page, explorer)
-    for width, height in ((1280, 800), (1024, 768)):
-        page.set_viewport_size({"width": width, "height": height})
-        centre(page, explorer)
-        picture(f"lab_{lesson}_{width}")
+    pictures(f"lab_{lesson}", lambda: centre(page, explorer))
 
 
 def test_play_pause_and_reset_work_from_the_keyboard(lab, page):

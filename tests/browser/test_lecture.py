@@ -20,7 +20,7 @@ SMALL = """(least) => {
 }"""
 
 
-def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, picture):
+def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, pictures):
     course, env = home
     words = ["rbcourse.lecture", lesson[:2], "--no-browser"]
     with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
@@ -35,11 +35,8 @@ def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, picture):
         if lesson[:2] != "00":
             look_at_question_and_explorer(page, explorer)
         move_every_slider(page, explorer)
-        for width, height in ((1280, 800), (1024, 768)):
-            page.set_viewport_size({"width": width, "height": height})
-            to_question(page)
-            page.wait_for_timeout(500)
-            picture(f"lecture_{lesson}_{width}")
+        pictures(f"lecture_{lesson}", lambda: to_question(page))
+        page.goto("about:blank")  # before the server ends
 
 
 def to_question(page):
