@@ -98,7 +98,7 @@ def draw_coordinate_paths(ax: Any, data: Table) -> list[Any]:
     start, end = _path(data, "optimum")[:, [0, -1]].T
     ax.text(*start, "   t = 0", va="top")
     ax.text(*end, "t = 1   ", va="bottom", ha="right")
-    ax.set(xlabel="σ₁ (rad)")
+    ax.set_xlabel("σ₁ (rad)", labelpad=8)
     ax.set_ylabel("σ₂ (rad)", labelpad=8)
     ax.zaxis.set_rotate_label(False)
     ax.set_zlabel("σ₃ (rad)", rotation=90)

@@ -1,12 +1,14 @@
 """Explorers of minimum acceleration: the optimum and the projection, solved again at each touch."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from rbcourse._numerics import Array
 from rbcourse.bodies import draw_box, move_box
-from rbcourse.cost import acceleration_cost, acceleration_cost_parts
+from rbcourse.cost import acceleration_cost_parts
+from rbcourse.curves import Curve
 from rbcourse.explorer import Explorer, look, new_figure, new_line, slider
 from rbcourse.figures import COLOURS
 from rbcourse.motions import projected_cubic_se3
@@ -14,6 +16,8 @@ from rbcourse.projected import projected_cubic_so3
 from rbcourse.relaxation import minimum_acceleration_se3, minimum_acceleration_so3
 from rbcourse.se3 import pose_from_coordinates
 from rbcourse.so3 import exp_so3, log_so3
+
+Solved = tuple[dict[str, Curve], dict[str, float]]
 
 _TIMES = np.linspace(0, 1, 61)
 _SIGMA = np.pi / 6 * np.array([1, 2, 3])
@@ -56,11 +60,7 @@ def minimum_acceleration_explorer() -> Explorer:
     }
 
     def show(s: float, extra: float, t: float) -> dict[str, str]:
-        ends = np.eye(3), exp_so3(s * _SIGMA), s * _SIGMA, s * _SIGMA + extra * np.eye(3)[0]
-        curves = {
-            "optimum": minimum_acceleration_so3(*ends),
-            "projection": projected_cubic_so3(*ends),
-        }
+        curves, costs = _solved_rotations(s, extra)
         rotations = {}
         for way, curve in curves.items():
             rotations[way] = curve(_TIMES)
@@ -70,7 +70,6 @@ def minimum_acceleration_explorer() -> Explorer:
             artists[f"{way} now"].set_data([t] * 3, marks)
         for number, height in zip("₁₂₃", s * _SIGMA, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
-        costs = {way: float(acceleration_cost(curve)) for way, curve in curves.items()}
         return {**_compared(costs), "apart": _apart(rotations)}
 
     return Explorer("Minimum acceleration", fig, artists, controls, show, plays="t")
@@ -112,28 +111,36 @@ def cube_explorer() -> Explorer:
     }
 
     def show(turn: float, spin: float, rise: float, t: float) -> dict[str, str]:
-        ends = figure5_ends(turn, spin, rise)
-        curves = {
-            "optimum": minimum_acceleration_se3(*ends),
-            "projection": projected_cubic_se3(*ends),
-        }
+        curves, costs = _solved_poses(turn, spin, rise)
         for way, curve in curves.items():
             artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
             move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
             move_box(artists[way], curve(t), _SIDE)
-        costs = {way: float(acceleration_cost_parts(curve)[0]) for way, curve in curves.items()}
         now = {way: curve(t)[None, :3, :3] for way, curve in curves.items()}
         return {**_compared(costs, "rotation, "), "apart now": _apart(now)}
 
     return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")
 
 
-def figure5_ends(turn: float, spin: float, rise: float) -> tuple[Array, ...]:
-    """Return the end conditions of BK 6.3, with these three changed; the paper's: 1, 1, 3."""
+@lru_cache(maxsize=1)
+def _solved_rotations(s: float, extra: float) -> Solved:
+    """Solve BK (21) with these two changed; while only the time runs it stays solved."""
+    ends = np.eye(3), exp_so3(s * _SIGMA), s * _SIGMA, s * _SIGMA + extra * np.eye(3)[0]
+    return _with_costs(minimum_acceleration_so3(*ends), projected_cubic_so3(*ends))
+
+
+@lru_cache(maxsize=1)
+def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
+    """Solve BK 6.3 with these three changed; while only the time runs it stays solved."""
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
     A0, A1 = np.eye(4), pose_from_coordinates([*sigma, 8, 10, 12])
-    velocities = [1.0, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
-    return A0, A1, *map(np.array, velocities)
+    ends = A0, A1, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
+    return _with_costs(minimum_acceleration_se3(*ends), projected_cubic_se3(*ends))
+
+
+def _with_costs(best: Curve, near: Curve) -> Solved:
+    curves = {"optimum": best, "projection": near}
+    return curves, {way: float(acceleration_cost_parts(c)[0]) for way, c in curves.items()}
 
 
 def _unbroken(sigma: Array) -> Array:

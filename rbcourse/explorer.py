@@ -16,7 +16,6 @@ import traitlets
 from matplotlib.figure import Figure
 
 from rbcourse.animate import painter
-from rbcourse.optimum import ConvergenceError
 
 DPI = 100
 """Pixels per inch of a picture at its own size."""
@@ -90,7 +89,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     show : callable
         ``show(**values)`` moves the artists to what the controls say, one keyword for each, and
         returns what is to be read: names, and what is said of them. It may raise a ValueError or a
-        ConvergenceError, or warn.
+        RuntimeError, or warn.
     plays : str
         Which control the play button moves: a slider.
     seconds : float, optional
@@ -179,7 +178,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             try:
                 said = dict(self._show(**self.values))
                 notice = " ".join(str(warning.message) for warning in warned)
-            except (ValueError, ConvergenceError) as error:
+            except (ValueError, RuntimeError) as error:
                 shown, notice = [], f"Nothing to show here: {error}"
         png = io.BytesIO()
         self._paint(shown).save(png, "png", compress_level=1)

@@ -28,7 +28,7 @@ COLOURS = {
     "optimum": "#000000",
     "projection": "#CC79A7",
     "screw": "#E69F00",
-    "reference": "#808080",
+    "reference": "#585858",
     "path": "#BB0000",
 }
 """The same meaning has the same colour everywhere; all can be told apart when colour-blind."""

@@ -164,7 +164,13 @@ def draw_angles(axes: Sequence[Axes], data: Table) -> list[Any]:
         for angle, (colour, dash) in looks.items():
             degrees = np.degrees(np.asarray(data[f"{name} {angle} [rad]"]))
             lines += ax.plot(data["t [1]"], degrees, color=colour, ls=dash, label=angle)
-        ax.set(xlabel="time t", title=name, xlim=(0, 1), yticks=[-180, -90, 0, 90, 180])
+        ax.set(
+            xlabel="time t",
+            title=name,
+            xlim=(0, 1),
+            xticks=[0, 0.5, 1],
+            yticks=[-180, -90, 0, 90, 180],
+        )
     axes[0].set_ylabel("angle (degrees)")
     axes[0].legend()
     return lines

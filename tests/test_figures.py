@@ -2,6 +2,7 @@
 
 import csv
 import re
+from itertools import combinations
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -50,6 +51,42 @@ def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
         save(tmp_path / folder, monkeypatch)
     for name in ("line.png", "line.pdf", "line.csv"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def seen(colour, matrix):
+    """A colour as CIE Lab, as an eye sees it whose deficiency is a matrix on linear RGB."""
+    channels = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750]]
+    to_xyz += [[0.0193339, 0.1191920, 0.9503041]]
+    share = to_xyz @ np.clip(matrix @ linear, 0, 1) / [0.95047, 1, 1.08883]
+    x, y, z = np.where(share > 216 / 24389, np.cbrt(share), (24389 / 27 * share + 16) / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+def test_colours_can_be_told_apart_by_all_eyes():
+    """The deficiencies in full, by Machado, Oliveira and Fernandes 2009; differences as CIE76."""
+    eyes = {
+        "normal": np.eye(3),
+        "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216]]
+        + [[-0.003882, -0.048116, 1.051998]],
+        "deutan": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413]]
+        + [[-0.011820, 0.042940, 0.968881]],
+        "tritan": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602]]
+        + [[0.004733, 0.691367, 0.303900]],
+    }
+    for matrix in map(np.array, eyes.values()):
+        for one, other in combinations(figures.COLOURS.values(), 2):
+            assert np.linalg.norm(seen(one, matrix) - seen(other, matrix)) > 16.9, (one, other)
+
+
+def test_letters_have_18_pixels_in_the_lecture_view():
+    """There a figure is 992 pixels wide, or as high as the screen lets it: 722, players 662."""
+    for path in FIGURES.glob("*.pdf"):
+        box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", path.read_bytes())
+        width, height = map(float, box.groups())  # in points, as the 12 of the smallest letters
+        most = 662 if path.with_suffix(".gif").exists() else 722
+        assert 12 * min(992, most * width / height) / width >= 18, path.name
 
 
 def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):

@@ -6,12 +6,10 @@ from pages import SEEN, centre, explorer_in_lab, move_every_slider, open_in_lab,
 def test_a_lesson_is_whole_before_and_after_it_is_run(lesson, lab, page, pictures):
     open_in_lab(page, lab(f"workspaces/{lesson}/tree/{lesson}.ipynb"))
     faults = set()
-    page.set_viewport_size({"width": 1280, "height": 3000})
     walk(page, lambda: faults.update(page.evaluate(SEEN)))
     run_all(page)
     walk(page, lambda: faults.update(page.evaluate(SEEN)))
     assert not faults
-    page.set_viewport_size({"width": 1280, "height": 800})
     explorer = explorer_in_lab(page)
     move_every_slider(page, explorer)
     pictures(f"lab_{lesson}", lambda: centre(page, explorer))

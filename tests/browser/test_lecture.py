@@ -28,7 +28,8 @@ def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, pictures):
         page.goto(found[1], timeout=120_000)
         explorer = page.locator(".rbcourse-explorer")
         explorer.wait_for(timeout=60_000)
-        page.wait_for_timeout(1500)
+        page.locator("mjx-container").first.wait_for()
+        page.wait_for_timeout(500)
         assert not page.evaluate(SEEN)
         assert not page.evaluate(SMALL, 24)
         assert page.evaluate("document.documentElement.scrollWidth") <= 1024
