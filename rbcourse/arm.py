@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, as_single
+from rbcourse._numerics import EPS, Array, as_finite, as_single, first_index
 from rbcourse.plans import Plan, interpolate, propagate
 
 LINKS = (2.0, 1.5)
@@ -140,8 +140,8 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
     Notes
     -----
-    Singular set: where the links lie on one line both solutions are the same. Where equal links
-    fold up, the tip is at the base whatever the first angle is; then that is ∓π/2.
+    Singular set: where the links lie on one line both solutions are the same, up to full turns.
+    Where equal links fold up, the tip is at the base whatever the first angle is; one is taken.
 
     References
     ----------
@@ -153,13 +153,14 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     array([[  0.  ,  90.  ],
            [ 73.74, -90.  ]])
     """
-    tip, (a, b) = as_finite("tip", tip, 2), _lengths(lengths, 2)
-    r = np.hypot(tip[..., 0], tip[..., 1])
-    slack = 4 * np.finfo(float).eps * (a + b)  # the rounding of a tip that was computed
+    tip, lengths = as_finite("tip", tip, 2), _lengths(lengths, 2)
+    size = 2.0 ** np.frexp(lengths.max())[1]  # so that no unit of length matters
+    (a, b), r = lengths / size, np.hypot(tip[..., 0], tip[..., 1]) / size
+    slack = 4 * EPS * (a + b)  # the rounding of a tip that was computed
     out = (r > a + b + slack) | (r < abs(a - b) - slack)
     if out.any():
-        reach = f"{abs(a - b):.4g} to {a + b:.4g} m"
-        raise ValueError(f"tip: {reach} from the base wanted, got {r[out].flat[0]:.4g} m")
+        name, reach = first_index("tip", out), f"{abs(a - b) * size:.6g} to {(a + b) * size:.6g} m"
+        raise ValueError(f"{name}: {reach} from the base wanted, got {r[out].flat[0] * size:.6g} m")
     beyond, within = (a + b - r) * (a + b + r), (r - abs(a - b)) * (r + abs(a - b))
     half = np.arctan2(np.sqrt(np.maximum(beyond, 0)), np.sqrt(np.maximum(within, 0)))
     elbow = 2 * np.stack([half, -half], axis=-1)

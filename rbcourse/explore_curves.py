@@ -23,11 +23,12 @@ from rbcourse.line import f, line_singular_value, theta
 from rbcourse.motions import geodesic_se3
 from rbcourse.screws import screw_from_pose, screw_se3
 from rbcourse.se3 import pose_from_components, pose_from_coordinates
-from rbcourse.so3 import exp_so3
+from rbcourse.so3 import exp_so3, log_so3
 
 _TIMES = np.linspace(0, 1, 101)
-_EDGES = np.array([0.20, 0.13, 0.03])
-_MOMENTS = (_EDGES @ _EDGES - _EDGES**2) / 24
+_SIDE = 0.8
+_EDGES = np.array([0.20, 0.13, 0.03])  # of a book of half a kilogram, in m
+_MOMENTS = 0.5 / 12 * (_EDGES @ _EDGES - _EDGES**2)
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
 _SPINS = {"axis 1": 0, "axis 2": 1, "axis 3": 2}
@@ -70,7 +71,7 @@ def theta_explorer() -> Explorer:
         side.legend(loc="upper left", handlelength=1.4)
     controls = {
         "angle": slider("‖ω₀‖ (°)", 30.0, 1.0, 179.0, 1.0),
-        "t": slider("time t (1)", 0.0, 0.0, 1.0, 0.01),
+        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(angle: float, t: float) -> dict[str, str]:
@@ -96,7 +97,7 @@ def theta_explorer() -> Explorer:
             artists[f"{name} now"].set_data([t], [curve(t, a)])
         return {
             "θ(t)": f"{theta(t, a):.3f}",
-            "speed θ′(t)": f"{theta(t, a, 1):.3f}",
+            "its speed": f"{theta(t, a, 1):.3f}",
             "f(t)": f"{f(t, a):.3f}",
             "length of the line": f"{line_singular_value(t, a):.3f}",
         }
@@ -116,17 +117,18 @@ def screw_explorer() -> Explorer:
     """
     with look():
         fig = new_figure()
-        ax = new_space(fig, (-0.1, -0.05, 1.2, 1.2), 2.6)
-        box = draw_box(ax, np.eye(4), 0.6)
-        box.set_alpha(0.3)
+        ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.5)
+        draw_box(ax, np.eye(4), _SIDE).set_alpha(0.3)
         black, orange = {"color": COLOURS["optimum"]}, {"color": COLOURS["screw"]}
         artists: dict[str, Any] = {
-            "axis": new_line(ax, color=COLOURS["reference"], ls=":", lw=3, label="axis"),
+            "axis": new_line(ax, color=COLOURS["reference"], ls="-.", lw=2, label="its axis"),
             "geodesic way": new_line(ax, **black, label="geodesic"),
             "screw way": new_line(ax, **orange, ls="--", label="screw"),
-            "geodesic": draw_box(ax, np.eye(4), 0.6),
-            "screw": draw_box(ax, np.eye(4), 0.6),
+            "goal": draw_box(ax, np.eye(4), _SIDE),
+            "geodesic": draw_box(ax, np.eye(4), _SIDE),
+            "screw": draw_box(ax, np.eye(4), _SIDE),
         }
+        artists["goal"].set_alpha(0.3)
         artists["geodesic"].set_edgecolor(COLOURS["optimum"])
         artists["screw"].set_edgecolor(COLOURS["screw"])
         fig.legend(loc="lower left", ncols=3, handlelength=1.5, columnspacing=1)
@@ -134,25 +136,29 @@ def screw_explorer() -> Explorer:
         "angle": slider("turn (°)", 120.0, -180.0, 180.0, 1.0),
         "tilt": slider("tilt of axis (°)", 0.0, 0.0, 90.0, 1.0),
         "x": slider("goal x (m)", 2.0, -2.0, 2.0, 0.1),
-        "z": slider("goal z (m)", 1.0, -2.0, 2.0, 0.1),
-        "t": slider("time t (1)", 0.0, 0.0, 1.0, 0.01),
+        "z": slider("goal z (m)", 0.8, -1.2, 1.2, 0.1),
+        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(angle: float, tilt: float, x: float, z: float, t: float) -> dict[str, str]:
         axis = np.array([np.sin(np.radians(tilt)), 0, np.cos(np.radians(tilt))])
         goal = pose_from_coordinates([*(np.radians(angle) * axis), x, 0, z])
         ways = {"geodesic": geodesic_se3(np.eye(4), goal), "screw": screw_se3(np.eye(4), goal)}
+        poses = {name: way(t) for name, way in ways.items()}
         for name, way in ways.items():
             artists[f"{name} way"].set_data_3d(*way(t * _TIMES)[:, :3, 3].T)
-            move_box(artists[name], way(t), 0.6)
+            move_box(artists[name], poses[name], _SIDE)
+        move_box(artists["goal"], goal, _SIDE)
         bolt = screw_from_pose(goal)
-        ends = bolt.point + np.outer([-2.6, 2.6], bolt.axis)
-        artists["axis"].set_data_3d(*ends.T)
+        artists["axis"].set_data_3d(*(bolt.point + np.outer([-2.5, 2.5], bolt.axis)).T)
+        far = ", not in sight" if np.linalg.norm(bolt.point) > 3 else ""
+        turned = {n: np.linalg.norm(log_so3(pose[:3, :3])) for n, pose in poses.items()}
+        apart = np.linalg.norm((poses["screw"] - poses["geodesic"])[:3, 3])
         return {
-            "axis through": f"({numbers(bolt.point, 2)}) m",
-            "along": f"({numbers(bolt.axis, 2)})",
-            "pitch": f"{numbers(bolt.pitch, 2)} m/rad" if angle else "∞: nothing turns",
-            "apart": f"{np.linalg.norm((ways['screw'](t) - ways['geodesic'](t))[:3, 3]):.2f} m",
+            **{f"turned, {n}": f"{numbers(np.degrees(a), 1)}°" for n, a in turned.items()},
+            "origins apart": f"{numbers(apart, 2)} m",
+            "its axis through": f"({numbers(bolt.point, 1)}) m{far}" if angle else "none",
+            "slide along it": f"{numbers(bolt.pitch, 2)} m per rad" if angle else "all of the way",
         }
 
     return Explorer("Geodesic and screw", fig, artists, controls, show, plays="t")
@@ -162,7 +168,8 @@ def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
     Its angular momentum is upright and stays. Controls: the ``axis`` that it spins about; how far
-    it is ``off`` that axis, in degrees; the time ``t`` in s, which plays.
+    it is ``off`` that axis, in degrees; the time ``t`` in s, which plays, and starts again when
+    another axis is chosen.
 
     References
     ----------
@@ -170,9 +177,10 @@ def flip_explorer() -> Explorer:
     """
     with look():
         fig = new_figure()
-        ax = new_space(fig, (-0.06, 0.0, 0.58, 1.0), 0.14)
+        ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)
         side = fig.add_axes((0.6, 0.19, 0.37, 0.6))
         side.set(xlim=(0, 8), ylim=(-4.4, 4.4), xlabel="time t (s)", ylabel="ω (rad/s)")
+        side.set_xticks([0, 2, 4, 6, 8])
         artists: dict[str, Any] = {"book": draw_box(ax, np.eye(4), _EDGES)}
         for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True), start=1):
             style = {"color": COLOURS[axis], "ls": dash}
@@ -180,10 +188,16 @@ def flip_explorer() -> Explorer:
             artists[f"number {i}"] = ax.text(0, 0, 0, str(i), ha="center", va="center")
             artists[f"w{i}"] = new_line(side, **style, label=f"ω{'₁₂₃'[i - 1]}")
         artists["now"] = side.axvline(0, color="black", lw=1.5)
-        side.legend(loc="lower center", bbox_to_anchor=(0.45, 1), ncols=3, handlelength=1.2)
+        side.legend(
+            loc="lower center",
+            bbox_to_anchor=(0.4, 1),
+            ncols=3,
+            handlelength=1.8,
+            columnspacing=0.6,
+        )
     controls = {
         "axis": choice("spin about", list(_SPINS)),
-        "off": slider("off by (°)", 4.0, 0.0, _OFF_MOST, _OFF_STEP),
+        "off": slider("off axis by (°)", 4.0, 0.0, _OFF_MOST, _OFF_STEP),
         "t": slider("time t (s)", 0.0, 0.0, 8.0, 0.04),
     }
 
@@ -197,13 +211,14 @@ def flip_explorer() -> Explorer:
             artists[f"number {i + 1}"].set_position_3d((_EDGES[i] / 2 + 0.065) * R[k, :, i])
             artists[f"w{i + 1}"].set_data(_SPIN_TIMES[: k + 1], w[: k + 1, i])
         artists["now"].set_xdata([t, t])
-        energy = 0.5 * (w[k] * _MOMENTS) @ w[k] * 1000
+        times_over = np.count_nonzero(np.diff(w[: k + 1, _SPINS[axis]] > 0))
         return {
             "ω": f"({numbers(w[k], 2)}) rad/s",
-            "energy": f"{energy:.3f} mJ",
-            "turned over": "yes" if w[k, _SPINS[axis]] < 0 else "no",
+            f"of {axis} itself": f"{numbers(w[k, _SPINS[axis]], 2)} rad/s",
+            "turned over": f"{times_over} times" if times_over != 1 else "once",
         }
 
+    controls["axis"].observe(lambda _: controls["t"].set_trait("value", 0.0), "value")
     return Explorer("A book that spins", fig, artists, controls, show, plays="t", seconds=8)
 
 

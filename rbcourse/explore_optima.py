@@ -4,12 +4,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
 from rbcourse.bodies import draw_box, move_box
 from rbcourse.cost import acceleration_cost_parts
 from rbcourse.curves import Curve
-from rbcourse.explorer import Explorer, look, new_figure, new_line, slider
+from rbcourse.explorer import Explorer, look, new_figure, new_line, numbers, slider
 from rbcourse.figures import COLOURS
 from rbcourse.motions import projected_cubic_se3
 from rbcourse.projected import projected_cubic_so3
@@ -28,8 +28,8 @@ _WAYS = {"optimum": "-", "projection": "--"}
 def minimum_acceleration_explorer() -> Explorer:
     """Return an explorer of the paper's example: the optimum and the projection, and their costs.
 
-    From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁. Controls: the
-    displacement ``s``, the ``extra`` k in rad, and the time ``t`` of the marks, which plays.
+    From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
+    `acceleration_cost`. Controls: the ``size`` s, and ``k`` in rad, which plays.
 
     References
     ----------
@@ -37,42 +37,32 @@ def minimum_acceleration_explorer() -> Explorer:
     """
     with look():
         fig = new_figure()
-        ax = fig.add_axes((0.14, 0.15, 0.72, 0.7))
-        ax.set(xlim=(0, 1), ylim=(-np.pi, np.pi), xlabel="time t", ylabel="σ (rad)")
-        ax.set_yticks([-np.pi, 0, np.pi], ["−π", "0", "π"])
+        ax = fig.add_axes((0.13, 0.16, 0.76, 0.71))
+        ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
         artists: dict[str, Any] = {}
         for way, dash in _WAYS.items():
             for axis in "xyz":
                 artists[f"{way} {axis}"] = new_line(ax, color=COLOURS[axis], ls=dash)
-        for way, ms in {"optimum": 11, "projection": 6}.items():
-            style: Any = {"color": "black", "marker": "o", "ms": ms, "mfc": "white"}
-            artists[f"{way} now"] = new_line(ax, ls="", **style)
-        for axis, number in zip("xyz", "₁₂₃", strict=True):
-            style = {"color": COLOURS[axis], "va": "center"}
-            artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
-        for way, dash in _WAYS.items():
             ax.plot([], [], color="0.3", ls=dash, label=way)
+        for axis, number in zip("xyz", "₁₂₃", strict=True):
+            style: Any = {"color": COLOURS[axis], "va": "center"}
+            artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
-        "s": slider("way s (1)", 1.0, 0.05, 1.5, 0.05),
-        "extra": slider("extra ω(1) (rad)", 1.0, -6.0, 6.0, 0.25),
-        "t": slider("time t (1)", 0.0, 0.0, 1.0, 0.01),
+        "size": slider("size s", 1.0, 0.05, 1.5, 0.05),
+        "k": slider("k (rad)", 1.0, -6.0, 6.0, 0.25),
     }
 
-    def show(s: float, extra: float, t: float) -> dict[str, str]:
-        curves, costs = _solved_rotations(s, extra)
-        rotations = {}
+    def show(size: float, k: float) -> dict[str, str]:
+        curves, costs = _solved_rotations(size, k)
         for way, curve in curves.items():
-            rotations[way] = curve(_TIMES)
-            lines, marks = _unbroken(log_so3(rotations[way])), log_so3(curve(t))
-            for axis, line in zip("xyz", lines.T, strict=True):
+            for axis, line in zip("xyz", log_so3(curve(_TIMES)).T, strict=True):
                 artists[f"{way} {axis}"].set_data(_TIMES, line)
-            artists[f"{way} now"].set_data([t] * 3, marks)
-        for number, height in zip("₁₂₃", s * _SIGMA, strict=True):
+        for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
-        return {**_compared(costs), "apart": _apart(rotations)}
+        return {**_compared(costs), "apart at most": _apart(curves, _TIMES)}
 
-    return Explorer("Minimum acceleration", fig, artists, controls, show, plays="t")
+    return Explorer("Minimum acceleration", fig, artists, controls, show, plays="k", seconds=6)
 
 
 def cube_explorer() -> Explorer:
@@ -104,10 +94,10 @@ def cube_explorer() -> Explorer:
             artists[way] = draw_box(ax, np.eye(4), _SIDE)
             fig.text(left + 0.25, 0.94, way, ha="center")
     controls = {
-        "turn": slider("turn (1)", 1.0, 0.0, 1.15, 0.05),
+        "turn": slider("turn", 1.0, 0.0, 1.15, 0.05),
         "spin": slider("ω₃(1) (rad)", 1.0, -6.0, 6.0, 0.25),
         "rise": slider("ḋ₃(1) (m)", 3.0, -20.0, 20.0, 1.0),
-        "t": slider("time t (1)", 0.0, 0.0, 1.0, 0.01),
+        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(turn: float, spin: float, rise: float, t: float) -> dict[str, str]:
@@ -116,20 +106,20 @@ def cube_explorer() -> Explorer:
             artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
             move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
             move_box(artists[way], curve(t), _SIDE)
-        now = {way: curve(t)[None, :3, :3] for way, curve in curves.items()}
-        return {**_compared(costs, "rotation, "), "apart now": _apart(now)}
+        return {**_compared(costs), "apart now": _apart(curves, t)}
 
     return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")
 
 
-@lru_cache(maxsize=1)
-def _solved_rotations(s: float, extra: float) -> Solved:
+@lru_cache(maxsize=64)
+def _solved_rotations(size: float, k: float) -> Solved:
     """Solve BK (21) with these two changed; while only the time runs it stays solved."""
-    ends = np.eye(3), exp_so3(s * _SIGMA), s * _SIGMA, s * _SIGMA + extra * np.eye(3)[0]
+    sigma = size * _SIGMA
+    ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
     return _with_costs(minimum_acceleration_so3(*ends), projected_cubic_so3(*ends))
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=64)
 def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
     """Solve BK 6.3 with these three changed; while only the time runs it stays solved."""
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
@@ -143,23 +133,18 @@ def _with_costs(best: Curve, near: Curve) -> Solved:
     return curves, {way: float(acceleration_cost_parts(c)[0]) for way, c in curves.items()}
 
 
-def _unbroken(sigma: Array) -> Array:
-    """Return σ over time with a gap where it leaves the ball of radius π and comes in opposite."""
-    jumps = np.linalg.norm(np.diff(sigma, axis=0), axis=-1) > np.pi
-    return np.where(np.append(jumps, False)[:, None], np.nan, sigma)
+def _compared(costs: dict[str, float]) -> dict[str, str]:
+    low, high = costs.values()
+    if low > 1e-12:
+        ratio = numbers(high / low, 3)
+    else:
+        ratio = "none: the optimum costs nothing" if high > 1e-12 else "none: both cost nothing"
+    said = {f"cost, {way}": f"{numbers(cost, 3)} rad²" for way, cost in costs.items()}
+    return {**said, "their ratio": ratio}
 
 
-def _compared(costs: dict[str, float], prefix: str = "") -> dict[str, str]:
-    low, high = costs["optimum"], costs["projection"]
-    ratio = f"{high / low:.3f}" if low > 1e-12 else "undefined: both cost nothing"
-    return {
-        f"{prefix}optimum": f"{low:.3f} rad²",
-        f"{prefix}projection": f"{high:.3f} rad²",
-        "ratio": ratio,
-    }
-
-
-def _apart(rotations: dict[str, Array]) -> str:
-    best, near = rotations["optimum"], rotations["projection"]
+def _apart(curves: dict[str, Curve], t: ArrayLike) -> str:
+    """Return by how much two motions are turned against each other, at most, at these times."""
+    best, near = (curve(t)[..., :3, :3] for curve in curves.values())
     angles = np.linalg.norm(log_so3(np.swapaxes(best, -1, -2) @ near), axis=-1)
-    return f"{np.degrees(angles.max()):.1f}°"
+    return f"{numbers(np.degrees(angles.max()), 1)}°"

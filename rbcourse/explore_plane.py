@@ -13,7 +13,7 @@ from rbcourse.postures import arm_table, show_reach
 from rbcourse.routes import draw_body, move_body
 
 _STEPS = 80
-_HALF = 2.0
+_LASTS = 2.0  # each command, in s
 _BODY = 0.9
 _FRAMES = {"world": (COLOURS["z"], "#D6E6F2", "-"), "body": (COLOURS["x"], "none", "--")}
 _START, _GOAL = (-20.0, 110.0), (130.0, -60.0)
@@ -36,36 +36,37 @@ def planar_explorer() -> Explorer:
         ax.set_aspect("equal")
         artists: dict[str, Any] = {}
         for frame, (colour, fill, ls) in _FRAMES.items():
-            (artists[f"{frame} way"],) = ax.plot(
-                [], [], color=colour, ls=ls, label=f"axes of the {frame}"
+            artists[f"{frame} plan"] = new_line(ax, color=colour, ls=ls, lw=1, alpha=0.4)
+            artists[f"{frame} way"] = new_line(
+                ax, color=colour, ls=ls, label=f"axes of the {frame}"
             )
             outline, nose = draw_body(ax, np.zeros(3), _BODY, colour, fill=fill, ls=ls)
             artists |= {f"{frame} outline": outline, f"{frame} nose": nose}
         fig.legend(loc="upper center", ncols=2)
     controls = {
-        f"{name}{i}": slider(f"{symbol}{'₁₂'[i - 1]} ({unit})", first[i - 1], -high, high, step)
-        for i in (1, 2)
+        f"{name}{i + 1}": slider(f"{nth} {symbol} ({unit})", first[i], -high, high, step)
+        for i, nth in enumerate(("1st", "2nd"))
         for name, symbol, unit, first, high, step in (
             ("vx", "vx", "m/s", (1.0, 0.5), 1.0, 0.1),
             ("vy", "vy", "m/s", (0.0, 0.5), 1.0, 0.1),
-            ("omega", "ω", "°/s", (0.0, 0.0), 90.0, 5.0),
+            ("omega", "vθ", "°/s", (0.0, 0.0), 90.0, 5.0),
         )
     }
 
     def show(t: float, **velocities: float) -> dict[str, str]:
         paths = plan_paths(**velocities)
-        now = round(t / (2 * _HALF) * _STEPS)
+        now = round(t / (2 * _LASTS) * _STEPS)
         said = {}
         for frame, path in paths.items():
+            artists[f"{frame} plan"].set_data(*path[:, :2].T)
             artists[f"{frame} way"].set_data(*path[: now + 1, :2].T)
             body = [artists[f"{frame} outline"], artists[f"{frame} nose"]]
             move_body(body, path[now], _BODY)
-            said[frame] = (
-                f"({numbers(path[now, :2], 2)}) m, {numbers(np.degrees(path[now, 2]), 0)}°"
-            )
+            x_y, heading = numbers(path[now, :2], 2), numbers(np.degrees(path[now, 2]), 0)
+            said[f"axes of the {frame}"] = f"({x_y}) m, heading {heading}°"
         return said
 
-    controls["t"] = slider("time t (s)", 0.0, 0.0, 2 * _HALF, 2 * _HALF / _STEPS)
+    controls["t"] = slider("time t (s)", 0.0, 0.0, 2 * _LASTS, 2 * _LASTS / _STEPS)
     return Explorer("A plan of two commands", fig, artists, controls, show, plays="t")
 
 
@@ -74,7 +75,7 @@ def plan_paths(
 ) -> dict[str, Array]:
     """Return the poses that the two commands lead through, by the frame they are meant in."""
     plan = [
-        (np.array([vx, vy, np.radians(omega)]), 2 * _HALF / _STEPS)
+        (np.array([vx, vy, np.radians(omega)]), 2 * _LASTS / _STEPS)
         for vx, vy, omega in ((vx1, vy1, omega1), (vx2, vy2, omega2))
         for _ in range(_STEPS // 2)
     ]
@@ -109,7 +110,7 @@ def arm_explorer() -> Explorer:
     controls = {
         "theta0": slider("shoulder θ₀ (°)", _GOAL[0], -180.0, 180.0, 1.0),
         "theta1": slider("elbow θ₁ (°)", _GOAL[1], -180.0, 180.0, 1.0),
-        "t": slider("time t (1)", 0.0, 0.0, 1.0, 0.01),
+        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(theta0: float, theta1: float, t: float) -> dict[str, str]:

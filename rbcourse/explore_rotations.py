@@ -30,7 +30,7 @@ _BOX = np.array([1.3, 0.8, 0.25])
 _PALE = "#E9CFDE"
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}
 _MOST = 2000
-_EDGES = np.linspace(-1, 1, 21)
+_BINS = np.linspace(-1, 1, 21)
 
 
 def rotation_explorer() -> Explorer:
@@ -56,7 +56,7 @@ def rotation_explorer() -> Explorer:
             for name, axis in looks.items()
         }
         artists["axis"] = new_line(ax, ls=":", color="black", lw=3, label="axis of it all")
-        artists |= _axes_of(ax, "body", "-", 3.5)
+        artists |= _axes_of(ax, "body", ls="-", lw=3.5)
         _legend(fig, [artists[name] for name in (*looks, "axis")])
     controls = {
         "alpha": slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
@@ -79,15 +79,15 @@ def rotation_explorer() -> Explorer:
         artists["axis"].set_data_3d(*np.outer(axis, [-1.25, 1.25]))
         said = {
             "matrix": _lines(R),
-            "quaternion": numbers(quaternion_from_matrix(R), 3),
-            "axis": numbers(axis, 3) if angle > 0 else "any",
-            "angle": f"{np.degrees(angle):.1f}°",
+            "quaternion": numbers(quaternion_from_matrix(R), 2),
+            "axis": numbers(axis, 2) if angle > 0 else "any",
+            "angle": _angle(R),
         }
         if abs(beta) == 90:
-            sum_or_difference = f"γ {'−' if beta > 0 else '+'} α"
-            value = gamma - np.sign(beta) * alpha
+            sign = "−" if beta > 0 else "+"
+            left = (alpha - np.sign(beta) * gamma + 180) % 360 - 180
             said["gimbal lock"] = (
-                f"two axes coincide: only\n{sum_or_difference} = {value:.0f}° counts"
+                f"first and third axis coincide,\nα {sign} γ = {numbers(left, 0)}°"
             )
         return said
 
@@ -107,43 +107,51 @@ def projection_explorer() -> Explorer:
     with look():
         fig = new_figure()
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.5)
-        artists = {
-            **_axes_of(ax, "M", "-", 7, colour="0.75"),
-            **_axes_of(ax, "nearest", "-", 3.5),
-            **_axes_of(ax, "Gram–Schmidt", "--", 2),
+        looks: dict[str, Any] = {
+            "M": {"ls": "-", "lw": 7, "colour": "0.75"},
+            "nearest": {"ls": "-", "lw": 3.5},
+            "Gram–Schmidt": {"ls": "--", "lw": 2},
         }
-        handles = [artists[f"{name} z"] for name in ("M", "nearest", "Gram–Schmidt")]
-        for handle, name in zip(handles, ("M", "nearest", "Gram–Schmidt"), strict=True):
-            handle.set_label(name)
-        _legend(fig, handles)
+        artists: dict[str, Any] = {}
+        for name, style in looks.items():
+            artists |= _axes_of(ax, name, **style)
+            artists[f"{name} z"].set_label(name)
+        _legend(fig, [artists[f"{name} z"] for name in looks])
     controls = {
-        "e12": slider("y leans (1)", 0.8, -1.0, 1.0, 0.05),
-        "e23": slider("z leans (1)", 0.0, -1.0, 1.0, 0.05),
-        "e33": slider("z stretched (1)", 0.0, -2.0, 1.0, 0.05),
-        "pull": slider("pull (1)", 0.0, 0.0, 1.0, 0.01),
+        "e12": slider("y leans", 0.8, -1.0, 1.0, 0.05),
+        "e23": slider("z leans", 0.0, -1.0, 1.0, 0.05),
+        "e33": slider("z stretched", 0.0, -2.0, 1.0, 0.05),
+        "pull": slider("pull", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(e12: float, e23: float, e33: float, pull: float) -> dict[str, str]:
         M = np.eye(3) + pull * np.array([[0, e12, 0], [0, 0, e23], [0, 0, e33]])
-        R, G = project_so(M), orthonormalize_gram_schmidt(M)
+        R, (G, fate) = project_so(M), _gram_schmidt(M)
         for name, matrix in (("M", M), ("nearest", R), ("Gram–Schmidt", G)):
             _move_axes(artists, name, matrix)
         singular = np.linalg.svd(M, compute_uv=False)
         det = float(np.linalg.det(M))
         said = {
-            "determinant": f"{det:.2f}",
+            "determinant": numbers(det, 2),
             "singular values": numbers(singular, 2),
-            "M to nearest": f"{np.linalg.norm(M - R):.3f}",
-            "M to Gram–Schmidt": f"{np.linalg.norm(M - G):.3f}",
-            "angle between": f"{np.degrees(np.linalg.norm(log_so3(R.T @ G))):.1f}°"
-            if det > 0
-            else "none: Gram–Schmidt\ngives a mirror",
+            "M to nearest": numbers(np.linalg.norm(M - R), 3),
+            "M to Gram–Schmidt": fate or numbers(np.linalg.norm(M - G), 3),
+            "angle between": "none" if fate else _angle(R.T @ G),
         }
         if singular[1] + np.sign(det) * singular[2] < 1e-9:
             said["nearest?"] = "several are equally near"
         return said
 
     return Explorer("Two repairs", fig, artists, controls, show, plays="pull")
+
+
+def _gram_schmidt(M: Array) -> tuple[Array, str]:
+    """Return what Gram and Schmidt make of M, and why that is no rotation: "" where it is one."""
+    try:
+        G = orthonormalize_gram_schmidt(M)
+    except ValueError:
+        return np.zeros((3, 3)), "none: M is flat"
+    return G, "" if np.linalg.det(G) > 0 else "a mirror"
 
 
 def random_explorer() -> Explorer:
@@ -168,20 +176,22 @@ def random_explorer() -> Explorer:
         }
         side = fig.add_axes((0.62, 0.19, 0.36, 0.69))
         side.set(
-            xlim=(0, 2),
+            xlim=(0, 3.2),
             ylim=(-1, 1),
             yticks=[-1, -0.5, 0, 0.5, 1],
             title="their heights",
             xlabel="density",
         )
         side.axvline(0.5, color="black", ls="--", lw=1.5)
+        side.text(0.85, 0, "dashed:\nuniform", va="center")
+        fig.text(0.26, 0.02, "pale: the far side", ha="center")
         artists["histogram"] = side.stairs(
-            np.zeros(20), _EDGES, orientation="horizontal", color=COLOURS["projection"], lw=2
+            np.zeros(20), _BINS, orientation="horizontal", color=COLOURS["projection"], lw=2
         )
     controls = {
         "sampler": choice("sampler", list(_SAMPLERS)),
-        "number": slider("number (1)", 100.0, 20.0, _MOST, 20.0),
-        "seed": slider("seed (1)", 0.0, 0.0, 20.0, 1.0),
+        "number": slider("rotations", 100.0, 20.0, _MOST, 20.0),
+        "seed": slider("seed", 0.0, 0.0, 20.0, 1.0),
     }
 
     def show(sampler: str, number: float, seed: float) -> dict[str, str]:
@@ -190,18 +200,20 @@ def random_explorer() -> Explorer:
         behind = points @ EYE < 0
         artists["behind"].set_data_3d(*points[behind].T)
         artists["before"].set_data_3d(*points[~behind].T)
-        counts, _ = np.histogram(np.clip(points[:, 2], -1, 1), _EDGES)
-        artists["histogram"].set_data(counts / (len(R) * np.diff(_EDGES)), _EDGES)
+        counts, _ = np.histogram(np.clip(points[:, 2], -1, 1), _BINS)
+        artists["histogram"].set_data(counts / (len(R) * np.diff(_BINS)), _BINS)
         caps = np.mean(np.abs(points[:, 2]) > 0.5)
-        said = {"|height| > ½": f"{caps:.1%}; if uniform, 50 %"}
+        said = {"|height| > ½": f"{numbers(100 * caps, 1)} % (50 % if uniform)"}
         if len(R) < 100:
             return {**said, "p-values": "from 100 rotations on"}
-        tests = uniformity_tests(R)
-        return said | {
-            f"p, {name}": f"{tests[name].p_value:.1e}" for name in ("image of e₁", "angle")
-        }
+        p = {name: uniformity_tests(R)[name].p_value for name in ("image of e₁", "angle")}
+        return said | {f"p, {name}": _said_p(value) for name, value in p.items()}
 
     return Explorer("Random rotations", fig, artists, controls, show, plays="number", seconds=10)
+
+
+def _said_p(value: float) -> str:
+    return "< 1e-6: not uniform" if value < 1e-6 else f"{value:.2g}"
 
 
 @lru_cache(maxsize=8)
@@ -209,16 +221,20 @@ def _sample(sampler: str, seed: int) -> Array:
     return _SAMPLERS[sampler](_MOST, rng=seed)
 
 
-def _axes_of(ax: Any, name: str, dash: str, lw: float, colour: str | None = None) -> dict[str, Any]:
+def _axes_of(ax: Any, name: str, ls: str, lw: float, colour: str | None = None) -> dict[str, Any]:
     """Draw three axes, to be moved by `_move_axes`; coloured ones have their letters."""
     artists: dict[str, Any] = {}
     for axis in "xyz":
-        style = {"color": colour or COLOURS[axis], "lw": lw, "ls": dash}
+        style = {"color": colour or COLOURS[axis], "lw": lw, "ls": ls}
         artists[f"{name} {axis}"] = new_line(ax, **style)
-        if not colour and dash == "-":
+        if not colour and ls == "-":
             style = {"color": COLOURS[axis], "ha": "center", "va": "center"}
             artists[f"{name} {axis} letter"] = ax.text(0, 0, 0, axis, **style)
     return artists
+
+
+def _angle(R: Array) -> str:
+    return f"{numbers(np.degrees(np.linalg.norm(log_so3(R))), 1)}°"
 
 
 def _move_axes(artists: dict[str, Any], name: str, M: Array) -> None:

@@ -34,10 +34,12 @@ export default {
       image.alt = model.get("alt");
       image.width = model.get("width");
     };
+    let clicks = 0;
     const point = (event) => {
       if (!(event.buttons & 1)) return;
       const { left, top, width, height } = image.getBoundingClientRect();
-      model.set("place", [(event.clientX - left) / width, (event.clientY - top) / height]);
+      const place = [(event.clientX - left) / width, (event.clientY - top) / height];
+      model.set("place", [...place, ++clicks]);  // so that the same place counts again
       model.save_changes();
     };
     if (model.get("clickable")) {
@@ -47,6 +49,18 @@ export default {
       image.addEventListener("pointerdown", point);
       image.addEventListener("pointermove", point);
     }
+    // Buttons and sliders have no names of their own for who cannot see them.
+    const name = () => {
+      const panel = el.closest(".rbcourse-explorer");
+      panel?.querySelectorAll(".widget-slider").forEach((slider) => {
+        const label = slider.querySelector(".widget-label").textContent;
+        slider.querySelector(".noUi-handle")?.setAttribute("aria-label", label);
+      });
+      panel?.querySelectorAll(".widget-play button").forEach((button, i) => {
+        button.title = ["Play or pause", "Stop"][i] ?? "";
+      });
+    };
+    setTimeout(name, 1000);
     model.on("change:png", draw);
     draw();
     el.append(image);
@@ -59,7 +73,11 @@ export default {
 
 
 class Picture(anywidget.AnyWidget):
-    """A PNG in the browser, which tells where it is clicked and how fine the screen is."""
+    """A PNG in the browser, which tells how fine the screen is, and where it is clicked.
+
+    A place is the share of the width from the left, that of the height from the top, and the number
+    of the click.
+    """
 
     _esm = _SCRIPT
     png = traitlets.Bytes().tag(sync=True)
@@ -123,7 +141,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         self.reset = ipywidgets.Button(description="Reset", layout={"width": "5em"})
         buttons = ipywidgets.HBox([self.play, self.reset])
         panel = ipywidgets.VBox(
-            [*self.controls.values(), buttons, self.said, self.notice],
+            [buttons, *self.controls.values(), self.said, self.notice],
             layout={"flex": "1 1 19em", "min_width": "0"},
         )
         panel.add_class("rbcourse-panel")
@@ -143,7 +161,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return {name: control.value for name, control in self.controls.items()}
 
     def put(self, **values: Any) -> None:
-        """Set some of the controls, and draw once.
+        """Set some of the controls, in their order, and draw once.
 
         Parameters
         ----------
@@ -152,11 +170,11 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         """
         self._resting = True
         try:
-            for name, value in values.items():
-                self.controls[name].value = value
+            for name in [name for name in self.controls if name in values]:
+                self.controls[name].value = values[name]
         finally:
             self._resting = False
-        self._follow()
+            self._follow()
 
     def restart(self) -> None:
         """Set all controls to what they were at first; stop playing."""
@@ -192,7 +210,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         self.notice.value = f'<b role="alert">{html.escape(notice)}</b>' if notice else ""
 
     def _pointed(self, change: Any) -> None:
-        right, down = change.new
+        right, down, _ = change.new
         x, y = self._fig.bbox.width * right, self._fig.bbox.height * (1 - down)
         assert self._point is not None
         try:
@@ -209,7 +227,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         source = base64.b64encode(self.picture.png).decode()
         still = (
             f'<figure><img style="max-width: 100%" alt="{html.escape(repr(self))}" '
-            f'src="data:image/png;base64,{source}"/><figcaption>{self.name}: '
+            f'src="data:image/png;base64,{source}"/><figcaption>{html.escape(self.name)}: '
             "run this cell (Shift + Enter) to get its sliders</figcaption></figure>"
         )
         return {"text/html": still, **super()._repr_mimebundle_(**kwargs)}
@@ -251,7 +269,7 @@ def new_line(ax: Any, **style: Any) -> Any:
 
 
 def slider(label: str, value: float, low: float, high: float, step: float) -> Any:
-    """Return a slider; its label ends with the unit."""
+    """Return a slider; its label ends with the unit, where there is one."""
     digits = len(f"{step:g}".partition(".")[2])
     return ipywidgets.FloatSlider(
         value,
@@ -293,14 +311,19 @@ def _table(said: Mapping[str, str]) -> str:
 
 def _play(control: Any, seconds: float) -> Any:
     steps = round((control.max - control.min) / control.step)
-    play = ipywidgets.Play(min=0, max=steps, interval=round(1000 * seconds / steps))
+    play = ipywidgets.Play(min=0, max=steps, interval=max(40, round(1000 * seconds / steps)))
     play.show_repeat = False
 
-    def place(value: float) -> int:
-        return round((value - control.min) / control.step)
+    def follow(_: Any) -> None:
+        play.value = round((control.value - control.min) / control.step)
 
-    def value(step: int) -> float:
-        return float(control.min + step * control.step)
+    def lead(change: Any) -> None:
+        if play.playing or change.new == play.min:
+            control.value = float(control.min + change.new * control.step)
+        else:  # said before the browser heard that it was stopped
+            follow(change)
 
-    traitlets.link((control, "value"), (play, "value"), transform=(place, value))
+    follow(None)
+    control.observe(follow, "value")
+    play.observe(lead, "value")
     return play

@@ -62,6 +62,7 @@ def mark_sections(notebook: NotebookNode) -> None:
     """Note in the cells' metadata where a folded section opens, and how many close.
 
     A section that is stored collapsed reaches to the next heading of its level or a higher one.
+    The run sheet is folded too: it has the answers, and is not for the class.
 
     Parameters
     ----------
@@ -75,7 +76,8 @@ def mark_sections(notebook: NotebookNode) -> None:
         while levels and 0 < level <= levels[-1]:
             levels.pop()
             cells[-1].metadata.lecture.closes += 1
-        folded = level and cell.metadata.get("jp-MarkdownHeadingCollapsed", False)
+        collapsed = cell.metadata.get("jp-MarkdownHeadingCollapsed", False)
+        folded = level and (collapsed or cell.source.startswith("## Run sheet"))
         parts = _heading_and_rest(cell) if folded else [cell]
         for part in parts:
             part.metadata.lecture = NotebookNode(opens=False, closes=0)

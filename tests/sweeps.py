@@ -1,5 +1,7 @@
 """Every slider of an explorer over its whole range, and pairs of extremes."""
 
+import html
+import re
 from itertools import combinations
 
 import numpy as np
@@ -55,3 +57,15 @@ def _range(control):
 
 def _ends(control):
     return [_range(control)[0], _range(control)[-1]]
+
+
+def read_off(explorer):
+    """What is to be read, by name, with plain minus signs and spaces."""
+    text = explorer.said.value.replace("−", "-").replace("\u2007", " ")
+    rows = re.findall(r"<tr[^>]*><td[^>]*>(.*?)</td><td[^>]*>(.*?)</td></tr>", text, re.S)
+    return {html.unescape(name): html.unescape(value) for name, value in rows}
+
+
+def numbers_in(text):
+    """The numbers of a text."""
+    return np.array(re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text), dtype=float)

@@ -151,3 +151,56 @@ def test_bad_input_is_named():
         rb.propagate_joints(1, [])
     with pytest.raises(ValueError, match=r"^plan\[1\] duration is -1\.0"):
         rb.propagate_joints([0, 0], [([1, 0], 1), ([1, 0], -1)])
+
+
+PAIRS = [(2.0, 1.5), (1.5, 2.0), (1.0, 1.0), (1e-3, 4.0), (1e-200, 2e-200), (3e200, 1e200)]
+
+
+@pytest.mark.source("RR 4")
+@pytest.mark.parametrize("lengths", PAIRS)
+def test_both_solutions_bring_the_tip_there(lengths):
+    q = np.random.default_rng(3).uniform(-np.pi, np.pi, size=(4, 250, 2))
+    q[0, :3, 1] = [0, np.pi, -np.pi]  # stretched and folded, as they come out of rounding
+    tip = rb.arm_forward_kinematics(q, lengths).joints[..., -1, :]
+    found = rb.arm_inverse_kinematics(tip, lengths)
+    assert found.shape == (4, 250, 2, 2)
+    reached = rb.arm_forward_kinematics(found, lengths).joints[..., -1, :]
+    assert np.abs(reached - tip[..., None, :]).max() < 16 * EPS * sum(lengths)
+    assert (np.abs(found) <= np.pi).all()
+    assert (found[..., 0, 1] >= 0).all()
+    assert np.array_equal(found[..., 1, 1], -found[..., 0, 1])
+
+
+def test_one_of_the_solutions_is_the_one_it_came_from():
+    q = np.random.default_rng(4).uniform(0.1, 3.0, size=(100, 2))
+    for sign, k in ((1, 0), (-1, 1)):
+        tip = rb.arm_forward_kinematics(sign * q).joints[:, -1]
+        assert np.abs(rb.arm_inverse_kinematics(tip)[:, k] - sign * q).max() < 1e-13
+
+
+def test_at_the_base_equal_links_fold_up():
+    for found in rb.arm_inverse_kinematics([0, 0], [1, 1]):
+        assert np.abs(rb.arm_forward_kinematics(found, [1, 1]).joints[-1]).max() < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("tip", "message"),
+    [
+        ([3.6, 0], "tip: 0.5 to 3.5 m from the base wanted, got 3.6 m"),
+        ([0, 0.4], "tip: 0.5 to 3.5 m from the base wanted, got 0.4 m"),
+        ([0, 3.5 + 1e-9], "tip: 0.5 to 3.5 m"),
+        ([0, 0.5 - 1e-9], "tip: 0.5 to 3.5 m"),
+        ([[1, 1], [0, 4], [0, 5]], r"tip\[1\]: 0.5 to 3.5 m from the base wanted, got 4 m"),
+        ([1, np.nan], r"tip\[1\] is nan"),
+        ([1, 2, 3], "tip: shape"),
+    ],
+)
+def test_places_out_of_reach_are_named(tip, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        rb.arm_inverse_kinematics(tip)
+
+
+def test_an_arm_of_two_links_is_wanted():
+    for lengths in ([1, 1, 1], [1], [1, 0], [1, -1]):
+        with pytest.raises(ValueError, match="lengths"):
+            rb.arm_inverse_kinematics([1, 0], lengths)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sweeps import corners, points, sweep
+from sweeps import corners, numbers_in, points, read_off, sweep
 
 import rbcourse as rb
 from rbcourse.widgets import cube_explorer, minimum_acceleration_explorer
@@ -32,39 +32,49 @@ def solved(optimum, projection, ends):
     return KNOWN[key]
 
 
+def check_costs(explorer, low, high):
+    said = read_off(explorer)
+    costs = [numbers_in(said[f"cost, {name}"])[0] for name in ("optimum", "projection")]
+    assert costs == pytest.approx([low, high], abs=5.1e-4)
+    if low > 1e-12:
+        assert float(said["their ratio"]) == pytest.approx(high / low, abs=5.1e-4)
+    else:
+        assert said["their ratio"] == "none: the optimum costs nothing"
+
+
+def apart(curves, t):
+    """By how many degrees two motions are turned against each other."""
+    best, near = (curve(t) for curve in curves.values())
+    return np.degrees(np.linalg.norm(rb.log_so3(np.swapaxes(best, -1, -2) @ near), axis=-1))
+
+
 @pytest.mark.source("BK (19)", "BK (21)", "BK Fig. 4")
-def test_both_curves_their_marks_and_their_costs(rotations):
-    for v in sweep(rotations, extra=3.0, t=0.7):
-        sigma = v["s"] * SIGMA
-        ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + v["extra"] * np.eye(3)[0]
-        curves, (low, high) = solved(rb.minimum_acceleration_so3, rb.projected_cubic_so3, ends)
+def test_both_curves_and_their_costs(rotations):
+    for v in sweep(rotations, k=3.0):
+        sigma = v["size"] * SIGMA
+        ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + v["k"] * np.eye(3)[0]
+        curves, costs = solved(rb.minimum_acceleration_so3, rb.projected_cubic_so3, ends)
+        check_costs(rotations, *costs)
         for name, curve in curves.items():
-            drawn = np.stack(
-                [points(rotations.artists[f"{name} {axis}"])[:, 1] for axis in "xyz"], axis=-1
-            )
-            there = np.isfinite(drawn).all(axis=1)
-            assert there.mean() > 0.9
-            assert np.abs(drawn - rb.log_so3(curve(TIMES)))[there].max() < 1e-12
-            now = points(rotations.artists[f"{name} now"])
-            assert (now[:, 0] == v["t"]).all()
-            assert np.abs(now[:, 1] - rb.log_so3(curve(v["t"]))).max() < 1e-12
-        for cost in (low, high):
-            assert f">{cost:.3f} rad²<" in rotations.said.value
-        assert (f">{high / low:.3f}<" in rotations.said.value) == (low > 1e-12)
+            lines = [points(rotations.artists[f"{name} {axis}"]) for axis in "xyz"]
+            drawn = np.stack([line[:, 1] for line in lines], axis=-1)
+            assert np.abs(drawn - rb.log_so3(curve(TIMES))).max() < 1e-12
+            assert np.abs(np.diff(drawn, axis=0)).max() < 0.5  # never round the ball of radius π
+            low, high = rotations.artists["σ₁"].axes.get_ylim()
+            assert low < drawn.min()
+            assert drawn.max() < high
+        heights = [rotations.artists[f"σ{number}"].get_position()[1] for number in "₁₂₃"]
+        assert np.abs(heights - sigma).max() < 1e-15
+        most = float(read_off(rotations)["apart at most"].rstrip("°"))
+        assert most == pytest.approx(apart(curves, TIMES).max(), abs=0.051)
 
 
 def test_the_costs_of_the_paper(rotations):
-    rotations.put(s=1.0, extra=5.0)
-    assert "1.174" in rotations.said.value  # 17 % more, in case (c)
-    rotations.put(extra=0.0)
-    assert "undefined: both cost nothing" in rotations.said.value
-
-
-def test_a_curve_that_leaves_the_ball_has_a_gap_there(rotations):
-    from rbcourse.explore_optima import _unbroken
-
-    sigma = np.array([[0, 0, 3.0], [0, 0, 3.1], [0, 0, -3.1], [0, 0, -3.0]])
-    assert np.isnan(_unbroken(sigma)).all(axis=1).tolist() == [False, True, False, False]
+    rotations.put(size=1.0, k=5.0)
+    assert read_off(rotations)["their ratio"] == "1.174"  # 17 % more, in case (c)
+    rotations.put(k=0.0)
+    assert read_off(rotations)["cost, projection"] == "0.222 rad²"  # case (a), lesson 9
+    assert read_off(rotations)["their ratio"] == "none: the optimum costs nothing"
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
@@ -82,14 +92,17 @@ def test_both_cubes_their_ways_and_their_costs(cubes):
                 assert np.abs(out - 1.25 * pose[:3, :3].T).max() < 1e-11
             way = points(cubes.artists[f"{name} way"])
             assert np.abs(way - curve(TIMES)[:, :3, 3]).max() < 1e-11
-        for cost in costs:
-            assert f">{cost:.3f} rad²<" in cubes.said.value
+        check_costs(cubes, *costs)
+        now = float(read_off(cubes)["apart now"].rstrip("°"))
+        best, near = (curve(v["t"])[:3, :3] for curve in curves.values())
+        angle = np.degrees(np.linalg.norm(rb.log_so3(best.T @ near)))
+        assert now == pytest.approx(angle, abs=0.051)
 
 
 def test_at_first_it_is_the_figure_of_the_paper(cubes):
     cubes.restart()
     assert cubes.values == {"turn": 1.0, "spin": 1.0, "rise": 3.0, "t": 0.0}
-    assert ">1.773<" in cubes.said.value  # 77 % more: lesson 9
+    assert read_off(cubes)["their ratio"] == "1.773"  # 77 % more: lesson 9
 
 
 def test_no_cube_leaves_its_picture(cubes):

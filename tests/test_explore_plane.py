@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from sweeps import points, sweep
+from sweeps import numbers_in, points, read_off, sweep
 
 import rbcourse as rb
 from rbcourse.widgets import arm_explorer, planar_explorer
 
 START = np.radians([-20, 110])
+CLICKS = []
 
 
 @pytest.fixture(scope="module")
@@ -33,12 +34,17 @@ def test_both_bodies_are_where_the_plan_leads_them(plan):
             end = rb.propagate_planar([0, 0, 0], commands(v), frame=frame)[-1]
             way = points(plan.artists[f"{frame} way"])
             assert len(way) == round(v["t"] * 20) + 1
+            whole = rb.propagate_planar([0, 0, 0], commands(v | {"t": 4.0}), frame=frame)[-1]
+            assert np.abs(points(plan.artists[f"{frame} plan"])[-1] - whole[:2]).max() < 1e-12
             assert np.abs(way[-1] - end[:2]).max() < 1e-12
             corners = plan.artists[f"{frame} outline"].get_xy()[:4]
             assert np.abs(corners.mean(axis=0) - end[:2]).max() < 1e-12
             ahead = corners[1] - corners[0]
             heading = np.array([np.cos(end[2]), np.sin(end[2])])
             assert np.abs(ahead - 0.9 * heading).max() < 1e-12
+            said = numbers_in(read_off(plan)[f"axes of the {frame}"])
+            assert np.abs(said - [*end[:2], np.degrees(end[2])]).max() <= 0.501
+            assert np.abs(said[:2] - end[:2]).max() < 0.0051
 
 
 def test_the_way_of_the_body_is_the_one_of_all_times_before(plan):
@@ -75,7 +81,6 @@ def test_before_it_is_touched_both_frames_agree(plan):
     plan.put(t=4.0)
     ways = [points(plan.artists[f"{frame} way"]) for frame in ("world", "body")]
     assert np.abs(ways[0] - ways[1]).max() < 1e-15
-    assert "1.00" in plan.said.value  # what the readout says is in metres and degrees
 
 
 @pytest.mark.source("RR (20)", "RR (21)")
@@ -88,6 +93,9 @@ def test_the_arm_and_the_way_of_its_hand(arm):
         assert np.abs(points(arm.artists["goal"])[0] - hand(goal)).max() < 1e-14
         way = points(arm.artists["way"])
         assert np.abs(way[[0, -1]] - [hand(START), joints[-1]]).max() < 1e-14
+        said = read_off(arm)
+        assert np.abs(numbers_in(said["angles"]) - np.degrees(q)).max() < 0.051
+        assert np.abs(numbers_in(said["hand"]) - joints[-1]).max() < 0.0051
         middle = (START + q) / 2
         assert np.abs(way[len(way) // 2] - hand(middle)).max() < 1e-14
 
@@ -116,7 +124,8 @@ def test_who_sets_a_goal_sees_the_arm_there(arm):
 def click(arm, place):
     x, y = arm.artists["links"].axes.transData.transform(place)
     box = arm._fig.bbox
-    arm.picture.place = [x / box.width, 1 - y / box.height]
+    arm.picture.place = [x / box.width, 1 - y / box.height, len(CLICKS) + 1]
+    CLICKS.append(place)
 
 
 @pytest.mark.parametrize("place", [(1, 2), (-2.5, -1), (0.6, -0.1), (3.4, 0)])

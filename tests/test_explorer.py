@@ -8,6 +8,7 @@ import ipywidgets
 import numpy as np
 import pytest
 from PIL import Image
+from traitlets import TraitError
 
 from rbcourse.explorer import LABELS, Explorer, choice, look, new_figure, new_line, slider
 
@@ -96,11 +97,28 @@ def test_reset_brings_everything_back_and_stops(explorer):
 
 def test_play_and_slider_move_together(explorer):
     assert (explorer.play.min, explorer.play.value, explorer.play.max) == (0, 4, 20)
+    assert explorer.play.interval == 4000 / 20
+    explorer.play.playing = True
     explorer.play.value = 9
     assert explorer.controls["x"].value == 4.5
     assert "4.5" in explorer.said.value
+    explorer.play.playing = False
     explorer.controls["x"].value = 10.0
     assert explorer.play.value == 20
+
+
+def test_what_the_player_says_too_late_is_not_followed(explorer):
+    explorer.play.playing = True
+    explorer.play.value = 9
+    explorer.reset.click()
+    explorer.play.value = 10  # sent before the browser heard of the reset
+    assert explorer.values == {"x": 2.0, "kind": "low"}
+    assert explorer.play.value == 4
+
+
+def test_stop_goes_to_the_start_of_the_range(explorer):
+    explorer.play.value = 0
+    assert explorer.controls["x"].value == 0
 
 
 def test_what_cannot_be_served_is_said_and_nothing_that_moves_is_drawn(explorer):
@@ -129,16 +147,37 @@ def test_other_errors_are_not_hidden(explorer):
 def test_a_click_is_given_in_the_pixels_of_the_figure(explorer):
     seen = []
     explorer._point = lambda x, y: seen.append((x, y)) or {}
-    explorer.picture.place = [0.25, 0.1]
+    explorer.picture.place = [0.25, 0.1, 1]
     assert seen == [(0.25 * 560, 0.9 * 380)]
 
 
 def test_a_click_sets_controls_or_says_why_not(explorer):
-    explorer.picture.place = [0.5, 0.5]
+    explorer.picture.place = [0.5, 0.5, 1]
     assert explorer.values == {"x": 4.0, "kind": "high"}
-    explorer.picture.place = [0.05, 0.5]
+    explorer.picture.place = [0.05, 0.5, 2]
     assert "click more to the right" in explorer.notice.value
+    assert 'role="alert"' in explorer.notice.value
     assert explorer.values == {"x": 4.0, "kind": "high"}
+    explorer.restart()
+    assert explorer.notice.value == ""
+    explorer.picture.place = [0.05, 0.5, 3]  # the same place again
+    assert "click more to the right" in explorer.notice.value
+
+
+def test_only_what_can_be_clicked_shows_it(explorer):
+    from rbcourse.widgets import arm_explorer, theta_explorer
+
+    assert explorer.picture.clickable
+    assert [make().picture.clickable for make in (arm_explorer, theta_explorer)] == [True, False]
+
+
+def test_a_wrong_setting_leaves_a_true_picture(explorer):
+    with pytest.raises(TraitError, match="Invalid selection"):
+        explorer.put(kind="nope", x=5.0)
+    assert explorer.values == {"x": 5.0, "kind": "low"}
+    assert "5.0\nlow" in explorer.said.value
+    explorer.controls["x"].value = 6.0
+    assert "6.0\nlow" in explorer.said.value
 
 
 @pytest.mark.parametrize(

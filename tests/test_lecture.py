@@ -83,6 +83,8 @@ def test_a_folded_section_reaches_to_the_next_heading_of_its_level_or_a_higher_o
     assert sections(answer("## a"), answer("### b"), text) == "{## a {### b text}}"
     assert sections(answer("### a\n\nmore"), text) == "{### a \nmore text}"
     assert sections(new_markdown_cell("### a"), text) == "### a text"
+    sheet = new_markdown_cell("## Run sheet for the lecturer\n\nanswers")
+    assert sections(text, sheet) == "text {## Run sheet for the lecturer \nanswers}"
 
 
 def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):

@@ -1,10 +1,15 @@
 """What a rehearsal finds, as the command line starts it."""
 
+import http.server
 import subprocess
 import sys
+import threading
 
+import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from tiny import MODULE, lesson_at
+
+from rbcourse import rehearsal
 
 
 def checked(folder, monkeypatch):
@@ -35,9 +40,57 @@ def test_cells_that_fail_and_pictures_from_outside_are_named(tmp_path, monkeypat
     )
     done = checked(tmp_path, monkeypatch)
     assert done.returncode == 1
-    missing = [line for line in done.stdout.splitlines() if line.startswith("missing: ")]
+    missing = [line for line in done.stdout.splitlines() if line.startswith("not ready: ")]
     assert len(missing) == 3
     assert "ZeroDivisionError: division by zero" in missing[0]
     assert "https://example.org/a.png" in missing[1]
     assert "//example.org/b.png" in missing[2]
-    assert "ready" not in done.stdout
+    assert "ready" not in done.stdout.splitlines()
+
+
+def outside(page):
+    """The addresses that are found in a page."""
+    found = rehearsal._Page()
+    found.feed(page)
+    return found.outside
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        '<img src="https://example.org/a.png">',
+        '<img srcset="a.png 1x, //example.org/b.png 2x">',
+        '<video poster="http://example.org/c.png">',
+        '<object data="https://example.org/d.svg">',
+        '<link href="https://example.org/e.css">',
+        '<p style="background: url(https://example.org/f.png)">',
+        '<style>@import "https://example.org/g.css"</style>',
+        '<script>fetch("https://example.org/h.js")</script>',
+    ],
+)
+def test_every_way_to_ask_outside_is_seen(page):
+    assert len(outside(page)) == 1
+
+
+def test_links_to_be_clicked_and_pictures_of_the_page_itself_are_none():
+    assert (
+        outside('<a href="https://example.org">more</a><img src="data:image/png;base64,AA">') == []
+    )
+
+
+def test_a_server_that_lets_everybody_in_is_named(capsys):
+    class Open(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200)
+            self.end_headers()
+
+        def log_message(self, *words):
+            pass
+
+    with http.server.HTTPServer(("127.0.0.1", 0), Open) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        found = rehearsal._look_for_token(f"127.0.0.1:{server.server_port}", "1")
+        server.shutdown()
+    assert len(found) == 3
+    assert all("is open to everybody" in what for what in found)
+    assert "without the token: no" in capsys.readouterr().out

@@ -12,25 +12,36 @@ if (error) {
   }
 }
 
-// PageDown and PageUp, which presenters' remote controls send, go from heading to heading.
+// PageDown and PageUp, which presenters' remote controls send, go from heading to heading, and
+// through what is longer than a screen.
 const turnPage = (forward) => {
-  const headings = [...document.querySelectorAll("#rendered_cells :is(h1, h2, h3, h4)")].filter(
-    (heading) => heading.checkVisibility(),
+  const screen = window.innerHeight;
+  const distance = (heading) => heading.getBoundingClientRect().top - screen / 100;
+  const stops = [...document.querySelectorAll("#rendered_cells :is(h1, h2, h3, h4)")].filter(
+    (heading, i, all) =>
+      heading.checkVisibility() &&
+      // a poll that follows the title of its section at once is on the screen with it
+      !(all[i - 1]?.matches("h2") && heading.matches("h3:not(summary *)") &&
+        distance(heading) - distance(all[i - 1]) < screen / 7),
   );
-  const distance = (heading) => heading.getBoundingClientRect().top - window.innerHeight / 50;
   const next = forward
-    ? headings.find((heading) => distance(heading) > 2)
-    : headings.findLast((heading) => distance(heading) < -2);
-  if (!next) return;
+    ? stops.find((heading) => distance(heading) > 2)
+    : stops.findLast((heading) => distance(heading) < -2);
+  if (!next || Math.abs(distance(next)) > 0.95 * screen) {
+    window.scrollBy(0, (forward ? 0.85 : -0.85) * screen);
+    return;
+  }
   next.scrollIntoView();
-  // Enter now opens an answer.
-  next.closest("summary")?.focus({ preventScroll: true });
+  // Enter now opens an answer, and Tab goes on from here.
+  const focused = next.closest("summary") ?? next;
+  if (focused === next) next.tabIndex = -1;
+  focused.focus({ preventScroll: true });
 };
 
 document.addEventListener("keydown", (event) => {
   const key = event.key;
   if (key !== "PageDown" && key !== "PageUp") return;
-  if (event.target.closest("input, textarea, select, [contenteditable], .noUi-handle")) return;
+  if (event.target.closest("input:not([type=range]), textarea, select")) return;
   event.preventDefault();
   event.stopPropagation();
   turnPage(key === "PageDown");

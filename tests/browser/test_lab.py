@@ -30,9 +30,17 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(lab, page):
     assert 0.1 < float(paused) < 0.9
     page.wait_for_timeout(500)
     assert time.inner_text() == paused
-    explorer.get_by_role("button", name="Reset").press("Enter")
+    reset = explorer.get_by_role("button", name="Reset")
+    reset.press("Enter")
     page.wait_for_timeout(500)
     assert time.inner_text() == "0.00"
+    play.press("Enter")
+    page.wait_for_timeout(700)
+    reset.press("Enter")  # while it plays
+    page.wait_for_timeout(1000)
+    assert time.inner_text() == "0.00"
+    assert explorer.locator(".noUi-handle").last.get_attribute("aria-label") == "time t"
+    assert play.get_attribute("title") == "Play or pause"
 
     image = explorer.locator("img")
     box = image.bounding_box()

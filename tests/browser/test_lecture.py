@@ -1,6 +1,7 @@
 """Every lesson in the lecture view: large letters, question and explorer on one screen."""
 
 import re
+from itertools import pairwise
 
 from pages import SEEN, move_every_slider
 from servers import serving
@@ -38,6 +39,41 @@ def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, pictures):
         move_every_slider(page, explorer)
         pictures(f"lecture_{lesson}", lambda: to_question(page))
         page.goto("about:blank")  # before the server ends
+
+
+def test_the_keys_of_a_remote_control_turn_the_pages(home, page):
+    course, env = home
+    words = ["rbcourse.lecture", "02", "--no-browser"]
+    with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
+        page.set_viewport_size({"width": 1024, "height": 768})
+        page.goto(found[1], timeout=120_000)
+        page.locator(".rbcourse-explorer").wait_for(timeout=60_000)
+        page.wait_for_timeout(1000)
+        places = [page.evaluate("scrollY")]
+        while len(places) < 60:
+            if len(places) == 4:
+                handle = page.locator(".noUi-handle").first  # as after the mouse was there
+                handle.evaluate("(handle) => handle.focus({ preventScroll: true })")
+            page.keyboard.press("PageDown")
+            page.wait_for_timeout(30)
+            places.append(page.evaluate("scrollY"))
+            if places[-1] == places[-2]:
+                break
+        steps = [after - before for before, after in pairwise(places)]
+        assert len(places) > 20
+        assert max(steps) <= 768  # nothing is passed over
+        assert all(step > 0 for step in steps[:-1])
+        for _ in range(60):
+            page.keyboard.press("PageUp")
+            page.wait_for_timeout(30)
+        assert page.evaluate("scrollY") == 0
+        answer = page.locator(".lecture-answer").first
+        page.evaluate("(answer) => answer.scrollIntoView()", answer.element_handle())
+        page.keyboard.press("PageUp")
+        page.keyboard.press("PageDown")
+        page.keyboard.press("Enter")
+        assert answer.evaluate("(answer) => answer.open")
+        page.goto("about:blank")
 
 
 def to_question(page):

@@ -10,6 +10,7 @@ from rbcourse import widgets
 from rbcourse.lessons import KERNEL
 
 HELD = 3.0
+SOLVES = {"cube_explorer": 2}  # the slider that is held where the last one only moves the time
 
 
 def test_the_pictures_follow_the_keys(home, lab, page, record_property):
@@ -30,7 +31,7 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
         centre(page, explorer)
         handles = explorer.locator(".noUi-handle").all()
         waits = [wait for handle in handles for wait in follow(page, handle)]
-        shown, late = hold(page, handles[-1])
+        shown, late = hold(page, handles[SOLVES.get(name, -1)])
         row = f"{name.removesuffix('_explorer'):22}{kind(name):4}{statistics.median(waits):7.0f} ms"
         row += f"{max(waits):7.0f} ms{shown / HELD:8.0f}/s{late:9.0f} ms"
         record_property("speed", row)
