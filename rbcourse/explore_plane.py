@@ -44,12 +44,12 @@ def planar_explorer() -> Explorer:
             artists |= {f"{frame} outline": outline, f"{frame} nose": nose}
         fig.legend(loc="upper center", ncols=2)
     controls = {
-        f"{name}{i + 1}": slider(f"{nth} {symbol} ({unit})", first[i], -high, high, step)
+        f"{name}{i + 1}": slider(f"{nth} {symbol} ({unit})", first, -high, high, step)
         for i, nth in enumerate(("1st", "2nd"))
         for name, symbol, unit, first, high, step in (
-            ("vx", "vx", "m/s", (1.0, 0.5), 1.0, 0.1),
-            ("vy", "vy", "m/s", (0.0, 0.5), 1.0, 0.1),
-            ("omega", "vθ", "°/s", (0.0, 0.0), 90.0, 5.0),
+            ("vx", "vx", "m/s", 1.0, 1.0, 0.1),
+            ("vy", "vy", "m/s", 0.0, 1.0, 0.1),
+            ("omega", "vθ", "°/s", 0.0, 90.0, 5.0),
         )
     }
 
@@ -63,7 +63,7 @@ def planar_explorer() -> Explorer:
             body = [artists[f"{frame} outline"], artists[f"{frame} nose"]]
             move_body(body, path[now], _BODY)
             x_y, heading = numbers(path[now, :2], 2), numbers(np.degrees(path[now, 2]), 0)
-            said[f"axes of the {frame}"] = f"({x_y}) m, heading {heading}°"
+            said[frame] = f"({x_y}) m, heading {heading}°"
         return said
 
     controls["t"] = slider("time t (s)", 0.0, 0.0, 2 * _LASTS, 2 * _LASTS / _STEPS)

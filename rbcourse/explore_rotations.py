@@ -203,7 +203,7 @@ def random_explorer() -> Explorer:
         counts, _ = np.histogram(np.clip(points[:, 2], -1, 1), _BINS)
         artists["histogram"].set_data(counts / (len(R) * np.diff(_BINS)), _BINS)
         caps = np.mean(np.abs(points[:, 2]) > 0.5)
-        said = {"|height| > ½": f"{numbers(100 * caps, 1)} % (50 % if uniform)"}
+        said = {"|height| > ½": f"{numbers(100 * caps, 1)} %; uniform: 50 %"}
         if len(R) < 100:
             return {**said, "p-values": "from 100 rotations on"}
         p = {name: uniformity_tests(R)[name].p_value for name in ("image of e₁", "angle")}
