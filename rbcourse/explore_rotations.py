@@ -23,11 +23,10 @@ from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 from rbcourse.sampling import sample_rotation, sample_rotation_naive
 from rbcourse.se3 import pose_from_components
 from rbcourse.so3 import log_so3
-from rbcourse.spheres import EYE, draw_sphere
+from rbcourse.spheres import EYE, PALE, draw_sphere
 from rbcourse.uniformity import uniformity_tests
 
 _BOX = np.array([1.3, 0.8, 0.25])
-_PALE = "#E9CFDE"
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}
 _MOST = 2000
 _BINS = np.linspace(-1, 1, 21)
@@ -169,7 +168,7 @@ def random_explorer() -> Explorer:
         ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="3d")
         draw_sphere(ax)
         fig.text(0.26, 0.91, "images of e₁", ha="center")
-        colours = {"behind": _PALE, "before": COLOURS["projection"]}
+        colours = {"behind": PALE, "before": COLOURS["projection"]}
         artists = {
             name: new_line(ax, marker="o", ls="", ms=4, mew=0, color=colour)
             for name, colour in colours.items()

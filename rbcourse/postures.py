@@ -200,7 +200,7 @@ def draw_joint_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
         for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
     ]
     ax.set(xlabel="$θ_0$ (degrees)", ylabel="$θ_1$ (degrees)")
-    ax.legend()
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
     return lines
 
 

@@ -19,7 +19,7 @@ EYE = np.array(
         np.sin(ELEVATION),
     ]
 )
-_PALE = "#E9CFDE"  # the colour of what lies behind
+PALE = "#E9CFDE"  # the colour of what lies behind
 _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
     "angle": ("angle (rad)", (0, np.pi), angle_law),
     "height of e₁": ("height of the image of e₁", (-1, 1), lambda z: (z + 1) / 2),
@@ -77,12 +77,12 @@ def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]
         ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
         ax.set_title(name)
         behind = strokes[:, 0] @ EYE < 0
-        colours = np.where(behind, _PALE, COLOURS["projection"])
+        colours = np.where(behind, PALE, COLOURS["projection"])
         lines = Line3DCollection(strokes, colors=colours, lw=1.6, zorder=3)
         ax.add_collection3d(lines)
         dots = [
             ax.plot([], [], [], "o", ms=5, mew=0, color=colour, zorder=zorder)[0]
-            for colour, zorder in ((_PALE, 2), (COLOURS["projection"], 4))
+            for colour, zorder in ((PALE, 2), (COLOURS["projection"], 4))
         ]
         panels.append((strokes, behind, colours, lines, dots))
 
