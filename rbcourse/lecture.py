@@ -5,6 +5,7 @@ import logging
 import os
 import re
 import secrets
+import signal
 import socket
 import sys
 import tempfile
@@ -204,6 +205,7 @@ def present(path: Path, browser: bool) -> None:
             # some browsers return only when they are closed
             threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a script ignores Ctrl-C
     serve(path, begin)
 
 
