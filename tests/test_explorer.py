@@ -132,6 +132,13 @@ def test_what_cannot_be_served_is_said_and_nothing_that_moves_is_drawn(explorer)
     assert darkest(explorer)[0] == pytest.approx(0.1 + 0.8 * 0.3, abs=0.003)
 
 
+def test_what_is_read_off_is_text_and_no_html(explorer):
+    explorer._show = lambda **values: {"1 < 2": "<b>"}
+    explorer.controls["x"].value = 3.0
+    assert "1 &lt; 2" in explorer.said.value
+    assert "&lt;b&gt;" in explorer.said.value
+
+
 def test_a_warning_is_said_and_the_picture_drawn(explorer):
     explorer.controls["x"].value = WARN
     assert "nearly too far" in explorer.notice.value
