@@ -5,6 +5,7 @@ import http.client
 import json
 import logging
 import re
+import shutil
 import sys
 import threading
 import time
@@ -20,6 +21,7 @@ from tornado.ioloop import IOLoop, PeriodicCallback
 
 from rbcourse.lecture import find_lesson, serve
 
+BROWSERS = ("firefox", "chromium", "chromium-browser", "google-chrome", "msedge")
 HEARTBEAT = "window.voila_heartbeat()"
 OUTSIDE = re.compile(r"(?:https?:|wss?:)?//[\w.-]+[^\s\"'<>)]*", re.IGNORECASE)
 
@@ -205,9 +207,13 @@ def _look_outside(page: _Page) -> list[str]:
 def _look_for_browser() -> list[str]:
     try:
         browser = webbrowser.get()
-    except webbrowser.Error:
-        return ["no web browser is found; install one, or name it in the variable BROWSER"]
-    print(f"browser: {getattr(browser, 'name', type(browser).__name__)}", flush=True)
+        name = getattr(browser, "name", type(browser).__name__)
+    except webbrowser.Error:  # also where there is no screen
+        name = next(filter(shutil.which, BROWSERS), "")
+        if not name:
+            return ["no web browser is found; install one, or name it in the variable BROWSER"]
+        name += ", to be opened by hand"
+    print(f"browser: {name}", flush=True)
     return []
 
 

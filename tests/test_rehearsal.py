@@ -1,9 +1,11 @@
 """What a rehearsal finds, as the command line starts it."""
 
 import http.server
+import shutil
 import subprocess
 import sys
 import threading
+import webbrowser
 
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell
@@ -94,3 +96,14 @@ def test_a_server_that_lets_everybody_in_is_named(capsys):
     assert len(found) == 3
     assert all("is open to everybody" in what for what in found)
     assert "without the token: no" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("there", "found"), [("firefox", 0), ("", 1)])
+def test_without_a_screen_a_browser_on_the_path_will_do(there, found, monkeypatch, capsys):
+    def no_screen():
+        raise webbrowser.Error
+
+    monkeypatch.setattr(webbrowser, "get", no_screen)
+    monkeypatch.setattr(shutil, "which", lambda name: there == name)
+    assert len(rehearsal._look_for_browser()) == found
+    assert ("firefox, to be opened by hand" in capsys.readouterr().out) == bool(there)
