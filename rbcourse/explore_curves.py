@@ -224,9 +224,9 @@ def flip_explorer() -> Explorer:
 
 @lru_cache(maxsize=1)
 def _spins() -> tuple[Array, Array]:
-    """Return orientations and angular velocities by time, axis and angle off it: all at once.
+    """Return orientations and angular velocities by time, axis and angle off it.
 
-    One integration of all takes hardly longer than that of one, which is too long for a slider.
+    All are integrated at once, before a slider is touched: even one takes too long to follow it.
     """
     tilt = np.radians(np.arange(0, _OFF_MOST + _OFF_STEP / 2, _OFF_STEP))[:, None]
     main = np.eye(3)[:, None]

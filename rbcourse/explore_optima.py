@@ -1,4 +1,4 @@
-"""Explorers of minimum acceleration: the optimum and the projection, solved again at each touch."""
+"""Explorers of minimum acceleration: optimum and projection, solved again for other ends."""
 
 from functools import lru_cache
 from typing import Any
@@ -113,7 +113,7 @@ def cube_explorer() -> Explorer:
 
 @lru_cache(maxsize=64)
 def _solved_rotations(size: float, k: float) -> Solved:
-    """Solve BK (21) with these two changed; while only the time runs it stays solved."""
+    """Solve BK (21) with these two changed."""
     sigma = size * _SIGMA
     ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
     return _with_costs(minimum_acceleration_so3(*ends), projected_cubic_so3(*ends))
