@@ -16,6 +16,14 @@ LEVELS = {
     "quaternion": 1,
     "projection": 1,
     "inertia": 1,
+    "own_work": 0,
+    "marking": 1,
+    "marking_samplers": 2,
+    "problems_acceleration": 7,
+    "problems_geodesics": 7,
+    "problems_random": 7,
+    "problems_rotations": 7,
+    "problems_plane": 7,
     "line": 1,
     "plans": 1,
     "polynomials": 1,
@@ -64,6 +72,7 @@ LEVELS = {
 }
 ALLOWED = {
     "figures": {"matplotlib"},
+    "marking": {"matplotlib"},
     "animate": {"PIL", "matplotlib"},
     "bodies": {"matplotlib", "mpl_toolkits"},
     "comparison": {"matplotlib"},
