@@ -62,6 +62,10 @@ LEVELS = {
     "lessons": 11,
     "lecture": 12,
     "rehearsal": 13,
+    "submission": 12,
+    "mending": 11,
+    "downloads": 11,
+    "collection": 12,
     "ledger": 12,
     "explorer": 11,
     "explore_curves": 12,
@@ -90,6 +94,9 @@ ALLOWED = {
     "lessons": {"nbformat", "nbclient"},
     "lecture": {"nbformat", "tornado", "traitlets", "voila"},
     "rehearsal": {"nbformat", "tornado"},
+    "submission": {"nbclient", "nbformat"},
+    "mending": {"nbformat"},
+    "collection": {"nbformat"},
     "ledger": {"nbformat"},
 }
 
