@@ -1,4 +1,4 @@
-"""Every task of the course: figures, test, lab, lecture, browser, ledger, lint.
+"""Every task of the course, for who learns, who teaches, and who works on it.
 
 The first call makes the environment .venv from environment.txt; later calls use it. When
 environment.txt changes or the folder is moved, .venv is made anew.
@@ -42,6 +42,15 @@ def main():
     lecture.add_argument("lesson", help="its number: 01")
     lecture.add_argument("--check", action="store_true", help="try it before class; show nothing")
     lecture.add_argument("--no-browser", action="store_true", help="print the address only")
+    check = tasks.add_parser("check", help="try a problem set, and write the file to hand in")
+    check.add_argument("file", type=os.path.abspath, help="the notebook: ps1.ipynb")
+    handout = tasks.add_parser("handout", help="pack a problem set for students")
+    handout.add_argument("set", help="its name: ps1")
+    collect = tasks.add_parser("collect", help="sort what Moodle and Canvas give you")
+    collect.add_argument("folder", type=os.path.abspath, help="with the downloads")
+    collect.add_argument("--due", help='what is later is listed: "2026-12-01 23:59"')
+    grade = tasks.add_parser("grade", help="grade what was collected; write feedback and a table")
+    grade.add_argument("sets", nargs="*", metavar="set", help="ps1; without, all there are")
     tasks.add_parser("browser", help="try every lesson in Chromium; further words go to pytest")
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("lint", help="check style and types of all code")
@@ -60,6 +69,15 @@ def main():
             run("-m", "rbcourse.rehearsal", known.lesson)
         else:
             run("-m", "rbcourse.lecture", known.lesson, *["--no-browser"] * known.no_browser)
+    elif known.task == "check":
+        run("-m", "rbcourse.submission", known.file)
+    elif known.task == "handout":
+        run("-m", "rbcourse.handout", known.set)
+    elif known.task == "collect":
+        due = ["--due", known.due] if known.due else []
+        run("-m", "rbcourse.collection", known.folder, *due)
+    elif known.task == "grade":
+        run("-m", "rbcourse.grading", *known.sets)
     elif known.task == "browser":
         look_in_browser(further)
     elif known.task == "ledger":

@@ -1,5 +1,6 @@
 """The problem sets: the reference passes, nothing passes, and each wrong answer gets its hint."""
 
+import ast
 import re
 from importlib import import_module
 from pathlib import Path
@@ -102,3 +103,111 @@ def test_no_two_mistakes_of_a_problem_have_one_hint():
         starts = [mistake.hint[:30] for mistake in problem.mistakes]
         assert len(set(starts)) == len(starts), name
         assert all(isinstance(mistake, Mistake) for mistake in problem.mistakes)
+
+
+def marks(cell):
+    return cell.metadata.nbgrader
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_set_has_what_a_set_needs(name):
+    notebook = SETS[name]
+    texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
+    problems = re.findall(
+        r"^## Problem (\d) · .* \((\d+) points\)$", "\n".join(texts), re.MULTILINE
+    )
+    assert [int(number) for number, _ in problems] == list(range(1, len(problems) + 1))
+    assert 3 <= len(problems) <= 6
+    assert texts[0].startswith(f"# Problem set {name[2]}: ")
+    assert "After this set you can" in texts[0]
+    assert "**Mark scheme.**" in "".join(texts)
+    assert any("draw_" in cell.source for cell in notebook.cells)
+    assert f"rbcourse.submission {name}.ipynb" in texts[-1]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_points_of_cells_headings_and_the_set_agree(name):
+    announced, given = {}, {}
+    for cell in SETS[name].cells:
+        if heading := re.match(r"## Problem (\d) · .* \((\d+) points\)", cell.source):
+            problem = int(heading[1])
+            announced[problem] = int(heading[2])
+        if marks(cell).grade:
+            given[problem] = given.get(problem, 0) + marks(cell).points
+    assert given == announced
+    (total,) = re.findall(r"There are (\d+) points", SETS[name].cells[0].source)
+    assert sum(given.values()) == int(total)
+    for cell in SETS[name].cells:
+        for scheme in re.findall(r"\*\*Mark scheme.\*\*(.*)", cell.source):
+            assert sum(map(int, re.findall(r"(\d) points?:", scheme))) == marks(cell).points
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_every_cell_has_its_own_name_and_its_place_in_the_grading(name):
+    ids = [marks(cell).grade_id for cell in SETS[name].cells]
+    assert len(set(ids)) == len(ids)
+    for cell in SETS[name].cells:
+        assert re.fullmatch(r"[A-Za-z0-9_-]+", marks(cell).grade_id)
+        assert marks(cell).schema_version == 3
+        assert marks(cell).locked == (not marks(cell).solution)
+        assert cell.get("outputs", []) == []
+
+
+@pytest.mark.parametrize(("name", "slug"), TESTS)
+def test_a_test_cell_ends_with_an_assertion_seen_and_unseen(name, slug):
+    """Of a bare expression nbgrader takes the value for the points."""
+    source = cells(name)[f"{slug}-test"].source
+    assert source.count("### BEGIN HIDDEN TESTS") == source.count("### END HIDDEN TESTS") == 1
+    for text in (source, visible(source)):
+        last = ast.parse(text).body[-1]
+        while isinstance(last, ast.For | ast.If):
+            last = last.body[-1]
+        assert isinstance(last, ast.Assert)
+
+
+@pytest.mark.parametrize(("name", "slug"), TESTS)
+def test_hidden_tests_need_nothing_of_the_package(name, slug):
+    source = cells(name)[f"{slug}-test"].source
+    hidden = source.partition("### BEGIN HIDDEN TESTS")[2]
+    names = {node.id for node in ast.walk(ast.parse(hidden)) if isinstance(node, ast.Name)}
+    own = {key for key in names if key.isupper() or key in ("rbcourse", "rb")}
+    assert not own
+    assert "import" not in hidden
+
+
+@pytest.mark.parametrize(("name", "slug"), TESTS)
+def test_hidden_tests_alone_refuse_what_only_looks_right(name, slug):
+    """An answer that knows the visible inputs by heart and nothing else."""
+    problem = listed()[re.search(r"assert (\w+)\.accepts", cells(name)[f"{slug}-test"].source)[1]]
+    source = cells(name)[f"{slug}-answer"].source
+    function = re.search(r"def (\w+)\(", source)[1]
+    hidden = cells(name)[f"{slug}-test"].source.partition("### BEGIN HIDDEN TESTS")[2]
+    space = {"__name__": "__main__"}
+    exec(cells(name)["setup"].source, space)
+    if isinstance(problem, Sampler):
+        return
+    space[function] = lambda *arguments: problem.answer(*problem.inputs[0])
+    with pytest.raises((AssertionError, ValueError)):
+        exec(hidden, space)
+
+
+def test_the_example_of_the_page_for_teachers_runs():
+    page = (SOURCE.parent / "README.md").read_text("utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    start = "import numpy as np\ndef area(r): return {}"
+    space = {"__name__": "__main__"}
+    exec(start.format("np.pi * r * r") + "\n" + code, space)
+    with pytest.raises(NotYet, match="This is the circumference"):
+        exec(start.format("2 * np.pi * r") + "\n" + code, {"__name__": "__main__"})
+
+
+def test_the_page_for_teachers_lists_the_sets():
+    page = (SOURCE.parent / "README.md").read_text("utf-8")
+    rows = re.findall(r"^\| (ps\d) \| (.*?) \| (.*?) \| (\d+) \|$", page, re.MULTILINE)
+    assert [row[0] for row in rows] == list(SETS)
+    for name, lessons, problems, points in rows:
+        headings = re.findall(r"^## Problem", "\n".join(c.source for c in SETS[name].cells), re.M)
+        assert len(problems.split("; ")) == len(headings)
+        assert f"There are {points} points" in SETS[name].cells[0].source
+        for lesson in re.findall(r"\d+", lessons):
+            assert f"{int(lesson)}" in SETS[name].cells[0].source
