@@ -316,6 +316,17 @@ def _write(notebook: NotebookNode, target: Path) -> None:
     part.replace(target)
 
 
+def _check_with_course(path: Path, assignments: Path) -> None:
+    """Check a problem set without its original in the course that it is of."""
+    from rbcourse.handout import release  # a student does not have nbgrader
+
+    content = release(path.stem, assignments)[f"{path.stem}.ipynb"]
+    with tempfile.TemporaryDirectory() as folder:
+        original = Path(folder, f"{path.stem}.ipynb")
+        original.write_bytes(content)
+        check(path, original)
+
+
 def main() -> None:
     """Check a problem set: ``python -m rbcourse.submission FILE.ipynb``."""
     parser = argparse.ArgumentParser(prog="python -m rbcourse.submission")
@@ -325,8 +336,12 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a console may not know every letter
             stream.reconfigure(errors="replace")
     known = parser.parse_args()
+    path, course = known.file.absolute(), Path("notebooks", "assignments")
     try:
-        check(known.file.absolute(), known.original)
+        if known.original or (path.parent / "original").exists() or not course.is_dir():
+            check(path, known.original)
+        else:
+            _check_with_course(path, course)
     except (OSError, ValueError, nbformat.ValidationError) as error:
         sys.exit(f"nothing to submit was written: {error}")
 

@@ -1,0 +1,145 @@
+"""What a kernel that runs work of others may put out; a gigabyte stays with who made it."""
+
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from typing import Any
+
+SHOWN = 100_000
+ENDED = 10_000_000
+OUTPUTS = ("stream", "display_data", "update_display_data", "execute_result")
+SENT = ("status", "execute_input", "kernel_info_reply", "shutdown_reply")
+CUT = "[output cut: "
+NOTE = CUT + "more than {:,} characters]\n"
+
+
+class TooMuchOutputError(RuntimeError):
+    """A cell prints without end."""
+
+
+def clipped(value: Any, room: int) -> Any:
+    r"""Return a value made of dicts, lists and strings with no string longer than the room.
+
+    Parameters
+    ----------
+    value : object
+    room : int
+        In characters; what is cut off is replaced by a note.
+
+    Returns
+    -------
+    object
+
+    Examples
+    --------
+    >>> clipped({"text": "abcdef"}, 3)
+    {'text': 'abc[output cut: more than 3 characters]\n'}
+    """
+    if isinstance(value, dict):
+        return {key: clipped(part, room) for key, part in value.items()}
+    if isinstance(value, list):
+        return [clipped(part, room) for part in value[:1000]]
+    if isinstance(value, str) and len(value) > room:
+        return value[:room] + NOTE.format(room)
+    return value
+
+
+def length(value: Any) -> int:
+    """Return how many characters there are in a value made of dicts, lists and strings.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> length({"text/plain": ["ab", "c"]})
+    3
+    """
+    if isinstance(value, dict):
+        return sum(map(length, value.values()))
+    if isinstance(value, list | tuple):
+        return sum(map(length, value))
+    return len(value) if isinstance(value, str | bytes | memoryview) else 0
+
+
+def limited(send: Callable[..., Any], shown: int = SHOWN) -> Callable[..., Any]:
+    """Return a way to send messages that cuts the outputs of each cell.
+
+    Parameters
+    ----------
+    send : callable
+        As `jupyter_client.session.Session.send`.
+    shown : int
+        Characters that the outputs of a cell may have together.
+
+    Returns
+    -------
+    callable
+    """
+    used = 0
+
+    def bounded(stream: Any, kind: Any, content: Any = None, *args: Any, **kwargs: Any) -> Any:
+        nonlocal used
+        message = kind if isinstance(kind, dict) else None
+        name = message["msg_type"] if message is not None else kind
+        content = message["content"] if message is not None else content
+        if name == "execute_input":
+            used = 0
+        elif name not in SENT:
+            before, used = used, used + length(content) + length(kwargs.get("buffers") or [])
+            if used > shown and before > shown and name not in ("error", "execute_reply"):
+                return None
+            if used > shown:
+                content = _shortened(name, content, max(shown - before, 0))
+                kwargs.pop("buffers", None)
+                message = {**message, "buffers": []} if message is not None else None
+        if message is not None:
+            return send(stream, {**message, "content": content}, *args, **kwargs)
+        return send(stream, kind, content, *args, **kwargs)
+
+    return bounded
+
+
+def _shortened(name: str, content: Any, room: int) -> Any:
+    if name == "stream":
+        return clipped(content, room)
+    if name in OUTPUTS:  # half a picture, or half a page, is worse than none
+        return {**content, "data": {"text/plain": NOTE.format(SHOWN)}, "metadata": {}}
+    return clipped(content, 2000)
+
+
+def load_ipython_extension(shell: Any) -> None:
+    """Limit the outputs of a kernel: ``--IPKernelApp.extensions=rbcourse.quota``.
+
+    A cell that has printed too much to be an oversight is ended by an exception.
+
+    Parameters
+    ----------
+    shell : ipykernel.zmqshell.ZMQInteractiveShell
+    """
+    session = shell.kernel.session
+    session.send = limited(session.send)
+    printed = 0
+
+    def start(*_: object) -> None:
+        nonlocal printed
+        printed = 0
+
+    vars(shell)["_tee"] = lambda channel: nullcontext()  # it would keep all that is printed
+    kind = type(sys.stdout)
+    write = kind.write
+
+    def bounded(stream: Any, text: str) -> int:
+        nonlocal printed
+        printed += len(text)
+        if printed > ENDED:
+            raise TooMuchOutputError(f"more than {ENDED:,} characters are printed")
+        return write(stream, text)
+
+    shell.events.register("pre_run_cell", start)
+    setattr(kind, "write", bounded)  # noqa: B010 (a plain assignment has no type)
