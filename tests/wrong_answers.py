@@ -849,7 +849,7 @@ WRONG = {
         ),
     ],
     ("ps4", "shadow"): [
-        ("x and y are swapped", "for a in angles:\n    ax.plot(THETA(t, a), t)"),
+        ("x and y are swapped", "for a in angles:\n    ax.plot(SHARE(t, a), t)"),
         (
             "These are the curves of f",
             """
@@ -857,15 +857,15 @@ WRONG = {
                 ax.plot(t, np.sin(a * t) / (np.sin(a * t) + np.sin(a * (1 - t))))
             """,
         ),
-        ("This is the angle turned", "for a in angles:\n    ax.plot(t, a * THETA(t, a))"),
+        ("This is the angle turned", "for a in angles:\n    ax.plot(t, a * SHARE(t, a))"),
         (
             "This is the rate",
             "for a in angles:\n"
             "    s2 = 1 - 2 * (1 - np.cos(a)) * t * (1 - t)\n"
             "    ax.plot(t, np.sin(a) / (a * s2))",
         ),
-        ("The angles come in radians", "for a in np.radians(angles):\n    ax.plot(t, THETA(t, a))"),
-        ("Only one of the curves", "ax.plot(t, THETA(t, angles[0]))"),
+        ("The angles come in radians", "for a in np.radians(angles):\n    ax.plot(t, SHARE(t, a))"),
+        ("Only one of the curves", "ax.plot(t, SHARE(t, angles[0]))"),
     ],
     ("ps4", "screw"): [
         (
@@ -1011,7 +1011,7 @@ def FAR(M):
     return np.linalg.norm(s - 1)
 
 
-def THETA(t, a):
+def SHARE(t, a):
     return np.arctan2(t * np.sin(a), 1 - t + t * np.cos(a)) / a
 
 
