@@ -4,6 +4,7 @@ import dis
 import functools
 import linecache
 import sys
+import textwrap
 import traceback
 from collections.abc import Iterator, Sequence
 from types import CodeType, FrameType, FunctionType, MethodType, ModuleType
@@ -16,7 +17,7 @@ class NotYet(AssertionError):
     """What is wrong, for the student to read; a notebook shows it without a traceback."""
 
     def _render_traceback_(self) -> list[str]:
-        return [str(self)]
+        return textwrap.wrap(str(self), 80)
 
 
 def call_student(function: Any, arguments: tuple[Any, ...], allowed: Sequence[str]) -> Any:

@@ -275,6 +275,8 @@ def _error(cell: NotebookNode) -> str:
         return ""
     lines = [line for line in errors[-1].evalue.splitlines() if line.strip()]
     words = re.sub(r"\x1b\[[0-9;]*m", "", lines[-1].strip() if lines else "")[:200]
+    if words and errors[-1].ename == "NotYet":  # a hint, which speaks for itself
+        return words
     return f"{errors[-1].ename}: {words}" if words else str(errors[-1].ename)
 
 

@@ -124,8 +124,11 @@ def test_the_profile_is_as_before_also_after_an_error():
     assert after is profile
 
 
-def test_a_notebook_shows_the_hint_alone():
+def test_a_notebook_shows_the_hint_alone_in_lines_that_fit():
     assert NotYet("the hint")._render_traceback_() == ["the hint"]
+    lines = NotYet("a long hint " * 30)._render_traceback_()
+    assert max(map(len, lines)) <= 80
+    assert "\n".join(lines).split() == ["a", "long", "hint"] * 30
 
 
 def test_the_package_is_there_to_be_borrowed():
