@@ -7,8 +7,9 @@ agrees with one of them everywhere gets its hint.
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from inspect import signature
+from typing import Any, Self
 
 import numpy as np
 
@@ -82,6 +83,20 @@ class Problem:
         print("As it should be, on these inputs. Others are tried when it is graded.")
         return True
 
+    def on(self, *inputs: tuple[Any, ...]) -> Self:
+        """Return the problem with other inputs, for hidden tests.
+
+        Parameters
+        ----------
+        *inputs : tuple
+            The arguments of each trial.
+
+        Returns
+        -------
+        Problem
+        """
+        return replace(self, inputs=inputs)
+
     def results(self, answer: Callable[..., Any]) -> list[Any]:
         """Return what an answer gives for each input.
 
@@ -123,12 +138,12 @@ class Problem:
             if any(all(map(self.same, given, self.results(f))) for f in mistake.answers):
                 raise NotYet(mistake.hint)
         first = right.index(False)
-        called = "For " + ", ".join(map(show, self.inputs[first]))
+        called = f"For {_named(self.answer, self.inputs[first])}"
         raise NotYet(self._describe(called, given[first], wanted[first]))
 
     def _run(self, function: Callable[..., Any], trial: tuple[Any, ...]) -> Any:
         arguments = copy.deepcopy(trial)
-        result = call_student(function, arguments, self.allowed)
+        (result,) = call_student(function, arguments, self.allowed)
         if not _unchanged(trial, arguments):
             raise NotYet("Your function changes the arguments that it is given. Work on a copy.")
         return result
@@ -139,7 +154,9 @@ class Problem:
             return f"{called} your function returns nothing. Is the line with return missing?"
         numbers = as_numbers(got)
         if numbers is None:
-            return f"{called} your function returns no numbers but {show(got)}."
+            complex_ = isinstance(got, np.ndarray | complex) and np.iscomplexobj(got)
+            why = " It is complex: return its real part." if complex_ else ""
+            return f"{called} your function returns no real numbers but {show(got)}.{why}"
         if numbers.shape != wanted.shape:
             return f"{called} the shape {wanted.shape} is wanted; yours is {numbers.shape}."
         if not np.isfinite(numbers).all():
@@ -209,7 +226,7 @@ class Drawing(Problem):
 
 
 def curves_of(axes: Any) -> list[Array]:
-    """Return the points of all lines, dots, steps and bars on axes.
+    """Return the points of all lines, dots, bars and steps on axes.
 
     Parameters
     ----------
@@ -218,17 +235,33 @@ def curves_of(axes: Any) -> list[Array]:
     Returns
     -------
     list of ndarray, shape (n, 2)
-        Of bars: left edge and height.
+        Of bars and steps: middle and height of each.
     """
-    from matplotlib.patches import Rectangle, StepPatch
+    from matplotlib.cbook import STEP_LOOKUP_MAP
+    from matplotlib.container import BarContainer
+    from matplotlib.patches import Polygon, StepPatch
 
     found = [np.array(line.get_xydata(), float) for line in axes.lines]
     found += [np.array(dots.get_offsets(), float) for dots in axes.collections]
-    steps = [p.get_data() for p in axes.patches if isinstance(p, StepPatch)]
-    found += [np.column_stack([edges[:-1], values]) for values, edges, _ in steps]
-    bars = [[p.get_x(), p.get_height()] for p in axes.patches if isinstance(p, Rectangle)]
-    found += [np.array(bars)] if bars else []
+    for bars in (c for c in axes.containers if isinstance(c, BarContainer)):
+        found.append(np.array([[b.get_x() + b.get_width() / 2, b.get_height()] for b in bars]))
+    outlines = [p.get_xy() for p in axes.patches if isinstance(p, Polygon)]
+    outlines += [path.vertices for shape in axes.collections for path in shape.get_paths()]
+    for line in axes.lines:
+        if str(line.get_drawstyle()).startswith("steps"):
+            steps = STEP_LOOKUP_MAP[line.get_drawstyle()]
+            outlines.append(np.column_stack(steps(*line.get_xydata().T)))
+    found += map(_treads, outlines)
+    for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
+        found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))
     return [curve for curve in found if curve.ndim == 2 and len(curve)]
+
+
+def _treads(outline: Any) -> Array:
+    """Return middle and height of each piece of an outline that runs to the right."""
+    a, b = np.array(outline[:-1], float), np.array(outline[1:], float)
+    level = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])
+    return np.asarray((a + b)[level] / 2)
 
 
 def as_numbers(value: Any) -> Array | None:
@@ -250,7 +283,7 @@ def as_numbers(value: Any) -> Array | None:
 
 
 def show(value: Any) -> str:
-    """Return a value as one reads it: arrays rounded, or by their shape, the rest cut.
+    """Return a value as one reads it: arrays as lists, rounded, or by their shape.
 
     Parameters
     ----------
@@ -260,10 +293,24 @@ def show(value: Any) -> str:
     -------
     str
     """
-    if isinstance(value, np.ndarray):
-        rounded = (np.round(value, 4) + 0.0).tolist()
-        value = rounded if value.size <= 16 else f"an array of shape {value.shape}"
-    return value if isinstance(value, str) else repr(value)[:300]
+    if isinstance(value, np.ndarray) and value.size > 16:
+        return f"an array of shape {value.shape}"
+    return value if isinstance(value, str) else repr(_plain(value))[:300]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return type(value)(map(_plain, value))
+    if isinstance(value, complex):
+        return complex(round(value.real, 4), round(value.imag, 4))
+    return round(value, 4) + 0 if isinstance(value, float) else value
+
+
+def _named(answer: Callable[..., Any], trial: tuple[Any, ...]) -> str:
+    names = list(signature(answer).parameters)
+    return ", ".join(f"{name} = {show(value)}" for name, value in zip(names, trial, strict=False))
 
 
 def _unchanged(before: Any, after: Any) -> bool:

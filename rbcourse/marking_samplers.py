@@ -67,9 +67,12 @@ class Sampler:
             With one hint.
         """
         rng = np.random.default_rng(rng)
-        first = [call_student(function, (rng,), self.allowed) for _ in range(10)]
-        self._look_at(first)
-        drawn = np.array(first + [function(rng) for _ in range(self.draws - 10)], dtype=float)
+        drawn = self._as_draws(call_student(function, (rng,), self.allowed, self.draws))
+        if (drawn[:10] == drawn[0]).all():
+            raise NotYet(
+                "Every call returns the same draw. Does your function make, and seed, a new "
+                "generator each time? Draw from the rng that it is given."
+            )
         if hint := self.fault(drawn):
             raise NotYet(hint)
         rows = self.uniforms(drawn)
@@ -78,39 +81,44 @@ class Sampler:
         if gaps[worst] <= self._bound(rows, worst):
             print(f"{self.draws} draws look as they should.")
             return True
-        for mistake in self.mistakes:
-            if any(self._looks_like(rows, answer) for answer in mistake.answers):
-                raise NotYet(mistake.hint)
         raise NotYet(
-            f"These draws are not uniform. What gives it away: {worst}, whose distribution is off "
-            f"by {gaps[worst]:.3f}; chance alone stays below {self._bound(rows, worst):.3f}."
+            self._hint(rows)
+            or f"These draws are not uniform. What gives it away: {worst}, whose distribution is "
+            f"off by {gaps[worst]:.3f}; chance alone stays below {self._bound(rows, worst):.3f}."
         )
 
-    def _look_at(self, first: list[Any]) -> None:
-        for got in first:
+    def _hint(self, rows: dict[str, Array]) -> str:
+        """Return the hint of the mistake whose draws look most like these, if any does."""
+        near, hint = 2.0, ""  # two samples of one law are not farther apart, in units of the bound
+        for mistake in self.mistakes:
+            for answer in mistake.answers:
+                far = self._distance(rows, answer, near)
+                near, hint = (far, mistake.hint) if far < near else (near, hint)
+        return hint
+
+    def _as_draws(self, given: list[Any]) -> Array:
+        for i, got in enumerate(given):
             numbers = as_numbers(got)
             if numbers is None:
-                raise NotYet(f"One draw of numbers is wanted; yours is {show(got)}.")
+                why = " Does a branch end without return?" if got is None else ""
+                raise NotYet(f"Draw {i} is to be numbers; yours is {show(got)}.{why}")
             if numbers.shape != self.shape:
                 raise NotYet(f"A draw has the shape {self.shape}; yours has {numbers.shape}.")
             if not np.isfinite(numbers).all():
-                raise NotYet(f"A draw is not finite: {show(numbers)}.")
-        if all(np.array_equal(first[0], got) for got in first[1:]):
-            raise NotYet(
-                "Every call returns the same draw. Does your function make, and seed, a new "
-                "generator each time? Draw from the rng that it is given."
-            )
+                raise NotYet(f"Draw {i} is not finite: {show(numbers)}. Is it divided by 0?")
+        return np.array(given, dtype=float)
 
     def _bound(self, rows: dict[str, Array], name: str) -> float:
         return float(np.sqrt(np.log(2 * len(rows) / DELTA) / (2 * len(rows[name]))))
 
-    def _looks_like(self, rows: dict[str, Array], answer: Callable[..., Any]) -> bool:
-        """Return whether draws with a mistake are distributed like these, as far as one can see."""
-        others = self.uniforms(answer(self.draws, np.random.default_rng(1)))
-        return all(
-            _gap_between(row, others[name]) <= 2 * self._bound(rows, name)
-            for name, row in rows.items()
-        )
+    def _distance(self, rows: dict[str, Array], answer: Callable[..., Any], near: float) -> float:
+        """Return how far these draws are from those of an answer, or something not below `near`."""
+        others, far = self.uniforms(answer(self.draws, np.random.default_rng(1))), 0.0
+        for name, row in rows.items():
+            far = max(far, _gap_between(row, others[name]) / self._bound(rows, name))
+            if far >= near:
+                break
+        return far
 
 
 def _gap(row: Array) -> float:

@@ -2,6 +2,7 @@
 
 import dis
 import functools
+import gc
 import linecache
 import sys
 import textwrap
@@ -11,6 +12,8 @@ from types import CodeType, FrameType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 TOOLS = {"__main__", "builtins", "numpy", "matplotlib", "mpl_toolkits", "IPython", "ipykernel"}
+# what these call is their own business: printing sends messages, imports ask every finder
+OF_THEIR_OWN = {"matplotlib", "mpl_toolkits", "IPython", "ipykernel", "importlib", "zipimport"}
 
 
 class NotYet(AssertionError):
@@ -20,8 +23,10 @@ class NotYet(AssertionError):
         return textwrap.wrap(str(self), 80)
 
 
-def call_student(function: Any, arguments: tuple[Any, ...], allowed: Sequence[str]) -> Any:
-    """Return what a student's function returns.
+def call_student(
+    function: Any, arguments: tuple[Any, ...], allowed: Sequence[str], times: int = 1
+) -> list[Any]:
+    """Return what a student's function returns, each time.
 
     Parameters
     ----------
@@ -31,10 +36,12 @@ def call_student(function: Any, arguments: tuple[Any, ...], allowed: Sequence[st
     allowed : sequence of str
         Functions of the package that it may call. Python and NumPy it may use as it likes, and
         Matplotlib to draw.
+    times : int
+        How often it is called; ten times at most it is watched.
 
     Returns
     -------
-    object
+    list of object
 
     Raises
     ------
@@ -43,25 +50,32 @@ def call_student(function: Any, arguments: tuple[Any, ...], allowed: Sequence[st
         built for not being seen is not: this tells an honest student what is not meant.)
     """
     _refuse(_foreign_names(function, allowed))
-    watch, before = _Watch(allowed), sys.getprofile()
+    watch, before, collecting = _Watch(allowed), sys.getprofile(), gc.isenabled()
+    gc.disable()  # what it cleans up is not the student's
     sys.setprofile(watch)
     try:
-        result = function(*arguments)
+        results = [function(*arguments) for _ in range(min(times, 10))]
+        sys.setprofile(before)
+        if collecting:
+            gc.enable()
+        results += [function(*arguments) for _ in range(times - 10)]
     except NotImplementedError:
         raise NotYet("Nothing is written here yet.") from None
     except Exception as error:
         raise NotYet(_trouble(error)) from None
     finally:
         sys.setprofile(before)
+        if collecting:
+            gc.enable()
     _refuse(watch.seen)
-    return result
+    return results
 
 
 def _refuse(foreign: Sequence[str]) -> None:
     if foreign:
         raise NotYet(
-            f"This uses {foreign[0]}, which gives the answer away. Write it yourself: with NumPy, "
-            "and what the problem allows."
+            f"This uses {foreign[0]}. Write it yourself: with Python, NumPy, and what the problem "
+            "set allows."
         )
 
 
@@ -105,7 +119,7 @@ def _is_students(frame: FrameType | None) -> bool:
     module = ""
     while frame and module != "__main__":
         module = frame.f_globals.get("__name__", "")
-        if not _is_tool(module) or _root(module) in ("matplotlib", "mpl_toolkits", "IPython"):
+        if not _is_tool(module) or _root(module) in OF_THEIR_OWN:
             return False
         frame = frame.f_back
     return module == "__main__"

@@ -8,6 +8,8 @@ from rbcourse.projected import projected_cubic_so3
 from rbcourse.projection import project_so
 from rbcourse.so3 import exp_so3, hat_so3
 
+ALLOWED = ("hat_so3", "project_so")  # what the notebook imports
+
 
 def _hermite(p0: Array, p1: Array, v0: Array, v1: Array, t: float) -> Array:
     """Return the cubic with these ends and end velocities."""
@@ -22,11 +24,13 @@ def _hermite(p0: Array, p1: Array, v0: Array, v1: Array, t: float) -> Array:
 _ENDS = [
     (np.array([0.0, 1.0]), np.array([2.0, -1.0]), np.array([1.0, 3.0]), np.array([-2.0, 0.5])),
     (np.array([-1.0, 0.3]), np.array([0.5, 2.0]), np.array([0.4, -2.0]), np.array([1.0, 1.5])),
+    (np.eye(2), np.array([[0.0, 2], [1, 3]]), np.array([[1.0, -1], [0, 2]]), 2 * np.eye(2)),
 ]
 
 CUBIC = Problem(
     answer=_hermite,
-    inputs=[(*ends, t) for ends, t in zip(_ENDS, (0.3, 0.8), strict=True)],
+    inputs=[(*ends, t) for ends, t in zip(_ENDS, (0.3, 0.8, 0.4), strict=True)],
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "The velocity at the end has the wrong sign: v₁ says where the curve would go on to.",
@@ -35,6 +39,14 @@ CUBIC = Problem(
         Mistake(
             "The velocities are exchanged.",
             lambda p0, p1, v0, v1, t: _hermite(p0, p1, v1, v0, t),
+        ),
+        Mistake(
+            "The velocity at the start has the wrong sign.",
+            lambda p0, p1, v0, v1, t: _hermite(p0, p1, -v0, v1, t),
+        ),
+        Mistake(
+            "Both velocities have the wrong sign.",
+            lambda p0, p1, v0, v1, t: _hermite(p0, p1, -v0, -v1, t),
         ),
         Mistake(
             "The velocities come out three times too large: Bézier's inner points are p₀ + v₀/3 "
@@ -76,12 +88,18 @@ _CASES = [
         np.array([-1.0, 2.0, 0.2]),
         np.array([2.0, 1.0, -1.0]),
     ),
+    (  # in the middle the cubic of matrices has a negative determinant
+        exp_so3([-0.3, 0.9, 0.8]),
+        exp_so3([1.7, -1.5, 0.9]),
+        np.array([7.0, 7.0, -8.0]),
+        np.array([6.0, 8.0, 7.0]),
+    ),
 ]
 
 END_RATE = Problem(
     answer=lambda R, w: R @ hat_so3(w),
     inputs=[(R0, w0) for R0, _, w0, _ in _CASES],
-    allowed=("hat_so3",),
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "This takes ω along the axes of the room. It is measured in the body, so its hat "
@@ -96,6 +114,10 @@ END_RATE = Problem(
         Mistake(
             "R is missing: ω̂ alone is the rate at I.",
             lambda R, w: hat_so3(w),
+        ),
+        Mistake(
+            "R ω̂ Rᵀ is the hat of ω as the room sees it. The rate of R is R ω̂.",
+            lambda R, w: R @ hat_so3(w) @ R.T,
         ),
         Mistake(
             "The product of a matrix and a vector is a vector. The rate of a matrix is a matrix.",
@@ -113,10 +135,15 @@ def _matrices(R0: Array, R1: Array, w0: Array, w1: Array, t: float) -> Array:
     return _hermite(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1), t)
 
 
+def _unsigned(M: Array) -> Array:
+    U, _, Vt = np.linalg.svd(M)
+    return np.array(U @ Vt)
+
+
 PROJECTED_CUBIC = Problem(
     answer=lambda R0, R1, w0, w1, t: projected_cubic_so3(R0, R1, w0, w1)(t),
-    inputs=[(*case, t) for case, t in zip(_CASES, (0.4, 0.7), strict=True)],
-    allowed=("project_so", "hat_so3"),
+    inputs=[(*case, t) for case, t in zip(_CASES, (0.4, 0.7, 0.5), strict=True)],
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "This is the cubic through the matrices: between its ends it is no rotation. Take the "
@@ -129,6 +156,21 @@ PROJECTED_CUBIC = Problem(
             lambda R0, R1, w0, w1, t: project_so(
                 _hermite(R0, R1, hat_so3(w0) @ R0, hat_so3(w1) @ R1, t)
             ),
+            lambda R0, R1, w0, w1, t: project_so(
+                _hermite(R0, R1, R0 @ hat_so3(w0), hat_so3(w1) @ R1, t)
+            ),
+            lambda R0, R1, w0, w1, t: project_so(
+                _hermite(R0, R1, hat_so3(w0) @ R0, R1 @ hat_so3(w1), t)
+            ),
+        ),
+        Mistake(
+            "For some matrices this is a mirror, not a rotation: U Vᵀ alone does not look at the "
+            "determinant. project_so does.",
+            lambda R0, R1, w0, w1, t: _unsigned(_matrices(R0, R1, w0, w1, t)),
+        ),
+        Mistake(
+            "The two velocities are exchanged.",
+            lambda R0, R1, w0, w1, t: project_so(_matrices(R0, R1, w1, w0, t)),
         ),
         Mistake(
             "The velocities are not used: this is the projected cubic from rest to rest.",
@@ -153,8 +195,10 @@ PROJECTED_CUBIC = Problem(
             lambda R0, R1, w0, w1, t: project_so(_hermite(R0, R1, hat_so3(w0), hat_so3(w1), t)),
         ),
         Mistake(
-            "Both ends' velocities have the wrong sign: ω̂ x = ω × x.",
+            "A velocity has the wrong sign: ω̂ x = ω × x, at both ends.",
             lambda R0, R1, w0, w1, t: project_so(_matrices(R0, R1, -w0, -w1, t)),
+            lambda R0, R1, w0, w1, t: project_so(_matrices(R0, R1, w0, -w1, t)),
+            lambda R0, R1, w0, w1, t: project_so(_matrices(R0, R1, -w0, w1, t)),
         ),
     ],
 )
@@ -170,6 +214,7 @@ _RATES = [
 THIRD_RATE = Problem(
     answer=lambda w, w1, w2: -np.cross(w, w2),
     inputs=_RATES,
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "The sign is wrong. The equation says that the sum of the third derivative and ω × ω″ "
@@ -217,6 +262,7 @@ def _square(w1: Array) -> Array:
 COST = Problem(
     answer=lambda w1: 2 * _integral(_square(w1)),
     inputs=[(sample,) for sample in _SAMPLES],
+    allowed=ALLOWED,
     accuracy=2e-3,  # a sum of rectangles will do
     mistakes=[
         Mistake(
@@ -227,6 +273,10 @@ COST = Problem(
             "The integral is missing its dt: this grows with the number of samples.",
             lambda w1: 2 * _square(w1).sum(),
             lambda w1: _square(w1).sum(),
+        ),
+        Mistake(
+            "This is the mean over all entries. The three squares of a sample are added.",
+            lambda w1: 2 * np.mean(w1**2),
         ),
         Mistake(
             "The norm is to be squared.",

@@ -1,5 +1,7 @@
 """Problem set 4: what is asked of geodesics, projected lines and screws, and what goes wrong."""
 
+from typing import Any
+
 import numpy as np
 
 from rbcourse._numerics import Array
@@ -8,6 +10,7 @@ from rbcourse.marking import Drawing, Mistake, Problem
 from rbcourse.se3 import exp_se3, log_se3
 from rbcourse.so3 import exp_so3, log_so3
 
+ALLOWED = ("exp_se3", "exp_so3", "log_se3", "log_so3")  # what the notebook imports
 _PAIRS = [
     (exp_so3([0.3, -0.8, 0.5]), exp_so3([1.0, 0.7, -1.2]), 0.3),
     (exp_so3([-1.5, 0.4, 0.2]), exp_so3([0.2, 0.9, 1.4]), 0.8),
@@ -26,7 +29,7 @@ def _long(w: Array) -> Array:
 GEODESIC = Problem(
     answer=lambda R0, R1, t: R0 @ exp_so3(t * _between(R0, R1)),
     inputs=_PAIRS,
-    allowed=("exp_so3", "log_so3"),
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "Two frames are mixed: R₁R₀ᵀ is the turn as the room sees it, and stands on the left "
@@ -49,6 +52,19 @@ GEODESIC = Problem(
         Mistake(
             "This starts at I. The turn from R₀ is right, but R₀ itself is missing.",
             lambda R0, R1, t: exp_so3(t * _between(R0, R1)),
+            lambda R0, R1, t: exp_so3(t * log_so3(R1 @ R0.T)),
+        ),
+        Mistake(
+            "A transpose is missing: R₀R₁ is one turn after the other, not the way from one to the "
+            "other.",
+            lambda R0, R1, t: R0 @ exp_so3(t * log_so3(R0 @ R1)),
+            lambda R0, R1, t: exp_so3(t * log_so3(R1 @ R0)) @ R0,
+        ),
+        Mistake(
+            "Rotation vectors cannot be subtracted: log R₁ − log R₀ is no turn from R₀ to R₁, "
+            "unless the two axes agree.",
+            lambda R0, R1, t: R0 @ exp_so3(t * (log_so3(R1) - log_so3(R0))),
+            lambda R0, R1, t: exp_so3((1 - t) * log_so3(R0)) @ exp_so3(t * log_so3(R1)),
         ),
         Mistake(
             "This is the straight line through the matrices: between its ends it is no rotation.",
@@ -62,7 +78,7 @@ GEODESIC = Problem(
 )
 
 
-def _parts(t: float, a: float) -> tuple[float, float]:
+def _parts(t: Any, a: float) -> tuple[Any, Any]:
     """Return sine and cosine part of the chord's point."""
     return t * np.sin(a), 1 - t + t * np.cos(a)
 
@@ -76,6 +92,7 @@ _TIMES = [(0.3, 1.0), (0.9, 2.6), (0.5, 2.0)]
 THETA = Problem(
     answer=lambda t, a: theta(t, a),
     inputs=_TIMES,
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "x and y are swapped. The paper writes atan2(cosine part, sine part); np.arctan2 takes "
@@ -95,6 +112,10 @@ THETA = Problem(
             lambda t, a: f(t, a),
         ),
         Mistake(
+            "This is a weight of Slerp. θ is the direction of a point on the chord.",
+            lambda t, a: np.sin(t * a) / np.sin(a),
+        ),
+        Mistake(
             "This is where the geodesic is. The projection of the line is elsewhere, except at the "
             "ends and in the middle.",
             lambda t, a: t,
@@ -111,6 +132,7 @@ THETA = Problem(
 THETA_RATE = Problem(
     answer=lambda t, a: theta(t, a, 1),
     inputs=_TIMES,
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "This is what the paper prints in Corollary 1. There s should be squared: with s the "
@@ -151,7 +173,7 @@ def _even(A0: Array, A1: Array, t: float) -> Array:
 SCREW = Problem(
     answer=lambda A0, A1, t: A0 @ exp_se3(t * log_se3(np.linalg.inv(A0) @ A1)),
     inputs=_POSES,
-    allowed=("exp_se3", "log_se3", "exp_so3", "log_so3"),
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "This turns evenly and moves the origin along a straight line: the geodesic of metric "
@@ -177,6 +199,17 @@ SCREW = Problem(
         Mistake(
             "This starts at I: A₀ itself is missing.",
             lambda A0, A1, t: exp_se3(t * log_se3(np.linalg.inv(A0) @ A1)),
+            lambda A0, A1, t: exp_se3(t * log_se3(A1 @ np.linalg.inv(A0))),
+        ),
+        Mistake(
+            "This sets out from A₀ in the opposite direction: A₁⁻¹A₀ leads from A₁ to A₀.",
+            lambda A0, A1, t: A0 @ exp_se3(-t * log_se3(np.linalg.inv(A0) @ A1)),
+        ),
+        Mistake(
+            "Twists of two poses cannot be subtracted or blended: take the twist of the "
+            "displacement between them.",
+            lambda A0, A1, t: A0 @ exp_se3(t * (log_se3(A1) - log_se3(A0))),
+            lambda A0, A1, t: exp_se3((1 - t) * log_se3(A0) + t * log_se3(A1)),
         ),
         Mistake(
             "Blended matrices are no pose: the rotation shrinks on the way.",
@@ -192,6 +225,7 @@ _ANGLES = np.radians([60.0, 120.0, 170.0])
 DRAW_THETA = Drawing(
     answer=lambda t, angles: [np.column_stack([t, theta(t, a)]) for a in angles],
     inputs=[(_T, _ANGLES), (_T[::3], _ANGLES[1:])],
+    allowed=ALLOWED,
     mistakes=[
         Mistake(
             "x and y are swapped. (What you see is the other function, f: the two are inverse.)",
@@ -211,11 +245,22 @@ DRAW_THETA = Drawing(
             lambda t, angles: [np.column_stack([t, theta(t, a, 1)]) for a in angles],
         ),
         Mistake(
+            "The arguments of np.arctan2 are exchanged: the sine part comes first.",
+            lambda t, angles: [
+                np.column_stack([t, np.arctan2(*_parts(t, a)[::-1]) / a]) for a in angles
+            ],
+        ),
+        Mistake(
+            "These are straight lines: where the geodesic is. The projection of the line runs "
+            "unevenly.",
+            lambda t, angles: [np.column_stack([t, t])],
+        ),
+        Mistake(
             "The angles come in radians: convert none.",
             lambda t, angles: [np.column_stack([t, theta(t, np.radians(a))]) for a in angles],
         ),
         Mistake(
-            "Only one of the curves is there: one for each angle is wanted.",
+            "Not all of the curves are there: one for each angle is wanted.",
             lambda t, angles: [np.column_stack([t, theta(t, angles[0])])],
             lambda t, angles: [np.column_stack([t, theta(t, angles[-1])])],
         ),

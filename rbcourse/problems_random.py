@@ -12,8 +12,13 @@ from rbcourse.conversions import (
 )
 from rbcourse.marking import Drawing, Mistake, Problem
 from rbcourse.marking_samplers import Sampler
-from rbcourse.sampling import arvo_rotation, sample_quaternion_naive, shoemake_quaternion
-from rbcourse.so3 import exp_so3
+from rbcourse.sampling import (
+    arvo_rotation,
+    sample_quaternion_naive,
+    sample_rotation,
+    shoemake_quaternion,
+)
+from rbcourse.so3 import exp_so3, log_so3
 from rbcourse.uniformity import angle_law
 
 Generator = np.random.Generator
@@ -37,8 +42,13 @@ _AXES = _normalised(
 
 def _direction_fault(drawn: Array) -> str:
     lengths = np.linalg.norm(drawn, axis=1)
-    if np.abs(lengths - 1).max() > 1e-9:
-        return f"A direction has the length 1; one of yours has {lengths[0]:.3f}."
+    return _off_length("A direction", lengths)
+
+
+def _off_length(what: str, lengths: Array) -> str:
+    worst = lengths[np.argmax(np.abs(lengths - 1))]
+    if abs(worst - 1) > 1e-9:
+        return f"{what} has the length 1; one of yours has {worst:.10g}."
     return ""
 
 
@@ -118,7 +128,8 @@ def _rotation_fault(R: Array) -> str:
                 "A draw is no rotation. If you reflect by I − 2VVᵀ: V has not the length 1. Its "
                 "radius is √z and its height √(1 − z); are both roots there?"
             )
-        return f"A draw is no rotation: its singular values are {stretch[0].round(3).tolist()}."
+        worst = stretch[np.argmax(np.abs(stretch - 1).max(axis=1))]
+        return f"A draw is no rotation: its singular values are {worst.round(10).tolist()}."
     negative = (np.linalg.det(R) < 0).mean()
     if negative > 0:
         how = "all" if negative == 1 else f"{negative:.0%}"
@@ -158,7 +169,7 @@ THREE_ANGLES = (
 )
 EVEN_ANGLE = (
     "The axis is uniform, and so is the angle. But small turns are rare: there is little room near "
-    "I. The density of the angle is (1 − cos a)/π."
+    "I. Which law has the angle?"
 )
 
 RANDOM_ROTATION = Sampler(
@@ -203,14 +214,19 @@ RANDOM_ROTATION = Sampler(
 
 def _quaternion_fault(drawn: Array) -> str:
     lengths = np.linalg.norm(drawn, axis=1)
-    if np.abs(lengths - 1).max() <= 1e-9:
-        return ""
-    if lengths.min() > 0.7 and lengths.max() <= 1:
+    if lengths.min() > 0.7 and lengths.max() <= 1 and lengths.max() - lengths.min() > 0.1:
         return (
             "The length is between 0.71 and 1, and should be 1: the two radii are √s and √(1 − s), "
             "whose squares add up to 1. Are the roots there?"
         )
-    return f"A unit quaternion has the length 1; one of yours has {lengths[0]:.3f}."
+    return _off_length("A unit quaternion", lengths)
+
+
+def _whole_angle(R: Array) -> Array:
+    """Return quaternions for somebody who forgets that they hold half the angle."""
+    w = log_so3(R)
+    a = np.linalg.norm(w, axis=1, keepdims=True)
+    return np.concatenate([np.cos(a), np.sin(a) * w / a], axis=1)
 
 
 def _rootless(x: Array) -> Array:
@@ -253,6 +269,11 @@ RANDOM_QUATERNION = Sampler(
             lambda n, rng: quaternion_from_rotation_vector(_by_axis(n, rng, FULL)),
         ),
         Mistake(
+            "The angle has the right law, but the quaternion holds half of it: cos(a/2), and "
+            "sin(a/2) times the axis.",
+            lambda n, rng: _whole_angle(sample_rotation(n, rng=rng)),
+        ),
+        Mistake(
             "Both angles go only half way round: one of them at least is uniform on [0, 2π).",
             lambda n, rng: shoemake_quaternion(rng.random((n, 3)) * [1, 0.5, 0.5]),
         ),
@@ -272,6 +293,10 @@ ANGLE_DENSITY = Problem(
             "This is the density of the angle between a fixed direction and a random one, on the "
             "ordinary sphere. A rotation also turns about its axis.",
             lambda a: np.sin(a) / 2,
+        ),
+        Mistake(
+            "This adds up to π over the angles from 0 to π, and should add up to 1.",
+            lambda a: 1 - np.cos(a),
         ),
         Mistake(
             "This adds up to ½ over the angles from 0 to π, and should add up to 1. The angle of a "
@@ -300,7 +325,8 @@ _SAMPLE = np.pi * np.random.default_rng(5).random(400) ** 0.4  # any angles will
 
 
 def _bars(angles: Array, edges: Array, density: bool = True) -> Array:
-    return np.column_stack([edges[:-1], np.histogram(angles, edges, density=density)[0]])
+    middles = (edges[1:] + edges[:-1]) / 2
+    return np.column_stack([middles, np.histogram(angles, edges, density=density)[0]])
 
 
 def _curve(edges: Array) -> Array:
@@ -318,8 +344,24 @@ DRAW_ANGLES = Drawing(
             lambda angles, edges: [_bars(angles, edges, density=False)],
         ),
         Mistake(
-            "The bars are right. The curve of the law, (1 − cos a)/π at the edges, is missing.",
+            "The bars are shares of the sample. To compare them with a density, divide each by its "
+            "width: all areas add up to 1.",
+            lambda angles, edges: [_bars(angles, edges) * [1, edges[1] - edges[0]]],
+        ),
+        Mistake(
+            "The bars stand with their middles on the edges. Each belongs between two edges: "
+            'align="edge".',
+            lambda angles, edges: [_bars(angles, edges) - [(edges[1] - edges[0]) / 2, 0]],
+        ),
+        Mistake(
+            "The bars are right. The line of the density, through its values at the edges, is "
+            "missing.",
             lambda angles, edges: [_bars(angles, edges)],
+        ),
+        Mistake(
+            "The line of the density is right. The histogram is missing, or its bars are not "
+            "between the given edges.",
+            lambda angles, edges: [_curve(edges)],
         ),
         Mistake(
             "These are degrees. The law is a density per radian.",

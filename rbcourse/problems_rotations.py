@@ -1,5 +1,7 @@
 """Problem set 2: what is asked of rotations, and of the nearest one, and what goes wrong."""
 
+from functools import partial
+
 import numpy as np
 
 from rbcourse._numerics import Array
@@ -71,6 +73,25 @@ TURN_ABOUT = Problem(
             ),
         ),
         Mistake(
+            "The last term has n̂², the product of n̂ with itself.",
+            lambda axis, angle: (
+                np.eye(3) + (np.sin(angle) + 1 - np.cos(angle)) * hat_so3(_unit(axis))
+            ),
+            lambda axis, angle: (
+                np.eye(3)
+                + np.sin(angle) * hat_so3(_unit(axis))
+                + (1 - np.cos(angle)) * hat_so3(_unit(axis)) ** 2
+            ),
+        ),
+        Mistake(
+            "Sine and cosine are exchanged: for the angle 0 the result should be I.",
+            lambda axis, angle: (
+                np.eye(3)
+                + np.cos(angle) * hat_so3(_unit(axis))
+                + (1 - np.sin(angle)) * hat_so3(_unit(axis)) @ hat_so3(_unit(axis))
+            ),
+        ),
+        Mistake(
             "The sign of the last term is wrong: it is (1 − cos a), which is never negative.",
             lambda axis, angle: _sum(axis, angle, np.cos(angle), np.cos(angle) - 1),
             lambda axis, angle: (
@@ -116,6 +137,7 @@ FROM_ANGLES = Problem(
             "These are sums or products of entries. Turns are joined by the product of matrices: "
             "A @ B, not A * B.",
             lambda yaw, pitch, roll: np.prod(_factors(yaw, pitch, roll), axis=0),
+            lambda yaw, pitch, roll: np.sum(_factors(yaw, pitch, roll), axis=0),
         ),
         Mistake(
             IN_RADIANS,
@@ -139,6 +161,10 @@ TURN_ON = Problem(
         Mistake(
             "This turns about the right axis the wrong way.",
             lambda R, angle: R @ exp_so3(-angle * X),
+        ),
+        Mistake(
+            "This is the further turn alone. Where the body was before is lost: multiply by R.",
+            lambda R, angle: exp_so3(angle * X),
         ),
         Mistake(
             "R Rx Rᵀ is the further turn alone, as the room sees it. Where the body was before is "
@@ -177,10 +203,11 @@ def _signed(M: Array, *where: int) -> Array:
     return U @ np.diag(D) @ Vt
 
 
-def _first_column(M: Array) -> Array:
-    """Return U Vᵀ with its own first column turned round where the determinant is negative."""
+def _turned_round(axis: int, k: int, M: Array) -> Array:
+    """Return U Vᵀ with a row or column of it turned round where its determinant is negative."""
     R = _signed(M)
-    return R * [np.linalg.det(R), 1, 1]
+    signs = np.where(np.arange(3) == k, np.linalg.det(R), 1)
+    return R * np.expand_dims(signs, axis)
 
 
 NEAREST = Problem(
@@ -206,7 +233,20 @@ NEAREST = Problem(
             "smallest singular value, which costs the least. It comes last.",
             lambda M: _signed(M, 0),
             lambda M: _signed(M, 1),
-            _first_column,
+            *(partial(_turned_round, axis, k) for axis in (0, 1) for k in range(3)),
+        ),
+        Mistake(
+            "You change a sign also where none is to be changed: where the determinant of U Vᵀ is "
+            "1, this is a mirror.",
+            lambda M: _svd(M)[0] @ np.diag([1, 1, -1]) @ _svd(M)[2],
+        ),
+        Mistake(
+            "This is M itself again: leave the singular values out.",
+            lambda M: M,
+        ),
+        Mistake(
+            "Only the lengths of the columns are repaired. They also have to be at right angles.",
+            lambda M: M / np.linalg.norm(M, axis=0),
         ),
         Mistake(
             "It is a rotation, but far away: you change all signs where the determinant is "
@@ -257,6 +297,14 @@ HOW_FAR = Problem(
             lambda M: np.linalg.norm(_off(M, sign=False)),
         ),
         Mistake(
+            "The minus where det M < 0 belongs to the last singular value, which is the smallest.",
+            lambda M: np.linalg.norm(_svd(M)[1] * [np.sign(np.linalg.det(M)), 1, 1] - 1),
+        ),
+        Mistake(
+            "This measures how far MᵀM is from I: 0 for a rotation, but no distance to one.",
+            lambda M: np.linalg.norm(M.T @ M - np.eye(3)),
+        ),
+        Mistake(
             "This adds the singular values' differences from 1 as they are. Their squares are to "
             "be added, and the root taken of the sum.",
             lambda M: np.abs(_off(M)).sum(),
@@ -296,6 +344,11 @@ DRAW_DISTANCE = Drawing(
             "This is the distance from I. That from the nearest rotation is asked for, which is "
             "another one at each t.",
             lambda R, t: [np.column_stack([t, t * np.linalg.norm(R - np.eye(3))])],
+        ),
+        Mistake(
+            "This is the distance from R. That from the nearest rotation is asked for, which is "
+            "another one at each t.",
+            lambda R, t: [np.column_stack([t, (1 - t) * np.linalg.norm(R - np.eye(3))])],
         ),
         Mistake(
             "Only the numbers of the points stand on the x axis. Hand t to plot as well.",

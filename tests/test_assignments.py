@@ -17,7 +17,7 @@ from rbcourse.own_work import NotYet
 
 SOURCE = Path(__file__).parents[1] / "notebooks" / "assignments" / "source"
 SETS = {path.stem: nbformat.read(path, as_version=4) for path in sorted(SOURCE.glob("*/*.ipynb"))}
-TOPICS = ("plane", "rotations", "random", "geodesics", "acceleration")
+TOPICS = ("plane", "arm", "rotations", "random", "geodesics", "acceleration")
 TESTS = [
     (name, cell.metadata.nbgrader.grade_id.removesuffix("-test"))
     for name, notebook in SETS.items()
@@ -82,6 +82,16 @@ def listed():
     modules = [import_module(f"rbcourse.problems_{topic}") for topic in TOPICS]
     values = {name: value for module in modules for name, value in vars(module).items()}
     return {name: value for name, value in values.items() if isinstance(value, Problem | Sampler)}
+
+
+@pytest.mark.parametrize(("name", "slug"), TESTS)
+def test_lists_are_as_good_as_arrays(name, slug):
+    """Whatever passes what students see must not fail for its type where they do not see."""
+    source = cells(name)[f"{slug}-answer"].source
+    function = re.search(r"def (\w+)\(", source)[1]
+    wrapped = f"{source}\n\n_inner = {function}\n\n\ndef {function}(*arguments):\n"
+    wrapped += "    result = _inner(*arguments)\n    return np.asarray(result).tolist()\n"
+    try_answer(name, slug, wrapped)
 
 
 def test_every_listed_mistake_is_made_above():
@@ -171,7 +181,7 @@ def test_hidden_tests_need_nothing_of_the_package(name, slug):
     hidden = source.partition("### BEGIN HIDDEN TESTS")[2]
     names = {node.id for node in ast.walk(ast.parse(hidden)) if isinstance(node, ast.Name)}
     own = {key for key in names if key.isupper() or key in ("rbcourse", "rb")}
-    assert not own
+    assert not {key for key in own if not key.startswith("DRAW_")}
     assert "import" not in hidden
 
 
@@ -184,6 +194,7 @@ def test_hidden_tests_alone_refuse_what_only_looks_right(name, slug):
     hidden = cells(name)[f"{slug}-test"].source.partition("### BEGIN HIDDEN TESTS")[2]
     space = {"__name__": "__main__"}
     exec(cells(name)["setup"].source, space)
+    exec(re.search(r"from rbcourse.*", cells(name)[f"{slug}-test"].source)[0], space)
     if isinstance(problem, Sampler):
         return
     space[function] = lambda *arguments: problem.answer(*problem.inputs[0])

@@ -23,6 +23,7 @@ LEVELS = {
     "problems_geodesics": 7,
     "problems_random": 7,
     "problems_rotations": 7,
+    "problems_arm": 7,
     "problems_plane": 7,
     "line": 1,
     "plans": 1,

@@ -39,7 +39,8 @@ def test_a_listed_mistake_gets_its_hint(text, hint):
 def test_a_mistake_has_to_be_made_on_all_inputs():
     text = told(DOUBLE, "def answer(x, k): return x * k / 2 if k == 1 else 2 * k * x")
     assert text == (
-        "For [1.0, -2.0], 1 the result should be [2.0, -4.0]; yours is [0.5, -1.0], off by 3."
+        "For x = [1.0, -2.0], k = 1 the result should be [2.0, -4.0]; yours is [0.5, -1.0], "
+        "off by 3."
     )
 
 
@@ -47,8 +48,9 @@ def test_a_mistake_has_to_be_made_on_all_inputs():
     ("body", "said"),
     [
         ("pass", "returns nothing. Is the line with return missing?"),
-        ("return 'two'", "returns no numbers but two"),
-        ("return [[1], [1, 2]]", "returns no numbers but"),
+        ("return 'two'", "returns no real numbers but two"),
+        ("return [[1], [1, 2]]", "returns no real numbers but [[1], [1, 2]]."),
+        ("return x + 0j", "no real numbers but [(1+0j), (-2+0j)]. It is complex"),
         ("return (2 * k * x)[:1]", "the shape (2,) is wanted; yours is (1,)"),
         ("return x * np.nan", "your result is not finite: [nan, nan]"),
         ("x *= 2 * k\n    return x", "changes the arguments"),
@@ -115,14 +117,22 @@ def test_what_is_wrong_with_a_drawing_is_told(drawing, said):
 def test_bars_and_steps_are_curves():
     from matplotlib.figure import Figure
 
-    wanted = [[0, 1 / 3], [1, 2 / 3]]
+    data, edges, heights = [0.5, 1.2, 1.4], [0, 1, 2], [1 / 3, 2 / 3]
+    wanted = [[0.5, 1 / 3], [1.5, 2 / 3]]
     for draw in (
-        lambda ax: ax.hist([0.5, 1.2, 1.4], [0, 1, 2], density=True),
-        lambda ax: (
-            ax.hist([0.5, 1.2, 1.4], [0, 1, 2], density=True, histtype="stepfilled")
-            and ax.stairs([1 / 3, 2 / 3], [0, 1, 2])
-        ),
-        lambda ax: ax.bar([0, 1], [1 / 3, 2 / 3], width=1, align="edge"),
+        lambda ax: ax.hist(data, edges, density=True),
+        lambda ax: ax.hist(data, edges, density=True, rwidth=0.9),
+        lambda ax: ax.hist(data, edges, density=True, histtype="step"),
+        lambda ax: ax.hist(data, edges, density=True, histtype="stepfilled"),
+        lambda ax: ax.stairs(heights, edges),
+        lambda ax: ax.stairs(heights, edges, fill=True),
+        lambda ax: ax.bar([0, 1], heights, width=1, align="edge"),
+        lambda ax: ax.bar([0.5, 1.5], heights, width=0.8),
+        lambda ax: ax.step(edges, [*heights, heights[-1]], where="post"),
+        lambda ax: ax.step(edges, [heights[0], *heights], where="pre"),
+        lambda ax: ax.step([0.5, 1.5], heights, where="mid"),
+        lambda ax: ax.fill_between(edges, [*heights, 0], step="post"),
+        lambda ax: (ax.axvspan(0, 1), ax.hist(data, edges, density=True)),
     ):
         ax = Figure().subplots()
         draw(ax)

@@ -1,5 +1,7 @@
 """A right sampler is as good as never refused; a wrong one is, with the reason."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -73,8 +75,8 @@ def test_a_sampler_may_have_a_generator_of_its_own():
         ("0.3", "Every call returns the same draw"),
         ("__import__('numpy').random.default_rng(0).random()", "Every call returns the same"),
         ("rng.random(3)", "A draw has the shape (); yours has (3,)"),
-        ("'x'", "One draw of numbers is wanted; yours is x"),
-        ("float('nan')", "A draw is not finite"),
+        ("'x'", "Draw 0 is to be numbers; yours is x"),
+        ("float('nan')", "Draw 0 is not finite: nan"),
         ("rng.random() / 2", "These draws are not uniform. What gives it away: the number"),
     ],
 )
@@ -94,6 +96,34 @@ def test_a_wrong_draw_late_in_the_run_is_seen():
     """
     with pytest.raises(NotYet, match="outside"):
         COIN.accepts(student(source))
+
+
+@pytest.mark.parametrize(
+    ("late", "said"),
+    [
+        ("None", "Draw 2999 is to be numbers; yours is None. Does a branch end without return?"),
+        ("float('inf')", "Draw 2999 is not finite: inf"),
+        ("1 / 0", "Your function stops: ZeroDivisionError"),
+    ],
+)
+def test_what_goes_wrong_late_is_told_too(late, said):
+    source = f"""
+        count = 0
+        def answer(rng):
+            global count
+            count += 1
+            return rng.random() if count < 3000 else {late}
+    """
+    with pytest.raises(NotYet) as refused:
+        COIN.accepts(student(source))
+    assert str(refused.value).startswith(said)
+
+
+def test_of_two_mistakes_that_look_alike_the_nearer_gets_its_hint():
+    near = [Mistake("near", lambda n, rng: rng.random(n) ** 2.02), *COIN.mistakes]
+    alike = replace(COIN, mistakes=near)
+    with pytest.raises(NotYet, match="squared"):
+        alike.accepts(student("def answer(rng): return rng.random() ** 1.98"), 5)
 
 
 def test_draws_that_are_used_twice_are_seen():

@@ -85,8 +85,30 @@ def test_numpy_python_and_printing_are_nobodys_secret(capsys):
             pair = Pair(math.fsum(s), sorted(s, key=lambda value: -value))
             return np.vectorize(lambda value: value + 1)(pair.b)
     """
-    assert len(call_student(student(source), ([1.0, 2.0, 3.0],), ())) == 3
+    (result,) = call_student(student(source), ([1.0, 2.0, 3.0],), ())
+    assert len(result) == 3
     assert capsys.readouterr().out.startswith("seen")
+
+
+def test_an_import_inside_and_its_finders_are_nobodys_secret(monkeypatch):
+    """As setuptools has one, which is asked at every first import."""
+
+    class Finder:
+        @staticmethod
+        def find_spec(*_):
+            return None
+
+    Finder.find_spec.__globals__["__name__"] = "finder"
+    monkeypatch.setattr(sys, "meta_path", [Finder, *sys.meta_path])
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    monkeypatch.setitem(sys.modules, "finder", sys)
+    source = "def answer():\n    import colorsys\n    return colorsys.rgb_to_hls(1, 0, 0)"
+    call_student(student(source), (), ())
+
+
+def test_what_is_called_often_is_called_so_often():
+    counted = student("count = []\ndef answer(): return len(count) or count.append(1) or 0")
+    assert len(call_student(counted, (), (), 25)) == 25
 
 
 def test_matplotlib_may_load_what_it_likes():

@@ -6,6 +6,20 @@ The code is the body of the function that is asked for, written as a student wou
 WRONG = {
     ("ps1", "pose-matrix"): [
         (
+            "Sine and cosine are exchanged",
+            """
+            s, c = np.cos(pose[2]), np.sin(pose[2])
+            return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0, 0, 1]])
+            """,
+        ),
+        (
+            "x and y are exchanged",
+            """
+            c, s = np.cos(pose[2]), np.sin(pose[2])
+            return np.array([[c, -s, pose[1]], [s, c, pose[0]], [0, 0, 1]])
+            """,
+        ),
+        (
             "The body turns the wrong way",
             """
             x, y, th = pose
@@ -50,6 +64,22 @@ WRONG = {
     ],
     ("ps1", "seen"): [
         (
+            "The signs are wrong",
+            """
+            c, s = np.cos(pose[2]), np.sin(pose[2])
+            return np.array([[c, s], [-s, c]]) @ (pose[:2] - point)
+            """,
+        ),
+        (
+            "The second number is how far to the *left*",
+            """
+            dx, dy = point - pose[:2]
+            c, s = np.cos(pose[2]), np.sin(pose[2])
+            return np.array([c * dx + s * dy, s * dx - c * dy])
+            """,
+        ),
+        ("The turn is missing", "return point - pose[:2]"),
+        (
             "This goes the other way",
             """
             c, s = np.cos(pose[2]), np.sin(pose[2])
@@ -87,6 +117,29 @@ WRONG = {
         ),
     ],
     ("ps1", "plan"): [
+        (
+            "All your poses are the last one",
+            """
+            pose = np.array(start, float)
+            poses = [pose]
+            for v, d in plan:
+                pose += v * d
+                poses.append(pose)
+            return np.array(poses)
+            """,
+        ),
+        (
+            "The headings are folded",
+            """
+            poses = [start]
+            for v, d in plan:
+                x, y, th = poses[-1] + v * d
+                poses.append(np.array([x, y, np.arctan2(np.sin(th), np.cos(th))]))
+            x, y, th = start
+            poses[0] = np.array([x, y, np.arctan2(np.sin(th), np.cos(th))])
+            return np.array(poses)
+            """,
+        ),
         (
             "The durations are missing",
             """
@@ -170,6 +223,35 @@ WRONG = {
         ),
     ],
     ("ps1", "short"): [
+        (
+            "One turn more or less is not always enough",
+            """
+            d = goal - start
+            if d > np.pi:
+                d -= 2 * np.pi
+            elif d < -np.pi:
+                d += 2 * np.pi
+            return start + t * d
+            """,
+        ),
+        (
+            "The result is in degrees",
+            """
+            d = np.angle(np.exp(1j * (goal - start)))
+            return np.rad2deg(start + t * d)
+            """,
+        ),
+        (
+            "You turn away from the goal",
+            """
+            d = np.angle(np.exp(1j * (start - goal)))
+            return start + t * d
+            """,
+        ),
+        (
+            "This blends the numbers as they are",
+            "return start + t * ((goal - start + 180) % 360 - 180)",
+        ),
         ("This blends the numbers as they are", "return (1 - t) * start + t * goal"),
         (
             "You take the long way",
@@ -206,6 +288,13 @@ WRONG = {
     ],
     ("ps1", "joints"): [
         (
+            "You let the motors take the short way",
+            """
+            d = goal - start
+            return start + t * np.arctan2(np.sin(d), np.cos(d))
+            """,
+        ),
+        (
             "This is the formula as the report prints it",
             """
             th0 = (1 - t) * start[0] + t * start[1]
@@ -217,6 +306,15 @@ WRONG = {
         ("This adds t times the goal", "return start + goal * t"),
     ],
     ("ps1", "tip"): [
+        (
+            "The two lengths are exchanged",
+            """
+            b, a = lengths
+            q = start + np.linspace(0, 1, 41)[:, None] * (goal - start)
+            x = a * np.cos(q[:, 0]) + b * np.cos(q.sum(axis=1))
+            ax.plot(x, a * np.sin(q[:, 0]) + b * np.sin(q.sum(axis=1)))
+            """,
+        ),
         (
             "x and y are swapped",
             """
@@ -275,6 +373,50 @@ WRONG = {
         ("Nothing was drawn on the axes", "plt.figure()"),
     ],
     ("ps1", "angles"): [
+        (
+            "np.arctan of a ratio",
+            """
+            a, b = lengths
+            th1 = np.arccos((tip @ tip - a * a - b * b) / (2 * a * b))
+            shoulder = np.arctan(b * np.sin(th1) / (a + b * np.cos(th1)))
+            return np.arctan2(tip[1], tip[0]) - shoulder, th1
+            """,
+        ),
+        (
+            "np.arcsin never gives more",
+            """
+            a, b = lengths
+            th1 = np.arccos((tip @ tip - a * a - b * b) / (2 * a * b))
+            return np.arctan2(tip[1], tip[0]) - np.arcsin(b * np.sin(th1) / np.hypot(*tip)), th1
+            """,
+        ),
+        (
+            "This is the other elbow",
+            """
+            a, b = lengths
+            th1 = 2 * np.pi - np.arccos((tip @ tip - a * a - b * b) / (2 * a * b))
+            shoulder = np.arctan2(b * np.sin(th1), a + b * np.cos(th1))
+            return np.arctan2(tip[1], tip[0]) - shoulder, th1
+            """,
+        ),
+        (
+            "The angles are right up to full turns",
+            """
+            a, b = lengths
+            th1 = np.arccos((tip @ tip - a * a - b * b) / (2 * a * b)) - 2 * np.pi
+            shoulder = np.arctan2(b * np.sin(th1), a + b * np.cos(th1))
+            return np.arctan2(tip[1], tip[0]) - shoulder, th1
+            """,
+        ),
+        (
+            "The two angles are exchanged",
+            """
+            a, b = lengths
+            th1 = np.arccos((tip @ tip - a * a - b * b) / (2 * a * b))
+            shoulder = np.arctan2(b * np.sin(th1), a + b * np.cos(th1))
+            return th1, np.arctan2(tip[1], tip[0]) - shoulder
+            """,
+        ),
         (
             "x and y are swapped",
             """
@@ -360,6 +502,22 @@ WRONG = {
     ],
     ("ps2", "turn"): [
         (
+            "The last term has n̂²",
+            """
+            x, y, z = axis / np.linalg.norm(axis)
+            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K**2
+            """,
+        ),
+        (
+            "Sine and cosine are exchanged",
+            """
+            x, y, z = axis / np.linalg.norm(axis)
+            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            return np.eye(3) + np.cos(angle) * K + (1 - np.sin(angle)) * K @ K
+            """,
+        ),
+        (
             "The turn goes the wrong way",
             """
             x, y, z = axis / np.linalg.norm(axis)
@@ -423,6 +581,7 @@ WRONG = {
         ),
     ],
     ("ps2", "angles"): [
+        ("These are sums or products", "return RZ(yaw) + RY(pitch) + RX(roll)"),
         ("The order is Rz Ry Rx", "return RX(roll) @ RY(pitch) @ RZ(yaw)"),
         ("Yaw and roll are exchanged", "return RZ(roll) @ RY(pitch) @ RX(yaw)"),
         ("Each of your three turns", "return RZ(yaw).T @ RY(pitch).T @ RX(roll).T"),
@@ -435,6 +594,7 @@ WRONG = {
         ),
     ],
     ("ps2", "further"): [
+        ("This is the further turn alone", "return RX(angle)"),
         ("This turns about the x axis of the room", "return RX(angle) @ R"),
         ("This turns about the right axis the wrong way", "return R @ RX(-angle)"),
         ("R Rx Rᵀ is the further turn alone", "return R @ RX(angle) @ np.linalg.inv(R)"),
@@ -442,6 +602,31 @@ WRONG = {
         ("Angles are in radians", "return R @ RX(np.deg2rad(angle))"),
     ],
     ("ps2", "nearest"): [
+        (
+            "It is a rotation, but not the nearest",
+            """
+            U, s, Vt = np.linalg.svd(M)
+            R = U @ Vt
+            if np.linalg.det(R) < 0:
+                R[:, 2] = -R[:, 2]
+            return R
+            """,
+        ),
+        (
+            "You change a sign also",
+            """
+            U, s, Vt = np.linalg.svd(M)
+            return U @ np.diag([1, 1, -1]) @ Vt
+            """,
+        ),
+        (
+            "This is M itself",
+            """
+            U, s, Vt = np.linalg.svd(M)
+            return U @ np.diag(s) @ Vt
+            """,
+        ),
+        ("Only the lengths of the columns", "return M / np.sqrt((M**2).sum(axis=0))"),
         (
             "For some matrices this has the determinant −1",
             """
@@ -513,6 +698,15 @@ WRONG = {
     ],
     ("ps2", "far"): [
         (
+            "The minus where det M < 0",
+            """
+            s = np.linalg.svd(M)[1]
+            s[0] *= np.sign(np.linalg.det(M))
+            return np.sqrt(((s - 1) ** 2).sum())
+            """,
+        ),
+        ("This measures how far MᵀM", "return np.linalg.norm(M.T @ M - np.eye(3))"),
+        (
             "This is the square",
             """
             s = np.linalg.svd(M)[1]
@@ -552,6 +746,13 @@ WRONG = {
         ("This is the distance to I", "return np.linalg.norm(M - np.eye(3))"),
     ],
     ("ps2", "line"): [
+        (
+            "This is the distance from R",
+            """
+            d = [np.linalg.norm((1 - s) * np.eye(3) + s * R - R) for s in t]
+            ax.plot(t, d)
+            """,
+        ),
         (
             "x and y are swapped",
             """
@@ -629,6 +830,7 @@ WRONG = {
         ),
     ],
     ("ps3", "density"): [
+        ("This adds up to π", "return 1 - np.cos(a)"),
         ("This is the same for all angles", "return 1 / np.pi"),
         ("This is the density of the angle between", "return np.sin(a) / 2"),
         ("This adds up to ½", "return (1 - np.cos(a)) / (2 * np.pi)"),
@@ -638,13 +840,35 @@ WRONG = {
     ],
     ("ps3", "histogram"): [
         (
+            "The line of the density is right",
+            """
+            ax.hist(angles, density=True)
+            ax.plot(edges, (1 - np.cos(edges)) / np.pi)
+            """,
+        ),
+        (
+            "The bars are shares",
+            """
+            ax.hist(angles, edges, weights=np.full(len(angles), 1 / len(angles)))
+            ax.plot(edges, (1 - np.cos(edges)) / np.pi)
+            """,
+        ),
+        (
+            "The bars stand with their middles",
+            """
+            heights = np.histogram(angles, edges, density=True)[0]
+            ax.bar(edges[:-1], heights, width=np.diff(edges))
+            ax.plot(edges, (1 - np.cos(edges)) / np.pi)
+            """,
+        ),
+        (
             "The bars are counts",
             """
             ax.hist(angles, edges)
             ax.plot(edges, (1 - np.cos(edges)) / np.pi)
             """,
         ),
-        ("The bars are right. The curve of the law", "ax.hist(angles, edges, density=True)"),
+        ("The bars are right. The line of the density", "ax.hist(angles, edges, density=True)"),
         (
             "These are degrees",
             """
@@ -654,6 +878,16 @@ WRONG = {
         ),
     ],
     ("ps3", "quaternion"): [
+        (
+            "The angle has the right law",
+            """
+            n = rng.normal(size=3)
+            while True:
+                a = rng.uniform(0, np.pi)
+                if rng.random() < (1 - np.cos(a)) / 2:
+                    return np.array([np.cos(a), *(np.sin(a) * n / np.linalg.norm(n))])
+            """,
+        ),
         (
             "Three uniform angles",
             """
@@ -791,6 +1025,12 @@ WRONG = {
         ("A draw is no rotation: its singular values", "return rng.normal(size=(3, 3))"),
     ],
     ("ps4", "geodesic"): [
+        ("A transpose is missing", "return R0 @ exp_so3(t * log_so3(R0 @ R1))"),
+        (
+            "Rotation vectors cannot be subtracted",
+            "return R0 @ exp_so3(t * (log_so3(R1) - log_so3(R0)))",
+        ),
+        ("This starts at I", "return exp_so3(t * log_so3(R1 @ R0.T))"),
         ("Two frames are mixed", "return R0 @ exp_so3(t * log_so3(R1 @ R0.T))"),
         ("Two frames are mixed", "return exp_so3(t * log_so3(R0.T @ R1)) @ R0"),
         ("This starts at R₁", "return R0 @ exp_so3((1 - t) * log_so3(R0.T @ R1))"),
@@ -808,6 +1048,7 @@ WRONG = {
         ("Blended rotation vectors", "return exp_so3(log_so3(R0) * (1 - t) + log_so3(R1) * t)"),
     ],
     ("ps4", "theta"): [
+        ("This is a weight of Slerp", "return np.sin(a * t) / np.sin(a)"),
         ("x and y are swapped", "return np.arctan2(1 - t + t * np.cos(a), t * np.sin(a)) / a"),
         ("This is the angle turned", "return np.arctan2(t * np.sin(a), 1 - t + t * np.cos(a))"),
         (
@@ -849,6 +1090,20 @@ WRONG = {
         ),
     ],
     ("ps4", "shadow"): [
+        (
+            "The arguments of np.arctan2",
+            """
+            for a in angles:
+                ax.plot(t, np.arctan2(1 - t + t * np.cos(a), t * np.sin(a)) / a)
+            """,
+        ),
+        (
+            "These are straight lines",
+            """
+            for a in angles:
+                ax.plot(t, t)
+            """,
+        ),
         ("x and y are swapped", "for a in angles:\n    ax.plot(SHARE(t, a), t)"),
         (
             "These are the curves of f",
@@ -865,9 +1120,14 @@ WRONG = {
             "    ax.plot(t, np.sin(a) / (a * s2))",
         ),
         ("The angles come in radians", "for a in np.radians(angles):\n    ax.plot(t, SHARE(t, a))"),
-        ("Only one of the curves", "ax.plot(t, SHARE(t, angles[0]))"),
+        ("Not all of the curves", "ax.plot(t, SHARE(t, angles[0]))"),
     ],
     ("ps4", "screw"): [
+        (
+            "This sets out from A₀ in the opposite",
+            "return A0 @ exp_se3(t * log_se3(np.linalg.inv(A1) @ A0))",
+        ),
+        ("Twists of two poses", "return exp_se3((1 - t) * log_se3(A0) + t * log_se3(A1))"),
         (
             "This turns evenly and moves the origin",
             """
@@ -894,6 +1154,8 @@ WRONG = {
         ("Blended matrices", "return A0 * (1 - t) + A1 * t"),
     ],
     ("ps5", "cubic"): [
+        ("The velocity at the start has", "return HERMITE(p0, p1, -v0, v1, t)"),
+        ("Both velocities have", "return HERMITE(p0, p1, -v0, -v1, t)"),
         (
             "The velocity at the end has the wrong sign",
             "return HERMITE(p0, p1, v0, -v1, t)",
@@ -912,12 +1174,13 @@ WRONG = {
             "The second velocity is taken",
             """
             A = np.array([[1, 0, 0, 0], [1, 1, 1, 1], [0, 1, 0, 0], [0, 0, 2, 6]])
-            c = np.linalg.solve(A, [p0, p1, v0, v1])
-            return c[0] + c[1] * t + c[2] * t**2 + c[3] * t**3
+            c = np.linalg.solve(A, np.reshape([p0, p1, v0, v1], (4, -1)))
+            return (c[0] + c[1] * t + c[2] * t**2 + c[3] * t**3).reshape(p0.shape)
             """,
         ),
     ],
     ("ps5", "rate"): [
+        ("R ω̂ Rᵀ is the hat", "return R @ hat_so3(w) @ R.T"),
         ("This takes ω along the axes of the room", "return hat_so3(w) @ R"),
         ("The sign is wrong", "return R @ hat_so3(w).T"),
         ("R is missing", "return hat_so3(w)"),
@@ -925,6 +1188,22 @@ WRONG = {
         ("This is the transpose", "return hat_so3(w).T @ R.T"),
     ],
     ("ps5", "projected"): [
+        (
+            "For some matrices this is a mirror",
+            """
+            M = HERMITE(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1), t)
+            U, s, Vt = np.linalg.svd(M)
+            return U @ Vt
+            """,
+        ),
+        (
+            "The two velocities are exchanged",
+            "return project_so(HERMITE(R0, R1, R0 @ hat_so3(w1), R1 @ hat_so3(w0), t))",
+        ),
+        (
+            "You take the angular velocities",
+            "return project_so(HERMITE(R0, R1, R0 @ hat_so3(w0), hat_so3(w1) @ R1, t))",
+        ),
         (
             "This is the cubic through the matrices",
             "return HERMITE(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1), t)",
@@ -951,7 +1230,7 @@ WRONG = {
             "return project_so(HERMITE(R0, R1, R0 @ hat_so3(w0), R0 @ hat_so3(w1), t))",
         ),
         (
-            "Both ends' velocities have the wrong sign",
+            "A velocity has the wrong sign",
             "return project_so(HERMITE(R0, R1, -R0 @ hat_so3(w0), -R1 @ hat_so3(w1), t))",
         ),
     ],
@@ -963,6 +1242,7 @@ WRONG = {
         ("This multiplies entry by entry", "return -w * w2"),
     ],
     ("ps5", "cost"): [
+        ("This is the mean over all", "return 2 * np.mean(w1**2)"),
         (
             "The factor 2 of (18)",
             "return np.trapezoid((w1**2).sum(axis=1), np.linspace(0, 1, len(w1)))",
