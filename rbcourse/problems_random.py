@@ -15,10 +15,9 @@ from rbcourse.marking_samplers import Sampler
 from rbcourse.sampling import (
     arvo_rotation,
     sample_quaternion_naive,
-    sample_rotation,
     shoemake_quaternion,
 )
-from rbcourse.so3 import exp_so3, log_so3
+from rbcourse.so3 import exp_so3
 from rbcourse.uniformity import angle_law
 
 Generator = np.random.Generator
@@ -222,13 +221,6 @@ def _quaternion_fault(drawn: Array) -> str:
     return _off_length("A unit quaternion", lengths)
 
 
-def _whole_angle(R: Array) -> Array:
-    """Return quaternions for somebody who forgets that they hold half the angle."""
-    w = log_so3(R)
-    a = np.linalg.norm(w, axis=1, keepdims=True)
-    return np.concatenate([np.cos(a), np.sin(a) * w / a], axis=1)
-
-
 def _rootless(x: Array) -> Array:
     """Return Shoemake's quaternions with s and 1 − s in the place of the roots, normalised."""
     s = x[:, 0]
@@ -264,14 +256,10 @@ RANDOM_QUATERNION = Sampler(
             lambda n, rng: _normalised(np.abs(rng.normal(size=(n, 4)))),
         ),
         Mistake(
-            EVEN_ANGLE,
+            f"{EVEN_ANGLE} (If you gave it the right one: a quaternion holds *half* the angle, "
+            "cos(a/2), and sin(a/2) times the axis.)",
             lambda n, rng: quaternion_from_rotation_vector(_by_axis(n, rng, np.pi)),
             lambda n, rng: quaternion_from_rotation_vector(_by_axis(n, rng, FULL)),
-        ),
-        Mistake(
-            "The angle has the right law, but the quaternion holds half of it: cos(a/2), and "
-            "sin(a/2) times the axis.",
-            lambda n, rng: _whole_angle(sample_rotation(n, rng=rng)),
         ),
         Mistake(
             "Both angles go only half way round: one of them at least is uniform on [0, 2π).",

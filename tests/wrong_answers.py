@@ -879,7 +879,7 @@ WRONG = {
     ],
     ("ps3", "quaternion"): [
         (
-            "The angle has the right law",
+            "The axis is uniform, and so is the angle",
             """
             n = rng.normal(size=3)
             while True:
