@@ -7,6 +7,7 @@ also work in its own commands.
 import os
 import re
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -33,13 +34,17 @@ class RefusedError(ValueError):
 
 
 def configure(config: Config) -> None:
-    """Set what nbgrader does with submissions and feedback.
+    """Set what nbgrader does with submissions and feedback, and where it finds its tools.
 
     Parameters
     ----------
     config : traitlets.config.Config
         It is changed in place.
     """
+    # to make a gradebook it calls alembic by name, which a shell finds in an activated environment
+    if not shutil.which("alembic"):
+        tools = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
+        os.environ["PATH"] = os.pathsep.join(tools)
     config.Autograde.sanitize_preprocessors = [
         nbgrader.ClearOutput,
         RestoreCells,

@@ -174,7 +174,7 @@ class Drawing(Problem):
 
     The student's function gets axes before the arguments of `inputs`. `answer` and the mistakes
     get none, and return the curves that are wanted, each an array of points, shape (n, 2). Others
-    may be drawn besides. The bars of a histogram are a curve too: left edge and height of each.
+    may be drawn besides. The bars of a histogram are a curve too: middle and height of each.
     Both axes need a label.
     """
 

@@ -3,7 +3,10 @@
 import csv
 import html
 import json
+import os
 import re
+import shutil
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -267,6 +270,13 @@ def test_grading_again_keeps_what_a_human_gave(tmp_path):
 def test_late_is_told_in_hours(ran):
     assert ran.rows["good one"]["late"] == "1.5 h"
     assert ran.rows["nosy"]["late"] == ""
+
+
+def test_a_gradebook_is_made_also_where_the_environment_is_not_activated(monkeypatch):
+    """nbgrader calls alembic by its name."""
+    monkeypatch.setenv("PATH", os.defpath)
+    configure(Config())
+    assert Path(shutil.which("alembic")).parent == Path(sys.executable).parent
 
 
 def test_a_set_without_submissions_and_an_unknown_one_are_told(tmp_path):

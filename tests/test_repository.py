@@ -202,6 +202,32 @@ def test_the_environment_in_use_is_not_made_anew(setting_up, monkeypatch):
     assert module.VENV.exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["handout", "ps1"], ["handout", "ps1"]),
+        (["check", "my work/ps1.ipynb"], ["submission", "HERE/my work/ps1.ipynb"]),
+        (["collect", "in"], ["collection", "HERE/in"]),
+        (
+            ["collect", "in", "--due", "2026-12-01"],
+            ["collection", "HERE/in", "--due", "2026-12-01"],
+        ),
+        (["grade"], ["grading"]),
+        (["grade", "ps1", "ps2"], ["grading", "ps1", "ps2"]),
+    ],
+)
+def test_a_task_for_problem_sets_runs_its_module(setting_up, tmp_path, monkeypatch, words, wanted):
+    """Files are those of the folder in which the command is typed."""
+    module, _ = setting_up
+    ran = []
+    monkeypatch.setattr(module, "run", lambda *given: ran.append(list(given)))
+    monkeypatch.setattr(sys, "argv", ["course.py", *words])
+    monkeypatch.chdir(tmp_path)
+    module.main()
+    name, *more = [word.replace("HERE", str(tmp_path)) for word in wanted]
+    assert ran == [["-m", f"rbcourse.{name}", *map(str, map(Path, more))]]
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")

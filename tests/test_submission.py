@@ -278,6 +278,20 @@ def test_without_the_original_it_is_said_what_to_do(handout, monkeypatch, capsys
         submission.main()
 
 
+def test_in_the_course_the_original_is_made_from_the_source(handout, tmp_path, monkeypatch, capsys):
+    write_tiny_set(tmp_path / "course" / "notebooks" / "assignments")
+    path = edited(handout, lambda notebook: None).rename(tmp_path / "ps0.ipynb")
+    monkeypatch.chdir(tmp_path / "course")
+    monkeypatch.setattr(sys, "argv", ["submission", str(path)])
+    submission.main()
+    assert "2 of 2 visible tests passed" in capsys.readouterr().out
+    assert (tmp_path / "to_submit" / "ps0.ipynb").exists()
+    unknown = path.rename(tmp_path / "mine.ipynb")
+    monkeypatch.setattr(sys, "argv", ["submission", str(unknown)])
+    with pytest.raises(SystemExit, match="no problem set mine; there are: ps0"):
+        submission.main()
+
+
 def test_a_test_that_is_hidden_as_a_whole_is_not_counted(release, capsys):
     notebook = nbformat.reads(release, as_version=4)
     cell_of(notebook, "half-test").source = "# the tests of this cell are hidden"
