@@ -61,7 +61,9 @@ def main():
     if known.task == "figures":
         run("-m", "rbcourse.lessons", "regenerate")
     elif known.task == "test":
-        run("-m", "pytest", "-n", "auto", "--dist", "loadfile", *further)
+        # file by file in their order: the lessons come last, and fill what time is left
+        files = ["--dist", "loadfile", "--no-loadscope-reorder"]
+        run("-m", "pytest", "-n", "auto", *(files + further))
     elif known.task == "lab":
         open_lab(known.edit, further)
     elif known.task == "lecture":
