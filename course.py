@@ -61,7 +61,9 @@ def main():
     if known.task == "figures":
         run("-m", "rbcourse.lessons", "regenerate")
     elif known.task == "test":
-        # file by file in their order: the lessons come last, and fill what time is left
+        # a worker for each processor, with one thread each; file by file in their order: the
+        # lessons come last, and fill what time is left
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         files = ["--dist", "loadfile", "--no-loadscope-reorder"]
         run("-m", "pytest", "-n", "auto", *(files + further))
     elif known.task == "lab":
