@@ -75,27 +75,28 @@ def limited(send: Callable[..., Any], shown: int = SHOWN) -> Callable[..., Any]:
     send : callable
         As `jupyter_client.session.Session.send`.
     shown : int
-        Characters that the outputs of a cell may have together.
+        Characters that a cell may print; its pictures and pages may have twenty times as many.
 
     Returns
     -------
     callable
     """
-    used = 0
+    used: dict[str, int] = {}
 
     def bounded(stream: Any, kind: Any, content: Any = None, *args: Any, **kwargs: Any) -> Any:
-        nonlocal used
         message = kind if isinstance(kind, dict) else None
         name = message["msg_type"] if message is not None else kind
         content = message["content"] if message is not None else content
         if name == "execute_input":
-            used = 0
+            used.clear()
         elif name not in SENT:
-            before, used = used, used + length(content) + length(kwargs.get("buffers") or [])
-            if used > shown and before > shown and name not in ("error", "execute_reply"):
+            sort, room = ("rich", 20 * shown) if name in OUTPUTS[1:] else ("plain", shown)
+            before = used.get(sort, 0)
+            now = used[sort] = before + length(content) + length(kwargs.get("buffers") or [])
+            if now > room and before > room and name not in ("error", "execute_reply"):
                 return None
-            if used > shown:
-                content = _shortened(name, content, max(shown - before, 0))
+            if now > room:
+                content = _shortened(name, content, max(room - before, 0))
                 kwargs.pop("buffers", None)
                 message = {**message, "buffers": []} if message is not None else None
         if message is not None:
@@ -109,7 +110,7 @@ def _shortened(name: str, content: Any, room: int) -> Any:
     if name == "stream":
         return clipped(content, room)
     if name in OUTPUTS:  # half a picture, or half a page, is worse than none
-        return {**content, "data": {"text/plain": NOTE.format(SHOWN)}, "metadata": {}}
+        return {**content, "data": {"text/plain": NOTE.format(20 * SHOWN)}, "metadata": {}}
     return clipped(content, 2000)
 
 

@@ -21,9 +21,14 @@ def test_a_stream_is_cut_and_what_follows_is_dropped():
 
 
 def test_half_a_page_is_not_shown():
-    ((_, content),) = sent([("display_data", {"data": {"text/html": "<p>" * 9}, "metadata": {}})])
+    ((_, content),) = sent([("display_data", {"data": {"text/html": "<p>" * 99}, "metadata": {}})])
     assert list(content["data"]) == ["text/plain"]
     assert "[output cut: " in content["data"]["text/plain"]
+
+
+def test_a_picture_is_larger_than_what_one_prints():
+    picture = {"data": {"image/png": "P" * 199, "text/plain": ""}, "metadata": {}}
+    assert sent([("display_data", picture)]) == [("display_data", picture)]
 
 
 def test_an_error_and_a_reply_come_shortened_whatever_was_printed():
