@@ -133,6 +133,7 @@ def look_in_browser(further):
     """Try every lesson in a browser; then, with nothing beside it, how fast its pictures follow."""
     set_up_extra("browser")
     os.environ["CHROMIUM"] = find_chromium()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     keep_lab_quiet()
     folder = Path("tests") / "browser"
     lessons = [str(folder / "test_lab.py"), str(folder / "test_lecture.py")]
@@ -200,7 +201,8 @@ def install(*words):
     if UV:
         patiently(UV, "pip", "install", "--python", str(PYTHON), *words)
     else:
-        patiently(str(PYTHON), "-m", "pip", "install", "--disable-pip-version-check", *words)
+        pip = [str(PYTHON), "-m", "pip", "install", "--disable-pip-version-check", "--no-compile"]
+        patiently(*(pip + list(words)))
 
 
 def patiently(*command):

@@ -9,7 +9,7 @@ from pages import NOTE, centre, open_in_lab, run_all
 from rbcourse import widgets
 from rbcourse.lessons import KERNEL
 
-HELD = 2.0
+HELD = 1.5
 SOLVES = {"cube_explorer": 2}  # the slider that is held where the last one only moves the time
 
 
@@ -61,7 +61,7 @@ def hold(page, handle):
             page.keyboard.press("ArrowRight" if now < HELD / 2 else "ArrowLeft")
             n += 1
         time.sleep(0.002)
-    page.wait_for_timeout(1000)
+    page.wait_for_timeout(600)
     keys, pictures = page.evaluate("[keys, pictures]")
     return len(pictures), pictures[-1] - keys[-1]
 
