@@ -22,7 +22,7 @@ from nbgrader.utils import find_all_files, is_grade, is_solution
 from traitlets import Bool
 from traitlets.config import Config
 
-from rbcourse.fairplay import find_tampering, names_relied_on
+from rbcourse.fairplay import find_in_cells
 from rbcourse.lessons import kernel_address
 from rbcourse.quota import CUT
 
@@ -181,17 +181,10 @@ def _as_given(cell: NotebookNode, given: NotebookNode | None) -> NotebookNode:
 def _refuse_tampering(cells: list[NotebookNode]) -> None:
     """Raise a RefusedError if code of the student replaces what tests rely on."""
     code = [cell for cell in cells if cell.cell_type == "code"]
-    own = [not _name(cell) or is_solution(cell) for cell in code]
-    relied = names_relied_on(
-        cell.source for cell, is_own in zip(code, own, strict=True) if not is_own
-    )
-    imported: set[str] = set()
-    for cell, is_own in zip(code, own, strict=True):
-        found = find_tampering(cell.source, relied, imported)
-        if found and is_own:
-            line, what = found[0]
-            where = describe(cell, cells.index(cell))
-            raise RefusedError(f"{where}, line {line} {what}: grade by hand")
+    found = find_in_cells((cell.source, not _name(cell) or is_solution(cell)) for cell in code)
+    for at, line, what in found:
+        where = describe(code[at], cells.index(code[at]))
+        raise RefusedError(f"{where}, line {line} {what}: grade by hand")
 
 
 def describe(cell: NotebookNode, index: int) -> str:

@@ -149,16 +149,22 @@ def _read_roster(path: Path) -> list[dict[str, str]]:
 def _read_csv(path: Path) -> list[dict[str, str]]:
     if not path.exists():
         return []
-    with path.open(encoding="utf-8-sig", newline="") as stream:
-        table = list(csv.DictReader(stream))
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: save it as CSV in UTF-8 ({error})") from error
+    head = text.partition("\n")[0]
+    delimiter = max(",;\t", key=head.count)
+    table = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter))
     return [{k: (v or "").strip() for k, v in row.items() if k} for row in table]
 
 
 def _read_record(path: Path) -> Record:
-    try:
-        return {(row["student"], row["assignment"]): row for row in _read_csv(path)}
-    except KeyError as error:
-        raise ValueError(f"{path}: the column {error} is missing; remove the file") from error
+    rows = _read_csv(path)
+    missing = [column for column in RECORD if rows and column not in rows[0]]
+    if missing:
+        raise ValueError(f"{path}: the columns {', '.join(missing)} are missing; restore them")
+    return {(row["student"], row["assignment"]): row for row in rows}
 
 
 def _match(download: Download, sets: dict[str, set[str]], rows: Rows) -> _File | None:
@@ -326,7 +332,7 @@ def _compare_with_roster(files: list[_File], roster: list[dict[str, str]], submi
 
 def _write_csv(path: Path, rows: Iterable[Iterable[str]]) -> None:
     part = path.with_suffix(".part")
-    with part.open("w", encoding="utf-8", newline="") as stream:
+    with part.open("w", encoding="utf-8-sig", newline="") as stream:  # as Excel wants it
         csv.writer(stream).writerows(rows)
     part.replace(path)
 

@@ -92,6 +92,26 @@ def find_tampering(
     return sorted(found)
 
 
+def find_in_cells(cells: Iterable[tuple[str, bool]]) -> list[tuple[int, int, str]]:
+    """Find where a notebook replaces what its tests rely on.
+
+    Parameters
+    ----------
+    cells : iterable of (str, bool)
+        The code of each cell, and whether it is the student's own.
+
+    Returns
+    -------
+    list of (int, int, str)
+        The number of the cell among these, from 0; the line; what is done there.
+    """
+    cells = list(cells)
+    relied = names_relied_on(source for source, own in cells if not own)
+    imported: set[str] = set()
+    found = [find_tampering(source, relied, imported) for source, _ in cells]
+    return [(i, *what) for i, (_, own) in enumerate(cells) if own for what in found[i]]
+
+
 class _Magics(ast.NodeTransformer):
     """Replace magics that do no harm by the code that they run."""
 
@@ -159,8 +179,10 @@ def _rebound(tree: ast.Module) -> Iterator[tuple[int, str]]:
             changed = (inner for inner in ast.walk(node) if isinstance(inner, ast.Global))
             yield from ((inner.lineno, name) for inner in changed for name in inner.names)
         elif isinstance(node, ast.Import | ast.ImportFrom):
+            place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
             for alias in node.names:
-                if alias.asname and CUSTOMARY.get(alias.asname, alias.asname) != alias.name:
+                usual = CUSTOMARY.get(alias.asname or "", alias.asname)
+                if alias.asname and usual not in (alias.name, place + alias.name):
                     yield node.lineno, alias.asname
         elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
             yield node.lineno, node.id

@@ -77,6 +77,11 @@ def grade(
     students = sorted(path.parent.name for path in assignments.glob(f"submitted/*/{name}/"))
     if not students:
         raise ValueError(f"There is no submission of {name}: submitted/STUDENT/{name}/{name}.ipynb")
+    table = assignments / f"{name}-grades.csv"
+    try:
+        table.open("a").close()
+    except PermissionError as error:
+        raise ValueError(f"{table} cannot be written: close it where it is open") from error
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
@@ -88,9 +93,13 @@ def grade(
         }
         for job in as_completed(jobs):
             student = jobs[job]
-            found[student] = _row(config, name, student, job.result())
+            try:
+                found[student] = _row(config, name, student, job.result())
+            except Exception as error:  # one student's trouble is not that of the others
+                remarks = f"not graded: {type(error).__name__}: {error}"
+                found[student] = {"student": student, "set": name, "remarks": remarks}
             print(f"{student}: {_summary(found[student])}", flush=True)
-    return _write_table(assignments / f"{name}-grades.csv", [found[who] for who in students])
+    return _write_table(table, [found[who] for who in students])
 
 
 def _row(config: Config, name: str, student: str, found: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import nbformat
 import psutil
 from nbgrader.converters import Autograde, GenerateFeedback
 from nbgrader.coursedir import CourseDirectory
-from nbgrader.utils import capture_log
+from nbgrader.utils import capture_log, is_grade, is_solution
 from traitlets.config import Config
 
 from rbcourse.autograding import RefusedError, configure
@@ -111,7 +111,9 @@ def grade_apart(
 
 def _end(worker: BaseProcess) -> None:
     """End a process and all that it has started."""
-    tree = psutil.Process(worker.pid).children(recursive=True)
+    tree = []
+    with suppress(psutil.NoSuchProcess):
+        tree = psutil.Process(worker.pid).children(recursive=True)
     worker.kill()
     for process in tree:
         with suppress(psutil.NoSuchProcess):
@@ -128,7 +130,11 @@ def _work(name: str, assignments: Path, student: str, memory: int, result: Path)
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-    result.write_text(json.dumps(grade_one(name, assignments, student)), encoding="utf-8")
+    try:
+        found = grade_one(name, assignments, student)
+    except Exception as error:  # told, and the others are graded
+        found = {"refused": f"{type(error).__name__}: {error}"}
+    result.write_text(json.dumps(found), encoding="utf-8")
 
 
 def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
@@ -149,6 +155,8 @@ def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
     """
     config = course_config(name, folder)
     config.CourseDirectory.student_id = glob.escape(student)
+    graded = folder / "autograded" / student / name / f"{name}.ipynb"
+    before = _words(graded)
     try:
         check_submission(folder / "submitted" / student / name, name)
         done = run_step(Autograde, config)
@@ -156,9 +164,23 @@ def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
             raise RefusedError(last_line(done))
     except RefusedError as error:
         return {"refused": str(error)}
-    graded = folder / "autograded" / student / name / f"{name}.ipynb"
     remarks = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
+    now = _words(graded)
+    new = [key for key in now if key in before and now[key] != before[key]]
+    remarks += [f"{key} is another answer than when it was graded before" for key in new]
     return {"remarks": remarks + _give_feedback(name, folder, student, config)}
+
+
+def _words(path: Path) -> dict[str, str]:
+    """Return the answers that a human grades, as they were graded last."""
+    if not path.exists():
+        return {}
+    cells = nbformat.read(path, as_version=4).cells
+    return {
+        cell.metadata.nbgrader.grade_id: cell.source
+        for cell in cells
+        if "nbgrader" in cell.metadata and is_grade(cell) and is_solution(cell)
+    }
 
 
 def check_submission(folder: Path, name: str) -> None:

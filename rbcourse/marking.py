@@ -302,7 +302,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return type(value)(map(_plain, value))
+        return (list if isinstance(value, list) else tuple)(map(_plain, value))
     if isinstance(value, complex):
         return complex(round(value.real, 4), round(value.imag, 4))
     return round(value, 4) + 0 if isinstance(value, float) else value

@@ -145,8 +145,8 @@ ARM_ANGLES = Problem(
             lambda tip, lengths: _elbow(tip, lengths, heading=_swapped, bend=_swapped),
         ),
         Mistake(
-            "np.arctan of a ratio loses the quadrant: for a tip with x < 0 it points the other "
-            "way. Take np.arctan2.",
+            "np.arctan of a ratio loses the quadrant: where the denominator is negative it points "
+            "the other way. Take np.arctan2.",
             lambda tip, lengths: _elbow(tip, lengths, heading=_ratio),
             lambda tip, lengths: _elbow(tip, lengths, bend=_ratio),
             lambda tip, lengths: _elbow(tip, lengths, heading=_ratio, bend=_ratio),

@@ -64,7 +64,12 @@ GEODESIC = Problem(
             "Rotation vectors cannot be subtracted: log R₁ − log R₀ is no turn from R₀ to R₁, "
             "unless the two axes agree.",
             lambda R0, R1, t: R0 @ exp_so3(t * (log_so3(R1) - log_so3(R0))),
+        ),
+        Mistake(
+            "A part of one turn after a part of the other is no geodesic, unless the two axes "
+            "agree.",
             lambda R0, R1, t: exp_so3((1 - t) * log_so3(R0)) @ exp_so3(t * log_so3(R1)),
+            lambda R0, R1, t: exp_so3(t * log_so3(R1)) @ exp_so3((1 - t) * log_so3(R0)),
         ),
         Mistake(
             "This is the straight line through the matrices: between its ends it is no rotation.",

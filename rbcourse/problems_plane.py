@@ -43,13 +43,7 @@ POSE_MATRIX = Problem(
         Mistake(
             "Sine and cosine are exchanged: at θ = 0 the matrix should not turn anything.",
             lambda p: matrix_from_planar([p[0], p[1], np.pi / 2 - p[2]]),
-            lambda p: np.array(
-                [
-                    [np.sin(p[2]), -np.cos(p[2]), p[0]],
-                    [np.cos(p[2]), np.sin(p[2]), p[1]],
-                    [0, 0, 1],
-                ]
-            ),
+            lambda p: matrix_from_planar([p[0], p[1], p[2] - np.pi / 2]),
         ),
         Mistake(
             "x and y are exchanged in the last column.",

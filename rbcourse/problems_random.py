@@ -163,8 +163,8 @@ def _by_axis(n: int, rng: Generator, largest: float) -> Array:
 
 
 THREE_ANGLES = (
-    "Three uniform angles are no uniform rotation: where the middle one is near 90° or 270°, too "
-    "many rotations crowd in too little room. Areas count, not degrees."
+    "Three uniform angles are no uniform rotation: where the first and the third axis nearly "
+    "agree, too many rotations crowd in too little room. Areas count, not degrees."
 )
 EVEN_ANGLE = (
     "The axis is uniform, and so is the angle. But small turns are rare: there is little room near "
@@ -297,7 +297,7 @@ ANGLE_DENSITY = Problem(
         ),
         Mistake(
             "This is what rotation vectors give that are uniform in the ball of radius π. Far from "
-            "I, rotations are less dense than their vectors.",
+            "I there is less room among rotations than among their vectors.",
             lambda a: 3 * a**2 / np.pi**3,
         ),
         Mistake(

@@ -187,7 +187,7 @@ _MATRICES = [
     np.array([[1.0, 0.2, -0.1], [0.1, 0.9, 0.3], [0.2, -0.2, 1.2]]),
     np.array([[0.5, -2.0, 0.3], [1.0, 0.4, 0.8], [-0.6, 0.7, 1.5]]),
     np.array([[0.2, 1.0, 0.3], [1.1, -0.3, 0.4], [0.5, 0.2, 0.9]]),  # the last two: det < 0
-    np.array([[-1.2, 0.4, 0.6], [0.3, 0.8, -0.9], [0.2, -1.1, -0.7]]),
+    np.array([[-1.2, 0.4, -0.6], [0.3, 0.8, 0.9], [0.2, -1.1, 0.7]]),
 ]
 
 
@@ -254,7 +254,7 @@ NEAREST = Problem(
             lambda M: _signed(M, 0, 1, 2),
         ),
         Mistake(
-            "This is Gram and Schmidt's: a rotation, but not the nearest one. It trusts the first "
+            "This is Gram and Schmidt's, which is not the nearest rotation: it trusts the first "
             "column more than the others. Use the SVD.",
             lambda M: np.linalg.qr(M)[0] * np.sign(np.diag(np.linalg.qr(M)[1])),
             lambda M: np.linalg.qr(M)[0],

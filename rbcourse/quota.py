@@ -17,7 +17,7 @@ class TooMuchOutputError(RuntimeError):
     """A cell prints without end."""
 
 
-def clipped(value: Any, room: int) -> Any:
+def clipped(value: Any, room: int, limit: int | None = None) -> Any:
     r"""Return a value made of dicts, lists and strings with no string longer than the room.
 
     Parameters
@@ -25,6 +25,8 @@ def clipped(value: Any, room: int) -> Any:
     value : object
     room : int
         In characters; what is cut off is replaced by a note.
+    limit : int, optional
+        What the note tells, where the room is what is left of more.
 
     Returns
     -------
@@ -36,11 +38,11 @@ def clipped(value: Any, room: int) -> Any:
     {'text': 'abc[output cut: more than 3 characters]\n'}
     """
     if isinstance(value, dict):
-        return {key: clipped(part, room) for key, part in value.items()}
+        return {key: clipped(part, room, limit) for key, part in value.items()}
     if isinstance(value, list):
-        return [clipped(part, room) for part in value[:1000]]
+        return [clipped(part, room, limit) for part in value[:1000]]
     if isinstance(value, str) and len(value) > room:
-        return value[:room] + NOTE.format(room)
+        return value[:room] + NOTE.format(room if limit is None else limit)
     return value
 
 
@@ -96,7 +98,7 @@ def limited(send: Callable[..., Any], shown: int = SHOWN) -> Callable[..., Any]:
             if now > room and before > room and name not in ("error", "execute_reply"):
                 return None
             if now > room:
-                content = _shortened(name, content, max(room - before, 0))
+                content = _shortened(name, content, max(room - before, 0), room)
                 kwargs.pop("buffers", None)
                 message = {**message, "buffers": []} if message is not None else None
         if message is not None:
@@ -106,11 +108,11 @@ def limited(send: Callable[..., Any], shown: int = SHOWN) -> Callable[..., Any]:
     return bounded
 
 
-def _shortened(name: str, content: Any, room: int) -> Any:
+def _shortened(name: str, content: Any, room: int, limit: int) -> Any:
     if name == "stream":
-        return clipped(content, room)
+        return {**content, "text": clipped(content["text"], room, limit)}
     if name in OUTPUTS:  # half a picture, or half a page, is worse than none
-        return {**content, "data": {"text/plain": NOTE.format(20 * SHOWN)}, "metadata": {}}
+        return {**content, "data": {"text/plain": NOTE.format(limit)}, "metadata": {}}
     return clipped(content, 2000)
 
 

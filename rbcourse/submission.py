@@ -22,6 +22,7 @@ from nbclient import NotebookClient
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 
+from rbcourse.fairplay import find_in_cells
 from rbcourse.lessons import KERNEL, kernel_address
 from rbcourse.mending import grade_id, is_test, marks_of, mend, name_cell
 
@@ -72,6 +73,7 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
     if len(notebook.cells) != number:
         print("from here on cells are counted in the file to submit")
     notebook.metadata.kernelspec = dict(KERNEL)
+    _list(_not_graded(notebook))
     remarks = _run(notebook, path.parent, seconds)
     _list(remarks + _failures(notebook, wanted))
     passed = _tests(notebook)
@@ -240,6 +242,18 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
     return remarks + _note(notebook, client, seconds)
 
 
+def _not_graded(notebook: NotebookNode) -> list[str]:
+    """Say what a machine will not grade: it could be meant to deceive the tests."""
+    code = [i for i, cell in enumerate(notebook.cells) if cell.cell_type == "code"]
+    marks = [marks_of(notebook.cells[i]) for i in code]
+    own = [not mark.get("grade_id") or bool(mark.get("solution")) for mark in marks]
+    sources = (notebook.cells[i].source for i in code)
+    return [
+        f"{name_cell(notebook.cells, code[at])}, line {line} {what}: not graded so, change it"
+        for at, line, what in find_in_cells(zip(sources, own, strict=True))
+    ]
+
+
 def _copy_files(folder: Path, work: Path) -> list[str]:
     """Copy what lies beside the notebook, not what lies in folders: that may be a whole disk."""
     remarks, left = [], COPIED_BYTES
@@ -322,10 +336,11 @@ def _check_with_course(path: Path, assignments: Path) -> None:
     """Check a problem set without its original in the course that it is of."""
     from rbcourse.handout import release  # a student does not have nbgrader
 
-    content = release(path.stem, assignments)[f"{path.stem}.ipynb"]
+    sets = [place.parent.name for place in assignments.glob("*/*/*.ipynb")]
+    name = next((own for own in sets if path.stem.startswith(own)), path.stem)
     with tempfile.TemporaryDirectory() as folder:
-        original = Path(folder, f"{path.stem}.ipynb")
-        original.write_bytes(content)
+        original = Path(folder, f"{name}.ipynb")
+        original.write_bytes(release(name, assignments)[original.name])
         check(path, original)
 
 

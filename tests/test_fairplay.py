@@ -2,14 +2,13 @@
 
 import pytest
 
-from rbcourse.fairplay import find_tampering, names_relied_on
+from rbcourse.fairplay import find_in_cells, find_tampering, names_relied_on
 
-RELIED = names_relied_on(
-    [
-        "import math, numpy as np\nfrom rbcourse import marking\ndef helper(): pass",
-        "assert all(isinstance(v, float) for v in np.ravel(answer(2)))",
-    ]
-)
+LOCKED = [
+    "import math, numpy as np\nfrom rbcourse import marking\ndef helper(): pass",
+    "assert all(isinstance(v, float) for v in np.ravel(answer(2)))",
+]
+RELIED = names_relied_on(LOCKED)
 
 
 def found(source):
@@ -52,11 +51,15 @@ def test_what_the_locked_cells_import_define_and_use_is_relied_on():
 )
 def test_what_replaces_the_means_of_the_tests_is_found(source, what):
     assert what in [said for _, said in found(source)]
+    assert what in [
+        said for *_, said in find_in_cells([*((text, False) for text in LOCKED), (source, True)])
+    ]
 
 
 @pytest.mark.parametrize(
     "source",
     [
+        "from matplotlib import pyplot as plt",
         "import matplotlib.pyplot as plt\nplt.rcParams['font.size'] = 9\nplt.rcParams.update({})",
         "%matplotlib inline",
         "%config InlineBackend.figure_format = 'retina'",

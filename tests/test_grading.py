@@ -257,6 +257,10 @@ def test_grading_again_keeps_what_a_human_gave(tmp_path):
     assert row["by hand"] == ""
     assert "Well put." in course.feedback("ann")
     assert "Score: 5.5 / 6.0" in course.feedback("ann")
+    course.submit("ann", words="It is not.")
+    grade("ps0", tmp_path)
+    changed = "words-answer is another answer than when it was graded before"
+    assert course.rows()["ann"]["remarks"] == changed
     course.submit_bytes("ann", b"")
     grade("ps0", tmp_path)
     assert course.rows()["ann"]["remarks"] == "refused: ps0.ipynb is empty"

@@ -48,6 +48,7 @@ def test_a_mistake_has_to_be_made_on_all_inputs():
     ("body", "said"),
     [
         ("pass", "returns nothing. Is the line with return missing?"),
+        ("return np.linalg.svd(np.eye(2))", "returns no real numbers but ("),
         ("return 'two'", "returns no real numbers but two"),
         ("return [[1], [1, 2]]", "returns no real numbers but [[1], [1, 2]]."),
         ("return x + 0j", "no real numbers but [(1+0j), (-2+0j)]. It is complex"),

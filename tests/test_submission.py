@@ -278,6 +278,14 @@ def test_without_the_original_it_is_said_what_to_do(handout, monkeypatch, capsys
         submission.main()
 
 
+def test_what_grading_would_refuse_is_said_before(handout, capsys):
+    edited(handout, lambda notebook: None, **{"half-answer": "half = 0.5\nmath.isclose = print"})
+    submission.check(handout / "ps0.ipynb")
+    said = capsys.readouterr().out
+    assert "the answer cell 'half-answer' (cell 5, after the heading 'A tiny set'), line 2" in said
+    assert "replaces math.isclose: not graded so, change it" in said
+
+
 def test_in_the_course_the_original_is_made_from_the_source(handout, tmp_path, monkeypatch, capsys):
     write_tiny_set(tmp_path / "course" / "notebooks" / "assignments")
     path = edited(handout, lambda notebook: None).rename(tmp_path / "ps0.ipynb")
@@ -286,6 +294,9 @@ def test_in_the_course_the_original_is_made_from_the_source(handout, tmp_path, m
     submission.main()
     assert "2 of 2 visible tests passed" in capsys.readouterr().out
     assert (tmp_path / "to_submit" / "ps0.ipynb").exists()
+    path = path.rename(tmp_path / "ps0 (1).ipynb")
+    monkeypatch.setattr(sys, "argv", ["submission", str(path)])
+    submission.main()
     unknown = path.rename(tmp_path / "mine.ipynb")
     monkeypatch.setattr(sys, "argv", ["submission", str(unknown)])
     with pytest.raises(SystemExit, match="no problem set mine; there are: ps0"):

@@ -1025,6 +1025,10 @@ WRONG = {
         ("A draw is no rotation: its singular values", "return rng.normal(size=(3, 3))"),
     ],
     ("ps4", "geodesic"): [
+        (
+            "A part of one turn after a part of the other",
+            "return exp_so3((1 - t) * log_so3(R0)) @ exp_so3(t * log_so3(R1))",
+        ),
         ("A transpose is missing", "return R0 @ exp_so3(t * log_so3(R0 @ R1))"),
         (
             "Rotation vectors cannot be subtracted",
