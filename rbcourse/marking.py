@@ -16,6 +16,10 @@ import numpy as np
 from rbcourse._numerics import Array
 from rbcourse.own_work import NotYet, call_student
 
+IN_RADIANS = (
+    "Angles are in radians here, and NumPy's functions take and give radians: convert none."
+)
+
 
 class Mistake:
     """What people get wrong, and what to tell them.

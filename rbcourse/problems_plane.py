@@ -3,12 +3,8 @@
 import numpy as np
 
 from rbcourse._numerics import Array
-from rbcourse.marking import Mistake, Problem
+from rbcourse.marking import IN_RADIANS, Mistake, Problem
 from rbcourse.planar import matrix_from_planar, propagate_planar
-
-IN_RADIANS = (
-    "Angles are in radians here, and NumPy's functions take and give radians: convert none."
-)
 
 
 def _turn(angle: float) -> Array:

@@ -6,13 +6,10 @@ import numpy as np
 
 from rbcourse._numerics import Array
 from rbcourse.conversions import matrix_from_zyx
-from rbcourse.marking import Drawing, Mistake, Problem
+from rbcourse.marking import IN_RADIANS, Drawing, Mistake, Problem
 from rbcourse.projection import distance_to_so, orthonormalize_gram_schmidt, project_so
 from rbcourse.so3 import exp_so3, hat_so3
 
-IN_RADIANS = (
-    "Angles are in radians here, and NumPy's functions take and give radians: convert none."
-)
 X, Y, Z = np.eye(3)
 
 

@@ -193,6 +193,24 @@ def test_who_changes_the_name_in_canvas_keeps_the_id(course):
     assert students(course) == ["berg_5/ps1/ps1.ipynb", "berg_5/ps2/ps2.ipynb"]
 
 
+def test_a_roster_of_another_spreadsheet_is_read_or_its_fault_is_named(course):
+    roster = course / "students.csv"
+    roster.write_text("id;first_name;last_name\ns1;Jörg;Müller\n", "utf-8")
+    notebook = {"Müller Jörg_500_assignsubmission_file/ps1.ipynb": answered(course)}
+    collected(course, notebook)
+    assert students(course) == ["s1/ps1/ps1.ipynb"]
+    roster.write_text("id,first_name,last_name\ns1,Jörg,Müller\n", "cp1252")
+    with pytest.raises(ValueError, match=r"students\.csv: save it as CSV in UTF-8"):
+        collected(course, {})
+
+
+def test_a_record_without_its_columns_is_not_thrown_away(course):
+    (course / "submitted").mkdir()
+    (course / "submitted" / "collected.csv").write_text("student,assignment\nann,ps1\n", "utf-8")
+    with pytest.raises(ValueError, match=r"the columns lms, .* are missing; restore them"):
+        collected(course, {})
+
+
 def test_the_roster_gives_ids_and_tells_who_is_missing(course):
     roster = "id,first_name,last_name,email,lms_user_id\n"
     roster += "s1,Jörg,Müller,,\ns2,Eva,Maria Roth,,\ns3,Al,Li,,500\ns4,Bo,Ek,,\ns5,Al,O'Neil,,\n"

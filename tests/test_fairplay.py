@@ -85,3 +85,14 @@ def test_what_students_write_every_day_is_not(source):
 def test_the_line_is_that_of_the_cell():
     assert found("\n\nx = 1\nnp.allclose = print") == [(4, "replaces np.allclose")]
     assert found("%%time\nx = 1\nnp.allclose = print") == [(3, "replaces np.allclose")]
+
+
+def test_pyplot_may_be_imported_in_either_way():
+    relied = names_relied_on(["import matplotlib.pyplot as plt"])
+    for source in ("from matplotlib import pyplot as plt", "import matplotlib.pyplot as plt"):
+        assert find_tampering(source, relied) == []
+    assert find_tampering("from json import tool as plt", relied)
+
+
+def test_what_the_locked_cells_do_themselves_is_in_order():
+    assert find_in_cells([("import math\nmath.tau = 6", False), ("x = 1", True)]) == []

@@ -117,9 +117,10 @@ def test_what_goes_wrong_late_is_told_too(late, said):
     assert str(refused.value).startswith(said)
 
 
-def test_of_two_mistakes_that_look_alike_the_nearer_gets_its_hint():
+@pytest.mark.parametrize("step", [1, -1])
+def test_of_two_mistakes_that_look_alike_the_nearer_gets_its_hint(step):
     near = [Mistake("near", lambda n, rng: rng.random(n) ** 2.02), *COIN.mistakes]
-    alike = replace(COIN, mistakes=near)
+    alike = replace(COIN, mistakes=near[::step])
     with pytest.raises(NotYet, match="squared"):
         alike.accepts(student("def answer(rng): return rng.random() ** 1.98"), 5)
 

@@ -20,6 +20,12 @@ def test_a_stream_is_cut_and_what_follows_is_dropped():
     assert out[3][1] == {"text": "short"}
 
 
+def test_where_a_stream_goes_is_kept_and_the_limit_is_told():
+    lines = [("stream", {"name": "stdout", "text": text}) for text in ("y" * 20, "z" * 9)]
+    text = "zzzz[output cut: more than 30 characters]\n"
+    assert sent(lines, 30)[1][1] == {"name": "stdout", "text": text}
+
+
 def test_half_a_page_is_not_shown():
     ((_, content),) = sent([("display_data", {"data": {"text/html": "<p>" * 99}, "metadata": {}})])
     assert list(content["data"]) == ["text/plain"]

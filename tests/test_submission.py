@@ -334,3 +334,9 @@ def test_an_error_whose_output_is_lost_is_an_error():
     reply = {"status": "error", "ename": "ZeroDivisionError", "evalue": "by zero", "traceback": []}
     submission._Client(notebook)._end(notebook.cells[0], 0, {"content": reply})
     assert submission._error(notebook.cells[0]) == "ZeroDivisionError: by zero"
+
+
+def test_a_hint_speaks_for_itself():
+    hint = {"ename": "NotYet", "evalue": "x and y are swapped.", "traceback": []}
+    cell = new_code_cell("1", outputs=[nbformat.v4.new_output("error", **hint)])
+    assert submission._error(cell) == "x and y are swapped."
