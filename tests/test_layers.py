@@ -36,6 +36,7 @@ LEVELS = {
     "uniformity": 3,
     "se3": 4,
     "curves": 5,
+    "textbook": 5,
     "metrics": 5,
     "projected": 6,
     "screws": 6,

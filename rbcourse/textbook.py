@@ -1,0 +1,150 @@
+"""The fast functions again, as one writes them on the board: short, slow, and to be read first.
+
+Each has the name of its fast twin, and gives the same to rounding. No argument is checked.
+"""
+
+import numpy as np
+
+from rbcourse._numerics import Array
+from rbcourse.polynomials import cubic_coefficients, polynomial
+from rbcourse.sampling import arvo_rotation, shoemake_quaternion
+from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
+
+
+def project_so(M: Array) -> Array:
+    """Return the rotations nearest to M, shape (..., n, n): U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
+
+    References
+    ----------
+    BK Prop. 2, with the determinant's sign.
+
+    Examples
+    --------
+    >>> project_so(np.array([[0.0, -2.0], [3.0, 0.0]]))
+    array([[ 0., -1.],
+           [ 1.,  0.]])
+    """
+    U, _, Vt = np.linalg.svd(M)
+    U[..., -1] *= np.linalg.det(U @ Vt)[..., None]
+    return U @ Vt
+
+
+def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
+    """Return R0 exp(σ̂ t) at the times t, shape (N,), with σ = log(R0ᵀ R1).
+
+    References
+    ----------
+    BK 6.1.
+
+    Examples
+    --------
+    >>> R = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]), np.array([0, 0.5, 1]))
+    >>> log_so3(R)[:, 2].round(12)
+    array([0.  , 0.75, 1.5 ])
+    """
+    sigma = log_so3(R0.T @ R1)
+    return R0 @ exp_so3(t[:, None] * sigma)
+
+
+def projected_cubic_so3(
+    R0: Array, R1: Array, w0: Array, w1: Array, t: Array
+) -> tuple[Array, Array, Array]:
+    """Return R, w and w' of the projected cubic at the times t, shape (N,).
+
+    With S = RᵀM, A = RᵀM' and G = tr(S) I − S the condition that S is symmetric, differentiated
+    once and twice, says G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
+    >>> R, w, a = projected_cubic_so3(I, R1, rest, rest, np.array([0, 0.5, 1]))
+    >>> log_so3(R)[:, 2].round(12)
+    array([0.  , 0.75, 1.5 ])
+    """
+    coefficients = cubic_coefficients(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1))
+    M, M_rate, M_bend = (polynomial(coefficients, t[:, None, None], order) for order in range(3))
+    R = project_so(M)
+    Rt = np.swapaxes(R, -1, -2)
+    S, A = Rt @ M, Rt @ M_rate
+    w = np.linalg.solve(_spin(S), 2 * vee_so3(A)[..., None])
+    W = hat_so3(w[..., 0])
+    A_rate, S_rate = Rt @ M_bend - W @ A, A - W @ S
+    a = np.linalg.solve(_spin(S), 2 * vee_so3(A_rate)[..., None] - _spin(S_rate) @ w)
+    return R, w[..., 0], a[..., 0]
+
+
+def _spin(S: Array) -> Array:
+    return np.trace(S, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - S
+
+
+def sample_rotation(n: int, rng: np.random.Generator) -> Array:
+    """Return n uniformly random rotations, each Arvo's of three uniform numbers.
+
+    References
+    ----------
+    RR 2.1, RR (9), RR (10), RR (11).
+
+    Examples
+    --------
+    >>> sample_rotation(5, np.random.default_rng(1)).shape
+    (5, 3, 3)
+    """
+    return arvo_rotation(rng.random((n, 3)))
+
+
+def sample_quaternion(n: int, rng: np.random.Generator) -> Array:
+    """Return n uniformly random unit quaternions, each Shoemake's of three uniform numbers.
+
+    References
+    ----------
+    RR 2.2, RR (13).
+
+    Examples
+    --------
+    >>> sample_quaternion(5, np.random.default_rng(1)).shape
+    (5, 4)
+    """
+    return shoemake_quaternion(rng.random((n, 3)))
+
+
+def minimum_acceleration_so3(
+    R0: Array, R1: Array, w0: Array, w1: Array, t: Array, tol: float = 1e-9
+) -> tuple[Array, Array, Array]:
+    """Return R, w and w' of the optimum at the times t, shape (N,), by SciPy's `solve_bvp`.
+
+    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. On the way ‖σ‖ has to
+    stay below 2π.
+
+    References
+    ----------
+    BK (19).
+
+    Examples
+    --------
+    >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
+    >>> R, w, a = minimum_acceleration_so3(I, R1, rest, rest, np.array([0, 0.5, 1]))
+    >>> log_so3(R)[:, 2].round(9)
+    array([0.  , 0.75, 1.5 ])
+    """
+    from scipy.integrate import solve_bvp
+
+    goal = log_so3(R0.T @ R1)
+
+    def rates(_: Array, y: Array) -> Array:
+        sigma, w, acceleration, jerk = y.reshape(4, 3, -1)
+        sigma_rate = np.einsum("nij,jn->in", right_jacobian_inverse_so3(sigma.T), w)
+        return np.concatenate([sigma_rate, acceleration, jerk, np.cross(jerk, w, axis=0)])
+
+    def misses(start: Array, end: Array) -> Array:
+        return np.concatenate([start[:3], start[3:6] - w0, end[:3] - goal, end[3:6] - w1])
+
+    nodes = np.linspace(0, 1, 11)
+    guess = np.zeros((12, 11))
+    guess[:3], guess[3:6] = np.outer(goal, nodes), np.outer(w0, 1 - nodes) + np.outer(w1, nodes)
+    solution = solve_bvp(rates, misses, nodes, guess, tol=tol, max_nodes=100_000)
+    sigma, w, acceleration, _ = np.moveaxis(solution.sol(t).reshape(4, 3, -1), -1, 1)
+    return R0 @ exp_so3(sigma), w, acceleration
