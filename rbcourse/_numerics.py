@@ -12,12 +12,15 @@ Rng: TypeAlias = "np.random.Generator | int | None"  # loads no numpy.random
 EPS = float(np.finfo(np.float64).eps)
 
 
-def as_array(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
+def as_array(
+    name: str, value: ArrayLike, *core: int | str, stacked: bool = True, copy: bool = True
+) -> Array:
     """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
 
     A letter in `core` stands for any size from 1 up, the same at each of its places, and "n+1" for
     any from 2 up: ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes
-    are batch axes; with ``stacked=False`` there may be none.
+    are batch axes; with ``stacked=False`` there may be none. With ``copy=False`` the array may be
+    the caller's own.
 
     Raises
     ------
@@ -37,7 +40,7 @@ def as_array(name: str, value: ArrayLike, *core: int | str, stacked: bool = True
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
         wanted = ", ".join([*["..."] * stacked, *map(str, core)])
         raise ValueError(f"{name}: shape ({wanted}) wanted, got {given.shape}")
-    array: Array = given.astype(np.float64)
+    array: Array = given.astype(np.float64, copy=copy)
     return array
 
 

@@ -1,5 +1,6 @@
 """Projected curves on SO(3): the optimum among all matrices, then the nearest rotations to it."""
 
+import math
 import warnings
 from collections.abc import Callable
 from functools import cached_property
@@ -12,10 +13,12 @@ from rbcourse.curves import AlongGeodesic, Curve, identity, start_and_rotation_v
 from rbcourse.line import f as rbcourse_f
 from rbcourse.line import line_singular_value, theta
 from rbcourse.polynomials import cubic_coefficients, polynomial, quintic_coefficients
-from rbcourse.projection import project_so_with_gap
-from rbcourse.so3 import hat_so3, vee_so3
+from rbcourse.projection import gap, nearest
+from rbcourse.so3 import hat_so3
 
 Progress = Callable[[Array, int], ArrayLike]
+
+_BLOCK = 5000  # rotations that are worked out together, in the cache
 
 
 class ProjectedLine(AlongGeodesic):
@@ -87,20 +90,27 @@ class ProjectedPolynomial(Curve):
         return polynomial(self.coefficients, t[..., None, None], order)
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        M = self._ambient(t)
-        R, gap = project_so_with_gap(M)
-        lost = gap < 8 * EPS * np.linalg.norm(M, axis=(-2, -1))
-        _check_unique(t, lost, len(self.batch_shape))
+        stacked = len(self.batch_shape)
+        shape = np.broadcast_shapes(t.shape, self.batch_shape) + ((3,) if order else (3, 3))
+        times = t.reshape(-1, *t.shape[t.ndim - stacked :])
+        values = np.empty((len(times), *shape[t.ndim - stacked :]))
+        rows = max(1, _BLOCK // max(1, math.prod(self.batch_shape)))
+        for start in range(0, len(times), rows):
+            block = slice(start, start + rows)
+            values[block] = self._block(times[block], order)
+        return values.reshape(shape)
+
+    def _block(self, t: Array, order: int) -> Array:
+        """Return what `_evaluate` does, with each component of all of it together in the memory."""
+        entries = np.moveaxis(self.coefficients, (-2, -1), (1, 2))[:, :, :, None]
+        M = [polynomial(entries, t, k) for k in range(order + 1)]
+        R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
+        if not unique.all():
+            _check_unique(t, ~unique, len(self.batch_shape))
         if order == 0:
             return R
-        Rt = np.swapaxes(R, -1, -2)
-        P, A = Rt @ M, Rt @ self._ambient(t, 1)
-        w = _solve(_spin(P), 2 * vee_so3(A))
-        if order == 1:
-            return w
-        W = hat_so3(w)
-        A_rate = Rt @ self._ambient(t, 2) - W @ A
-        return _solve(_spin(P), 2 * vee_so3(A_rate) - _apply(_spin(A - W @ P), w))
+        rates = _rates(np.moveaxis(R, (-2, -1), (0, 1)), *M)
+        return np.moveaxis(rates[order - 1], 0, -1)
 
     @property
     def margin(self) -> Array:
@@ -131,7 +141,7 @@ class ProjectedPolynomial(Curve):
         return bool(np.any(self._gap(times) < change))
 
     def _gap(self, t: Array) -> Array:
-        return project_so_with_gap(self._ambient(t))[1]
+        return gap(self._ambient(t))
 
     def _column(self, t: Array) -> Array:
         return t.reshape(-1, *(1 for _ in self.batch_shape))
@@ -364,14 +374,40 @@ def _which(index: NDArray[np.intp]) -> str:
     return f" of curve {[int(i) for i in index]}" if len(index) else ""
 
 
-def _spin(P: Array) -> Array:
-    """Return tr(P) I − P: (tr(P) I − P) w is the vector of P ŵ + ŵ P, for symmetric P."""
-    return np.trace(P, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - P
+def _rates(R: Array, M: Array, M_rate: Array, M_bend: Array | None = None) -> list[Array]:
+    """Return w and, if M'' is given, w' of the nearest rotations R to M; components first.
+
+    S = RᵀM is symmetric. With A = RᵀM', differentiated, that says (tr(S) I − S) w = vee(A − Aᵀ),
+    and once more (tr(S) I − S) w' = vee(A' − A'ᵀ) − (tr(S') I − S') w.
+    """
+    S, A = _transposed_times(R, M), _transposed_times(R, M_rate)
+    w = _solve(S, _skew(A))
+    if M_bend is None:
+        return [w]
+    S_rate = A - np.cross(w[:, None], S, axis=0)
+    A_rate = _transposed_times(R, M_bend) - np.cross(w[:, None], A, axis=0)
+    spin = np.trace(S_rate) * w - np.einsum("ij...,j...->i...", S_rate, w)
+    return [w, _solve(S, _skew(A_rate) - spin)]
 
 
-def _solve(matrix: Array, vector: Array) -> Array:
-    return np.linalg.solve(matrix, vector[..., None])[..., 0]
+def _transposed_times(R: Array, M: Array) -> Array:
+    return np.einsum("ki...,kj...->ij...", R, M)
 
 
-def _apply(matrix: Array, vector: Array) -> Array:
-    return (matrix @ vector[..., None])[..., 0]
+def _skew(A: Array) -> Array:
+    """Return vee(A − Aᵀ)."""
+    return np.stack([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
+
+
+def _solve(S: Array, b: Array) -> Array:
+    """Return x with (tr(S) I − S) x = b; that matrix, L D Lᵀ, is positive definite."""
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = S
+    d1 = yy + zz
+    l21, l31 = -xy / d1, -xz / d1
+    d2, below = xx + zz + l21 * xy, -yz + l21 * xz
+    l32 = below / d2
+    d3 = xx + yy + l31 * xz - l32 * below
+    y2 = b[1] - l21 * b[0]
+    x3 = (b[2] - l31 * b[0] - l32 * y2) / d3
+    x2 = y2 / d2 - l32 * x3
+    return np.stack([b[0] / d1 - l21 * x2 - l31 * x3, x2, x3])

@@ -14,6 +14,7 @@ from rbcourse._numerics import (
     first_index,
     scaled,
 )
+from rbcourse.foam import nearest_rotations
 
 
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -137,7 +138,7 @@ def project_so(M: ArrayLike) -> Array:
     array([[ 0., -1.],
            [ 1.,  0.]])
     """
-    return project_so_with_gap(scaled(as_finite("M", M, "n", "n")))[0]
+    return nearest(as_array("M", M, "n", "n", copy=False))[0]
 
 
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
@@ -194,7 +195,7 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     refused = ~(sizes[..., 0] > W.shape[-1] * EPS * sizes[..., -1])
     if refused.any():
         raise ValueError(f"{first_index('W', refused)} is not positive definite")
-    return project_so_with_gap(scaled(M) @ W)[0]
+    return nearest(scaled(M) @ W)[0]
 
 
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
@@ -277,19 +278,48 @@ def distance_to_so(M: ArrayLike) -> Array:
     >>> float(distance_to_so([[1, 0], [0, -1]]))  # from a mirror every turn is as far
     2.0
     """
-    M = as_finite("M", M, "n", "n")
-    d = np.linalg.svd(M, compute_uv=False)
-    d[..., -1] *= np.linalg.slogdet(M).sign
+    d = _signed_singular_values(as_finite("M", M, "n", "n"))
     return np.hypot.reduce(d - 1, axis=-1)
 
 
-def project_so_with_gap(M: Array) -> tuple[Array, Array]:
-    """Return `project_so` of M, n ≥ 2, and the sum of the two smallest eigenvalues of RᵀM."""
+def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return `project_so` of M, and where it is unique: by FOAM, or by the SVD where it has to be.
+
+    Raises
+    ------
+    ValueError
+        If `M` is not finite.
+    """
+    flat = M.reshape(-1, *M.shape[-2:])
+    R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
+    if M.shape[-1] == 3:
+        unique = nearest_rotations(flat.transpose(1, 2, 0), R.transpose(1, 2, 0))
+    if not unique.all():
+        left = np.flatnonzero(~unique)
+        if not np.isfinite(flat[left]).all():
+            as_finite("M", M)
+        R[left], unique[left] = _nearest_by_svd(scaled(flat[left]))
+    return R.reshape(M.shape), unique.reshape(M.shape[:-2])
+
+
+def _nearest_by_svd(M: Array) -> tuple[Array, NDArray[np.bool_]]:
     U, d, Vt = np.linalg.svd(M)
     sign = np.sign(np.linalg.det(U @ Vt))
     U[..., -1] *= sign[..., None]
     d[..., -1] *= sign
-    return (U + U @ _rounding_left(M, U, d, Vt)) @ Vt, d[..., -2:].sum(axis=-1)
+    unique = d[..., -2:].sum(axis=-1) >= 8 * EPS * np.linalg.norm(d, axis=-1)
+    return (U + U @ _rounding_left(M, U, d, Vt)) @ Vt, unique
+
+
+def gap(M: Array) -> Array:
+    """Return the sum of the two smallest eigenvalues of RᵀM, R the nearest rotation to M."""
+    return _signed_singular_values(M)[..., -2:].sum(axis=-1)
+
+
+def _signed_singular_values(M: Array) -> Array:
+    d = np.linalg.svd(M, compute_uv=False)
+    d[..., -1] *= np.linalg.slogdet(M).sign
+    return d
 
 
 def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:

@@ -13,8 +13,9 @@ import rbcourse
 PACKAGE = Path(rbcourse.__file__).parent
 LEVELS = {
     "_numerics": 0,
+    "foam": 1,
     "quaternion": 1,
-    "projection": 1,
+    "projection": 2,
     "inertia": 1,
     "own_work": 0,
     "marking": 1,
@@ -145,7 +146,7 @@ def test_an_import_that_goes_up_is_seen():
         "import rbcourse.so3",
         "def late():\n    from rbcourse import exp_so3",
         "from .curves import theta",
-        "from rbcourse.quaternion import slerp",
+        "from rbcourse.planar import compose_planar",
     ):
         assert upward("projection", source) != [], source
     assert upward("curves", "from rbcourse.so3 import exp_so3\nimport numpy") == []
