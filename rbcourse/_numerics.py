@@ -1,6 +1,6 @@
 """Arguments checked by name, and the functions that need care near zero."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from operator import index
 from typing import Any, TypeAlias
 
@@ -129,8 +129,10 @@ def as_time(t: ArrayLike, batch_ndim: int) -> Array:
     ValueError
         As `as_finite`; and the message names the first time outside [0, 1].
     """
-    times = as_finite("t", t)
-    _check_all((times >= 0) & (times <= 1), "t", times, "a time in [0, 1]")
+    times = as_array("t", t, copy=False)
+    if not (times.min(initial=0) >= 0 and times.max(initial=1) <= 1):
+        times = as_finite("t", t)
+        _check_all((times >= 0) & (times <= 1), "t", times, "a time in [0, 1]")
     return times.reshape(times.shape + (1,) * batch_ndim)
 
 
@@ -181,6 +183,12 @@ def as_generator(rng: Rng) -> "np.random.Generator":
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
         raise ValueError(f"rng: a Generator, a seed or None wanted, got {rng!r}") from error
+
+
+def blocks(count: int, size: int) -> Iterator[slice]:
+    """Yield slices that cut `count` things into parts of at most `size`."""
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
 
 
 def check_order(order: int) -> int:

@@ -23,7 +23,7 @@ from operator import mul
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._numerics import Array, scaled
+from rbcourse._numerics import Array, blocks, scaled
 
 LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; below, digits are lost, and matrices are rare
 _FEW = 10  # matrices, for which it is faster to take them one by one
@@ -35,7 +35,7 @@ def nearest_rotation(M: Sequence[float]) -> list[float] | None:
     """Return the nearest rotation to M, both as nine numbers; None where ζ is small.
 
     s₁² is the largest root of x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, by Viète's formula
-    x = a + 2 r cos(arccos(q/r³)/3), and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
+    x = a + 2 r cos(arccos(q)/3), and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
 
     References
     ----------
@@ -52,9 +52,9 @@ def nearest_rotation(M: Sequence[float]) -> list[float] | None:
     if not _SAFE[0] < norm2 < _SAFE[1]:
         return None
     a = norm2 / 3
-    r2 = max(a * a - cof2 / 3, 0.0)
+    r2 = max(a * a - cof2 / 3, 1e-200)
     r = math.sqrt(r2)
-    q = (a * (a * a - cof2 / 2) + det * det / 2) / max(r * r2, 1e-300)
+    q = (a * (3 * r2 - a * a) + det * det) / (2 * r * r2)
     s1 = math.sqrt(a + 2 * r * math.cos(math.acos(max(-1.0, min(1.0, q))) / 3))
     gap = math.sqrt(max(norm2 - s1 * s1 + 2 * det / s1, 0.0))
     lam = s1 + gap
@@ -125,11 +125,11 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
                 R[..., k], right[k] = np.reshape(found, (3, 3)), True
         return right
     size = 8 * math.ceil(count / 8 / math.ceil(count / _BLOCK))
-    for start in range(0, count, size):
-        block = slice(start, min(start + size, count))
-        entries, X, C = (x[..., : block.stop - start] for x in (_KEPT.M, _KEPT.X, _KEPT.C))
+    for block in blocks(count, size):
+        part = slice(block.stop - block.start)
+        entries, X, C = (x[..., part] for x in (_KEPT.M, _KEPT.X, _KEPT.C))
         np.copyto(entries, M[..., block])
-        right[block] = _project(entries, X, C, _KEPT.rows[:, : block.stop - start])
+        right[block] = _project(entries, X, C, _KEPT.rows[:, part])
         np.copyto(R[..., block], C)
     return right
 
@@ -151,44 +151,53 @@ def _project(M: Array, X: Array, C: Array, rows: Array) -> NDArray[np.bool_]:
         _dots(M[:1], C[:1], det)
         _write_largest_and_gap(norm2, cof2, det, s1, gap, t, u)
         lam = np.add(s1, gap, u)
-        zeta = (s1 * lam + det / s1) * gap
+        zeta = np.multiply(s1, lam, det)
+        zeta += t
+        zeta *= gap
         right = zeta > LEAST_ZETA * s1 * norm2
         np.multiply(M, lam, X)
         X += C
         _write_cofactors(x, c, t)
-        np.multiply(M, zeta, X)
-        X += C
-        _write_cofactors(x, c, t)
-        _dots(X[:1], C[:1], det)
-        lam *= zeta
-        C *= lam**2 / det
-        C += X
-        C *= 0.5 / lam
+        M *= zeta
+        M += C
+        _write_cofactors(m, c, t)
+        zeta *= lam
+        _dots(M[:1], C[:1], t)
+        C *= zeta**2 / t
+        C += M
+        C *= 0.5 / zeta
     return right
 
 
 def _write_largest_and_gap(
     norm2: Array, cof2: Array, det: Array, s1: Array, gap: Array, t: Array, u: Array
 ) -> None:
-    """Write s₁ and s₂ + s₃, with 2 cos 2φ = 4/(1 + tan² φ) − 2: the tangent is faster."""
-    a = np.divide(norm2, 3, s1)
-    r2 = np.multiply(a, a, gap)
-    q = np.subtract(r2, cof2 / 2, t)
-    q *= a
-    q += det**2 / 2
-    r2 -= cof2 / 3
-    np.maximum(r2, 0, out=r2)
+    """Write s₁, s₂ + s₃, and det/s₁ into t; with 2 cos 2φ = 4/(1 + tan² φ) − 2, which is faster."""
+    a, a2, r2 = np.multiply(norm2, 1 / 3, s1), np.multiply(s1, s1, t), gap
+    np.subtract(a2, np.multiply(cof2, 1 / 3, u), r2)
+    np.maximum(r2, 1e-200, out=r2)
     r = np.sqrt(r2, u)
+    q = np.subtract(np.multiply(r2, 3, cof2), a2, t)
+    q *= a
+    q += np.multiply(det, det, cof2)
     r2 *= r
-    q /= np.maximum(r2, 1e-300, out=r2)
+    r2 *= 2
+    q /= r2
     np.clip(q, -1, 1, out=q)
-    tangent = np.tan(np.arccos(q, q) / 6, q)
-    tangent *= tangent
-    tangent += 1
-    a += r * (4 / tangent - 2)
+    np.arccos(q, q)
+    q *= 1 / 6
+    np.tan(q, q)
+    q *= q
+    q += 1
+    np.divide(4, q, q)
+    q -= 2
+    q *= r
+    a += q
     np.subtract(norm2, a, gap)
     np.sqrt(s1, s1)
-    gap += 2 * det / s1
+    np.divide(det, s1, t)
+    gap += t
+    gap += t
     np.sqrt(np.maximum(gap, 0, out=gap), gap)
 
 

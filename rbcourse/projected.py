@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import EPS, Array, as_angle, as_finite, as_time, check_broadcast
+from rbcourse._numerics import EPS, Array, as_angle, as_finite, as_time, blocks, check_broadcast
 from rbcourse.curves import AlongGeodesic, Curve, identity, start_and_rotation_vector
 from rbcourse.line import f as rbcourse_f
 from rbcourse.line import line_singular_value, theta
@@ -38,7 +38,7 @@ class ProjectedLine(AlongGeodesic):
     def __init__(self, R0: Array, rotation_vector: Array, f: Progress) -> None:
         super().__init__(R0, rotation_vector)
         self._f = f
-        self._angle = as_angle(np.linalg.norm(rotation_vector, axis=-1))
+        self._angle = as_angle(self._angle)
         self.margin = 2 * np.cos(self._angle / 2)
         _warn_if_nearly_singular(self.margin)
         start, end = self._line(as_time([0, 1], len(self.batch_shape)), 0)
@@ -95,8 +95,7 @@ class ProjectedPolynomial(Curve):
         times = t.reshape(-1, *t.shape[t.ndim - stacked :])
         values = np.empty((len(times), *shape[t.ndim - stacked :]))
         rows = max(1, _BLOCK // max(1, math.prod(self.batch_shape)))
-        for start in range(0, len(times), rows):
-            block = slice(start, start + rows)
+        for block in blocks(len(times), rows):
             values[block] = self._block(times[block], order)
         return values.reshape(shape)
 
