@@ -1,5 +1,6 @@
 """Arguments checked by name, and the functions that need care near zero."""
 
+import math
 from collections.abc import Iterator, Sequence
 from operator import index
 from typing import Any, TypeAlias
@@ -189,6 +190,13 @@ def blocks(count: int, size: int) -> Iterator[slice]:
     """Yield slices that cut `count` things into parts of at most `size`."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
+
+
+def at_cache_line(*shape: int) -> Array:
+    """Return an array that begins at a cache line, not yet written: there NumPy is faster."""
+    raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)
 
 
 def check_order(order: int) -> int:

@@ -23,7 +23,7 @@ from operator import mul
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._numerics import Array, blocks, scaled
+from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
 LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; below, digits are lost, and matrices are rare
 _FEW = 10  # matrices, for which it is faster to take them one by one
@@ -87,14 +87,8 @@ class _Workspace(threading.local):
     """Arrays that begin at a cache line, and are kept for the next call: that saves a third."""
 
     def __init__(self) -> None:
-        self.M, self.X, self.C = (_at_cache_line(3, 3, _BLOCK) for _ in range(3))
-        self.rows = _at_cache_line(7, _BLOCK)
-
-
-def _at_cache_line(*shape: int) -> Array:
-    raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)
+        self.M, self.X, self.C = (at_cache_line(3, 3, _BLOCK) for _ in range(3))
+        self.rows = at_cache_line(7, _BLOCK)
 
 
 _KEPT = _Workspace()

@@ -10,10 +10,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, Rng, as_generator, as_size, as_within_unit
+from rbcourse._numerics import (
+    Array,
+    Rng,
+    as_generator,
+    as_size,
+    as_within_unit,
+    at_cache_line,
+    blocks,
+)
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
 
-_BLOCK = 8192  # draws whose arrays fit into the cache together
+_BLOCK = 8184  # draws whose arrays fit into the cache together; with 8192 they would collide there
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
@@ -266,43 +274,58 @@ def _three_angles(size: int | Sequence[int] | None, rng: Rng) -> Array:
 
 
 def _in_blocks(
-    kernel: Callable[[Array], list[Array]],
+    kernel: Callable[[Array, Array], None],
     core: tuple[int, ...],
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return draws of a kernel: it takes uniform numbers, shape (3, m), to the entries of m."""
+    """Return draws of a kernel: of uniform numbers, shape (3, m), it writes the entries, (…, m)."""
     shape, generator = as_size(size), as_generator(rng)
-    draws = np.empty((math.prod(shape), *core))
-    for start in range(0, len(draws), _BLOCK):
-        block = draws[start : start + _BLOCK]
-        x = np.ascontiguousarray(generator.random((len(block), 3)).T)
-        for column, entry in zip(block.reshape(len(block), -1).T, kernel(x), strict=True):
-            column[...] = entry
+    draws = np.empty((math.prod(shape), math.prod(core)))
+    width = min(len(draws), _BLOCK)
+    uniform, entries = at_cache_line(3, width), at_cache_line(math.prod(core), width)
+    for block in blocks(len(draws), _BLOCK):
+        part = slice(block.stop - block.start)
+        uniform[:, part] = generator.random((part.stop, 3)).T
+        kernel(uniform[:, part], entries[:, part])
+        draws[block] = entries[:, part].T
     return draws.reshape(*shape, *core)
 
 
-def _arvo(x: Array) -> list[Array]:
-    """Return `arvo_rotation`, multiplied out, with the angles φ and ψ = φ − θ."""
+def _arvo(x: Array, entries: Array) -> None:
+    """Write `arvo_rotation`, multiplied out, with the angles φ and ψ = φ − θ."""
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = entries
     (c, cos_psi), (s, sin_psi) = _cos_sin(np.stack([x[1], x[1] - x[0]]))
     height, radius = 2 * x[2] - 1, 2 * np.sqrt(x[2] * (1 - x[2]))
     hc, hs = height * c, height * s
-    return [
-        *(hc * cos_psi - s * sin_psi, hc * sin_psi + s * cos_psi, radius * c),
-        *(hs * cos_psi + c * sin_psi, hs * sin_psi - c * cos_psi, radius * s),
-        *(radius * cos_psi, radius * sin_psi, -height),
-    ]
+    np.subtract(hc * cos_psi, s * sin_psi, xx)
+    np.add(hc * sin_psi, s * cos_psi, xy)
+    np.multiply(radius, c, xz)
+    np.add(hs * cos_psi, c * sin_psi, yx)
+    np.subtract(hs * sin_psi, c * cos_psi, yy)
+    np.multiply(radius, s, yz)
+    np.multiply(radius, cos_psi, zx)
+    np.multiply(radius, sin_psi, zy)
+    np.negative(height, zz)
 
 
-def _shoemake(x: Array) -> list[Array]:
-    """Return `shoemake_quaternion`."""
+def _shoemake(x: Array, entries: Array) -> None:
+    """Write `shoemake_quaternion`."""
     (c1, c2), (s1, s2) = _cos_sin(x[1:])
     sigma1, sigma2 = np.sqrt(1 - x[0]), np.sqrt(x[0])
-    return [c2 * sigma2, s1 * sigma1, c1 * sigma1, s2 * sigma2]
+    for entry, on_circle, sigma in zip(
+        entries, (c2, s1, c1, s2), (sigma2, sigma1, sigma1, sigma2), strict=True
+    ):
+        np.multiply(on_circle, sigma, entry)
 
 
 def _cos_sin(turns: Array) -> tuple[Array, Array]:
     """Return cosine and sine from the tangent of half the angle, which NumPy computes faster."""
-    tangent = np.tan(np.pi * turns)
-    versed = 2 / (1 + tangent * tangent)
-    return versed - 1, tangent * versed
+    tangent = np.pi * turns
+    np.tan(tangent, tangent)
+    versed = tangent * tangent
+    versed += 1
+    np.divide(2, versed, versed)
+    tangent *= versed
+    versed -= 1
+    return versed, tangent
