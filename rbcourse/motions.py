@@ -7,7 +7,6 @@ from rbcourse._numerics import Array, as_finite, check_broadcast
 from rbcourse.curves import Curve, geodesic_so3
 from rbcourse.polynomials import cubic_coefficients, polynomial
 from rbcourse.projected import ProjectedPolynomial, projected_cubic_so3
-from rbcourse.se3 import pose_from_components
 
 
 class RigidMotion(Curve):
@@ -34,7 +33,9 @@ class RigidMotion(Curve):
         R = self.rotation._evaluate(t, 0)
         d = polynomial(self.coefficients, t[..., None], order)
         if order == 0:
-            return pose_from_components(R, d)
+            A = np.zeros((*np.broadcast_shapes(R.shape[:-2], d.shape[:-1]), 4, 4))
+            A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
+            return A
         in_body = (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
         turning = np.broadcast_to(self.rotation._evaluate(t, order), in_body.shape)
         return np.concatenate([turning, in_body], axis=-1)

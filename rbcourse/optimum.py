@@ -1,20 +1,20 @@
 """What both solvers of BK (19) share: the curve they return, and the way to hard problems."""
 
+import warnings
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebint, chebvander
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, as_single
+from rbcourse._numerics import Array, as_finite, check_broadcast
 from rbcourse.curves import Curve, geodesic_so3
 from rbcourse.polynomials import cubic_coefficients, polynomial
 from rbcourse.projected import ProjectedPolynomial
-from rbcourse.projection import project_so
-from rbcourse.so3 import BASIS_SO3, exp_so3, hat_so3, right_jacobian_inverse_so3
+from rbcourse.projection import nearest
+from rbcourse.so3 import BASIS_SO3, exp_so3, right_jacobian_inverse_so3
 
 
 class ConvergenceError(RuntimeError):
@@ -38,12 +38,32 @@ class ConvergenceError(RuntimeError):
 
 
 class Ends(NamedTuple):
-    """Boundary conditions: rotations and body angular velocities at t = 0 and 1."""
+    """Boundary conditions of N problems: rotations and body angular velocities at t = 0 and 1."""
 
     R0: Array
     R1: Array
     w0: Array
     w1: Array
+
+    def of(self, which: NDArray[np.bool_] | NDArray[np.intp] | slice) -> "Ends":
+        """Return some of the problems."""
+        return Ends(*(array[which] for array in self))
+
+
+class Solution(NamedTuple):
+    """One problem solved: R at the nodes, c = R w'', what was left, and after how many steps."""
+
+    R: Array
+    c: Array
+    residual: float
+    iterations: int
+
+
+class Failure(NamedTuple):
+    """One problem not solved: what was left, and after how many steps."""
+
+    residual: float
+    iterations: int
 
 
 class Grid(NamedTuple):
@@ -80,192 +100,278 @@ def grid(n: int) -> Grid:
 
 
 def along(matrix: Array, values: Array) -> Array:
-    """Return a matrix of a `Grid` applied to values at the nodes, of any shape (n, ...)."""
-    return (matrix @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
+    """Return a matrix of a `Grid` applied to values at the nodes, of any shape (N, n, ...)."""
+    count, n = values.shape[:2]
+    return (matrix @ values.reshape(count, n, -1)).reshape(count, -1, *values.shape[2:])
 
 
 def hats(w: Array) -> Array:
-    """Return `hat_so3` of (n, 3), unchecked."""
-    return (w @ BASIS_SO3.reshape(3, 9)).reshape(-1, 3, 3)
+    """Return `hat_so3` of (..., 3), unchecked."""
+    return (w @ BASIS_SO3.reshape(3, 9)).reshape(*w.shape, 3)
 
 
 def vees(W: Array) -> Array:
-    """Return `vee_so3` of (n, 3, 3), unchecked."""
-    return W.reshape(-1, 9) @ BASIS_SO3.reshape(3, 9).T / 2
+    """Return `vee_so3` of (..., 3, 3), unchecked."""
+    return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
+
+
+def in_body(R: Array, c: Array) -> Array:
+    """Return Rᵀc at the nodes, shape (N, n, 3)."""
+    return (c[:, None, None] @ R)[:, :, 0]
+
+
+def orthogonal(R: Array) -> Array:
+    """Return R without its rounding: one step of Newton and Schulz."""
+    return R @ (1.5 * np.eye(3) - 0.5 * (R.mT @ R))
 
 
 class MinimumAcceleration(Curve):
-    """A `Curve` on SO(3) that solves (19), as Chebyshev series.
+    """A `Curve` on SO(3), or a stack of them, that solves (19); as Chebyshev series.
 
     Attributes
     ----------
     ends : Ends
-        R0, R1, w0, w1.
-    c : ndarray, shape (3,)
+        R0, R1, w0, w1; of a stack they have one batch axis, however many it has.
+    converged : bool, or ndarray of bool, shape (...)
+        Where a solution was found. Elsewhere the curve, `c` and the cost are NaN.
+    c : ndarray, shape (..., 3)
         R w'', which does not depend on t: the angular jerk in the fixed frame.
-    residual : float
+    residual : float or ndarray, shape (...)
         The largest entry of R0 + ∫ R ŵ dt − R(t) at the nodes, w from R w'' = c and the ends.
-    iterations : int
-        How many steps the solver took at the end.
-    nodes : int
-        How many nodes carry it.
+    iterations, nodes : int or ndarray of int, shape (...)
+        How many steps the solver took, and how many nodes carry the curve.
 
     References
     ----------
     BK (19). It says that R w'' is constant: (R w'')' = R (w''' + w × w'').
     """
 
-    batch_shape = ()
-
-    def __init__(self, ends: Ends, R: Array, c: Array, iterations: int) -> None:
-        self.ends, self.c, self.iterations, self.nodes = ends, c, iterations, len(R)
-        self._R = R
-        nodes, jerk = grid(self.nodes), np.swapaxes(R, -1, -2) @ c
-        self._tail = np.abs(nodes.series[-2:] @ R.reshape(-1, 9)).max()
-        off = ends.R0 + along(nodes.integral, R @ hats(velocity(ends, jerk))) - R
-        self.residual = float(np.abs(off).max())
+    def __init__(
+        self, ends: Ends, solutions: list[Solution | Failure], batch_shape: tuple[int, ...]
+    ) -> None:
+        self.ends, self.batch_shape = ends, batch_shape
+        found = {i: s for i, s in enumerate(solutions) if isinstance(s, Solution)}
+        nodes, c = np.zeros(len(solutions), int), np.full((len(solutions), 3), np.nan)
+        for i, solution in found.items():
+            nodes[i], c[i] = len(solution.R), solution.c
+        same = [np.flatnonzero(nodes == n) for n in np.unique(nodes[nodes > 0])]
+        self._parts = [(index, np.stack([found[int(i)].R for i in index])) for index in same]
+        residual = np.array([s.residual for s in solutions], float)
+        iterations = np.array([s.iterations for s in solutions], int)
+        self.c = c.reshape(*batch_shape, 3)
+        self.converged, self.nodes, self.residual, self.iterations = (
+            x.reshape(batch_shape)[()] for x in (nodes > 0, nodes, residual, iterations)
+        )
 
     @property
-    def cost(self) -> float:
-        """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes."""
-        nodes, (_, _, series) = grid(self.nodes), self._series
-        rates = chebvander(2 * nodes.t - 1, len(series) - 1) @ series
-        return float(2 * nodes.integral[-1] @ np.sum(rates**2, axis=-1))
-
-    @property
-    def resolved(self) -> bool:
-        """Whether the nodes carry the curve, to rounding."""
-        return bool(self._tail < 1e-13 and self.residual < 1e-11)
+    def cost(self) -> Array:
+        """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes; shape (...)."""
+        cost = np.full(len(self.ends.w0), np.nan)
+        for (index, R), (_, _, series) in zip(self._parts, self._series, strict=True):
+            nodes = grid(R.shape[1])
+            rates = chebvander(2 * nodes.t - 1, series.shape[1] - 1) @ series
+            cost[index] = 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
+        return cost.reshape(self.batch_shape)[()]
 
     @cached_property
-    def _series(self) -> tuple[Array, Array, Array]:
-        """The Chebyshev series of R, of w and of w'."""
-        jerk = np.swapaxes(self._R, -1, -2) @ self.c
-        return along(grid(self.nodes).series, self._R), *_rates(self.ends, jerk)
+    def _series(self) -> list[tuple[Array, Array, Array]]:
+        """The Chebyshev series of R, of w and of w', for each number of nodes."""
+        c = self.c.reshape(-1, 3)
+        return [
+            (along(grid(R.shape[1]).series, R), *_rates(self.ends.of(index), in_body(R, c[index])))
+            for index, R in self._parts
+        ]
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        series = self._series[order]
-        value = chebvander(2 * t - 1, len(series) - 1) @ series.reshape(len(series), -1)
-        if order:
-            return value.reshape(*t.shape, 3)
-        R = value.reshape(*t.shape, 3, 3)
-        return R @ (3 * np.eye(3) - np.swapaxes(R, -1, -2) @ R) / 2  # rounding, made orthogonal
+        core = (3,) if order else (3, 3)
+        times = t.reshape(-1)
+        values = np.full((len(times), len(self.ends.w0), *core), np.nan)
+        for (index, _), part in zip(self._parts, self._series, strict=True):
+            series = np.moveaxis(part[order], 1, 0)
+            powers = chebvander(2 * times - 1, len(series) - 1)
+            value = powers @ series.reshape(len(series), -1)
+            values[:, index] = value.reshape(len(times), len(index), *core)
+        time_shape = t.shape[: t.ndim - len(self.batch_shape)]
+        values = values.reshape(*time_shape, *self.batch_shape, *core)
+        return values if order else orthogonal(values)
 
 
 def velocity(ends: Ends, jerk: Array) -> Array:
     """Return w at the nodes, from w'' there and w at the ends."""
-    nodes = grid(len(jerk))
-    return nodes.blend @ np.array([ends.w0, ends.w1]) + nodes.twice @ jerk
+    nodes = grid(jerk.shape[1])
+    return nodes.blend @ np.stack([ends.w0, ends.w1], axis=1) + nodes.twice @ jerk
+
+
+def defects(ends: Ends, R: Array, c: Array) -> tuple[Array, Array]:
+    """Return E = R0 + ∫ R ŵ − R at the nodes, with R w'' = c, and ŵ."""
+    W = hats(velocity(ends, in_body(R, c)))
+    return ends.R0[:, None] + along(grid(R.shape[1]).integral, R @ W) - R, W
+
+
+def tails(R: Array) -> Array:
+    """Return the larger of the last two Chebyshev coefficients: what the nodes do not carry."""
+    return np.abs(along(grid(R.shape[1]).series[-2:], R)).max(axis=(1, 2, 3))
 
 
 def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
     """Return the series of w and w', from w'' at the nodes and w at the ends."""
-    nodes = grid(len(jerk))
+    nodes = grid(jerk.shape[1])
     w, acceleration = nodes.again @ jerk, nodes.once @ jerk
-    slope = ends.w1 - ends.w0 - w.sum(axis=0)
-    acceleration[0] += slope
-    w[:2] += slope / 2
-    w[0] += ends.w0
+    slope = ends.w1 - ends.w0 - w.sum(axis=1)
+    acceleration[:, 0] += slope
+    w[:, :2] += slope[:, None] / 2
+    w[:, 0] += ends.w0
     return w, acceleration
 
 
-Guess = Callable[[Array], Array]
-"""Rotations over time; a `Curve` is one."""
+COARSE = 17  # nodes, on which guesses are made and systems solved
+
+Guess = Callable[[int], Array]
+"""Rotations at the nodes, when told how many: shape (N, n, 3, 3)."""
 
 
-def first_guess(ends: Ends, guess: Guess, n: int) -> tuple[Array, Array]:
-    """Return R of a guess at n nodes, and the c for which w'' = Rᵀc gives w most nearly."""
-    nodes = grid(n)
-    R = guess(nodes.t)
-    R[0], R[-1] = ends.R0, ends.R1
-    Rt = np.swapaxes(R, -1, -2)
-    w = vees(Rt @ along(nodes.derivative, R))
-    lacking = w - velocity(ends, np.zeros_like(w))
-    effect = along(nodes.twice, Rt)
-    return R, np.linalg.lstsq(effect.reshape(-1, 3), lacking.ravel())[0]
+def from_curve(curve: Callable[[Array], Array]) -> Guess:
+    """Return a guess: a stack of curves at the nodes, kept for the next time."""
+    return cache(lambda n: np.moveaxis(curve(grid(n).t), 0, 1))
 
 
-Solver = Callable[[Ends, Guess], MinimumAcceleration]
+def first_guess(ends: Ends, R: Array) -> tuple[Array, Array]:
+    """Return R of a guess with the right ends, and c for which w'' = Rᵀc gives w most nearly."""
+    nodes, R = grid(R.shape[1]), R.copy()
+    R[:, 0], R[:, -1] = ends.R0, ends.R1
+    w = vees(R.mT @ along(nodes.derivative, R))
+    lacking = (w - velocity(ends, np.zeros_like(w))).reshape(len(R), -1, 1)
+    effect = along(nodes.twice, R.mT).reshape(len(R), -1, 3)
+    return R, np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0]
+
+
+Solver = Callable[[Ends, Guess], list[Solution | Failure]]
 
 
 def solve(
     solver: Solver, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
 ) -> MinimumAcceleration:
-    """Solve from the projected cubic; if that fails, by continuation.
+    """Solve from the projected cubic; what fails, by continuation.
 
     Where the projected cubic may jump, a cubic in exponential coordinates is tried too.
 
     Raises
     ------
     ValueError
-        If an argument is not finite or not of its shape.
+        If an argument is not finite or not of its shape, or the batches do not broadcast.
     ConvergenceError
-        If both fail.
+        If both fail, for a single problem.
+
+    Warns
+    -----
+    RuntimeWarning
+        If both fail, for some of a stack.
     """
-    ends = Ends(
-        project_so(as_single("R0", R0, 3, 3)),
-        project_so(as_single("R1", R1, 3, 3)),
-        as_single("w0", w0, 3),
-        as_single("w1", w1, 3),
-    )
-    cubic = _projected_cubic(ends)
-    try:
-        curve = _attempt(solver, ends, cubic)
-    except ConvergenceError:
-        return _continue(solver, ends)
-    if not cubic.may_jump():
-        return curve
-    with suppress(ConvergenceError):  # a guess that jumps may have led to a turn too many
-        other = _attempt(solver, ends, _exponential_cubic(ends))
-        curve = min(curve, other, key=lambda found: found.cost)
+    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+    rotations = (np.broadcast_to(nearest(R)[0], (*batch, 3, 3)).reshape(-1, 3, 3) for R in (R0, R1))
+    velocities = (np.broadcast_to(w, (*batch, 3)).reshape(-1, 3) for w in (w0, w1))
+    ends = Ends(*rotations, *velocities)
+    solutions = _solutions(solver, ends)
+    if not batch and isinstance(solutions[0], Failure):
+        raise ConvergenceError(*solutions[0])
+    curve = MinimumAcceleration(ends, solutions, batch)
+    _warn_if_not_converged(curve)
     return curve
 
 
-def _attempt(solver: Solver, ends: Ends, guess: Guess) -> MinimumAcceleration:
-    """Count an overflow, what comes of it, and a singular system as no convergence."""
+def _solutions(solver: Solver, ends: Ends) -> list[Solution | Failure]:
+    guess = from_curve(_projected_cubic(ends))
+    found = _attempt(solver, ends, guess)
+    suspects = np.flatnonzero(_jumps(guess(COARSE)))  # there it may have led to a turn too many
+    if suspects.size:
+        part = ends.of(suspects)
+        firsts = [found[i] for i in suspects]
+        others = _attempt(solver, part, from_curve(_exponential_cubic(part)))
+        better = _costs(part, others) < _costs(part, firsts)
+        for k in np.flatnonzero(better):
+            found[suspects[k]] = others[k]
+    for i, solution in enumerate(found):
+        if isinstance(solution, Failure):
+            found[i] = _continue(solver, ends.of(slice(i, i + 1)))
+    return found
+
+
+def _jumps(R: Array) -> NDArray[np.bool_]:
+    """Tell where neighbours are more than a right angle apart."""
+    return (np.einsum("ntij,ntij->nt", R[:, 1:], R[:, :-1]) < 1).any(axis=1)
+
+
+def _costs(ends: Ends, solutions: list[Solution | Failure]) -> Array:
+    costs = MinimumAcceleration(ends, solutions, (len(solutions),)).cost
+    return np.where(np.isnan(costs), np.inf, costs)
+
+
+def _warn_if_not_converged(curve: MinimumAcceleration) -> None:
+    failed = np.argwhere(~np.asarray(curve.converged))
+    if len(failed):
+        warnings.warn(
+            f"{len(failed)} of {curve.converged.size} problems did not converge, the first of them "
+            f"{[int(i) for i in failed[0]]}: there the curve is NaN (see converged)",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def _attempt(solver: Solver, ends: Ends, guess: Guess) -> list[Solution | Failure]:
+    """Count what is singular or no number any more as not solved; in a stack, one by one."""
     try:
-        with np.errstate(over="raise", invalid="raise"):
+        with np.errstate(over="ignore", invalid="ignore"):
             return solver(ends, guess)
-    except (FloatingPointError, np.linalg.LinAlgError, ValueError) as error:
-        raise ConvergenceError(np.inf, 0) from error
+    except (FloatingPointError, np.linalg.LinAlgError, ValueError):
+        if len(ends.w0) == 1:
+            return [Failure(np.inf, 0)]
+    parts = [slice(i, i + 1) for i in range(len(ends.w0))]
+    return [_attempt(solver, ends.of(one), _part(guess, one))[0] for one in parts]
+
+
+def _part(guess: Guess, which: slice) -> Guess:
+    return lambda n: guess(n)[which]
 
 
 class _ProjectedCubic(ProjectedPolynomial):
     """The projected cubic as a guess: where the nearest rotation is not unique, any one."""
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        return project_so(self._ambient(t, order))
+        return nearest(self._ambient(t, order))[0]
 
 
 def _projected_cubic(ends: Ends) -> _ProjectedCubic:
-    V0, V1 = ends.R0 @ hat_so3(ends.w0), ends.R1 @ hat_so3(ends.w1)
+    V0, V1 = ends.R0 @ hats(ends.w0), ends.R1 @ hats(ends.w1)
     return _ProjectedCubic(cubic_coefficients(ends.R0, ends.R1, V0, V1))
 
 
-def _exponential_cubic(ends: Ends) -> Guess:
+def _exponential_cubic(ends: Ends) -> Callable[[Array], Array]:
     """Return R0 exp(σ(t)), with σ the cubic of these ends."""
     turn = geodesic_so3(ends.R0, ends.R1).rotation_vector
-    end_rate = right_jacobian_inverse_so3(turn) @ ends.w1
+    end_rate = (right_jacobian_inverse_so3(turn) @ ends.w1[..., None])[..., 0]
     coefficients = cubic_coefficients(np.zeros(3), turn, ends.w0, end_rate)
-    return lambda t: ends.R0 @ exp_so3(polynomial(coefficients, t[:, None]))
+    return lambda t: ends.R0 @ exp_so3(polynomial(coefficients, t[:, None, None]))
 
 
-def _continue(solver: Solver, ends: Ends) -> MinimumAcceleration:
+def _continue(solver: Solver, ends: Ends) -> Solution | Failure:
     """Change the end velocities from those of the geodesic to the wanted ones, step by step."""
     geodesic = geodesic_so3(ends.R0, ends.R1)
-    guess: Guess = geodesic
+    guess = from_curve(geodesic)
     start = geodesic.rotation_vector
     done, step = 0.0, 0.25
     while True:
         share = min(done + step, 1.0)
         w0, w1 = (start + share * (w - start) for w in (ends.w0, ends.w1))
-        try:
-            curve = _attempt(solver, Ends(ends.R0, ends.R1, w0, w1), guess)
-        except ConvergenceError:
+        nearer = Ends(ends.R0, ends.R1, w0, w1)
+        [solution] = _attempt(solver, nearer, guess)
+        if isinstance(solution, Failure):
             step /= 2
             if step < 1 / 256:
-                raise
+                return solution
+        elif share == 1:
+            return solution
         else:
-            if share == 1:
-                return curve
-            guess, done, step = curve, share, 2 * step
+            guess = from_curve(MinimumAcceleration(nearer, [solution], (1,)))
+            done, step = share, 2 * step

@@ -133,11 +133,16 @@ class ProjectedPolynomial(Curve):
             reach, count = 2 * reach / (count - 1), 17
         return centre, np.take_along_axis(gap, least, axis=0)[0]
 
-    def may_jump(self) -> bool:
-        """Tell whether the gap at 65 times leaves room for a 0 between them."""
-        times = self._column(np.linspace(0, 1, 65))
-        change = np.linalg.norm(np.diff(self._ambient(times), axis=0), axis=(-2, -1)).max(axis=0)
-        return bool(np.any(self._gap(times) < change))
+    def may_jump(self) -> NDArray[np.bool_]:
+        """Tell for which curves the gap at 65 times, if not at 9, leaves room for a 0 between."""
+        coefficients = self.coefficients.reshape(-1, math.prod(self.batch_shape), 3, 3)
+        may = np.ones(coefficients.shape[1], bool)
+        for count in (9, 65):
+            times = np.linspace(0, 1, count)[:, None, None, None]
+            M = polynomial(coefficients[:, may], times)
+            change = np.linalg.norm(np.diff(M, axis=0), axis=(-2, -1)).max(axis=0)
+            may[may] = (gap(M) < change).any(axis=0)
+        return may.reshape(self.batch_shape)
 
     def _gap(self, t: Array) -> Array:
         return gap(self._ambient(t))
@@ -352,7 +357,7 @@ def _check_unique(t: Array, lost: NDArray[np.bool_], batch_ndim: int) -> None:
 
 def _watched(coefficients: Array) -> ProjectedPolynomial:
     curve = ProjectedPolynomial(coefficients)
-    if curve.may_jump():
+    if curve.may_jump().any():
         _warn_if_nearly_singular(curve.margin)
     return curve
 

@@ -1,27 +1,37 @@
 """The optimum by relaxation: Newton's method on the whole curve at once."""
 
-import numpy as np
-from numpy.typing import ArrayLike
+from functools import lru_cache
+from typing import NamedTuple
 
-from rbcourse._numerics import Array, as_single
+import numpy as np
+from numpy.polynomial.chebyshev import chebvander
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._numerics import Array, blocks
 from rbcourse.motions import RigidMotion, cubic_ends
 from rbcourse.optimum import (
-    ConvergenceError,
+    COARSE,
     Ends,
+    Failure,
     Guess,
     MinimumAcceleration,
+    Solution,
     along,
+    defects,
     first_guess,
     grid,
     hats,
+    orthogonal,
     solve,
+    tails,
     vees,
-    velocity,
 )
-from rbcourse.so3 import exp_so3, hat_so3
 
-STEPS = 60
+STEPS = 25
+EXACT = 3e-12  # what may be left of the equation, and of R in the last Chebyshev coefficients
 LONGEST_STEP = 0.5
+ROUGH = 1e-2  # rad: with shorter steps the fewest nodes are left
+_BLOCK = 128  # problems whose linear systems fit into the cache together
 
 
 def minimum_acceleration_so3(
@@ -135,57 +145,161 @@ def minimum_acceleration_se3(
     >>> c(0.5)[:3, 3].round(9)
     array([1., 0., 0.])
     """
-    vectors = {"w0": w0, "w1": w1, "d0_dot": d0_dot, "d1_dot": d1_dot}
-    poses = as_single("A0", A0, 4, 4), as_single("A1", A1, 4, 4)
-    ends = cubic_ends(*poses, *(as_single(name, v, 3) for name, v in vectors.items()))
-    R0, R1, path = ends
+    R0, R1, path = cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
     return RigidMotion(minimum_acceleration_so3(R0, R1, w0, w1), path)
 
 
-def relax(ends: Ends, guess: Guess) -> MinimumAcceleration:
-    """Solve (19) on 28 nodes, then on ever more, until they carry the curve."""
-    curve = _newton(ends, guess, 28)
-    while not curve.resolved:
-        if curve.nodes == 224:
-            raise ConvergenceError(curve.residual, curve.iterations)
-        curve = _newton(ends, curve, 2 * curve.nodes)
-    return curve
+def relax(ends: Ends, guess: Guess) -> list[Solution | Failure]:
+    """Solve (19) for a stack, from 17 nodes on; what fails, from 33 nodes on."""
+    found: list[Solution | Failure] = []
+    for block in blocks(len(ends.w0), _BLOCK):
+        found += _refine(ends.of(block), guess(COARSE)[block])
+    failed = [i for i, solution in enumerate(found) if isinstance(solution, Failure)]
+    if failed:
+        again = _refine(ends.of(np.array(failed)), guess(33)[failed])
+        for i, solution in zip(failed, again, strict=True):
+            found[i] = solution
+    return found
 
 
-def _newton(ends: Ends, guess: Guess, n: int) -> MinimumAcceleration:
-    """Solve (19) on n nodes by Newton's method, no node turned by more than half a rad at once."""
-    R, c = first_guess(ends, guess, n)
-    for iteration in range(1, STEPS + 1):
-        turn, dc = _newton_step(ends, R, c)
-        size = float(np.abs(turn).max())
-        share = min(1.0, LONGEST_STEP / max(size, LONGEST_STEP))
-        R = exp_so3(share * turn) @ R
-        c = c + share * dc
-        if size < 1e-8:
-            return MinimumAcceleration(ends, R, c, iteration)
-    raise ConvergenceError(size, STEPS)
+def _refine(ends: Ends, R: Array) -> list[Solution | Failure]:
+    """Solve (19) roughly on the nodes of a guess, then on ever more, until they carry the curve."""
+    found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
+    intervals = R.shape[1] - 1
+    R, c = first_guess(ends, R)
+    rough = _newton(_State(np.arange(len(R)), ends, R, c, np.zeros(len(R), int)), 1, found)
+    stride = 1
+    while rough and stride < 16:
+        stride *= 2
+        R = orthogonal(along(_interpolation(rough.R.shape[1], intervals * stride + 1), rough.R))
+        R[:, 0], R[:, -1] = rough.ends.R0, rough.ends.R1
+        rough = _newton(rough._replace(R=R), stride, found)
+    return found
 
 
-def _newton_step(ends: Ends, R: Array, c: Array) -> tuple[Array, Array]:
+class _State(NamedTuple):
+    """How far the problems are that are still worked at, and which they are."""
+
+    which: NDArray[np.intp]
+    ends: Ends
+    R: Array
+    c: Array
+    steps: NDArray[np.intp]
+
+    def of(self, part: NDArray[np.bool_]) -> "_State":
+        """Return some of them."""
+        if part.all():
+            return self
+        which, ends, R, c, steps = self
+        return _State(which[part], ends.of(part), R[part], c[part], steps[part])
+
+
+def _joined(states: list[_State]) -> _State:
+    which, ends, R, c, steps = zip(*states, strict=True)
+    joined = Ends(*(np.concatenate(array) for array in zip(*ends, strict=True)))
+    return _State(np.concatenate(which), joined, *map(np.concatenate, (R, c, steps)))
+
+
+def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State | None:
+    """Improve R and c, no node turned by more than half a rad at once.
+
+    What is solved, or fails, is written into `found`; what wants more nodes is returned.
+    """
+    size = before = np.full(len(now.R), np.inf)
+    finer = []
+    for _ in range(STEPS):
+        E, W = defects(now.ends, now.R, now.c)
+        left = np.abs(E).max(axis=(1, 2, 3))
+        if stride == 1:
+            solved, enough = np.zeros(len(left), bool), size < ROUGH
+        else:
+            tail, stalled = tails(now.R), (size < 1e-6) & (left > before / 2)
+            solved = (tail < EXACT) & (left < EXACT)
+            enough = (stalled | (tail > EXACT) & (size < 1e3 * tail)) & ~solved
+        done = solved | enough | ~np.isfinite(left)
+        if done.any():
+            for i in np.flatnonzero(done):
+                outcome = float(left[i]), int(now.steps[i])
+                found[now.which[i]] = (
+                    Solution(now.R[i], now.c[i], *outcome) if solved[i] else Failure(*outcome)
+                )
+            if enough.any():
+                finer.append(now.of(enough))
+            if done.all():
+                break
+            now, E, W, left, size = now.of(~done), E[~done], W[~done], left[~done], size[~done]
+        turn, dc = _newton_step(now.R, now.c, E, W, stride)
+        size, before = np.abs(turn).max(axis=(1, 2)), left
+        share = LONGEST_STEP / np.maximum(size, LONGEST_STEP)
+        R, c = _turned(now.R, share[:, None, None] * turn), now.c + share[:, None] * dc
+        now = _State(now.which, now.ends, R, c, now.steps + 1)
+    else:
+        for i in range(len(now.which)):
+            found[now.which[i]] = Failure(float(left[i]), int(now.steps[i]))
+    return _joined(finer) if len(finer) > 1 else next(iter(finer), None)
+
+
+def _turned(R: Array, turn: Array) -> Array:
+    """Return the rotations R turned, in the fixed frame, by Cayley's formula: 2 tan(a/2) for a."""
+    H = hats(turn)
+    share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
+    HR = H @ R
+    return R + share[..., None, None] * (HR + H @ HR / 2)
+
+
+def _newton_step(R: Array, c: Array, E: Array, W: Array, stride: int) -> tuple[Array, Array]:
     """Return the turns ε of the nodes, in the fixed frame, and the change of c.
 
     With w'' = Rᵀc, so w = (1 − t) w0 + t w1 + G Rᵀc, the unknowns are R and c. The equation is
     R' = R ŵ in integral form; its defect is E = R0 + ∫ R ŵ − R. When ε turns R, Rᵀc changes by
     Rᵀ(ĉ ε + dc), and to first order
 
-        ε = ∫ R G Rᵀ (ĉ ε + dc) + vee(E Rᵀ + ∫ E ŵ Rᵀ),
+        ε = d + ∫ R G Rᵀ (ĉ ε + dc),    d = vee(E Rᵀ + ∫ E ŵ Rᵀ),
 
-    with ε = 0 at the end.
+    with ε = 0 at the end. It is solved on every `stride`-th node; there the integrals smooth so
+    much that the right side, worked out on all nodes, is as good as a solution on all of them.
     """
-    n, Rt, nodes = len(R), np.swapaxes(R, -1, -2), grid(len(R))
-    W = hats(velocity(ends, Rt @ c))
-    E = ends.R0 + along(nodes.integral, R @ W) - R
+    nodes, Rt = grid(R.shape[1]), R.mT
     defect = vees(E @ Rt + along(nodes.integral, E @ W @ Rt))
-    rows = R.reshape(-1, 3)
-    RGRt = nodes.twice[:, None, :, None] * (rows @ rows.T).reshape(n, 3, n, 3)
-    effect = along(nodes.integral, RGRt)
-    system = np.eye(3 * n) - (effect.reshape(-1, 3) @ hat_so3(c)).reshape(3 * n, 3 * n)
-    right = np.concatenate([defect[..., None], effect.sum(axis=2)], axis=-1)
-    x = np.linalg.solve(system, right.reshape(3 * n, 4)).reshape(n, 3, 4)
-    dc = -np.linalg.solve(x[-1, :, 1:], x[-1, :, 0])
-    return x[..., 0] + x[..., 1:] @ dc, dc
+    turn, dc = _coarse_step(R[:, ::stride], c, defect[:, ::stride])
+    if stride == 1:
+        return turn, dc
+    causes = np.empty((*R.shape[:2], 3, 4))
+    causes[..., 0] = _interpolation(turn.shape[1], len(nodes.t)) @ turn @ hats(-c)
+    causes[..., 1:] = np.eye(3)
+    effects = along(nodes.integral, R @ along(nodes.twice, Rt @ causes))
+    effects[..., 0] += defect
+    dc = _end_at_zero(effects)
+    return effects[..., 0] + (effects[..., 1:] @ dc[:, None, :, None])[..., 0], dc
+
+
+def _coarse_step(R: Array, c: Array, defect: Array) -> tuple[Array, Array]:
+    """Return ε and dc from d, all on the same nodes: a linear system for each problem."""
+    count, n = R.shape[:2]
+    nodes, rows = grid(n), R.reshape(count, 3 * n, 3)
+    RGRt = (rows @ rows.mT) * _for_each_entry(n)
+    effect = along(nodes.integral, RGRt.reshape(count, n, -1))
+    system = (effect.reshape(count, -1, 3) @ hats(-c)).reshape(count, 3 * n, 3 * n)
+    np.einsum("...ii->...i", system)[...] += 1
+    by_c = along(nodes.integral, R @ along(nodes.twice, R.mT))
+    right = np.concatenate([defect[..., None], by_c], axis=-1)
+    x = np.linalg.solve(system, right.reshape(count, 3 * n, 4)).reshape(count, n, 3, 4)
+    dc = _end_at_zero(x)
+    return x[..., 0] + (x[..., 1:] @ dc[:, None, :, None])[..., 0], dc
+
+
+def _end_at_zero(x: Array) -> Array:
+    """Return dc, so that x[..., 0] + x[..., 1:] dc is 0 at the last node."""
+    return -np.linalg.solve(x[:, -1, :, 1:], x[:, -1, :, :1])[..., 0]
+
+
+@lru_cache
+def _for_each_entry(n: int) -> Array:
+    """Return `twice` with each number in a 3 × 3 block of its own."""
+    return np.kron(grid(n).twice, np.ones((3, 3)))
+
+
+@lru_cache
+def _interpolation(few: int, many: int) -> Array:
+    """Return the matrix that goes from the values at some nodes to those at more."""
+    return chebvander(2 * grid(many).t - 1, few - 1) @ grid(few).series

@@ -5,10 +5,12 @@ from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.optimum import (
-    ConvergenceError,
     Ends,
+    Failure,
     Guess,
     MinimumAcceleration,
+    Solution,
+    defects,
     first_guess,
     grid,
     solve,
@@ -72,7 +74,13 @@ def shoot_minimum_acceleration_so3(
     return solve(shoot, R0, R1, w0, w1)
 
 
-def shoot(ends: Ends, guess: Guess) -> MinimumAcceleration:
+def shoot(ends: Ends, guess: Guess) -> list[Solution | Failure]:
+    """Solve the problems of a stack, one by one."""
+    parts = [slice(i, i + 1) for i in range(len(ends.w0))]
+    return [_shoot(ends.of(one), guess(33)[one]) for one in parts]
+
+
+def _shoot(ends: Ends, guess: Array) -> Solution | Failure:
     """Improve the aim (w'(0), b) by Newton's method, the hit moved by half a unit at most."""
     aim = _first_aim(ends, guess)
     for iteration in range(STEPS):
@@ -80,27 +88,27 @@ def shoot(ends: Ends, guess: Guess) -> MinimumAcceleration:
         size = float(np.abs(miss).max())
         if size < 1e-11:
             R = _shot(ends, aim, grid(NODES).t)[0]
-            c = ends.R0 @ (aim[3:] - np.cross(ends.w0, aim[:3]))
-            curve = MinimumAcceleration(ends, R, c, iteration)
-            if curve.residual < 1e-10:
-                return curve
-            raise ConvergenceError(curve.residual, iteration)
+            c = ends.R0[0] @ (aim[3:] - np.cross(ends.w0[0], aim[:3]))
+            residual = float(np.abs(defects(ends, R[None], c[None])[0]).max())
+            if residual < 1e-10:
+                return Solution(R, c, residual, iteration)
+            return Failure(residual, iteration)
         aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
-    raise ConvergenceError(size, STEPS)
+    return Failure(size, STEPS)
 
 
-def _first_aim(ends: Ends, guess: Guess) -> Array:
+def _first_aim(ends: Ends, guess: Array) -> Array:
     """Return w'(0) and b = w''(0) + w(0) × w'(0) of the curve that `relax` would start with."""
-    R, c = first_guess(ends, guess, 32)
-    acceleration = MinimumAcceleration(ends, R, c, 0)(0, 2)
-    return np.concatenate([acceleration, ends.R0.T @ c + np.cross(ends.w0, acceleration)])
+    [R], [c] = first_guess(ends, guess)
+    acceleration = MinimumAcceleration(ends, [Solution(R, c, 0.0, 0)], ())(0, 2)
+    return np.concatenate([acceleration, R[0].T @ c + np.cross(ends.w0[0], acceleration)])
 
 
 def _miss(ends: Ends, aim: Array) -> tuple[Array, Array]:
     """Return by how much R1 and w1 are missed, and, near the goal, how that depends on the aim."""
     R, w, sensitivity = (values[-1] for values in _shot(ends, aim, np.ones(1)))
-    turn = log_so3(ends.R1.T @ R)
-    return np.concatenate([turn, w - ends.w1]), sensitivity[:6]
+    turn = log_so3(ends.R1[0].T @ R)
+    return np.concatenate([turn, w - ends.w1[0]]), sensitivity[:6]
 
 
 def _shot(ends: Ends, aim: Array, t: Array) -> tuple[Array, Array, Array]:
@@ -108,7 +116,7 @@ def _shot(ends: Ends, aim: Array, t: Array) -> tuple[Array, Array, Array]:
     from scipy.integrate import solve_ivp
 
     sensitivity = np.eye(9, 6, -6)
-    start = np.concatenate([ends.R0.ravel(), ends.w0, aim[:3], sensitivity.ravel()])
+    start = np.concatenate([ends.R0.ravel(), ends.w0[0], aim[:3], sensitivity.ravel()])
     shot = solve_ivp(
         _flow, (0, 1), start, "DOP853", t_eval=t, args=(aim[3:],), rtol=1e-12, atol=1e-13
     )

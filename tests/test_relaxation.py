@@ -231,18 +231,13 @@ def test_shapes_and_bad_arguments(solver):
     assert curve(np.zeros((2, 5))).shape == (2, 5, 3, 3)
     assert curve(0.5).shape == (3, 3)
     assert curve(0.5, 1).shape == curve(0.5, 2).shape == (3,)
-    with pytest.raises(ValueError, match=r"w0: shape \(3\) wanted, got \(2,\)"):
+    with pytest.raises(ValueError, match=r"w0: shape \(\.\.\., 3\) wanted, got \(2,\)"):
         solver(np.eye(3), np.eye(3), [0, 0], REST)
     with pytest.raises(ValueError, match=r"R1\[0, 0\] is nan"):
         solver(np.eye(3), np.full((3, 3), np.nan), REST, REST)
-    with pytest.raises(ValueError, match=r"w1: shape \(3\) wanted, got \(4, 3\)"):
-        solver(np.eye(3), np.eye(3), REST, np.zeros((4, 3)))
+    with pytest.raises(ValueError, match=r"do not broadcast: .*w0 \(3,\), w1 \(4,\)"):
+        solver(np.eye(3), np.eye(3), np.zeros((3, 3)), np.zeros((4, 3)))
     with pytest.raises(ValueError, match=r"t is -1\.0"):
         curve(-1)
-    pose, stack = np.eye(4), np.zeros((2, 3))
-    with pytest.raises(ValueError, match=r"A0: shape \(4, 4\) wanted, got \(2, 4, 4\)"):
-        rb.minimum_acceleration_se3([pose, pose], pose, REST, REST, REST, REST)
-    with pytest.raises(ValueError, match=r"d1_dot: shape \(3\) wanted, got \(2, 3\)"):
-        rb.minimum_acceleration_se3(pose, pose, REST, REST, REST, stack)
     with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted"):
         curve(0, 3)
