@@ -160,18 +160,19 @@ class MinimumAcceleration(Curve):
         iterations = np.array([s.iterations for s in solutions], int)
         self.c = c.reshape(*batch_shape, 3)
         self.converged, self.nodes, self.residual, self.iterations = (
-            x.reshape(batch_shape)[()] for x in (nodes > 0, nodes, residual, iterations)
+            x.reshape(batch_shape) if batch_shape else x.item()
+            for x in (nodes > 0, nodes, residual, iterations)
         )
 
     @property
-    def cost(self) -> Array:
+    def cost(self) -> float | Array:
         """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes; shape (...)."""
         cost = np.full(len(self.ends.w0), np.nan)
         for (index, R), (_, _, series) in zip(self._parts, self._series, strict=True):
             nodes = grid(R.shape[1])
             rates = chebvander(2 * nodes.t - 1, series.shape[1] - 1) @ series
             cost[index] = 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
-        return cost.reshape(self.batch_shape)[()]
+        return cost.reshape(self.batch_shape) if self.batch_shape else cost.item()
 
     @cached_property
     def _series(self) -> list[tuple[Array, Array, Array]]:

@@ -249,6 +249,7 @@ def projected_cubic_so3(
 
     See Also
     --------
+    rbcourse.textbook.projected_cubic_so3 : The same, matrix by matrix.
     minimum_acceleration_so3 : The optimum with the same ends.
     acceleration_cost : What both cost.
 

@@ -116,6 +116,7 @@ def project_so(M: ArrayLike) -> Array:
 
     See Also
     --------
+    rbcourse.textbook.project_so : The same in three lines, by the singular value decomposition.
     project_se : The same for poses.
     project_so_weighted : The same for a body, by mass.
     distance_to_so : How far it is.
@@ -130,7 +131,8 @@ def project_so(M: ArrayLike) -> Array:
 
     References
     ----------
-    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
+    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. For n = 3 it is computed by
+    FOAM (see `rbcourse.foam`), and near the singular set, as for other n, by the SVD.
 
     Examples
     --------

@@ -41,27 +41,35 @@ def minimum_acceleration_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (3, 3)
+    R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices at t = 0 and 1; of what is none, the nearest rotation (`project_so`).
-    w0, w1 : array_like, shape (3,)
+    w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
     Returns
     -------
     MinimumAcceleration
-        A `Curve` that meets all four ends and solves w''' + w × w'' = 0. Its ``residual``,
-        ``iterations`` and ``nodes`` tell how it was found, and ``c`` is the constant R w''.
+        A `Curve`, or a stack of them, that meets all four ends and solves w''' + w × w'' = 0. Its
+        ``converged``, ``residual``, ``iterations`` and ``nodes`` tell how it was found, and ``c``
+        is the constant R w''.
 
     Raises
     ------
     ValueError
-        If an argument is not finite or not of that shape.
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
-        If Newton's method does not converge, neither from the projected cubic nor in small steps
-        from the geodesic. Rare for ‖w0‖, ‖w1‖ < 9; a tenth of all draws up to 20.
+        For a single problem, if Newton's method does not converge, neither from the projected cubic
+        nor in small steps from the geodesic. Rare for ‖w0‖, ‖w1‖ < 9; a tenth of all draws up
+        to 20.
+
+    Warns
+    -----
+    RuntimeWarning
+        For a stack, if that happens to some: there the curve is NaN and ``converged`` False.
 
     See Also
     --------
+    rbcourse.textbook.minimum_acceleration_so3 : The equation, and SciPy's `solve_bvp`.
     shoot_minimum_acceleration_so3 : The same by shooting.
     projected_cubic_so3 : Its near-optimal stand-in, in closed form.
     acceleration_cost : What both cost.
@@ -106,11 +114,11 @@ def minimum_acceleration_se3(
 
     Parameters
     ----------
-    A0, A1 : array_like, shape (4, 4)
+    A0, A1 : array_like, shape (..., 4, 4)
         Poses at t = 0 and 1; of what is none, the nearest pose (`project_se`).
-    w0, w1 : array_like, shape (3,)
+    w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
-    d0_dot, d1_dot : array_like, shape (3,)
+    d0_dot, d1_dot : array_like, shape (..., 3)
         Velocities of the origin there, *fixed* frame, in m per unit time.
 
     Returns
@@ -121,8 +129,13 @@ def minimum_acceleration_se3(
     Raises
     ------
     ValueError
-        If an argument is not finite or not of that shape.
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
+        As `minimum_acceleration_so3`.
+
+    Warns
+    -----
+    RuntimeWarning
         As `minimum_acceleration_so3`.
 
     See Also
@@ -209,7 +222,7 @@ def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State
     finer = []
     for _ in range(STEPS):
         E, W = defects(now.ends, now.R, now.c)
-        left = np.abs(E).max(axis=(1, 2, 3))
+        left = np.nan_to_num(np.abs(E).max(axis=(1, 2, 3)), nan=np.inf, posinf=np.inf)
         if stride == 1:
             solved, enough = np.zeros(len(left), bool), size < ROUGH
         else:
@@ -234,8 +247,8 @@ def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State
         R, c = _turned(now.R, share[:, None, None] * turn), now.c + share[:, None] * dc
         now = _State(now.which, now.ends, R, c, now.steps + 1)
     else:
-        for i in range(len(now.which)):
-            found[now.which[i]] = Failure(float(left[i]), int(now.steps[i]))
+        for k, where in enumerate(now.which):
+            found[where] = Failure(float(left[k]), int(now.steps[k]))
     return _joined(finer) if len(finer) > 1 else next(iter(finer), None)
 
 

@@ -32,25 +32,30 @@ def shoot_minimum_acceleration_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (3, 3)
+    R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices at t = 0 and 1; of what is none, the nearest rotation (`project_so`).
-    w0, w1 : array_like, shape (3,)
+    w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
     Returns
     -------
     MinimumAcceleration
         As `minimum_acceleration_so3`, and for the same ends the same curve to about 1e-11, if both
-        find the same solution of (19).
+        find the same solution of (19). Of a stack the problems are solved one by one.
 
     Raises
     ------
     ValueError
-        If an argument is not finite or not of that shape.
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
-        If Newton's method does not converge, neither from the projected cubic nor in small steps
-        from the geodesic: one in some 40 of random ends with ‖w0‖, ‖w1‖ < 9. For ‖w‖ of 30 it
-        takes ten seconds to say so, for 1000 minutes.
+        For a single problem, if Newton's method does not converge, neither from the projected cubic
+        nor in small steps from the geodesic: one in some 40 of random ends with ‖w0‖, ‖w1‖ < 9.
+        For ‖w‖ of 30 it takes ten seconds to say so, for 1000 minutes.
+
+    Warns
+    -----
+    RuntimeWarning
+        For a stack, if that happens to some: there the curve is NaN and ``converged`` False.
 
     See Also
     --------
