@@ -27,7 +27,12 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 UV = shutil.which("uv")
+PEERS = ("peers", "peers-torch")  # the latter may take several GB on Linux
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
+
+
+class SetUpError(Exception):
+    """A command of the set-up has failed; its last words."""
 
 
 def main():
@@ -53,6 +58,7 @@ def main():
     grade.add_argument("sets", nargs="*", metavar="set", help="ps1; without, all there are")
     tasks.add_parser("browser", help="try every lesson in Chromium; further words go to pytest")
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
+    tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
     if further and known.task not in ("test", "lab", "browser"):
@@ -86,6 +92,10 @@ def main():
         look_in_browser(further)
     elif known.task == "ledger":
         run("-m", "rbcourse.ledger")
+    elif known.task == "bench":
+        for name in PEERS:
+            set_up_peers(name)
+        run("-m", "benchmarks")
     else:
         set_up_extra("lint")
         run("-m", "ruff", "check")
@@ -180,6 +190,14 @@ def set_up_extra(name):
         print(" done.", flush=True)
 
 
+def set_up_peers(name):
+    """Install what bench compares with; what cannot be had is named, and left out."""
+    try:
+        set_up_extra(name)
+    except SetUpError:
+        print(" failed: the run goes on without.", flush=True)
+
+
 def find_chromium():
     """Return the path of a Chromium; it is installed where Debian's packages are to be had."""
     there = [os.environ.get("CHROMIUM")] + [shutil.which(name) for name in CHROMIUM]
@@ -206,7 +224,7 @@ def install(*words):
 
 
 def patiently(*command):
-    """Run a command, a dot every two seconds; if it fails, show the end of what it said.
+    """Run a command, a dot every two seconds; if it fails, raise the end of what it said.
 
     The certificates of the system, as pip takes them (uv has two names for that): networks of
     schools and firms have their own.
@@ -224,8 +242,7 @@ def patiently(*command):
                 print(".", end="", flush=True)
         if job.returncode:
             said.seek(0)
-            print("\n" + "".join(said.readlines()[-25:]))
-            sys.exit("Set-up failed; README.md, 'When something goes wrong', may help.")
+            raise SetUpError("".join(said.readlines()[-25:]))
 
 
 def fingerprint(path, *more):
@@ -237,5 +254,8 @@ def fingerprint(path, *more):
 if __name__ == "__main__":
     try:
         main()
+    except SetUpError as error:
+        print("\n%s" % error)
+        sys.exit("Set-up failed; README.md, 'When something goes wrong', may help.")
     except KeyboardInterrupt:
         sys.exit(130)

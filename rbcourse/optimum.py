@@ -313,7 +313,7 @@ def _warn_if_not_converged(curve: MinimumAcceleration) -> None:
     failed = np.argwhere(~np.asarray(curve.converged))
     if len(failed):
         warnings.warn(
-            f"{len(failed)} of {curve.converged.size} problems did not converge, the first of them "
+            f"{len(failed)} of {len(curve.ends.w0)} problems did not converge, the first of them "
             f"{[int(i) for i in failed[0]]}: there the curve is NaN (see converged)",
             RuntimeWarning,
             stacklevel=4,

@@ -229,6 +229,55 @@ def test_a_task_for_problem_sets_runs_its_module(setting_up, tmp_path, monkeypat
     assert ran == [["-m", f"rbcourse.{name}", *map(str, map(Path, more))]]
 
 
+@pytest.mark.parametrize("missing", [[], ["peers-torch"], ["peers", "peers-torch"]])
+def test_bench_goes_on_without_what_does_not_install(setting_up, monkeypatch, capsys, missing):
+    module, done = setting_up
+    module.set_up()
+    (module.ROOT / "pyproject.toml").write_text("")
+    ran, pretend = [], module.patiently
+
+    def fails(*command):
+        if any(command[-1] == f".[{name}]" for name in missing):
+            raise module.SetUpError("no such package")
+        pretend(*command)
+
+    monkeypatch.setattr(module, "patiently", fails)
+    monkeypatch.setattr(module, "run", lambda *given: ran.append(given))
+    monkeypatch.setattr(sys, "argv", ["course.py", "bench"])
+    capsys.readouterr()
+    for _ in range(2):
+        module.main()
+    assert ran == [("-m", "benchmarks")] * 2
+    assert len(done) == 3 + 2 - len(missing)  # what is there is not installed again
+    said = capsys.readouterr().out.splitlines()
+    failed = [line for line in said if "failed: the run goes on without" in line]
+    assert [line.split()[2] for line in failed] == missing * 2
+
+
+def test_what_a_command_said_last_is_kept_when_it_fails():
+    spec = spec_from_file_location("course", ROOT / "course.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    with pytest.raises(module.SetUpError, match=r"^no network\n$"):
+        module.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
+
+
+def test_the_peers_of_the_benchmarks_are_exact_and_not_in_the_environment():
+    extras = PROJECT["optional-dependencies"]
+    peers = [Requirement(line) for name in ("peers", "peers-torch") for line in extras[name]]
+    assert {peer.name for peer in peers} == {"pytransform3d", "roma", "torch"}
+    assert not {peer.name for peer in peers} & set(PINS)
+    assert all(re.fullmatch(r"==[\d.]+", str(peer.specifier)) for peer in peers)
+
+
+def test_the_readme_has_a_row_for_every_task():
+    tasks = re.findall(r'add_parser\("(\w+)"', read("course.py"))
+    assert len(tasks) > 10
+    readme = read("README.md")
+    for task in tasks:
+        assert re.search(rf"^\| `python3 course\.py {task}\b", readme, re.MULTILINE), task
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
