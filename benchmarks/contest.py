@@ -12,7 +12,7 @@ from benchmarks.timing import in_turn, quartiles, ratios
 OURS = "rbcourse"
 """The name of our own method, the first of each contest."""
 
-SLOW = 20.0
+SLOW = 10.0
 """What would take longer, in s a call, is left out."""
 
 SPREADS = (

@@ -1,7 +1,13 @@
 """The fast functions again, as one writes them on the board: short, slow, and to be read first.
 
 Each has the name of its fast twin, and gives the same to rounding. No argument is checked.
+`show` prints one without its docstring.
 """
+
+import ast
+import inspect
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +15,22 @@ from rbcourse._numerics import Array
 from rbcourse.polynomials import cubic_coefficients, polynomial
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
+
+
+def show(function: Callable[..., Any]) -> None:
+    """Print the code of a function that has a docstring, without it.
+
+    Examples
+    --------
+    >>> show(sample_quaternion)
+    def sample_quaternion(n: int, rng: np.random.Generator) -> Array:
+        return shoemake_quaternion(rng.random((n, 3)))
+    """
+    source = inspect.getsource(function)
+    [definition] = ast.parse(source).body
+    assert isinstance(definition, ast.FunctionDef)
+    docstring, lines = definition.body[0], source.splitlines()
+    print("\n".join(lines[: docstring.lineno - 1] + lines[docstring.end_lineno :]))
 
 
 def project_so(M: Array) -> Array:
