@@ -6,7 +6,6 @@ from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebder, chebint, chebvander
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import Array, as_finite, check_broadcast
@@ -85,15 +84,23 @@ class Grid(NamedTuple):
     again: Array
 
 
+def chebyshev(t: Array, count: int) -> Array:
+    """Return the first Chebyshev polynomials on [0, 1] at the times t, shape (n, count)."""
+    from numpy.polynomial.chebyshev import chebvander
+
+    return chebvander(2 * t - 1, count - 1)
+
+
 @lru_cache
 def grid(n: int) -> Grid:
     """Return the grid of n nodes."""
-    x = -np.cos(np.pi * np.arange(n) / (n - 1))
-    t = (x + 1) / 2
-    series = np.linalg.inv(chebvander(x, n - 1))
+    from numpy.polynomial.chebyshev import chebder, chebint
+
+    t = (1 - np.cos(np.pi * np.arange(n) / (n - 1))) / 2
+    series = np.linalg.inv(chebyshev(t, n))
     once, again = (chebint(series, m, lbnd=-1, scl=0.5) for m in (1, 2))
     derivative, integral, double = (
-        chebvander(x, len(c) - 1) @ c for c in (chebder(series, scl=2), once, again)
+        chebyshev(t, len(c)) @ c for c in (chebder(series, scl=2), once, again)
     )
     blend, twice = np.stack([1 - t, t], axis=-1), double - np.outer(t, double[-1])
     return Grid(t, blend, derivative, integral, twice, series, once, again)
@@ -170,7 +177,7 @@ class MinimumAcceleration(Curve):
         cost = np.full(len(self.ends.w0), np.nan)
         for (index, R), (_, _, series) in zip(self._parts, self._series, strict=True):
             nodes = grid(R.shape[1])
-            rates = chebvander(2 * nodes.t - 1, series.shape[1] - 1) @ series
+            rates = chebyshev(nodes.t, series.shape[1]) @ series
             cost[index] = 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
         return cost.reshape(self.batch_shape) if self.batch_shape else cost.item()
 
@@ -189,8 +196,7 @@ class MinimumAcceleration(Curve):
         values = np.full((len(times), len(self.ends.w0), *core), np.nan)
         for (index, _), part in zip(self._parts, self._series, strict=True):
             series = np.moveaxis(part[order], 1, 0)
-            powers = chebvander(2 * times - 1, len(series) - 1)
-            value = powers @ series.reshape(len(series), -1)
+            value = chebyshev(times, len(series)) @ series.reshape(len(series), -1)
             values[:, index] = value.reshape(len(times), len(index), *core)
         time_shape = t.shape[: t.ndim - len(self.batch_shape)]
         values = values.reshape(*time_shape, *self.batch_shape, *core)

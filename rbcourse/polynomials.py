@@ -1,7 +1,6 @@
 """Polynomials through given ends, in any vector space: numbers, vectors, matrices."""
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
 
 from rbcourse._numerics import Array
 
@@ -92,7 +91,13 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
     >>> polynomial(np.array([1.0, 2.0, 3.0]), np.array([0.0, 1.0]), 1)
     array([2., 8.])
     """
-    return polyval(t, polyder(coefficients, order), tensor=False)
+    for _ in range(order):
+        powers = np.arange(len(coefficients)).reshape(-1, *(1,) * (coefficients.ndim - 1))
+        coefficients = (powers * coefficients)[min(1, len(coefficients) - 1) :]
+    value = coefficients[-1] + 0 * t
+    for coefficient in coefficients[-2::-1]:  # Horner's scheme
+        value = value * t + coefficient
+    return value
 
 
 def _stack(*coefficients: Array) -> Array:

@@ -4,7 +4,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import Array, blocks
@@ -17,6 +16,7 @@ from rbcourse.optimum import (
     MinimumAcceleration,
     Solution,
     along,
+    chebyshev,
     defects,
     first_guess,
     grid,
@@ -315,4 +315,4 @@ def _for_each_entry(n: int) -> Array:
 @lru_cache
 def _interpolation(few: int, many: int) -> Array:
     """Return the matrix that goes from the values at some nodes to those at more."""
-    return chebvander(2 * grid(many).t - 1, few - 1) @ grid(few).series
+    return chebyshev(grid(many).t, few) @ grid(few).series
