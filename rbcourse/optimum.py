@@ -280,7 +280,8 @@ def solve(
     rotations = (np.broadcast_to(nearest(R)[0], (*batch, 3, 3)).reshape(-1, 3, 3) for R in (R0, R1))
     velocities = (np.broadcast_to(w, (*batch, 3)).reshape(-1, 3) for w in (w0, w1))
     ends = Ends(*rotations, *velocities)
-    solutions = _solutions(solver, ends)
+    with np.errstate(over="ignore", invalid="ignore"):
+        solutions = _solutions(solver, ends)
     if not batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
     curve = MinimumAcceleration(ends, solutions, batch)
@@ -329,8 +330,7 @@ def _warn_if_not_converged(curve: MinimumAcceleration) -> None:
 def _attempt(solver: Solver, ends: Ends, guess: Guess) -> list[Solution | Failure]:
     """Count what is singular or no number any more as not solved; in a stack, one by one."""
     try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return solver(ends, guess)
+        return solver(ends, guess)
     except (FloatingPointError, np.linalg.LinAlgError, ValueError):
         if len(ends.w0) == 1:
             return [Failure(np.inf, 0)]
@@ -343,10 +343,10 @@ def _part(guess: Guess, which: slice) -> Guess:
 
 
 class _ProjectedCubic(ProjectedPolynomial):
-    """The projected cubic as a guess: where the nearest rotation is not unique, any one."""
+    """The projected cubic as a guess: any rotation where none is the nearest, or where M overflows."""
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        return nearest(self._ambient(t, order))[0]
+        return nearest(np.nan_to_num(self._ambient(t, order)))[0]
 
 
 def _projected_cubic(ends: Ends) -> _ProjectedCubic:

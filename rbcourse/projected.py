@@ -135,8 +135,8 @@ class ProjectedPolynomial(Curve):
 
     def may_jump(self) -> NDArray[np.bool_]:
         """Tell for which curves the gap at 65 times, if not at 9, leaves room for a 0 between."""
-        coefficients = self.coefficients.reshape(-1, math.prod(self.batch_shape), 3, 3)
-        may = np.ones(coefficients.shape[1], bool)
+        may = np.ones(math.prod(self.batch_shape), bool)
+        coefficients = self.coefficients.reshape(len(self.coefficients), len(may), 3, 3)
         for count in (9, 65):
             times = np.linspace(0, 1, count)[:, None, None, None]
             M = polynomial(coefficients[:, may], times)

@@ -59,6 +59,16 @@ def log_so3(R):
         return np.array([float(sign * angle * a / length) for a in axis])
 
 
+def nearest_rotation(M):
+    """The rotation nearest to M: U diag(1, …, 1, ±1) Vᵀ, by mpmath's singular values."""
+    with mp.workdps(DIGITS):
+        U, _, Vt = mp.svd_r(mp.matrix(np.asarray(M, dtype=float).tolist()))
+        if mp.det(U * Vt) < 0:
+            for i in range(U.rows):
+                U[i, U.cols - 1] *= -1
+        return _array(U * Vt)
+
+
 def right_jacobian_so3(w):
     """∫₀¹ exp(−s ŵ) ds, the definition behind the closed form, by Gauss's rule with 24 nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(24)

@@ -204,6 +204,97 @@ def test_shapes_are_times_then_stack_then_core():
                     assert np.abs(stacked[k][i] - single(t, order)[k]).max() < 40 * EPS
 
 
+@pytest.mark.source("BK 6.1")
+@pytest.mark.parametrize("i", [0, 5, 22, 26, 27, 29])
+def test_at_many_times_the_geodesic_is_rodrigues_formula(i):
+    """More times than are worked out together; against 60 digits, at some of all of them."""
+    t = np.random.default_rng(i).random(100_000)
+    curve = rb.geodesic_so3(np.eye(3), oracles.exp_so3(TURNS[i]))
+    R = curve(t)
+    assert R.shape == (100_000, 3, 3)
+    for k in (0, 4095, 4096, 8191, 8192, 50_000, 98_303, 98_304, 99_999):
+        assert np.abs(R[k] - oracles.exp_so3(t[k] * TURNS[i])).max() < 8 * EPS
+    assert np.abs(R.mT @ R - np.eye(3)).max() < 16 * EPS
+    assert np.abs(R[::-1] - curve(t[::-1])).max() < 4 * EPS
+
+
+@pytest.mark.parametrize("f", [None, quick], ids=["the identity", "one that leaves the interval"])
+def test_at_many_times_the_line_is_what_it_is_at_each(f):
+    t = np.random.default_rng(7).random(10_000)
+    line = rb.projected_line_so3(STARTS[3], GOALS[3], f)
+    bound = 20 * EPS / line.margin
+    for order in (0, 1, 2):
+        values = line(t, order)
+        for k in (0, 4095, 4096, 8192, 9999):
+            scale = max(1, np.abs(values[k]).max())
+            assert np.abs(values[k] - line(t[k], order)).max() < bound * scale
+
+
+@pytest.mark.parametrize("make", [rb.geodesic_so3, rb.projected_line_so3])
+@pytest.mark.parametrize("shape", [(), (0,), (1,), (2, 3), (2, 0, 3), (2, 1, 5000)])
+@pytest.mark.parametrize("batch", [(), (0,), (2, 3)])
+def test_times_of_any_shape(make, shape, batch):
+    t = np.random.default_rng(8).random(shape)
+    count = int(np.prod(batch))
+    pair = (x[:count].reshape(*batch, 3, 3) for x in (STARTS, GOALS))
+    curve = make(*pair)
+    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+        values = curve(t, order)
+        assert values.shape == (*shape, *batch, *core)
+        flat = curve(t.ravel(), order).reshape(values.shape)
+        assert np.abs(values - flat).max(initial=0) < 8 * EPS
+
+
+def test_at_the_start_the_geodesic_is_the_start():
+    for i in range(len(ANGLES)):
+        curve = rb.geodesic_so3(STARTS[i], GOALS[i])
+        assert np.array_equal(curve(0), STARTS[i])
+        assert np.array_equal(curve(np.zeros(5000))[[0, -1]], STARTS[[i, i]])
+    assert np.array_equal(GEODESICS(0), STARTS)
+    for R in STARTS:
+        assert np.array_equal(rb.geodesic_so3(np.eye(3), np.eye(3))(TIMES)[4], np.eye(3))
+        assert np.abs(rb.geodesic_so3(R, R)(TIMES) - R).max() < 4 * EPS
+
+
+def test_a_stack_of_geodesics_is_the_stack_of_its_members():
+    t = np.random.default_rng(9).random(5000)
+    stack = rb.geodesic_so3(STARTS[:6].reshape(2, 3, 3, 3), GOALS[:6].reshape(2, 3, 3, 3))
+    for i in np.ndindex(2, 3):
+        k = 3 * i[0] + i[1]
+        one = rb.geodesic_so3(STARTS[k], GOALS[k])
+        assert np.abs(stack(t)[:, *i] - one(t)).max() < 4 * EPS
+
+
+def test_geodesics_over_half_turns_are_rodrigues_formula():
+    """About the axis they say, to the end of the interval, where the tangent is infinite."""
+    R0, R1, n = half_turn_pairs()
+    n = named_sign(n)
+    cross = rb.hat_so3(n)
+    for t in (1e-9, 0.25, 0.5, 1 - 2.0**-53, 1):
+        sine, versine = np.sin(np.pi * t), 1 - np.cos(np.pi * t)
+        want = R0 @ (np.eye(3) + sine * cross + versine * cross @ cross)
+        assert np.abs(rb.geodesic_so3(R0, R1)(t) - want).max() < 20 * EPS
+        for k in range(0, len(R0), 25):
+            assert np.abs(rb.geodesic_so3(R0[k], R1[k])(t) - want[k]).max() < 20 * EPS
+
+
+@pytest.mark.parametrize("make", [rb.geodesic_so3, rb.projected_line_so3])
+@pytest.mark.parametrize("count", [(), (2,)])
+def test_neither_times_nor_ends_are_changed_or_kept(make, count):
+    R0, R1, t = np.broadcast_to(STARTS[0], (*count, 3, 3)).copy(), GOALS[0].copy(), TIMES.copy()
+    curve = make(R0, R1)
+    first = [curve(t, order) for order in (0, 1, 2)]
+    assert np.array_equal(t, TIMES)
+    assert np.array_equal(R1, GOALS[0])
+    kept = [values.copy() for values in first]
+    t[:], R0[:], R1[:] = 0.5, np.eye(3), np.eye(3)
+    for order in (0, 1, 2):
+        assert np.array_equal(first[order], kept[order])
+        assert np.array_equal(curve(TIMES, order), kept[order])
+        curve(TIMES, order)[:] = 7
+        assert np.array_equal(curve(TIMES, order), kept[order])
+
+
 def test_f_may_be_a_constant_rate_and_must_have_the_right_ends():
     curve = rb.projected_line_so3(STARTS[:2], GOALS[:2], lambda t, order: (t, 1, 0)[order])
     assert np.array_equal(curve(TIMES, 2), rb.projected_line_so3(STARTS[:2], GOALS[:2])(TIMES, 2))

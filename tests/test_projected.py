@@ -215,6 +215,83 @@ def test_shapes_are_times_then_stack_then_core():
             assert off < 1e-11 / min(scale, 1)
 
 
+def with_ends(make, which, batch):
+    """A stack of curves, of that shape, of the problems `which`."""
+    rotations = (R[which].reshape(*batch, 3, 3) for R in (R0, R1))
+    vectors = (W0, W1) if make is rb.projected_cubic_so3 else (W0, W1, B0, B1)
+    return make(*rotations, *(w[which].reshape(*batch, 3) for w in vectors))
+
+
+MAKERS = [rb.projected_cubic_so3, rb.projected_quintic_so3]
+
+
+@pytest.mark.parametrize("make", MAKERS)
+@pytest.mark.parametrize(
+    ("count", "batch"), [(12_000, ()), (3000, (2, 3)), (5001, (1,)), (1, (6, 840))]
+)
+def test_more_than_is_worked_out_together_is_the_stack_of_its_members(make, count, batch):
+    """More times, or more curves, than a block has: to rounding over the margin, and its powers."""
+    which = np.arange(int(np.prod(batch))) % 6
+    stack, t = with_ends(make, which, batch), np.random.default_rng(3).random(count)
+    some = np.unique(np.linspace(0, count - 1, 30, dtype=int))
+    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+        values = stack(t, order).reshape(count, -1, *core)
+        for k in range(6 if batch else 1):
+            one = with_ends(make, [k], ())
+            scale = np.linalg.norm(one.coefficients, axis=(-2, -1)).sum() / min(one.margin, 1)
+            off = np.abs(values[some][:, which == k] - one(t[some], order)[:, None]).max(initial=0)
+            assert off < 4 * EPS * scale ** (1 + order)
+
+
+@pytest.mark.parametrize("make", MAKERS)
+@pytest.mark.parametrize("batch", [(), (0,), (2, 0), (2, 3)])
+@pytest.mark.parametrize("shape", [(), (0,), (2, 0), (2, 3), (2, 3000)])
+def test_stacks_and_times_of_any_shape_even_of_none(make, batch, shape):
+    count = int(np.prod(batch))
+    stack = with_ends(make, np.arange(count), batch)
+    t = np.random.default_rng(4).random(shape)
+    assert stack.batch_shape == stack.margin.shape == stack.margin_time.shape == batch
+    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+        values = stack(t, order)
+        assert values.shape == (*shape, *batch, *core)
+        flat = stack(t.ravel(), order).reshape(values.shape)
+        scale = np.abs(values).max(initial=1)
+        assert np.abs(values - flat).max(initial=0) < 1000 * EPS * scale
+
+
+def test_the_time_and_the_curve_that_jump_are_named_in_any_block():
+    half, rest = np.diag([1.0, -1, -1]), np.zeros(3)
+    goals = np.tile(np.eye(3), (2, 3, 1, 1))
+    goals[1, 2] = half
+    with pytest.warns(RuntimeWarning, match=r"of curve \[1, 2\]"):
+        stack = rb.projected_cubic_so3(np.eye(3), goals, rest, rest)
+    t = np.linspace(0, 0.4, 4000)
+    for order in (0, 1, 2):
+        assert np.isfinite(stack(t, order)).all()
+        for k in (0, 833, 834, 3999):
+            times = t.copy()
+            times[k] = 0.5
+            with pytest.raises(ValueError, match=r"^t = 0\.5 of curve \[1, 2\]: the nearest"):
+                stack(times, order)
+            with pytest.raises(ValueError, match=r"^t = 0\.5 of curve \[1, 2\]: the nearest"):
+                stack(times.reshape(40, 100), order)
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_neither_times_nor_ends_are_changed_or_kept(make):
+    ends = [x[:3].copy() for x in (R0, R1, W0, W1, B0, B1)[: 4 if make is MAKERS[0] else 6]]
+    given, t = [x.copy() for x in ends], TIMES.copy()
+    curve = make(*ends)
+    first = [curve(t, order) for order in (0, 1, 2)]
+    assert all(np.array_equal(x, y) for x, y in zip((*ends, t), (*given, TIMES), strict=True))
+    kept = [values.copy() for values in first]
+    for x in (*ends, t):
+        x[:] = 0
+    for order in (0, 1, 2):
+        assert np.array_equal(first[order], kept[order])
+        assert np.array_equal(curve(TIMES, order), kept[order])
+
+
 def test_bad_arguments_are_named():
     rest = np.zeros(3)
     with pytest.raises(ValueError, match=r"w1: shape \(\.\.\., 3\) wanted, got \(4,\)"):

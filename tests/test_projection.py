@@ -1,3 +1,5 @@
+import tracemalloc
+
 import awkward
 import numpy as np
 import oracles
@@ -331,6 +333,85 @@ def test_arguments_are_left_alone():
     rb.project_so(M)
     rb.project_se(M)
     assert np.array_equal(M, np.arange(9.0).reshape(3, 3))
+
+
+def condition(M, R):
+    """‖M‖ over the sum of the two smallest eigenvalues of RᵀM: what rounding grows by."""
+    return np.linalg.norm(M, axis=(-2, -1)) / oracles.two_smallest_eigenvalues(R.mT @ M)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_of_many_matrices_the_first_that_is_not_finite_is_named(value):
+    M = np.random.default_rng(9).normal(size=(200_000, 3, 3))
+    M[777, 1, 2] = M[778, 0, 0] = M[199_999, 2, 2] = value
+    with pytest.raises(ValueError, match=rf"^M\[777, 1, 2\] is {value}"):
+        rb.project_so(M)
+    with pytest.raises(ValueError, match=rf"^M\[1, 377, 1, 2\] is {value}"):
+        rb.project_so(M.reshape(500, 400, 3, 3))
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.parametrize("kind", [int, np.int8, np.float32, bool, list])
+def test_numbers_of_any_kind_are_taken(n, kind):
+    numbers = np.random.default_rng(n).integers(0, 2, size=(30, n, n)) + np.eye(n, dtype=int)
+    M = numbers.tolist() if kind is list else numbers.astype(kind)
+    R = rb.project_so(M)
+    assert R.dtype == np.float64
+    assert np.array_equal(R, rb.project_so(np.array(M, float)))
+    assert_nearest(R, np.array(M, float))
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_arrays_of_any_layout_are_read_and_left_alone(n):
+    M = np.random.default_rng(n).normal(size=(6, 5, n, n))
+    R = rb.project_so(M)
+    wide = np.zeros((12, 5, n + 1, 2 * n))
+    wide[::-2, ::-1, 1:, ::2] = M
+    wide.setflags(write=False)
+    for view in (
+        wide[::-2, ::-1, 1:, ::2],
+        np.moveaxis(np.moveaxis(M, (0, 1), (2, 3)).copy(), (2, 3), (0, 1)),
+        np.asfortranarray(M),
+        M.mT.copy().mT,
+        M.astype(">f8"),
+    ):
+        before = view.copy()
+        assert np.array_equal(rb.project_so(view), R)
+        assert np.array_equal(view, before)
+    assert not np.shares_memory(R, M)
+    same = np.broadcast_to(M[0, 0], (20, n, n))
+    bound = 4 * n * EPS * (1 + condition(M[0, 0], R[0, 0]))
+    assert np.abs(rb.project_so(same) - R[0, 0]).max() < bound
+
+
+@pytest.mark.source("BK Prop. 2")
+def test_in_a_mixed_stack_each_gets_what_it_gets_alone():
+    rng = np.random.default_rng(10)
+    good = np.eye(3) + 0.1 * rng.normal(size=(20, 3, 3))
+    U, V = np.split(members(3, rng), 2)
+    mixed = [good, U * [1, 0.5, -0.499] @ V, U * [1, 1e-5, 0] @ V, -good, U * [1, 0.6, -0.2] @ V]
+    mixed += [factor * good for factor in (2.0**900, 2.0**-900, 1e150, 1e-150)]
+    M = rng.permutation(np.concatenate(mixed))
+    alone = np.array([rb.project_so(m) for m in M])
+    scale = np.abs(M).max(axis=(-2, -1), keepdims=True)
+    size = condition(M / scale, alone)
+    zero, M[7] = np.zeros((3, 3)), 0
+    R = rb.project_so(M)
+    off, others = np.abs(R - alone).max(axis=(-2, -1)), np.arange(len(M)) != 7
+    assert np.all(off[others] < 4 * EPS * (1 + size[others]))
+    assert np.array_equal(R[7], rb.project_so(zero))
+    assert_members(R)
+
+
+def test_no_more_memory_is_taken_than_three_times_what_goes_in_and_out():
+    M = np.random.default_rng(11).normal(size=(300_000, 3, 3))
+    tracemalloc.start()
+    try:
+        R = rb.project_so(M)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert M.nbytes + peak < 3 * (M.nbytes + R.nbytes)
 
 
 def test_bad_arguments_are_named():

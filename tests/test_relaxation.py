@@ -213,6 +213,7 @@ def test_no_motion_at_all(solver):
         (rb.minimum_acceleration_so3, 40),
         (rb.minimum_acceleration_so3, 1e150),
         (rb.minimum_acceleration_so3, 1e160),
+        (rb.minimum_acceleration_so3, 1e308),
         (rb.shoot_minimum_acceleration_so3, 1e160),
     ],
 )
@@ -222,6 +223,196 @@ def test_what_does_not_converge_says_how_far_it_got(solver, speed):
     assert isinstance(failed.value, RuntimeError)
     assert failed.value.residual > 1e-11
     assert failed.value.iterations >= 0
+
+
+def random_stack(count, seed=300):
+    """R0, R1, w0, w1 of random problems: turns up to 3 rad, velocities up to 6."""
+    rng = np.random.default_rng(seed)
+    turn, w0, w1 = np.moveaxis([random_ends(rng, 3, 6) for _ in range(count)], 1, 0)
+    R0 = Rotation.random(count, rng=rng).as_matrix()
+    return R0, R0 @ rb.exp_so3(turn), w0, w1
+
+
+ENDS = random_stack(300)
+STACK = rb.minimum_acceleration_so3(*ENDS)
+
+
+def members(ends, which):
+    return [x[which] for x in ends]
+
+
+@pytest.mark.source("BK (19)", "BK 6.2")
+def test_a_stack_of_problems_gives_what_each_gives_alone():
+    values = [STACK(TIMES, order) for order in (0, 1, 2)]
+    for i in range(0, 300, 15):
+        alone = rb.minimum_acceleration_so3(*members(ENDS, i))
+        for order in (0, 1, 2):
+            assert np.abs(values[order][:, i] - alone(TIMES, order)).max() < 1e-10
+        assert np.abs(STACK.c[i] - alone.c).max() < 1e-10 * (1 + np.linalg.norm(alone.c))
+        assert STACK.cost[i] == pytest.approx(alone.cost, rel=1e-10)
+        assert type(alone.cost) is float
+        assert alone.converged is True
+
+
+@pytest.mark.source("BK (18)", "BK (19)")
+def test_a_stack_of_problems_is_solved_and_says_so():
+    R0, R1, w0, w1 = ENDS
+    assert STACK.converged.dtype == bool
+    assert STACK.converged.all()
+    for said in (STACK.converged, STACK.residual, STACK.cost, STACK.iterations, STACK.nodes):
+        assert said.shape == (300,)
+    assert 0 <= STACK.residual.min() <= STACK.residual.max() < 1e-11
+    for t, R, w in ((0, R0, w0), (1, R1, w1)):
+        assert np.abs(STACK(t) - R).max() < 1e-11
+        assert np.abs(STACK(t, 1) - w).max() < 1e-11
+    R = STACK(TIMES)
+    assert np.abs(R.mT @ R - np.eye(3)).max() < 20 * np.finfo(float).eps
+    for i in range(0, 300, 60):
+        alone = rb.minimum_acceleration_so3(*members(ENDS, i))
+        assert STACK.cost[i] == pytest.approx(rb.acceleration_cost(alone), rel=1e-9)
+    assert STACK.cost == pytest.approx(rb.acceleration_cost(STACK), rel=1e-9)
+
+
+@pytest.mark.source("BK (19)")
+def test_of_a_stack_the_rates_are_the_derivatives_and_the_jerk_in_the_fixed_frame_is_constant():
+    scale = 1 + np.linalg.norm(STACK.c, axis=-1, keepdims=True)
+    for t in (0.1, 0.5, 0.85):
+        rate = oracles.derivative_by_differences(STACK, t)
+        assert np.abs(rate - STACK(t) @ rb.hat_so3(STACK(t, 1))).max() < 1e-9
+        rate = oracles.derivative_by_differences(lambda u: STACK(u, 1), t)
+        assert np.all(np.abs(rate - STACK(t, 2)) < 1e-11 * scale)
+        jerk = oracles.derivative_by_differences(lambda u: STACK(u, 2), t)
+        assert np.all(np.abs((STACK(t) @ jerk[..., None])[..., 0] - STACK.c) < 1e-8 * scale)
+
+
+def test_stacks_have_the_shape_of_what_is_broadcast():
+    R0, R1, w0, w1 = ENDS
+    shaped = rb.minimum_acceleration_so3(
+        R0.reshape(5, 60, 3, 3), R1.reshape(5, 60, 3, 3), w0.reshape(5, 60, 3), w1.reshape(5, 60, 3)
+    )
+    assert shaped.batch_shape == shaped.residual.shape == shaped.nodes.shape == (5, 60)
+    assert shaped.c.shape == (5, 60, 3)
+    assert shaped.converged.all()
+    t = np.array([[0.0, 0.3, 1], [0.5, 0.7, 0.1]])
+    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+        assert shaped(t, order).shape == (2, 3, 5, 60, *core)
+        assert shaped([], order).shape == (0, 5, 60, *core)
+        off = shaped(t, order).reshape(6, 300, *core) - STACK(t.ravel(), order)
+        assert np.abs(off).max() < 1e-10
+    assert shaped.cost == pytest.approx(STACK.cost.reshape(5, 60), rel=1e-10)
+
+
+def test_one_start_goes_with_many_goals_and_velocities():
+    R0, R1, w0, w1 = ENDS
+    fan = rb.minimum_acceleration_so3(R0[0], R0[0] @ R0[:4].mT @ R1[:4], w0[:3, None], w1[:4])
+    assert fan.batch_shape == (3, 4)
+    for i, k in np.ndindex(3, 4):
+        one = rb.minimum_acceleration_so3(R0[0], R0[0] @ R0[k].T @ R1[k], w0[i], w1[k])
+        assert np.abs(fan(TIMES)[:, i, k] - one(TIMES)).max() < 1e-10
+        assert fan.cost[i, k] == pytest.approx(one.cost, rel=1e-10)
+
+
+@pytest.mark.parametrize(("speed", "shape"), [(1e160, (12,)), (1e160, (3, 4)), (40.0, (3, 4))])
+def test_a_hopeless_problem_is_named_and_harms_no_other(speed, shape):
+    R0, R1, w0, w1 = (x.copy() for x in members(ENDS, slice(12)))
+    R0[7], R1[7] = np.eye(3), rb.exp_so3([1, 2, 0])
+    w0[7], w1[7] = [speed, 0, 0], [0, speed, 0]
+    ends = [x.reshape(*shape, *x.shape[1:]) for x in (R0, R1, w0, w1)]
+    name = r"\[7\]" if len(shape) == 1 else r"\[1, 3\]"
+    with pytest.warns(
+        RuntimeWarning, match=f"^1 of 12 problems did not converge, .* {name}:"
+    ) as said:
+        curve = rb.minimum_acceleration_so3(*ends)
+    assert [warning.filename for warning in said] == [__file__]
+    others = np.arange(12) != 7
+    assert np.array_equal(curve.converged.ravel(), others)
+    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+        values = curve(TIMES, order).reshape(101, 12, *core)
+        assert np.isnan(values[:, 7]).all()
+        assert np.abs(values - STACK(TIMES, order)[:, :12])[:, others].max() < 1e-10
+    assert np.isnan(curve.c.reshape(12, 3)[7]).all()
+    assert np.isnan(curve.cost.ravel()[7])
+    assert curve.cost.ravel()[others] == pytest.approx(STACK.cost[:12][others], rel=1e-10)
+    assert np.isfinite(curve.c.reshape(12, 3)[others]).all()
+    assert curve.residual.ravel()[7] > 1e-11
+    assert curve.residual.ravel()[others].max() < 1e-11
+
+
+def test_a_stack_of_only_hopeless_problems_is_nan_everywhere():
+    w0, w1 = np.zeros((2, 2, 3))
+    w0[:, 0] = w1[:, 1] = 1e160
+    with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
+        curve = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3([1, 2, 0]), w0, w1)
+    assert not curve.converged.any()
+    for values in (curve(TIMES), curve(TIMES, 1), curve(TIMES, 2), curve.c, curve.cost):
+        assert np.isnan(values).all()
+
+
+def test_a_stack_over_half_turns_is_solved():
+    """Where the projected cubic jumps: from rest to rest the geodesic, else what each is alone."""
+    rng = np.random.default_rng(180)
+    n, w0, w1 = rng.normal(size=(3, 8, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    R1 = 2 * n[:, :, None] * n[:, None, :] - np.eye(3)
+    rest = rb.minimum_acceleration_so3(np.eye(3), R1, REST, REST)
+    assert rest.cost == pytest.approx(np.full(8, 24 * np.pi**2), rel=1e-9)
+    moving = rb.minimum_acceleration_so3(np.eye(3), R1, w0, w1)
+    assert moving.converged.all()
+    for i in range(0, 8, 2):
+        alone = rb.minimum_acceleration_so3(np.eye(3), R1[i], w0[i], w1[i])
+        assert np.abs(moving(TIMES)[:, i] - alone(TIMES)).max() < 1e-10
+
+
+def test_shooting_takes_stacks_too():
+    ends = members(ENDS, slice(2))
+    shot, relaxed = (solver(*ends) for solver in (SOLVERS["shooting"], SOLVERS["relaxation"]))
+    assert shot.batch_shape == (2,)
+    assert shot.converged.all()
+    for order in (0, 1, 2):
+        assert np.abs(shot(TIMES, order) - relaxed(TIMES, order)).max() < 1e-9
+    assert shot.cost == pytest.approx(relaxed.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("batch", [(0,), (2, 0)])
+def test_a_stack_of_no_problems_has_no_curves(solver, batch):
+    curve = solver(np.eye(3), np.eye(3), np.zeros((*batch, 3)), REST)
+    assert curve.batch_shape == curve.cost.shape == curve.converged.shape == batch
+    assert curve(TIMES).shape == (101, *batch, 3, 3)
+    assert curve(0.5, 1).shape == curve(0.5, 2).shape == curve.c.shape == (*batch, 3)
+
+
+def poses(R, d):
+    A = np.tile(np.eye(4), (*R.shape[:-2], 1, 1))
+    A[..., :3, :3], A[..., :3, 3] = R, d
+    return A
+
+
+@pytest.mark.source("BK 6.3")
+def test_motions_come_in_stacks_and_a_hopeless_one_is_nan():
+    R0, R1, w0, w1 = (x.copy() for x in members(ENDS, slice(4)))
+    d = np.random.default_rng(63).normal(size=(4, 4, 3))
+    ends = poses(R0, d[0]), poses(R1, d[1]), w0, w1, d[2], d[3]
+    motion = rb.minimum_acceleration_se3(*ends)
+    path = CubicHermiteSpline([0, 1], d[:2], d[2:])
+    assert motion.batch_shape == (4,)
+    assert np.abs(motion(TIMES)[..., :3, :3] - STACK(TIMES)[:, :4]).max() < 1e-10
+    assert np.abs(motion(TIMES)[..., :3, 3] - path(TIMES)).max() < 1e-13
+    assert np.array_equal(motion(0.5)[..., 3, :], np.tile([0, 0, 0, 1], (4, 1)))
+    for k in range(4):
+        one = rb.minimum_acceleration_se3(*members(ends, k))
+        for order in (0, 1, 2):
+            assert np.abs(motion(TIMES, order)[:, k] - one(TIMES, order)).max() < 1e-10
+    w0[2], w1[2] = [1e160, 0, 0], [0, 1e160, 0]
+    with pytest.warns(RuntimeWarning, match=r"^1 of 4 problems .* \[2\]:"):
+        broken = rb.minimum_acceleration_se3(*ends)
+    others = np.arange(4) != 2
+    assert np.array_equal(broken.rotation.converged, others)
+    assert np.isnan(broken(TIMES)[:, 2, :3, :3]).all()
+    for order in (0, 1, 2):
+        values = broken(TIMES, order)
+        assert np.isnan(values[:, 2]).any(axis=tuple(range(1, values.ndim - 1))).all()
+        assert np.abs(values - motion(TIMES, order))[:, others].max() < 1e-10
 
 
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)

@@ -1,0 +1,82 @@
+"""Each fast function against its textbook twin."""
+
+import numpy as np
+import oracles
+import pytest
+from scipy.spatial.transform import Rotation
+
+import rbcourse as rb
+from rbcourse import textbook
+
+EPS = np.finfo(float).eps
+ALONG = np.pi / 6 * np.array([1, 2, 3])
+E1 = np.array([1.0, 0, 0])
+PAPER = {
+    "4b": (ALONG, ALONG, ALONG + E1),
+    "4c": (ALONG, ALONG, ALONG + 5 * E1),
+    "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
+}
+
+
+def condition(M, R):
+    """‖M‖ over the sum of the two smallest eigenvalues of RᵀM: what rounding grows by."""
+    return np.linalg.norm(M, axis=(-2, -1)) / oracles.two_smallest_eigenvalues(R.mT @ M)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.source("BK Prop. 2")
+def test_the_projection_is_the_textbooks(n):
+    M = np.random.default_rng(n).normal(size=(1000, n, n))
+    R = textbook.project_so(M)
+    off = np.abs(rb.project_so(M) - R).max(axis=(-2, -1))
+    assert np.all(off < 8 * n * EPS * (1 + condition(M, R)))
+    assert np.linalg.det(R).min() > 0 > np.linalg.det(M).min()
+
+
+@pytest.mark.source("BK 6.1")
+def test_the_geodesic_is_the_textbooks():
+    t = np.linspace(0, 1, 101)
+    for turn in (ALONG, [0, 0, 0], [1e-9, 0, 2e-9], [0, 3.14, 0], [0, 0, np.pi]):
+        R0 = Rotation.random(rng=6).as_matrix()
+        R1 = R0 @ rb.exp_so3(turn)
+        off = np.abs(rb.geodesic_so3(R0, R1)(t) - textbook.geodesic_so3(R0, R1, t))
+        assert off.max() < 8 * EPS
+
+
+@pytest.mark.source("BK 6.2")
+def test_the_projected_cubic_is_the_textbooks():
+    """To eps over the least gap, its derivatives to that over its square and its cube."""
+    rng = np.random.default_rng(62)
+    t = np.linspace(0, 1, 101)
+    for _ in range(40):
+        R0, R1 = Rotation.random(2, rng=rng).as_matrix()
+        w0, w1 = 3 * rng.normal(size=(2, 3))
+        curve = rb.projected_cubic_so3(R0, R1, w0, w1)
+        size = np.linalg.norm(curve.coefficients, axis=(-2, -1)).sum() / min(curve.margin, 1)
+        for order, want in enumerate(textbook.projected_cubic_so3(R0, R1, w0, w1, t)):
+            assert np.abs(curve(t, order) - want).max() < 4 * EPS * size ** (1 + order)
+
+
+@pytest.mark.parametrize(
+    ("name", "core"), [("sample_rotation", (3, 3)), ("sample_quaternion", (4,))]
+)
+@pytest.mark.parametrize("count", [0, 1, 7, 8184, 20_000])
+@pytest.mark.source("RR 2.1", "RR (9)", "RR (10)", "RR (11)", "RR 2.2", "RR (13)")
+def test_samplers_draw_what_the_textbooks_draw(name, core, count):
+    """More than a block of draws, too; and the generator is left where the textbook leaves it."""
+    fast, slow = np.random.default_rng(21), np.random.default_rng(21)
+    draws, want = getattr(rb, name)(count, rng=fast), getattr(textbook, name)(count, slow)
+    assert draws.shape == want.shape == (count, *core)
+    assert np.abs(draws - want).max(initial=0) < 8 * EPS
+    assert fast.random() == slow.random()
+
+
+@pytest.mark.parametrize("case", PAPER)
+@pytest.mark.source("BK (19)")
+def test_the_optimum_is_the_textbooks(case):
+    turn, w0, w1 = PAPER[case]
+    R0, t = Rotation.random(rng=19).as_matrix(), np.linspace(0, 1, 101)
+    ends = R0, R0 @ rb.exp_so3(turn), w0, w1
+    curve = rb.minimum_acceleration_so3(*ends)
+    for order, want in enumerate(textbook.minimum_acceleration_so3(*ends, t)):
+        assert np.abs(curve(t, order) - want).max() < 1e-9 * max(1, np.abs(want).max())
