@@ -175,27 +175,30 @@ class MinimumAcceleration(Curve):
     def cost(self) -> float | Array:
         """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes; shape (...)."""
         cost = np.full(len(self.ends.w0), np.nan)
-        for (index, R), (_, _, series) in zip(self._parts, self._series, strict=True):
+        for (index, R), (_, series) in zip(self._parts, self._rates, strict=True):
             nodes = grid(R.shape[1])
             rates = chebyshev(nodes.t, series.shape[1]) @ series
             cost[index] = 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
         return cost.reshape(self.batch_shape) if self.batch_shape else cost.item()
 
     @cached_property
-    def _series(self) -> list[tuple[Array, Array, Array]]:
-        """The Chebyshev series of R, of w and of w', for each number of nodes."""
+    def _rotations(self) -> list[Array]:
+        """The Chebyshev series of R, for each number of nodes."""
+        return [along(grid(R.shape[1]).series, R) for _, R in self._parts]
+
+    @cached_property
+    def _rates(self) -> list[tuple[Array, Array]]:
+        """The Chebyshev series of w and of w', for each number of nodes."""
         c = self.c.reshape(-1, 3)
-        return [
-            (along(grid(R.shape[1]).series, R), *_rates(self.ends.of(index), in_body(R, c[index])))
-            for index, R in self._parts
-        ]
+        return [_rates(self.ends.of(i), in_body(R, c[i])) for i, R in self._parts]
 
     def _evaluate(self, t: Array, order: int) -> Array:
         core = (3,) if order else (3, 3)
         times = t.reshape(-1)
         values = np.full((len(times), len(self.ends.w0), *core), np.nan)
-        for (index, _), part in zip(self._parts, self._series, strict=True):
-            series = np.moveaxis(part[order], 1, 0)
+        parts = [part[order - 1] for part in self._rates] if order else self._rotations
+        for (index, _), part in zip(self._parts, parts, strict=True):
+            series = part.swapaxes(0, 1)
             value = chebyshev(times, len(series)) @ series.reshape(len(series), -1)
             values[:, index] = value.reshape(len(times), len(index), *core)
         time_shape = t.shape[: t.ndim - len(self.batch_shape)]
@@ -343,7 +346,7 @@ def _part(guess: Guess, which: slice) -> Guess:
 
 
 class _ProjectedCubic(ProjectedPolynomial):
-    """The projected cubic as a guess: any rotation where none is the nearest, or where M overflows."""
+    """The projected cubic as a guess: any rotation where none is nearest, or where M overflows."""
 
     def _evaluate(self, t: Array, order: int) -> Array:
         return nearest(np.nan_to_num(self._ambient(t, order)))[0]

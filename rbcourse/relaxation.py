@@ -222,7 +222,8 @@ def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State
     finer = []
     for _ in range(STEPS):
         E, W = defects(now.ends, now.R, now.c)
-        left = np.nan_to_num(np.abs(E).max(axis=(1, 2, 3)), nan=np.inf, posinf=np.inf)
+        left = np.abs(E).max(axis=(1, 2, 3))
+        left[np.isnan(left)] = np.inf
         if stride == 1:
             solved, enough = np.zeros(len(left), bool), size < ROUGH
         else:
