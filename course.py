@@ -194,8 +194,8 @@ def set_up_peers(name):
     """Install what bench compares with; what cannot be had is named, and left out."""
     try:
         set_up_extra(name)
-    except SetUpError:
-        print(" failed: the run goes on without.", flush=True)
+    except SetUpError as error:
+        print("%s\nThe run goes on without %s." % (error, name), flush=True)
 
 
 def find_chromium():

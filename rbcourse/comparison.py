@@ -188,7 +188,7 @@ def describe_coordinates(data: Table) -> str:
     )
     if apart.max() < 1e-9:
         return said + "They coincide at all times."
-    when = np.asarray(data["t [1]"])[apart.argmax()]
+    when = np.asarray(data["t [1]"])[np.argmax(apart > (1 - 1e-9) * apart.max())]
     return said + f"σ differs most at t = {when:g}, by {apart.max():.2g} rad in length."
 
 

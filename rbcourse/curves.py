@@ -65,6 +65,7 @@ class Curve:
 
         Examples
         --------
+        >>> from rbcourse import exp_so3
         >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]))
         >>> c(np.linspace(0, 1, 5)).shape, c(0.5, 1).shape
         ((5, 3, 3), (3,))
@@ -100,24 +101,25 @@ class AlongGeodesic(Curve):
         return identity(t, order)
 
     def _evaluate(self, t: Array, order: int) -> Array:
+        progress = self._progress(t, order)
         if order:
-            return self._progress(t, order)[..., None] * self.rotation_vector
+            return progress[..., None] * self.rotation_vector
         if self.batch_shape:
             shares = np.ones((3, *np.broadcast_shapes(t.shape, self.batch_shape)))
-            self._write_shares(t, shares)
+            self._write_shares(progress, shares)
             return np.einsum("k...,k...ij->...ij", shares, self._terms)
         shares, terms = np.ones((3, min(t.size, _BLOCK))), self._terms.reshape(3, 9)
-        R, times = np.empty((t.size, 9)), t.reshape(-1)
+        R, progress = np.empty((t.size, 9)), progress.reshape(-1)
         for block in blocks(t.size, _BLOCK):
             part = shares[:, : block.stop - block.start]
-            self._write_shares(times[block], part)
+            self._write_shares(progress[block], part)
             np.matmul(part.T, terms, out=R[block])
         return R.reshape(*t.shape, 3, 3)
 
-    def _write_shares(self, t: Array, shares: Array) -> None:
+    def _write_shares(self, progress: Array, shares: Array) -> None:
         """Write sin a and 1 − cos a beside the 1, a the angle, by tan(a/2): NumPy's fastest way."""
         _, sine, versine = shares
-        tangent = np.tan(self._progress(t, 0) * (self._angle / 2), out=versine)
+        tangent = np.tan(progress * (self._angle / 2), out=versine)
         np.multiply(tangent, tangent, out=sine)
         sine += 1
         np.divide(2 * tangent, sine, out=sine)
@@ -167,6 +169,7 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
 
     Examples
     --------
+    >>> from rbcourse import exp_so3
     >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]))
     >>> log_so3(c([0, 0.5, 1])).round(12)
     array([[0.  , 0.  , 0.  ],

@@ -32,10 +32,14 @@ _SAFE = 1e-30, 1e30  # squares of norms that can be taken to the sixth power
 
 
 def nearest_rotation(M: Sequence[float]) -> list[float] | None:
-    """Return the nearest rotation to M, both as nine numbers; None where ζ is small.
+    """Return the nearest rotation to M, both as nine numbers, row by row.
 
     s₁² is the largest root of x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, by Viète's formula
-    x = a + 2 r cos(arccos(q)/3), and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
+    x = a + 2 r cos(arccos(q)/3), with a = ‖M‖²/3, r² = a² − ‖cof M‖²/3 and
+    q = (a (3 r² − a²) + det²)/(2 r³); and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
+
+    None is returned where ζ is less than `LEAST_ZETA` s₁ ‖M‖², near the singular set of
+    `project_so`; and where ‖M‖² is not within 1e-30 and 1e30.
 
     References
     ----------
@@ -97,7 +101,8 @@ _KEPT = _Workspace()
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
     """Write the nearest rotations to M into R, both of shape (3, 3, N); return which are right.
 
-    What is not is of no use: ζ is small, or an entry of M is not finite.
+    What is not is of no use, or not even written: near the singular set of `project_so` (see
+    `nearest_rotation`), where an entry of M is not finite, and perhaps where ‖M‖ is extreme.
 
     References
     ----------

@@ -138,7 +138,7 @@ class MinimumAcceleration(Curve):
     Attributes
     ----------
     ends : Ends
-        R0, R1, w0, w1; of a stack they have one batch axis, however many it has.
+        R0, R1, w0, w1, with one batch axis: one entry for each problem, in their order.
     converged : bool, or ndarray of bool, shape (...)
         Where a solution was found. Elsewhere the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
@@ -263,7 +263,8 @@ def solve(
 ) -> MinimumAcceleration:
     """Solve from the projected cubic; what fails, by continuation.
 
-    Where the projected cubic may jump, a cubic in exponential coordinates is tried too.
+    Where the projected cubic turns by more than a right angle from one node to the next, a cubic in
+    exponential coordinates is tried too, and the cheaper of the two optima is taken.
 
     Raises
     ------
@@ -349,7 +350,7 @@ class _ProjectedCubic(ProjectedPolynomial):
     """The projected cubic as a guess: any rotation where none is nearest, or where M overflows."""
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        return nearest(np.nan_to_num(self._ambient(t, order)))[0]
+        return nearest(np.nan_to_num(self._ambient(t)))[0]
 
 
 def _projected_cubic(ends: Ends) -> _ProjectedCubic:

@@ -86,8 +86,8 @@ class ProjectedPolynomial(Curve):
         self.coefficients = coefficients
         self.batch_shape = coefficients.shape[1:-2]
 
-    def _ambient(self, t: Array, order: int = 0) -> Array:
-        return polynomial(self.coefficients, t[..., None, None], order)
+    def _ambient(self, t: Array) -> Array:
+        return polynomial(self.coefficients, t[..., None, None])
 
     def _evaluate(self, t: Array, order: int) -> Array:
         stacked = len(self.batch_shape)
@@ -133,8 +133,8 @@ class ProjectedPolynomial(Curve):
             reach, count = 2 * reach / (count - 1), 17
         return centre, np.take_along_axis(gap, least, axis=0)[0]
 
-    def may_jump(self) -> NDArray[np.bool_]:
-        """Tell for which curves the gap at 65 times, if not at 9, leaves room for a 0 between."""
+    def may_jump(self) -> bool:
+        """Tell whether the gap of a curve at 65 times, if not at 9, leaves room for a 0 between."""
         may = np.ones(math.prod(self.batch_shape), bool)
         coefficients = self.coefficients.reshape(len(self.coefficients), len(may), 3, 3)
         for count in (9, 65):
@@ -142,7 +142,7 @@ class ProjectedPolynomial(Curve):
             M = polynomial(coefficients[:, may], times)
             change = np.linalg.norm(np.diff(M, axis=0), axis=(-2, -1)).max(axis=0)
             may[may] = (gap(M) < change).any(axis=0)
-        return may.reshape(self.batch_shape)
+        return bool(may.any())
 
     def _gap(self, t: Array) -> Array:
         return gap(self._ambient(t))
@@ -358,7 +358,7 @@ def _check_unique(t: Array, lost: NDArray[np.bool_], batch_ndim: int) -> None:
 
 def _watched(coefficients: Array) -> ProjectedPolynomial:
     curve = ProjectedPolynomial(coefficients)
-    if curve.may_jump().any():
+    if curve.may_jump():
         _warn_if_nearly_singular(curve.margin)
     return curve
 

@@ -140,7 +140,7 @@ def project_so(M: ArrayLike) -> Array:
     array([[ 0., -1.],
            [ 1.,  0.]])
     """
-    return nearest(as_array("M", M, "n", "n", copy=False))[0]
+    return np.ascontiguousarray(nearest(as_array("M", M, "n", "n", copy=False))[0])
 
 
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
@@ -286,6 +286,8 @@ def distance_to_so(M: ArrayLike) -> Array:
 
 def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return `project_so` of M, and where it is unique: by FOAM, or by the SVD where it has to be.
+
+    The rotations lie in the memory as the matrices do: component by component is the fastest.
 
     Raises
     ------

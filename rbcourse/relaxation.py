@@ -168,9 +168,9 @@ def relax(ends: Ends, guess: Guess) -> list[Solution | Failure]:
     for block in blocks(len(ends.w0), _BLOCK):
         found += _refine(ends.of(block), guess(COARSE)[block])
     failed = [i for i, solution in enumerate(found) if isinstance(solution, Failure)]
-    if failed:
-        again = _refine(ends.of(np.array(failed)), guess(33)[failed])
-        for i, solution in zip(failed, again, strict=True):
+    for block in blocks(len(failed), _BLOCK):
+        again = np.array(failed[block])
+        for i, solution in zip(again, _refine(ends.of(again), guess(33)[again]), strict=True):
             found[i] = solution
     return found
 
@@ -214,7 +214,7 @@ def _joined(states: list[_State]) -> _State:
 
 
 def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State | None:
-    """Improve R and c, no node turned by more than half a rad at once.
+    """Improve R and c, no node turned about any axis of the frame by more than half a rad at once.
 
     What is solved, or fails, is written into `found`; what wants more nodes is returned.
     """

@@ -1,7 +1,9 @@
 """The fast functions again, as one writes them on the board: short, slow, and to be read first.
 
-Each has the name of its fast twin, and gives the same to rounding. No argument is checked.
-`show` prints one without its docstring.
+Each has the name of its fast twin and gives the same to rounding, the optimum to a tolerance. Units
+and frames are those of the twin, and so is the singular set. No argument is checked, and rotations
+R0, R1 and velocities w0, w1 are single ones, of shape (3, 3) and (3,). `show` prints a function
+without its docstring.
 """
 
 import ast
@@ -28,7 +30,8 @@ def show(function: Callable[..., Any]) -> None:
     """
     source = inspect.getsource(function)
     [definition] = ast.parse(source).body
-    assert isinstance(definition, ast.FunctionDef)
+    if not isinstance(definition, ast.FunctionDef) or not ast.get_docstring(definition):
+        raise ValueError(f"function: one with a docstring is wanted, got {function!r}")
     docstring, lines = definition.body[0], source.splitlines()
     print("\n".join(lines[: docstring.lineno - 1] + lines[docstring.end_lineno :]))
 
@@ -52,7 +55,7 @@ def project_so(M: Array) -> Array:
 
 
 def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
-    """Return R0 exp(σ̂ t) at the times t, shape (N,), with σ = log(R0ᵀ R1).
+    """Return R0 exp(σ̂ t), shape (N, 3, 3), at the times t, shape (N,), with σ = log(R0ᵀ R1).
 
     References
     ----------
@@ -73,6 +76,7 @@ def projected_cubic_so3(
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the projected cubic at the times t, shape (N,).
 
+    Their shapes are (N, 3, 3), (N, 3) and (N, 3).
     With S = RᵀM, A = RᵀM' and G = tr(S) I − S the condition that S is symmetric, differentiated
     once and twice, says G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
 
@@ -138,6 +142,8 @@ def minimum_acceleration_so3(
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the optimum at the times t, shape (N,), by SciPy's `solve_bvp`.
 
+    Their shapes are (N, 3, 3), (N, 3) and (N, 3). If it fails, a RuntimeError says why.
+
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. On the way ‖σ‖ has to
     stay below 2π.
 
@@ -168,5 +174,7 @@ def minimum_acceleration_so3(
     guess = np.zeros((12, 11))
     guess[:3], guess[3:6] = np.outer(goal, nodes), np.outer(w0, 1 - nodes) + np.outer(w1, nodes)
     solution = solve_bvp(rates, misses, nodes, guess, tol=tol, max_nodes=100_000)
+    if not solution.success:
+        raise RuntimeError(solution.message)
     sigma, w, acceleration, _ = np.moveaxis(solution.sol(t).reshape(4, 3, -1), -1, 1)
     return R0 @ exp_so3(sigma), w, acceleration

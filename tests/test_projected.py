@@ -302,3 +302,16 @@ def test_bad_arguments_are_named():
         rb.projected_cubic_so3(R0, R1, W0[:5], W1)
     with pytest.raises(ValueError, match=r"t is 1\.2, a time in \[0, 1\] is wanted"):
         CUBICS(1.2)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_what_f_returns_is_named_as_it_returned_it_however_many_times_there_are(order):
+    def timing(t, order):
+        value = np.full_like(t, order == 1) if order else t.copy()
+        if t.size > 2:
+            value[5000] = np.nan
+        return value
+
+    line = rb.projected_line_so3(np.eye(3), rb.exp_so3([0, 1, 0]), timing)
+    with pytest.raises(ValueError, match=r"f\(t, 0\)\[5000\] is nan"):
+        line(np.linspace(0, 1, 6001), order)

@@ -80,3 +80,20 @@ def test_the_optimum_is_the_textbooks(case):
     curve = rb.minimum_acceleration_so3(*ends)
     for order, want in enumerate(textbook.minimum_acceleration_so3(*ends, t)):
         assert np.abs(curve(t, order) - want).max() < 1e-9 * max(1, np.abs(want).max())
+
+
+def test_what_is_shown_is_the_code_without_its_docstring(capsys):
+    textbook.show(textbook.geodesic_so3)
+    shown = capsys.readouterr().out
+    assert shown.startswith("def geodesic_so3(")
+    assert "return R0 @ exp_so3" in shown
+    assert '"""' not in shown
+    with pytest.raises(ValueError, match="one with a docstring is wanted"):
+        textbook.show(textbook._spin)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_an_optimum_that_is_not_found_is_no_result():
+    w0, w1 = 1000 * np.eye(3)[:2]
+    with pytest.raises(RuntimeError, match="singular Jacobian"):
+        textbook.minimum_acceleration_so3(np.eye(3), rb.exp_so3([0, 1, 0]), w0, w1, np.zeros(1))
