@@ -153,9 +153,14 @@ def test_a_boundary_value_problem_that_was_not_solved_is_not_counted():
     curve = rb.minimum_acceleration_so3(np.eye(3), R1, w0, w1)
     other = rb.projected_cubic_so3(np.eye(3), R1, w0, w1)
     solved, not_solved = ([c(optima.MOMENTS, k) for k in range(3)] for c in (curve, other))
-    assert optima._solves(*solved, R1, w0, w1)
-    assert not optima._solves(*not_solved, R1, w0, w1)
-    assert not optima._solves(*solved, R1, w0, w0)
+
+    def fails():
+        raise RuntimeError("singular Jacobian")
+
+    assert optima._solves(lambda: solved, R1, w0, w1)
+    assert not optima._solves(lambda: not_solved, R1, w0, w1)
+    assert not optima._solves(lambda: solved, R1, w0, w0)
+    assert not optima._solves(fails, R1, w0, w1)
 
 
 def test_what_would_be_too_slow_is_left_out_and_named():
