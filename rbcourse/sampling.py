@@ -21,7 +21,7 @@ from rbcourse._numerics import (
 )
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
 
-_BLOCK = 8184  # draws whose arrays fit into the cache together; with 8192 they would collide there
+_BLOCK = 6136  # draws whose arrays fit into the cache together; with 6144 they would collide there
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
@@ -284,9 +284,10 @@ def _in_blocks(
     draws = np.empty((math.prod(shape), math.prod(core)))
     width = min(len(draws), _BLOCK)
     uniform, entries = at_cache_line(3, width), at_cache_line(math.prod(core), width)
+    numbers = np.empty((width, 3))
     for block in blocks(len(draws), _BLOCK):
         part = slice(block.stop - block.start)
-        uniform[:, part] = generator.random((part.stop, 3)).T
+        uniform[:, part] = generator.random(out=numbers[part]).T
         kernel(uniform[:, part], entries[:, part])
         draws[block] = entries[:, part].T
     return draws.reshape(*shape, *core)
