@@ -84,8 +84,9 @@ def main():
     rng = np.random.default_rng()
     rows = run(peers, Patience(), all_contests(peers, rng), scaled_errors(peers, rng))
     report.write_csv(rows)
-    report.update_readme(rows)
-    picture.save(picture.draw(report.read_csv()), Path(__file__).parent / "benchmarks")
+    written = report.read_csv()
+    report.update_readme(written)
+    picture.save(picture.draw(written), Path(__file__).parent / "benchmarks")
 
 
 if __name__ == "__main__":

@@ -284,10 +284,9 @@ def _in_blocks(
     draws = np.empty((math.prod(shape), math.prod(core)))
     width = min(len(draws), _BLOCK)
     uniform, entries = at_cache_line(3, width), at_cache_line(math.prod(core), width)
-    numbers = np.empty((width, 3))
     for block in blocks(len(draws), _BLOCK):
         part = slice(block.stop - block.start)
-        uniform[:, part] = generator.random(out=numbers[part]).T
+        uniform[:, part] = generator.random((part.stop, 3)).T
         kernel(uniform[:, part], entries[:, part])
         draws[block] = entries[:, part].T
     return draws.reshape(*shape, *core)
