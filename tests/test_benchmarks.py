@@ -85,7 +85,7 @@ def no_figures_left():
 def ran():
     """The rows of every task at the smallest size, one round each, without peers."""
     rng = np.random.default_rng(1)
-    contests = tasks.all_contests({}, rng, sizes=(1, 2), cases=["5"], problems=2, frames=2)
+    contests = tasks.all_contests({}, rng, sizes=(1, 2), cases=["5"], problems=1, frames=2)
     return bench.run({}, ONCE, contests, rotations.scaled_errors({}, rng, n=10))
 
 
