@@ -33,7 +33,7 @@ def find_peers():
 
 def describe(peers):
     """Return a line: the processor, the threads, and the versions of what is compared."""
-    vectors = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    vectors = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
     wide = any(name.startswith(("X86_V4", "AVX512")) for name in vectors)
     names = {"numpy": "NumPy", "scipy": "SciPy"}
     names |= {"pytransform3d": "pytransform3d"} if "rotations" in peers else {}
