@@ -175,7 +175,7 @@ class MinimumAcceleration(Curve):
     def cost(self) -> float | Array:
         """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes; shape (...)."""
         cost = np.full(len(self.ends.w0), np.nan)
-        for (index, R), (_, series) in zip(self._parts, self._rates, strict=True):
+        for (index, R), (_, series) in zip(self._parts, self._velocities, strict=True):
             nodes = grid(R.shape[1])
             rates = chebyshev(nodes.t, series.shape[1]) @ series
             cost[index] = 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
@@ -187,7 +187,7 @@ class MinimumAcceleration(Curve):
         return [along(grid(R.shape[1]).series, R) for _, R in self._parts]
 
     @cached_property
-    def _rates(self) -> list[tuple[Array, Array]]:
+    def _velocities(self) -> list[tuple[Array, Array]]:
         """The Chebyshev series of w and of w', for each number of nodes."""
         c = self.c.reshape(-1, 3)
         return [_rates(self.ends.of(i), in_body(R, c[i])) for i, R in self._parts]
@@ -196,7 +196,7 @@ class MinimumAcceleration(Curve):
         core = (3,) if order else (3, 3)
         times = t.reshape(-1)
         values = np.full((len(times), len(self.ends.w0), *core), np.nan)
-        parts = [part[order - 1] for part in self._rates] if order else self._rotations
+        parts = [part[order - 1] for part in self._velocities] if order else self._rotations
         for (index, _), part in zip(self._parts, parts, strict=True):
             series = part.swapaxes(0, 1)
             value = chebyshev(times, len(series)) @ series.reshape(len(series), -1)
