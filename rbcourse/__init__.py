@@ -74,6 +74,13 @@ from rbcourse.quaternion import (
     slerp_long,
 )
 from rbcourse.relaxation import minimum_acceleration_se3, minimum_acceleration_so3
+from rbcourse.rivals import (
+    bezier_so3,
+    cayley_cubic_so3,
+    cumulative_bezier_so3,
+    exponential_cubic_so3,
+    quaternion_cubic_so3,
+)
 from rbcourse.sampling import (
     sample_quaternion,
     sample_quaternion_naive,
@@ -123,16 +130,20 @@ __all__ = [
     "arm_forward_kinematics",
     "arm_inverse_kinematics",
     "arm_tip_jacobian",
+    "bezier_so3",
     "canonical_quaternion",
+    "cayley_cubic_so3",
     "christoffel",
     "components_from_tangent",
     "compose_planar",
     "coordinates_from_pose",
     "covariant_derivative",
+    "cumulative_bezier_so3",
     "distance_to_so",
     "exp_planar",
     "exp_se3",
     "exp_so3",
+    "exponential_cubic_so3",
     "f",
     "geodesic_flow",
     "geodesic_se3",
@@ -178,6 +189,7 @@ __all__ = [
     "propagate_joints",
     "propagate_planar",
     "quaternion_conjugate",
+    "quaternion_cubic_so3",
     "quaternion_from_matrix",
     "quaternion_from_rotation_vector",
     "quaternion_from_zyx",

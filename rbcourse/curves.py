@@ -1,9 +1,11 @@
 """What a curve is: a rotation or a pose over time. And the simplest one, the geodesic."""
 
+import math
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import (
     Array,
@@ -15,7 +17,7 @@ from rbcourse._numerics import (
 )
 from rbcourse.so3 import hat_so3, log_so3
 
-_BLOCK = 4096  # times that are worked out together, in the cache
+_BLOCK = 4096  # rotations that are worked out together, in the cache
 
 
 class Curve:
@@ -73,6 +75,53 @@ class Curve:
         return self._evaluate(as_time(t, len(self.batch_shape)), check_order(order))
 
     def _evaluate(self, t: Array, order: int) -> Array:
+        raise NotImplementedError
+
+
+class BlockwiseCurve(Curve):
+    """A `Curve` on SO(3), or a stack of them, worked out for as many times as fit into the cache.
+
+    References
+    ----------
+    BK 6.
+    """
+
+    def _evaluate(self, t: Array, order: int) -> Array:
+        stacked = len(self.batch_shape)
+        shape = np.broadcast_shapes(t.shape, self.batch_shape) + ((3,) if order else (3, 3))
+        times = t.reshape(-1, *t.shape[t.ndim - stacked :])
+        values = np.empty((len(times), *shape[t.ndim - stacked :]))
+        rows = max(1, _BLOCK // max(1, math.prod(self.batch_shape)))
+        for block in blocks(len(times), rows):
+            values[block] = self._block(times[block], order)
+        return values.reshape(shape)
+
+    def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
+        """Return each curve of the stack, or a derivative, at times of its own.
+
+        Parameters
+        ----------
+        t : array_like, shape (..., *batch_shape)
+            Times in [0, 1].
+        order : {0, 1, 2}, optional
+            As for a call.
+
+        Returns
+        -------
+        ndarray, shape t.shape + (3, 3) or t.shape + (3,)
+
+        Raises
+        ------
+        ValueError
+            As a call, or if `t` has not that shape.
+        """
+        times, stacked = as_time(t, 0), len(self.batch_shape)
+        if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
+            raise ValueError(f"t: shape (..., {self.batch_shape}) wanted, got {times.shape}")
+        return self._evaluate(times, check_order(order))
+
+    def _block(self, t: Array, order: int) -> Array:
+        """Return the values at times of shape (N, ...): for each curve the same, or its own."""
         raise NotImplementedError
 
 
@@ -191,3 +240,34 @@ def start_and_rotation_vector(R0: ArrayLike, R1: ArrayLike) -> tuple[Array, Arra
 def identity(t: Array, order: int) -> Array:
     """Return t, or its derivative."""
     return t if order == 0 else np.full_like(t, order == 1)
+
+
+def check_times(t: Array, lost: NDArray[np.bool_], batch_ndim: int, why: str) -> None:
+    """Raise a ValueError that names the first time (and curve of the stack) that is lost."""
+    if lost.any():
+        first = np.argwhere(lost)[0]
+        time = np.broadcast_to(t, lost.shape)[tuple(first)]
+        raise ValueError(f"t = {time}{which_curve(first[lost.ndim - batch_ndim :])}: {why}")
+
+
+def which_curve(index: NDArray[np.intp]) -> str:
+    """Return how a curve of a stack is called, nothing for a single one."""
+    return f" of curve {[int(i) for i in index]}" if len(index) else ""
+
+
+def least_over_time(
+    value: Callable[[Array], Array], batch_shape: tuple[int, ...]
+) -> tuple[Array, Array]:
+    """Return when a function of time is least, and how large: on 129 times, then ever closer.
+
+    Times and values have the shape (N, *batch_shape).
+    """
+    centre, reach, count = np.full(batch_shape, 0.5), 0.5, 129
+    while reach > 1e-15:
+        steps = np.linspace(-reach, reach, count).reshape(-1, *(1 for _ in batch_shape))
+        times = np.clip(centre + steps, 0, 1)
+        values = value(times)
+        least = values.argmin(axis=0)[None]
+        centre = np.take_along_axis(times, least, axis=0)[0]
+        reach, count = 2 * reach / (count - 1), 17
+    return centre, np.take_along_axis(values, least, axis=0)[0]

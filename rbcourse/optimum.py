@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import Array, as_finite, check_broadcast
-from rbcourse.curves import Curve, geodesic_so3
-from rbcourse.polynomials import cubic_coefficients, polynomial
-from rbcourse.projected import ProjectedPolynomial
+from rbcourse.curves import Curve
 from rbcourse.projection import nearest
-from rbcourse.so3 import BASIS_SO3, exp_so3, right_jacobian_inverse_so3
+from rbcourse.rivals import CumulativeBezier, Given, bezier_legs, other_way, to_given
+from rbcourse.so3 import BASIS_SO3
 
 
 class ConvergenceError(RuntimeError):
@@ -234,6 +233,7 @@ def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
     return w, acceleration
 
 
+CLOSE = 1.5  # when one guess costs less than so many times the other, both are tried
 COARSE = 17  # nodes, on which guesses are made and systems solved
 
 Guess = Callable[[int], Array]
@@ -261,10 +261,10 @@ Solver = Callable[[Ends, Guess], list[Solution | Failure]]
 def solve(
     solver: Solver, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
 ) -> MinimumAcceleration:
-    """Solve from the projected cubic; what fails, by continuation.
+    """Solve from a cumulative Bézier curve, its middle leg turned the short way or the other.
 
-    Where the projected cubic turns by more than a right angle from one node to the next, a cubic in
-    exponential coordinates is tried too, and the cheaper of the two optima is taken.
+    The cheaper of the two curves is as a rule next to the cheaper optimum. Where their costs are
+    within a factor of 1.5, or nothing is found, both are tried.
 
     Raises
     ------
@@ -294,25 +294,36 @@ def solve(
 
 
 def _solutions(solver: Solver, ends: Ends) -> list[Solution | Failure]:
-    guess = from_curve(_projected_cubic(ends))
-    found = _attempt(solver, ends, guess)
-    suspects = np.flatnonzero(_jumps(guess(COARSE)))  # there it may have led to a turn too many
-    if suspects.size:
-        part = ends.of(suspects)
-        firsts = [found[i] for i in suspects]
-        others = _attempt(solver, part, from_curve(_exponential_cubic(part)))
-        better = _costs(part, others) < _costs(part, firsts)
+    slow = (np.clip(w, -1e6, 1e6) for w in (ends.w0, ends.w1))  # for a guess fast enough
+    given = to_given(ends.R0, ends.R1, *slow)
+    first, middle, last = bezier_legs(given)
+    middles = np.stack([middle, other_way(middle)])
+    costs = _cost_of_guesses(given, first, middles, last)
+    cheaper = (costs[1] < costs[0]).astype(int)
+
+    def attempt(which: NDArray[np.intp], way: NDArray[np.intp]) -> list[Solution | Failure]:
+        legs = first[which], middles[way[which], which], last[which]
+        curve = CumulativeBezier(Given(*(x[which] for x in given)), legs)
+        return _attempt(solver, ends.of(which), from_curve(curve))
+
+    found = attempt(np.arange(len(middle)), cheaper)
+    failed = np.array([isinstance(solution, Failure) for solution in found], bool)
+    doubtful = np.flatnonzero((costs.max(axis=0) < CLOSE * costs.min(axis=0)) | failed)
+    if doubtful.size:
+        others, part = attempt(doubtful, 1 - cheaper), ends.of(doubtful)
+        better = _costs(part, others) < _costs(part, [found[i] for i in doubtful])
         for k in np.flatnonzero(better):
-            found[suspects[k]] = others[k]
-    for i, solution in enumerate(found):
-        if isinstance(solution, Failure):
-            found[i] = _continue(solver, ends.of(slice(i, i + 1)))
+            found[doubtful[k]] = others[k]
     return found
 
 
-def _jumps(R: Array) -> NDArray[np.bool_]:
-    """Tell where neighbours are more than a right angle apart."""
-    return (np.einsum("ntij,ntij->nt", R[:, 1:], R[:, :-1]) < 1).any(axis=1)
+def _cost_of_guesses(given: Given, first: Array, middles: Array, last: Array) -> Array:
+    """Return about what the curves cost that have one of two middle legs, shape (2, N)."""
+    both = (np.broadcast_to(x, (2, *x.shape)) for x in (*given, first, last))
+    *twice, first, last = both
+    nodes = grid(COARSE)
+    rates = CumulativeBezier(Given(*twice), (first, middles, last))(nodes.t, 2)
+    return np.tensordot(nodes.integral[-1], np.sum(rates**2, axis=-1), axes=1)
 
 
 def _costs(ends: Ends, solutions: list[Solution | Failure]) -> Array:
@@ -344,45 +355,3 @@ def _attempt(solver: Solver, ends: Ends, guess: Guess) -> list[Solution | Failur
 
 def _part(guess: Guess, which: slice) -> Guess:
     return lambda n: guess(n)[which]
-
-
-class _ProjectedCubic(ProjectedPolynomial):
-    """The projected cubic as a guess: any rotation where none is nearest, or where M overflows."""
-
-    def _evaluate(self, t: Array, order: int) -> Array:
-        return nearest(np.nan_to_num(self._ambient(t)))[0]
-
-
-def _projected_cubic(ends: Ends) -> _ProjectedCubic:
-    V0, V1 = ends.R0 @ hats(ends.w0), ends.R1 @ hats(ends.w1)
-    return _ProjectedCubic(cubic_coefficients(ends.R0, ends.R1, V0, V1))
-
-
-def _exponential_cubic(ends: Ends) -> Callable[[Array], Array]:
-    """Return R0 exp(σ(t)), with σ the cubic of these ends."""
-    turn = geodesic_so3(ends.R0, ends.R1).rotation_vector
-    end_rate = (right_jacobian_inverse_so3(turn) @ ends.w1[..., None])[..., 0]
-    coefficients = cubic_coefficients(np.zeros(3), turn, ends.w0, end_rate)
-    return lambda t: ends.R0 @ exp_so3(polynomial(coefficients, t[:, None, None]))
-
-
-def _continue(solver: Solver, ends: Ends) -> Solution | Failure:
-    """Change the end velocities from those of the geodesic to the wanted ones, step by step."""
-    geodesic = geodesic_so3(ends.R0, ends.R1)
-    guess = from_curve(geodesic)
-    start = geodesic.rotation_vector
-    done, step = 0.0, 0.25
-    while True:
-        share = min(done + step, 1.0)
-        w0, w1 = (start + share * (w - start) for w in (ends.w0, ends.w1))
-        nearer = Ends(ends.R0, ends.R1, w0, w1)
-        [solution] = _attempt(solver, nearer, guess)
-        if isinstance(solution, Failure):
-            step /= 2
-            if step < 1 / 256:
-                return solution
-        elif share == 1:
-            return solution
-        else:
-            guess = from_curve(MinimumAcceleration(nearer, [solution], (1,)))
-            done, step = share, 2 * step

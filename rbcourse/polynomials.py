@@ -1,6 +1,9 @@
 """Polynomials through given ends, in any vector space: numbers, vectors, matrices."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 
@@ -31,6 +34,45 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     array([ 0.,  0.,  3., -2.])
     """
     return _stack(x0, v0, -3 * x0 + 3 * x1 - 2 * v0 - v1, 2 * x0 - 2 * x1 + v0 + v1)
+
+
+def hermite(ends: Sequence[ArrayLike], t: Array, order: int = 0) -> Array:
+    """Return that cubic, or one of its first two derivatives, at the times t.
+
+    Written by its ends, it meets them exactly, however they differ in size.
+
+    Parameters
+    ----------
+    ends : sequence of array_like
+        x0, x1, v0, v1, as for `cubic_coefficients`.
+    t : ndarray
+        The times; they broadcast with the ends.
+    order : {0, 1, 2}, optional
+        Which derivative.
+
+    Returns
+    -------
+    ndarray
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
+    array([0. , 0.5, 1. ])
+    """
+    weights: list[Array]
+    s = 1 - t
+    if order == 0:
+        weights = [s * s * (1 + 2 * t), t * t * (1 + 2 * s), t * s * s, -t * t * s]
+    elif order == 1:
+        weights = [-6 * t * s, 6 * t * s, s * (1 - 3 * t), t * (1 - 3 * s)]
+    else:
+        weights = [6 * (t - s), 6 * (s - t), 2 - 6 * s, 6 * t - 2]
+    first, *others = (w * x for w, x in zip(weights, map(np.asarray, ends), strict=True))
+    return sum(others, first)
 
 
 def quintic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array, a0: Array, a1: Array) -> Array:
@@ -94,10 +136,11 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
     for _ in range(order):
         powers = np.arange(len(coefficients)).reshape(-1, *(1,) * (coefficients.ndim - 1))
         coefficients = (powers * coefficients)[min(1, len(coefficients) - 1) :]
-    value = coefficients[-1] + 0 * t
+    value: Array = np.array(coefficients[-1] + 0.0 * t)
     for coefficient in coefficients[-2::-1]:  # Horner's scheme
-        value = value * t + coefficient
-    return value
+        value *= t
+        value += coefficient
+    return value[()]
 
 
 def _stack(*coefficients: Array) -> Array:

@@ -58,9 +58,8 @@ def minimum_acceleration_so3(
     ValueError
         If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
-        For a single problem, if Newton's method does not converge, neither from the projected cubic
-        nor in small steps from the geodesic. Rare for ‖w0‖, ‖w1‖ < 9; a tenth of all draws up
-        to 20.
+        For a single problem, if Newton's method does not converge from either of two guesses. None
+        in ten thousand for ‖w0‖, ‖w1‖ < 12; one draw in thirty up to 30.
 
     Warns
     -----
@@ -77,8 +76,10 @@ def minimum_acceleration_so3(
     Notes
     -----
     Singular set: none is known in closed form. (19) is necessary, not sufficient, and has several
-    solutions: a turn by σ and one by σ ± 2π reach the same rotation. The one that is found from
-    the projected cubic is returned; it is stationary, and not proven to be the best.
+    solutions: a turn by σ and one by σ ± 2π reach the same rotation. Newton's method starts from
+    `cumulative_bezier_so3`, its middle leg turned the short way or the other, whichever curve costs
+    less; where that is in doubt from both, and the better is returned. It is stationary, and not
+    proven to be the best.
 
     End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
     R0ᵀR1: the shortest, or one that turns the other way round or once more; as a rule because that
@@ -270,47 +271,54 @@ def _newton_step(R: Array, c: Array, E: Array, W: Array, stride: int) -> tuple[A
 
         ε = d + ∫ R G Rᵀ (ĉ ε + dc),    d = vee(E Rᵀ + ∫ E ŵ Rᵀ),
 
-    with ε = 0 at the end. It is solved on every `stride`-th node; there the integrals smooth so
+    with ε = 0 at the end. It is solved for ĉ ε on every `stride`-th node; the integrals smooth so
     much that the right side, worked out on all nodes, is as good as a solution on all of them.
     """
     nodes, Rt = grid(R.shape[1]), R.mT
     defect = vees(E @ Rt + along(nodes.integral, E @ W @ Rt))
-    turn, dc = _coarse_step(R[:, ::stride], c, defect[:, ::stride])
-    if stride == 1:
-        return turn, dc
-    causes = np.empty((*R.shape[:2], 3, 4))
-    causes[..., 0] = _interpolation(turn.shape[1], len(nodes.t)) @ turn @ hats(-c)
-    causes[..., 1:] = np.eye(3)
+    coarse = _coarse_causes(R[:, ::stride], c, defect[:, ::stride])
+    causes = along(_interpolation(coarse.shape[1], len(nodes.t)), coarse)
+    causes[..., 1:] += np.eye(3)
     effects = along(nodes.integral, R @ along(nodes.twice, Rt @ causes))
     effects[..., 0] += defect
-    dc = _end_at_zero(effects)
+    dc = -np.linalg.solve(effects[:, -1, :, 1:], effects[:, -1, :, :1])[..., 0]
     return effects[..., 0] + (effects[..., 1:] @ dc[:, None, :, None])[..., 0], dc
 
 
-def _coarse_step(R: Array, c: Array, defect: Array) -> tuple[Array, Array]:
-    """Return ε and dc from d, all on the same nodes: a linear system for each problem."""
+def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
+    """Return ĉ ε that comes from d and from each unit of dc, at the nodes, shape (N, n, 3, 4).
+
+    Only the two components of ε across c count: a linear system for each problem, for these.
+    """
     count, n = R.shape[:2]
-    nodes, rows = grid(n), R.reshape(count, 3 * n, 3)
-    RGRt = (rows @ rows.mT) * _for_each_entry(n)
-    effect = along(nodes.integral, RGRt.reshape(count, n, -1))
-    system = (effect.reshape(count, -1, 3) @ hats(-c)).reshape(count, 3 * n, 3 * n)
+    nodes, (across, ahead) = grid(n), _across(c)
+    rows = (across[:, None] @ R).reshape(count, 2 * n, 3)
+    between = (rows @ rows.mT) * _for_each_entry(n)
+    effect = along(nodes.integral, between.reshape(count, n, -1)).reshape(count, -1, 2)
+    system = (effect @ -(across @ ahead)).reshape(count, 2 * n, 2 * n)
     np.einsum("...ii->...i", system)[...] += 1
     by_c = along(nodes.integral, R @ along(nodes.twice, R.mT))
-    right = np.concatenate([defect[..., None], by_c], axis=-1)
-    x = np.linalg.solve(system, right.reshape(count, 3 * n, 4)).reshape(count, n, 3, 4)
-    dc = _end_at_zero(x)
-    return x[..., 0] + (x[..., 1:] @ dc[:, None, :, None])[..., 0], dc
+    right = across[:, None] @ np.concatenate([defect[..., None], by_c], axis=-1)
+    x = np.linalg.solve(system, right.reshape(count, 2 * n, 4)).reshape(count, n, 2, 4)
+    return ahead[:, None] @ x
 
 
-def _end_at_zero(x: Array) -> Array:
-    """Return dc, so that x[..., 0] + x[..., 1:] dc is 0 at the last node."""
-    return -np.linalg.solve(x[:, -1, :, 1:], x[:, -1, :, :1])[..., 0]
+def _across(c: Array) -> tuple[Array, Array]:
+    """Return two unit vectors across c as rows, shape (N, 2, 3), and c × both as columns."""
+    length = np.linalg.norm(c, axis=-1)
+    x, y, z = np.where(length == 0, [[0.0], [0.0], [1.0]], c.T / np.where(length == 0, 1, length))
+    sign = np.copysign(1, z)
+    share = -1 / (sign + z)
+    first = 1 + sign * share * x * x, sign * share * x * y, -sign * x
+    second = share * x * y, sign + share * y * y, -y
+    across = np.array([first, second]).transpose(2, 0, 1)
+    return across, hats(c) @ across.mT
 
 
 @lru_cache
 def _for_each_entry(n: int) -> Array:
-    """Return `twice` with each number in a 3 × 3 block of its own."""
-    return np.kron(grid(n).twice, np.ones((3, 3)))
+    """Return `twice` with each number in a 2 × 2 block of its own."""
+    return np.kron(grid(n).twice, np.ones((2, 2)))
 
 
 @lru_cache

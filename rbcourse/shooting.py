@@ -48,9 +48,8 @@ def shoot_minimum_acceleration_so3(
     ValueError
         If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
-        For a single problem, if Newton's method does not converge, neither from the projected cubic
-        nor in small steps from the geodesic: one in some 40 of random ends with ‖w0‖, ‖w1‖ < 9.
-        For ‖w‖ of 30 it takes ten seconds to say so, for 1000 minutes.
+        For a single problem, if Newton's method does not converge from either of two guesses: rare
+        for ‖w0‖, ‖w1‖ < 12. For ‖w‖ of 30 it takes seconds to say so, for 1000 minutes.
 
     Warns
     -----

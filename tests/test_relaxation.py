@@ -172,8 +172,7 @@ def test_no_turn_too_many_near_half_turns(short_of, speeds):
     assert curve.cost == pytest.approx(rb.acceleration_cost(curve), rel=1e-12)
 
 
-def test_what_fails_from_the_projection_is_reached_by_continuation():
-    """Two fast problems from which Newton's method does not find back from the projected cubic."""
+def test_fast_problems_whose_projected_cubics_lead_newtons_method_nowhere():
     for turn, w0, w1 in (
         ([-0.1, 2.5, -1.7], [-7.1, 7.0, 4.1], [-7.2, 0.4, 8.0]),
         ([0.6, 0.4, -2.9], [6.0, -2.5, 8.6], [-0.2, 7.1, -8.1]),
@@ -206,7 +205,7 @@ def test_no_motion_at_all(solver):
 @pytest.mark.parametrize(
     ("solver", "speed"),
     [
-        (rb.minimum_acceleration_so3, 40),
+        (rb.minimum_acceleration_so3, 1000),
         (rb.minimum_acceleration_so3, 1e150),
         (rb.minimum_acceleration_so3, 1e160),
         (rb.minimum_acceleration_so3, 1e308),
@@ -308,7 +307,7 @@ def test_one_start_goes_with_many_goals_and_velocities():
         assert fan.cost[i, k] == pytest.approx(one.cost, rel=1e-10)
 
 
-@pytest.mark.parametrize(("speed", "shape"), [(1e160, (12,)), (1e160, (3, 4)), (40.0, (3, 4))])
+@pytest.mark.parametrize(("speed", "shape"), [(1e160, (12,)), (1e160, (3, 4)), (1e3, (3, 4))])
 def test_a_hopeless_problem_is_named_and_harms_no_other(speed, shape):
     R0, R1, w0, w1 = (x.copy() for x in members(ENDS, slice(12)))
     R0[7], R1[7] = np.eye(3), rb.exp_so3([1, 2, 0])

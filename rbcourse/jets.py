@@ -1,0 +1,239 @@
+"""Quaternions that change in time, with their derivatives: what exact velocities are made of.
+
+A jet is the list [x, x', x''] of a function of time and its derivatives, or its beginning, as far
+as they are wanted. Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
+Quaternions are (w, x, y, z).
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rbcourse._numerics import Array
+
+Jet = list[Array]
+
+# Coefficients, the highest first: of the second derivative of sin(√s)/√s in s, and of that of
+# arccos(x)² in (1 − x)/2.
+_SINC_BEND = [n * (n - 1) * (-1) ** n / math.factorial(2 * n + 1) for n in range(9, 1, -1)]
+_ANGLE_BEND = [k * math.prod(j / (j + 0.5) for j in range(1, k + 1)) for k in range(13, 0, -1)]
+
+
+def product(p: Jet, q: Jet) -> Jet:
+    """Return the jet of Hamilton's product p q, by Leibniz's rule.
+
+    Parameters
+    ----------
+    p, q : list of ndarray, shape (4, ...)
+        As many derivatives of each.
+
+    Returns
+    -------
+    list of ndarray, shape (4, ...)
+
+    Examples
+    --------
+    >>> i, j = np.eye(4)[1:3]
+    >>> product([i], [j])  # i j = k
+    [array([0., 0., 0., 1.])]
+    """
+    return _leibniz(multiply, p, q)
+
+
+def multiply(p: Array, q: Array) -> Array:
+    """Return Hamilton's product of two quaternions, components first."""
+    (a, b, c, d), (w, x, y, z) = p, q
+    return np.stack(
+        [
+            a * w - b * x - c * y - d * z,
+            a * x + b * w + c * z - d * y,
+            a * y - b * z + c * w + d * x,
+            a * z + b * y - c * x + d * w,
+        ]
+    )
+
+
+def exp(u: Jet) -> Jet:
+    """Return the jet of the unit quaternion exp(u) = (cos ‖u‖, sin(‖u‖)/‖u‖ u).
+
+    Parameters
+    ----------
+    u : list of ndarray, shape (3, ...)
+        Half the rotation vector.
+
+    Returns
+    -------
+    list of ndarray, shape (4, ...)
+
+    Examples
+    --------
+    >>> exp([np.array([0, 0, np.pi / 2])])[0].round(12)  # a half-turn about z
+    array([0., 0., 0., 1.])
+    """
+    s = dot(u, u)
+    cosine, sinc = _cosine_and_sinc(s[0], len(u) - 1)
+    real, share = _chain(cosine, s), _chain(sinc, s)
+    return [np.stack([c, *v]) for c, v in zip(real, times(share, u), strict=True)]
+
+
+def slerp(a: Jet, b: Jet, share: Jet) -> Jet:
+    """Return the jet of (sin((1 − t) φ) a + sin(t φ) b)/sin φ, φ the angle between a and b.
+
+    Parameters
+    ----------
+    a, b : list of ndarray, shape (4, ...)
+        Unit quaternions, φ < π.
+    share : list of ndarray
+        t.
+
+    Returns
+    -------
+    list of ndarray, shape (4, ...)
+
+    Notes
+    -----
+    sin(t φ)/sin φ = t sinc(t φ)/sinc φ. With s = φ² it is a smooth function of t and s, as s is of
+    cos φ = a·b.
+
+    Examples
+    --------
+    >>> one, about_z = np.eye(4)[[0, 3]]
+    >>> slerp([one], [about_z], [np.array(0.5)])[0].round(4)
+    array([0.7071, 0.    , 0.    , 0.7071])
+    """
+    order = len(share) - 1
+    cosine = dot(a, b)
+    s = _chain(_squared_angle(cosine[0], order), cosine)
+    whole = _chain(_cosine_and_sinc(s[0], order)[1], s)
+    rest = [1 - share[0], *[-x for x in share[1:]]]
+    parts = []
+    for quaternion, t in ((a, rest), (b, share)):
+        part = times(times(t, t), s)
+        sinc = _chain(_cosine_and_sinc(part[0], order)[1], part)
+        parts.append(times(_over(times(t, sinc), whole), quaternion))
+    return [x + y for x, y in zip(*parts, strict=True)]
+
+
+def times(share: Jet, x: Jet) -> Jet:
+    """Return the jet of a number times a number or a vector, by Leibniz's rule."""
+    return _leibniz(np.multiply, share, x)
+
+
+def dot(x: Jet, y: Jet) -> Jet:
+    """Return the jet of the inner product of two vectors, by Leibniz's rule."""
+    return _leibniz(_dot, x, y)
+
+
+def rotation(q: Array) -> Array:
+    """Return the rotation of a quaternion of any norm but 0, shape (..., 3, 3)."""
+    w, x, y, z = q
+    share = 2 / (w * w + x * x + y * y + z * z)
+    sx, sy, sz = share * x, share * y, share * z
+    R = np.empty((*w.shape, 3, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = 1 - sy * y - sz * z, sx * y - sz * w, sx * z + sy * w
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sx * y + sz * w, 1 - sx * x - sz * z, sy * z - sx * w
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = sx * z - sy * w, sy * z + sx * w, 1 - sx * x - sy * y
+    return R
+
+
+def angular_velocity(q: Jet) -> Array:
+    """Return the last derivative that a jet gives: w of [q, q'], w' of [q, q', q''].
+
+    A unit quaternion has q' = q (0, w)/2. One of any norm, n = ‖q‖², has n w = 2 im(q̄ q'), and,
+    differentiated, n w' + n' w = 2 im(q̄ q'').
+
+    Parameters
+    ----------
+    q : list of ndarray, shape (4, ...)
+        A quaternion of any norm but 0.
+
+    Returns
+    -------
+    ndarray, shape (3, ...)
+        Angular velocity or acceleration, body frame.
+
+    Examples
+    --------
+    >>> still, about_x = np.eye(4)[:2]
+    >>> angular_velocity([still, about_x / 2])
+    array([1., 0., 0.])
+    """
+    n = _dot(q[0], q[0])
+    w = 2 * _imaginary(q[0], q[1]) / n
+    if len(q) == 2:
+        return w
+    return 2 * (_imaginary(q[0], q[2]) - _dot(q[0], q[1]) * w) / n
+
+
+def _imaginary(p: Array, q: Array) -> Array:
+    """Return the vector part of p̄ q."""
+    (a, b, c, d), (w, x, y, z) = p, q
+    return np.stack(
+        [
+            a * x - b * w - c * z + d * y,
+            a * y + b * z - c * w - d * x,
+            a * z - b * y + c * x - d * w,
+        ]
+    )
+
+
+def _dot(x: Array, y: Array) -> Array:
+    return np.einsum("i...,i...->...", x, y)
+
+
+def _leibniz(op: Callable[[Array, Array], Array], x: Jet, y: Jet) -> Jet:
+    """Return the jet of a product of any kind."""
+    jet = [op(x[0], y[0])]
+    if len(x) > 1:
+        jet.append(op(x[1], y[0]) + op(x[0], y[1]))
+    if len(x) > 2:
+        jet.append(op(x[2], y[0]) + 2 * op(x[1], y[1]) + op(x[0], y[2]))
+    return jet
+
+
+def _chain(f: list[Array], x: Jet) -> Jet:
+    """Return the jet of f(x), from f and its derivatives at x."""
+    jet = f[:1]
+    if len(f) > 1:
+        jet.append(f[1] * x[1])
+    if len(f) > 2:
+        jet.append(f[2] * x[1] ** 2 + f[1] * x[2])
+    return jet
+
+
+def _over(x: Jet, y: Jet) -> Jet:
+    """Return the jet of the quotient of two numbers."""
+    quotient: Jet = [x[0] / y[0]]
+    if len(x) > 1:
+        quotient.append((x[1] - quotient[0] * y[1]) / y[0])
+    if len(x) > 2:
+        quotient.append((x[2] - 2 * quotient[1] * y[1] - quotient[0] * y[2]) / y[0])
+    return quotient
+
+
+def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
+    """Return cos √s, sin(√s)/√s, and their derivatives by s; where s is small by a power series."""
+    root = np.sqrt(s)
+    tangent = np.tan(root / 2)  # NumPy's fastest way
+    sine = 2 * tangent / (1 + tangent * tangent)
+    c, k = 1 - tangent * sine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
+    if order == 0:
+        return [c], [k]
+    small = s < 0.25
+    direct = ((3 - s) * k - 3 * c) / np.where(small, 1.0, 4 * s * s)
+    k2 = np.where(small, np.polyval(_SINC_BEND, s), direct)
+    k1 = -(k / 2 + 2 * s * k2) / 3
+    return [c, -k / 2, -k1 / 2][: order + 1], [k, k1, k2][: order + 1]
+
+
+def _squared_angle(x: Array, order: int) -> list[Array]:
+    """Return arccos(x)² and its derivatives by x; where x is near 1 by a power series."""
+    x = np.minimum(x, 1.0)
+    angle, z = np.arccos(x), (1 - x) * (1 + x)
+    g = np.where(z > 0, angle / np.sqrt(np.where(z > 0, z, 1.0)), 1.0)
+    if order < 2:
+        return [angle**2, -2 * g][: order + 1]
+    small = z < 0.1
+    direct = 2 * (1 - x * g) / np.where(small, 1.0, z)
+    return [angle**2, -2 * g, np.where(small, np.polyval(_ANGLE_BEND, (1 - x) / 2), direct)]

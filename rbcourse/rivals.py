@@ -1,0 +1,472 @@
+"""The other closed forms that BK 1 names: curves with the same four ends as the projected cubic.
+
+Each is R0 times the rotation of a quaternion Q(t), Q(0) = 1, which need not keep its norm.
+"""
+
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import EPS, Array, as_finite, check_broadcast, first_index
+from rbcourse.conversions import quaternion_from_matrix
+from rbcourse.curves import BlockwiseCurve, check_times, least_over_time
+from rbcourse.jets import Jet, angular_velocity, exp, multiply, product, rotation, slerp
+from rbcourse.polynomials import hermite
+from rbcourse.quaternion import quaternion_multiply
+from rbcourse.so3 import exp_so3, log_so3, right_jacobian_inverse_so3
+
+
+class Given(NamedTuple):
+    """Where a curve starts, by how far it turns, R0ᵀ R1, and how fast: all of the batch's shape."""
+
+    R0: Array
+    turn: Array
+    w0: Array
+    w1: Array
+
+
+Legs = tuple[Array, Array, Array]
+
+
+def to_given(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Given:
+    """Check the arguments of all these curves, and bring them to one batch shape."""
+    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+    matrices = (np.broadcast_to(x, (*batch, 3, 3)) for x in (R0, np.swapaxes(R0, -1, -2) @ R1))
+    return Given(*matrices, *(np.broadcast_to(w, (*batch, 3)) for w in (w0, w1)))
+
+
+def bezier_legs(given: Given) -> Legs:
+    """Return the turns from each of Bézier's control points to the next, the shortest."""
+    first, last = given.w0 / 3, given.w1 / 3
+    return first, log_so3(exp_so3(-first) @ given.turn @ exp_so3(-last)), last
+
+
+def other_way(turn: Array) -> Array:
+    """Return the turns to the same rotations the other way round, by 2π − angle; of 0, itself."""
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
+
+
+class QuaternionCurve(BlockwiseCurve):
+    """A `Curve` R0 times the rotation of Q(t); components of many times together in the memory.
+
+    References
+    ----------
+    BK 1.
+    """
+
+    def __init__(self, given: Given) -> None:
+        self.batch_shape = given.w0.shape[:-1]
+        self._start = _components(quaternion_from_matrix(given.R0))
+
+    def _quaternion(self, t: Array, order: int) -> Jet:
+        raise NotImplementedError
+
+    def _block(self, t: Array, order: int) -> Array:
+        Q = self._quaternion(t, order)
+        if order == 0:
+            return rotation(multiply(self._start, Q[0]))
+        return np.moveaxis(angular_velocity(Q), 0, -1)
+
+
+class ExponentialCubic(QuaternionCurve):
+    """The `Curve` R0 exp(σ̂(t)), σ a cubic; σ(1) is any logarithm of the turn."""
+
+    def __init__(self, given: Given, turn: Array) -> None:
+        super().__init__(given)
+        end_rate = (right_jacobian_inverse_so3(turn) @ given.w1[..., None])[..., 0]
+        vectors = np.zeros_like(turn), turn, given.w0, end_rate
+        self._halves = [_components(x / 2) for x in vectors]
+
+    def _quaternion(self, t: Array, order: int) -> Jet:
+        return exp(_cubic(self._halves, t, order))
+
+
+class CumulativeBezier(QuaternionCurve):
+    """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), β the cumulative Bernstein polynomials."""
+
+    def __init__(self, given: Given, legs: Legs) -> None:
+        super().__init__(given)
+        self._halves = [_components(leg / 2) for leg in legs]
+
+    def _quaternion(self, t: Array, order: int) -> Jet:
+        s = 1 - t
+        shares: list[Jet] = [
+            [t * (1 + s + s * s), 3 * s * s, -6 * s],
+            [t * t * (1 + 2 * s), 6 * t * s, 6 * (s - t)],
+            [t * t * t, 3 * t * t, 6 * t],
+        ]
+        first, second, third = (
+            exp([beta * half for beta in share[: order + 1]])
+            for share, half in zip(shares, self._halves, strict=True)
+        )
+        return product(product(first, second), third)
+
+
+class Bezier(QuaternionCurve):
+    """The `Curve` of de Casteljau's construction, geodesics in the place of straight lines."""
+
+    def __init__(self, given: Given, legs: Legs) -> None:
+        super().__init__(given)
+        start, first, second, third = (
+            exp([_components(leg / 2)])[0] for leg in (np.zeros_like(given.w0), *legs)
+        )
+        last = multiply(multiply(first, second), third)
+        self._points = start, first, multiply(first, second), last
+
+    def _quaternion(self, t: Array, order: int) -> Jet:
+        share = [t, np.ones_like(t), np.zeros_like(t)][: order + 1]
+        points = [[point, *[np.zeros_like(point)] * order] for point in self._points]
+        while len(points) > 1:
+            points = [slerp(a, b, share) for a, b in pairwise(points)]
+        return points[0]
+
+
+class NormalizedCubic(QuaternionCurve):
+    """The `Curve` of a cubic in the space of quaternions, Q(0) = 1."""
+
+    def __init__(self, given: Given, end: Array, end_rate: Array) -> None:
+        super().__init__(given)
+        start = np.zeros_like(end)
+        start[..., 0] = 1
+        start_rate = _rate(start, given.w0)
+        self._vectors = [_components(x) for x in (start, end, start_rate, end_rate)]
+
+    def _quaternion(self, t: Array, order: int) -> Jet:
+        return _cubic(self._vectors, t, order)
+
+
+class QuaternionCubic(NormalizedCubic):
+    """The `Curve` of the unit quaternions nearest to a cubic between unit quaternions.
+
+    Attributes
+    ----------
+    margin : ndarray, shape (...)
+        The least norm of the cubic. At 0 the nearest unit quaternion is not unique.
+    margin_time : ndarray, shape (...)
+        When that is.
+    """
+
+    def __init__(self, given: Given) -> None:
+        end = quaternion_from_matrix(given.turn)
+        super().__init__(given, end, _rate(end, given.w1))
+
+    def _quaternion(self, t: Array, order: int) -> Jet:
+        Q = super()._quaternion(t, order)
+        lost = np.abs(Q[0]).max(axis=0) < 8 * EPS * self._scale
+        check_times(t, lost, len(self.batch_shape), "the cubic of quaternions is zero")
+        return Q
+
+    @property
+    def margin(self) -> Array:
+        """The least norm of the cubic."""
+        return self._least[1]
+
+    @property
+    def margin_time(self) -> Array:
+        """When the margin is reached."""
+        return self._least[0]
+
+    @cached_property
+    def _least(self) -> tuple[Array, Array]:
+        def norm(t: Array) -> Array:
+            [Q] = _cubic(self._vectors, t, 0)
+            return np.linalg.norm(Q, axis=0)
+
+        return least_over_time(norm, self.batch_shape)
+
+    @cached_property
+    def _scale(self) -> Array:
+        return np.abs(self._vectors).max(axis=(0, 1))
+
+
+def exponential_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> ExponentialCubic:
+    """Return R0 exp(σ̂(t)), σ(t) the cubic in exponential coordinates about R0 with these ends.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time, of any size.
+
+    Returns
+    -------
+    ExponentialCubic
+        A `Curve` that meets all four ends: σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1)
+        by `right_jacobian_inverse_so3`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+
+    See Also
+    --------
+    projected_cubic_so3, minimum_acceleration_so3
+
+    Notes
+    -----
+    Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
+    `log_so3` chooses. The curve itself is smooth everywhere. Velocities along the geodesic give the
+    optimum.
+
+    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+
+    References
+    ----------
+    BK 1, its reference 13.
+
+    Examples
+    --------
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = exponential_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    given = to_given(R0, R1, w0, w1)
+    return ExponentialCubic(given, log_so3(given.turn))
+
+
+def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Bezier:
+    """Return the cubic Bézier curve with these ends: de Casteljau's construction by geodesics.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
+
+    Returns
+    -------
+    Bezier
+        A `Curve` that meets all four ends, with the control points R0, R0 exp(ŵ0/3),
+        R1 exp(−ŵ1/3), R1.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, the batches do not broadcast, or a
+        velocity is 3π or more: its leg would be no shortest geodesic.
+
+    See Also
+    --------
+    cumulative_bezier_so3 : From the same control points, quicker.
+
+    Notes
+    -----
+    Singular set: the two inner control points a half-turn apart; the geodesic between them is that
+    of `log_so3`. No other leg can become a half-turn: those of the next level are, by the triangle
+    inequality, never longer than the longest two before.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    BK 1, its references 3 to 5.
+
+    Examples
+    --------
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    given = to_given(R0, R1, w0, w1)
+    for name, w in (("w0", given.w0), ("w1", given.w1)):
+        fast = np.linalg.norm(w, axis=-1) >= 3 * np.pi
+        if fast.any():
+            raise ValueError(f"{first_index(name, fast)}: a norm below 3π is wanted")
+    return Bezier(given, bezier_legs(given))
+
+
+def cumulative_bezier_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> CumulativeBezier:
+    """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time, of any size.
+
+    Returns
+    -------
+    CumulativeBezier
+        A `Curve` that meets all four ends: v₁ = w0/3, v₃ = w1/3, v₂ the shortest turn between, and
+        β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+
+    See Also
+    --------
+    bezier_so3 : De Casteljau's construction, from the same control points.
+
+    Notes
+    -----
+    Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where v₂ is what `log_so3`
+    chooses. The curve itself is smooth everywhere.
+
+    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+
+    References
+    ----------
+    BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit quaternion
+    curves with simple high order derivatives, SIGGRAPH 1995.
+
+    Examples
+    --------
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = cumulative_bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    given = to_given(R0, R1, w0, w1)
+    return CumulativeBezier(given, bezier_legs(given))
+
+
+def quaternion_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> QuaternionCubic:
+    """Return the projection of a cubic in R⁴ on the unit quaternions: BK's idea in another space.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time, of any size.
+
+    Returns
+    -------
+    QuaternionCubic
+        A `Curve` that meets all four ends; with ``margin``. The cubic has q' = q (0, w)/2 at its
+        ends; of q1 and −q1 the one nearer to q0 is its goal.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast. The
+        curve, when called at a time when the cubic is zero, to rounding.
+
+    See Also
+    --------
+    projected_cubic_so3 : The same with matrices.
+
+    Notes
+    -----
+    Singular set: R0 and R1 a half-turn apart, where q1 and −q1 are equally near: the one that
+    `canonical_quaternion` chooses for R0ᵀ R1 is taken. And where the cubic is zero at some time;
+    near it, where ``margin`` is small, the body turns by up to a full turn in a moment, and the
+    curve is accurate to eps over ``margin`` at that time, its derivatives to that over its square
+    and its cube.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    BK 1, BK Remark 7.
+
+    Examples
+    --------
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = quaternion_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    >>> float(c.margin.round(3))
+    0.933
+    """
+    return QuaternionCubic(to_given(R0, R1, w0, w1))
+
+
+def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> NormalizedCubic:
+    """Return the cubic in Cayley's parameters about R0 with these ends.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1, no half-turn apart; what is none is not repaired (see
+        `project_so`).
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time, of any size.
+
+    Returns
+    -------
+    NormalizedCubic
+        A `Curve` that meets all four ends. Cayley's parameters of a turn by a about the unit
+        vector n are g = tan(a/2) n; its quaternion is (1, g) over its norm, and along a curve
+        2 g' = w + g × w + (g·w) g.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, the batches do not broadcast, or R0 and R1
+        are a half-turn apart, to rounding.
+
+    See Also
+    --------
+    exponential_cubic_so3 : The same in exponential coordinates.
+
+    Notes
+    -----
+    Singular set: half-turns, which have no such parameters. No curve ever turns by 180° from R0,
+    so near them it is a long way round: the cost grows without bound.
+
+    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+
+    References
+    ----------
+    BK 1, its reference 8.
+
+    Examples
+    --------
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = cayley_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    given = to_given(R0, R1, w0, w1)
+    quaternion = quaternion_from_matrix(given.turn)
+    infinite = quaternion[..., 0] == 0
+    if infinite.any():
+        raise ValueError(
+            f"{first_index('R1', infinite)} is a half-turn from R0: no Cayley parameters"
+        )
+    g = quaternion[..., 1:] / quaternion[..., :1]
+    along = np.sum(g * given.w1, axis=-1, keepdims=True) * g
+    g_rate = (given.w1 + np.cross(g, given.w1) + along) / 2
+    one = np.ones((*g.shape[:-1], 1))
+    end, end_rate = (np.concatenate(x, axis=-1) for x in ((one, g), (0 * one, g_rate)))
+    return NormalizedCubic(given, end, end_rate)
+
+
+def _components(x: Array) -> Array:
+    """Return vectors of shape (..., n) as (n, 1, ...): the components first, then the times."""
+    return np.ascontiguousarray(np.moveaxis(x, -1, 0))[:, None]
+
+
+def _cubic(ends: list[Array], t: Array, order: int) -> Jet:
+    return [hermite(ends, t, k) for k in range(order + 1)]
+
+
+def _rate(q: Array, w: Array) -> Array:
+    """Return q' = q (0, w)/2."""
+    return quaternion_multiply(q, np.concatenate([np.zeros_like(w[..., :1]), w], axis=-1)) / 2
