@@ -18,6 +18,8 @@ RATIOS = [
     ("geodesic at {} times", "geodesic at N times", ""),
     ("projected cubic at {} times", "projected cubic at N times", ""),
     ("the same with velocity and acceleration", "projected cubic with derivatives", ""),
+    ("other curves with the same ends at {} times", "closed forms at N times", ""),
+    ("the same with velocity and acceleration", "closed forms with derivatives", ""),
     ("{} random rotation matrices", "random rotation matrices", ""),
     ("{} random quaternions", "random quaternions", ""),
     ("minimum acceleration, BK Figure 4c", "optimum, one problem", "4c"),

@@ -156,7 +156,7 @@ def _slerps(ends, t, peers):
 
 def projected_cubic(n, peers, rng):
     """Return the contest of the projected cubic at n times; only the evaluation is timed."""
-    ends, t = _cubic_ends(), rng.random(n)
+    ends, t = cubic_ends(), rng.random(n)
     ours, spline = rb.projected_cubic_so3(*ends), _spline()
     R0, R1, w0, w1 = ends
     coefficients = cubic_coefficients(R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1))
@@ -176,7 +176,7 @@ def projected_cubic(n, peers, rng):
 
 def projected_cubic_with_derivatives(n, peers, rng):
     """Return the same with velocity and acceleration; the error of each is relative."""
-    ends, t = _cubic_ends(), rng.random(n)
+    ends, t = cubic_ends(), rng.random(n)
     ours, spline = rb.projected_cubic_so3(*ends), _spline()
     methods = [
         Method(OURS, "projected_cubic_so3", lambda: [ours(t, order) for order in range(3)], _nines),
@@ -200,14 +200,15 @@ def projected_cubic_with_derivatives(n, peers, rng):
     return Contest("projected cubic with derivatives", "", n, methods, error)
 
 
-def _cubic_ends():
+def cubic_ends():
+    """Return R0, R1, w0 and w1 of BK Figure 5."""
     return np.eye(3), rb.exp_so3(TURN), W0, W1
 
 
 def _spline():
     """Return SciPy's spline through five rotations of the projected cubic."""
     t = np.linspace(0, 1, 5)
-    return RotationSpline(t, Rotation.from_matrix(rb.projected_cubic_so3(*_cubic_ends())(t)))
+    return RotationSpline(t, Rotation.from_matrix(rb.projected_cubic_so3(*cubic_ends())(t)))
 
 
 def _nines(parts):

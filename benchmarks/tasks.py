@@ -14,6 +14,7 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 import rbcourse as rb
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.optima import CASES, one_optimum, stacked_optimum
+from benchmarks.rivals import closed_forms, closed_forms_with_derivatives
 from benchmarks.rotations import (
     geodesic,
     nearest_rotation,
@@ -53,6 +54,8 @@ def all_contests(peers, rng, sizes=SIZES, cases=tuple(CASES), problems=1000, fra
     ):
         for n in sizes:
             yield replace(task(n, peers, rng), weigh=n == max(sizes))
+    for task in (closed_forms, closed_forms_with_derivatives):
+        yield from (task(n, rng) for n in sizes[::3])
     yield from (one_optimum(case) for case in cases)
     yield stacked_optimum(problems, rng)
     yield imports()

@@ -4,7 +4,6 @@ import os
 import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,9 @@ from rbcourse.polynomials import cubic_coefficients
 from rbcourse.projected import ProjectedPolynomial
 from rbcourse.relaxation import minimum_acceleration_so3, relax
 from rbcourse.rivals import (
+    Bezier,
     ExponentialCubic,
+    bezier_legs,
     bezier_so3,
     cayley_cubic_so3,
     cumulative_bezier_so3,
@@ -279,8 +280,8 @@ def excesses(ends: Ends, found: Mapping[str, Array]) -> dict[str, Array]:
     return {way: cost / optimum - 1 for way, cost in found.items() if way != "optimum"}
 
 
-def cell_table(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
-    """Return the median and the 90 % quantile in each cell of the atlas, as a table.
+def cell_table(excess: Mapping[str, Array], draws: int, share: float) -> dict[str, Array]:
+    """Return a quantile of the excess in each cell of the atlas, as a table.
 
     Parameters
     ----------
@@ -288,28 +289,27 @@ def cell_table(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
         See `excesses`, of `atlas_problems`.
     draws : int
         How many there are in each cell.
+    share : float
+        Which quantile: 0.5 for the median.
 
     Returns
     -------
     dict of str to ndarray, shape (2 * 10 * 10,)
-        Family, the middle of the cell, how many problems count, and the quantiles: the smallest
-        excess that the wanted share of them does not pass, with four digits.
+        Family, the middle of the cell, how many problems count, and a `quantile` for each way.
     """
     family, turn, speed = np.indices((2, CELLS, CELLS)).reshape(3, -1)
     cells = {way: x.reshape(-1, draws) for way, x in excess.items()}
-    table: dict[str, Array] = {
+    return {
         "family": np.array(FAMILIES)[family],
-        "displacement [rad]": (turn + 0.5) * np.pi / CELLS,
+        "displacement [deg]": (turn + 0.5) * 180 / CELLS,
         "end velocity [rad]": (speed + 0.5) * FASTEST / CELLS,
         "problems [1]": np.sum(~np.isnan(next(iter(cells.values()))), axis=-1),
+        **{f"{way} excess [1]": quantile(x, share) for way, x in cells.items()},
     }
-    for (name, share), (way, x) in product({"median": 0.5, "90 %": 0.9}.items(), cells.items()):
-        table[f"{way} {name} excess [1]"] = quantile(x, share)
-    return table
 
 
 def quantile(x: Array, share: float) -> Array:
-    """Return the smallest of the numbers that `share` of them do not pass, with four digits.
+    """Return the smallest of the numbers that `share` of them do not pass.
 
     Parameters
     ----------
@@ -321,14 +321,34 @@ def quantile(x: Array, share: float) -> Array:
     Returns
     -------
     ndarray, shape (...)
+        With four digits, and eight decimals at most: the costs are no more exact than that.
 
     Examples
     --------
-    >>> float(quantile(np.array([3.0, 1.0, np.nan, 2.0]), 0.5))
-    2.0
+    >>> float(quantile(np.array([3.0, 1.23456, np.nan, 0.1]), 0.5))
+    1.235
     """
-    value = np.nanquantile(x, share, axis=-1, method="inverted_cdf")
-    return np.vectorize(lambda number: float(f"{number:.4g}"), otypes=[float])(value)
+    return rounded(np.nanquantile(x, share, axis=-1, method="inverted_cdf"))
+
+
+def rounded(x: Array) -> Array:
+    """Return numbers with four digits, and eight decimals at most."""
+    return np.vectorize(lambda y: round(float(f"{y:.4g}"), 8) + 0.0, otypes=[float])(x)
+
+
+def in_words(excess: float) -> str:
+    """Return an excess as text: in percent, or how many times the optimum.
+
+    Examples
+    --------
+    >>> [in_words(x) for x in (-1e-12, 3.141e-3, 0.5, 46.2, 1e9)]
+    ['< 0.01 %', '0.31 %', '50 %', '47 ×', '> 10⁴ ×']
+    """
+    if excess < 1e-4:
+        return "< 0.01 %"
+    if excess < 10:
+        return f"{100 * excess:.2g} %" if excess < 0.1 else f"{100 * excess:.0f} %"
+    return f"{1 + excess:.0f} ×" if excess < 1e4 else "> 10⁴ ×"
 
 
 def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
@@ -368,6 +388,13 @@ def long_way_round(R0: Array, R1: Array, w0: Array, w1: Array) -> ExponentialCub
     """Return the exponential cubics that turn the other way round, by 2π − ‖σ‖."""
     given = to_given(R0, R1, w0, w1)
     return ExponentialCubic(given, other_way(log_so3(given.turn)))
+
+
+def bezier_other_way(R0: Array, R1: Array, w0: Array, w1: Array) -> Bezier:
+    """Return the Bézier curves whose middle legs turn the other way round."""
+    given = to_given(R0, R1, w0, w1)
+    first, middle, last = bezier_legs(given)
+    return Bezier(given, (first, other_way(middle), last))
 
 
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rbcourse.atlas import WAYS
 from rbcourse.bodies import draw_box, move_box
 from rbcourse.cost import acceleration_cost_parts
 from rbcourse.curves import Curve
-from rbcourse.explorer import Explorer, look, new_figure, new_line, numbers, slider
+from rbcourse.explorer import Explorer, look, menu, new_figure, new_line, numbers, slider
 from rbcourse.figures import COLOURS
 from rbcourse.motions import projected_cubic_se3
-from rbcourse.projected import projected_cubic_so3
 from rbcourse.relaxation import minimum_acceleration_se3, minimum_acceleration_so3
 from rbcourse.se3 import pose_from_coordinates
 from rbcourse.so3 import exp_so3, log_so3
@@ -26,21 +26,22 @@ _WAYS = {"optimum": "-", "projection": "--"}
 
 
 def minimum_acceleration_explorer() -> Explorer:
-    """Return an explorer of the paper's example: the optimum and the projection, and their costs.
+    """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
 
     From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
-    `acceleration_cost`. Controls: the ``size`` s, and ``k`` in rad, which plays.
+    `acceleration_cost`. Controls: the ``rival``, the projection or one of the others; the ``size``
+    s; and ``k`` in rad, which plays.
 
     References
     ----------
-    BK (18), BK (19), BK (21), BK 6.2, BK Fig. 4.
+    BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig. 4.
     """
     with look():
         fig = new_figure()
         ax = fig.add_axes((0.13, 0.16, 0.76, 0.71))
         ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
         artists: dict[str, Any] = {}
-        for way, dash in _WAYS.items():
+        for way, dash in {"optimum": "-", "rival": "--"}.items():
             for axis in "xyz":
                 artists[f"{way} {axis}"] = new_line(ax, color=COLOURS[axis], ls=dash)
             ax.plot([], [], color="0.3", ls=dash, label=way)
@@ -49,13 +50,14 @@ def minimum_acceleration_explorer() -> Explorer:
             artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
+        "rival": menu("rival", list(WAYS)),
         "size": slider("size s", 1.0, 0.05, 1.5, 0.05),
         "k": slider("k (rad)", 1.0, -6.0, 6.0, 0.25),
     }
 
-    def show(size: float, k: float) -> dict[str, str]:
-        curves, costs = _solved_rotations(size, k)
-        for way, curve in curves.items():
+    def show(rival: str, size: float, k: float) -> dict[str, str]:
+        curves, costs = _solved_rotations(rival, size, k)
+        for way, curve in zip(("optimum", "rival"), curves.values(), strict=True):
             for axis, line in zip("xyz", log_so3(curve(_TIMES)).T, strict=True):
                 artists[f"{way} {axis}"].set_data(_TIMES, line)
         for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
@@ -112,11 +114,11 @@ def cube_explorer() -> Explorer:
 
 
 @lru_cache(maxsize=64)
-def _solved_rotations(size: float, k: float) -> Solved:
+def _solved_rotations(rival: str, size: float, k: float) -> Solved:
     """Solve BK (21) with these two changed."""
     sigma = size * _SIGMA
     ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
-    return _with_costs(minimum_acceleration_so3(*ends), projected_cubic_so3(*ends))
+    return _with_costs({"optimum": minimum_acceleration_so3(*ends), rival: WAYS[rival](*ends)})
 
 
 @lru_cache(maxsize=64)
@@ -125,11 +127,11 @@ def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
     A0, A1 = np.eye(4), pose_from_coordinates([*sigma, 8, 10, 12])
     ends = A0, A1, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
-    return _with_costs(minimum_acceleration_se3(*ends), projected_cubic_se3(*ends))
+    best, near = minimum_acceleration_se3(*ends), projected_cubic_se3(*ends)
+    return _with_costs({"optimum": best, "projection": near})
 
 
-def _with_costs(best: Curve, near: Curve) -> Solved:
-    curves = {"optimum": best, "projection": near}
+def _with_costs(curves: dict[str, Curve]) -> Solved:
     return curves, {way: float(acceleration_cost_parts(c)[0]) for way, c in curves.items()}
 
 

@@ -292,6 +292,14 @@ def choice(label: str, options: Any) -> Any:
     )
 
 
+def menu(label: str, options: Any) -> Any:
+    """Return a menu of which one line is chosen, the first to begin with: for many options."""
+    style = {"description_width": "7.5em"}
+    return ipywidgets.Dropdown(
+        options=options, description=label, style=style, layout={"width": "auto"}
+    )
+
+
 def numbers(values: Any, digits: int) -> str:
     """Return numbers as text, with commas between them, and without a minus before zero."""
     rounded = np.round(np.atleast_1d(values), digits) + 0.0

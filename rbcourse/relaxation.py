@@ -274,7 +274,7 @@ def _newton_step(R: Array, c: Array, E: Array, W: Array, stride: int) -> tuple[A
     with ε = 0 at the end. It is solved for ĉ ε on every `stride`-th node; the integrals smooth so
     much that the right side, worked out on all nodes, is as good as a solution on all of them.
     """
-    nodes, Rt = grid(R.shape[1]), R.mT
+    nodes, Rt = grid(R.shape[1]), np.ascontiguousarray(R.mT)  # faster to multiply with
     defect = vees(E @ Rt + along(nodes.integral, E @ W @ Rt))
     coarse = _coarse_causes(R[:, ::stride], c, defect[:, ::stride])
     causes = along(_interpolation(coarse.shape[1], len(nodes.t)), coarse)
@@ -292,10 +292,9 @@ def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
     """
     count, n = R.shape[:2]
     nodes, (across, ahead) = grid(n), _across(c)
-    rows = (across[:, None] @ R).reshape(count, 2 * n, 3)
-    between = (rows @ rows.mT) * _for_each_entry(n)
-    effect = along(nodes.integral, between.reshape(count, n, -1)).reshape(count, -1, 2)
-    system = (effect @ -(across @ ahead)).reshape(count, 2 * n, 2 * n)
+    rows, causes = ((x[:, None] @ R).reshape(count, 2 * n, 3) for x in (across, -ahead.mT))
+    between = (rows @ causes.mT) * _for_each_entry(n)
+    system = along(nodes.integral, between.reshape(count, n, -1)).reshape(count, 2 * n, 2 * n)
     np.einsum("...ii->...i", system)[...] += 1
     by_c = along(nodes.integral, R @ along(nodes.twice, R.mT))
     right = across[:, None] @ np.concatenate([defect[..., None], by_c], axis=-1)

@@ -22,19 +22,29 @@ def cubes():
     return cube_explorer()
 
 
-def solved(optimum, projection, ends):
+RIVALS = {
+    "projection": rb.projected_cubic_so3,
+    "exponential": rb.exponential_cubic_so3,
+    "Bézier": rb.bezier_so3,
+    "cumulative": rb.cumulative_bezier_so3,
+    "quaternion": rb.quaternion_cubic_so3,
+    "Cayley": rb.cayley_cubic_so3,
+}
+
+
+def solved(optimum, rival, ends, name="rival"):
     """Both curves of these ends, and the costs of their rotations; each is solved once."""
-    key = str(ends)
+    key = rival.__name__, str(ends)
     if key not in KNOWN:
-        curves = {"optimum": optimum(*ends), "projection": projection(*ends)}
+        curves = {"optimum": optimum(*ends), name: rival(*ends)}
         costs = [float(rb.acceleration_cost_parts(curve)[0]) for curve in curves.values()]
         KNOWN[key] = curves, costs
     return KNOWN[key]
 
 
-def check_costs(explorer, low, high):
+def check_costs(explorer, low, high, rival="projection"):
     said = read_off(explorer)
-    costs = [numbers_in(said[f"cost, {name}"])[0] for name in ("optimum", "projection")]
+    costs = [numbers_in(said[f"cost, {name}"])[0] for name in ("optimum", rival)]
     assert costs == pytest.approx([low, high], abs=5.1e-4)
     if low > 1e-12:
         assert float(said["their ratio"]) == pytest.approx(high / low, abs=5.1e-4)
@@ -53,12 +63,14 @@ def test_both_curves_and_their_costs(rotations):
     for v in sweep(rotations, k=3.0):
         sigma = v["size"] * SIGMA
         ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + v["k"] * np.eye(3)[0]
-        curves, costs = solved(rb.minimum_acceleration_so3, rb.projected_cubic_so3, ends)
-        check_costs(rotations, *costs)
+        curves, costs = solved(rb.minimum_acceleration_so3, RIVALS[v["rival"]], ends)
+        check_costs(rotations, *costs, v["rival"])
         for name, curve in curves.items():
             lines = [points(rotations.artists[f"{name} {axis}"]) for axis in "xyz"]
             drawn = np.stack([line[:, 1] for line in lines], axis=-1)
             assert np.abs(drawn - rb.log_so3(curve(TIMES))).max() < 1e-12
+            if v["rival"] == "Cayley" and name == "rival":
+                continue  # it may leave the picture
             assert np.abs(np.diff(drawn, axis=0)).max() < 0.5  # never round the ball of radius π
             low, high = rotations.artists["σ₁"].axes.get_ylim()
             assert low < drawn.min()
@@ -83,7 +95,9 @@ def test_both_cubes_their_ways_and_their_costs(cubes):
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
         A1 = rb.pose_from_coordinates([*sigma, 8, 10, 12])
         ends = np.eye(4), A1, [1, 2, 3], [2, 1, v["spin"]], [1, 1, 1], [1, 5, v["rise"]]
-        curves, costs = solved(rb.minimum_acceleration_se3, rb.projected_cubic_se3, ends)
+        curves, costs = solved(
+            rb.minimum_acceleration_se3, rb.projected_cubic_se3, ends, "projection"
+        )
         for name, curve in curves.items():
             for box, pose in ((name, curve(v["t"])), (f"{name} goal", A1)):
                 faces = corners(cubes.artists[box])

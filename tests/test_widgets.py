@@ -42,7 +42,7 @@ def test_every_label_has_its_unit(explorer):
 
 
 def test_the_keyboard_reaches_every_control(explorer):
-    reached = (ipywidgets.FloatSlider, ipywidgets.ToggleButtons)
+    reached = (ipywidgets.FloatSlider, ipywidgets.ToggleButtons, ipywidgets.Dropdown)
     assert all(isinstance(control, reached) for control in explorer.controls.values())
     assert all(
         control.continuous_update
