@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import rbcourse as rb
+from rbcourse.curves import least_over_time
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(61)
@@ -342,3 +343,79 @@ def test_bad_arguments_are_named(make):
         curve([0, 1, 1.5])
     with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got 3"):
         curve(0.5, 3)
+
+
+OWN = [rb.projected_cubic_so3, rb.quaternion_cubic_so3, rb.exponential_cubic_so3]
+
+
+@pytest.mark.parametrize("make", OWN)
+@pytest.mark.parametrize("batch", [(), (1,), (2, 3)])
+def test_each_curve_of_a_stack_has_times_of_its_own(make, batch):
+    """Also more of them than are worked out together."""
+    count = int(np.prod(batch))
+    R0, R1 = STARTS[:count].reshape(*batch, 3, 3), GOALS[:count].reshape(*batch, 3, 3)
+    w0, w1 = np.random.default_rng(10).normal(size=(2, *batch, 3))
+    stack = make(R0, R1, w0, w1)
+    for shape in ((), (0,), (7,), (5, 2), (5000,)):
+        t = np.random.default_rng(11).random((*shape, *batch))
+        for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
+            values = stack.at_own_times(t, order)
+            assert values.shape == (*t.shape, *core)
+            for i in np.ndindex(*batch):
+                one = make(R0[i], R1[i], w0[i], w1[i])(t[..., *i], order)
+                scale = np.abs(one).max(initial=1)
+                off = np.abs(values[(slice(None),) * len(shape) + i] - one)
+                assert off.max(initial=0) < 100 * EPS * scale
+
+
+@pytest.mark.xfail(reason="reshape(-1, 0) has no answer")
+@pytest.mark.parametrize("batch", [(0,), (2, 0)])
+def test_an_empty_stack_has_no_times_of_its_own(batch):
+    R, w = np.zeros((*batch, 3, 3)), np.zeros((*batch, 3))
+    stack = rb.exponential_cubic_so3(R, R, w, w)
+    for shape in ((), (5,), (5, 2)):
+        for order, core in ((0, (3, 3)), (1, (3,))):
+            t = np.zeros((*shape, *batch))
+            assert stack.at_own_times(t, order).shape == (*t.shape, *core)
+
+
+def test_times_of_their_own_are_checked():
+    w = np.zeros((2, 3, 3))
+    stack = rb.quaternion_cubic_so3(np.eye(3), np.eye(3), w, w)
+    for shape in ((), (3,), (3, 2), (2, 3, 1), (2, 1)):
+        with pytest.raises(ValueError, match=r"^t: shape .* wanted, got"):
+            stack.at_own_times(np.zeros(shape))
+    t = np.zeros((4, 2, 3))
+    with pytest.raises(ValueError, match=r"^order: 0, 1 or 2 wanted, got 3"):
+        stack.at_own_times(t, 3)
+    for wrong in (np.nan, -0.1, 1.1):
+        t[3, 1, 2] = wrong
+        with pytest.raises(ValueError, match=r"^t\[3, 1, 2\] is "):
+            stack.at_own_times(t)
+
+
+def test_a_time_of_its_own_at_which_a_curve_jumps_is_named():
+    half = np.diag([1.0, -1, -1])
+    with pytest.warns(RuntimeWarning, match=r"of curve \[1\]"):
+        stack = rb.projected_cubic_so3(np.eye(3), [np.eye(3), half], np.zeros(3), np.zeros(3))
+    t = np.full((3000, 2), [0.5, 0.25])
+    assert np.isfinite(stack.at_own_times(t)).all()
+    t[2999, 1] = 0.5
+    with pytest.raises(ValueError, match=r"^t = 0\.5 of curve \[1\]: the nearest"):
+        stack.at_own_times(t)
+
+
+def test_the_least_over_time_is_found_wherever_it_is():
+    """Of kinks to rounding; of parabolas, which are flat there, to the root of it."""
+    where = np.array([[0, 1e-9, 1 / 3], [0.5, 0.9999, 1]])
+    kinks = least_over_time(lambda t: 2 + np.abs(t - where), (2, 3))
+    parabolas = least_over_time(lambda t: 2 + (t - where) ** 2, (2, 3))
+    for (when, least), reach in ((kinks, 4 * EPS), (parabolas, 4 * np.sqrt(EPS))):
+        assert when.shape == least.shape == (2, 3)
+        assert np.abs(when - where).max() < reach
+        assert np.abs(least - 2).max() < 8 * EPS
+    when, least = least_over_time(lambda t: np.cos(7 * t) - t, ())
+    t = np.linspace(0, 1, 100_001)
+    assert least <= (np.cos(7 * t) - t).min()
+    assert abs(least - (np.cos(7 * when) - when)) < 4 * EPS
+    assert [x.shape for x in least_over_time(np.sin, (2, 0))] == [(2, 0), (2, 0)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse.polynomials import cubic_coefficients, polynomial, quintic_coefficients
+from rbcourse.polynomials import cubic_coefficients, hermite, polynomial, quintic_coefficients
 
 RNG = np.random.default_rng(62)
 EPS = np.finfo(float).eps
@@ -48,3 +48,36 @@ def test_ends_and_times_broadcast():
     coefficients = cubic_coefficients(np.zeros(3), np.ones((4, 3)), np.zeros(3), np.zeros(3))
     assert coefficients.shape == (4, 4, 3)
     assert polynomial(coefficients, np.zeros((7, 1, 1)), 1).shape == (7, 4, 3)
+
+
+@pytest.mark.source("BK 6.2")
+def test_the_cubic_by_its_ends_is_that_of_its_coefficients():
+    ends, t = RNG.normal(size=(4, 3, 3)), np.linspace(0, 1, 9)[:, None, None]
+    coefficients = cubic_coefficients(*ends)
+    scale = np.abs(coefficients).sum(axis=0).max()
+    for order in (0, 1, 2):
+        want = polynomial(coefficients, t, order)
+        assert np.abs(hermite(ends, t, order) - want).max() < 20 * EPS * scale
+
+
+@pytest.mark.source("BK 6.2")
+def test_the_cubic_by_its_ends_meets_them_exactly_however_they_differ_in_size():
+    for sizes in ([1, 1, 1, 1], [1e-200, 1, 1e9, 1e-9], [1e-9, 1e200, 1, 1e100]):
+        ends = RNG.normal(size=(4, 5)) * np.reshape(sizes, (4, 1))
+        for t, value, rate in ((0.0, ends[0], ends[2]), (1.0, ends[1], ends[3])):
+            assert np.array_equal(hermite(ends, np.array(t)), value)
+            assert np.array_equal(hermite(ends, np.array(t), 1), rate)
+
+
+def test_its_derivatives_are_complex_steps():
+    ends, t = RNG.normal(size=4), np.linspace(0, 1, 9)
+    scale = np.abs(cubic_coefficients(*ends)).sum()
+    for order in (0, 1):
+        step = hermite(ends, t + 1e-100j, order).imag / 1e-100
+        assert np.abs(hermite(ends, t, order + 1) - step).max() < 40 * EPS * scale
+
+
+def test_it_takes_numbers_and_ends_that_broadcast_with_the_times():
+    assert hermite([0, 1, 0, 0], np.array(0.5)) == 0.5
+    ends = [np.zeros(3), np.ones((4, 3)), 0, np.zeros(3)]
+    assert hermite(ends, np.zeros((7, 1, 1)), 2).shape == (7, 4, 3)
