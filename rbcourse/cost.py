@@ -111,12 +111,12 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
 def _panels(curve: Curve) -> Array:
     """Return the ends of panels of time: sixteenths, and ever smaller to where the curve is fast.
 
-    It is fast where it starts and ends as fast as its velocities say, and near its margin.
+    It is fast where it starts and ends, as its velocities and accelerations say, and near its
+    margin.
     """
     curve = getattr(curve, "rotation", curve)
-    speeds = (
-        np.linalg.norm(curve([0, 1], 1)[..., :3], axis=-1).reshape(2, -1).max(axis=-1, initial=0)
-    )
+    w, a = (np.linalg.norm(curve([0, 1], k)[..., :3], axis=-1).reshape(2, -1) for k in (1, 2))
+    speeds = (w + np.sqrt(a)).max(axis=-1, initial=0)
     events = [(0.0, 1 / (1 + speeds[0])), (1.0, 1 / (1 + speeds[1]))]
     margin = np.ravel(getattr(curve, "margin", ()))
     if margin.min(initial=np.inf) < 1e-6:

@@ -87,10 +87,10 @@ class BlockwiseCurve(Curve):
     """
 
     def _evaluate(self, t: Array, order: int) -> Array:
-        stacked = len(self.batch_shape)
+        free = t.ndim - len(self.batch_shape)
         shape = np.broadcast_shapes(t.shape, self.batch_shape) + ((3,) if order else (3, 3))
-        times = t.reshape(-1, *t.shape[t.ndim - stacked :])
-        values = np.empty((len(times), *shape[t.ndim - stacked :]))
+        times = t.reshape(math.prod(t.shape[:free]), *t.shape[free:])
+        values = np.empty((len(times), *shape[free:]))
         rows = max(1, _BLOCK // max(1, math.prod(self.batch_shape)))
         for block in blocks(len(times), rows):
             values[block] = self._block(times[block], order)
@@ -117,7 +117,8 @@ class BlockwiseCurve(Curve):
         """
         times, stacked = as_time(t, 0), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
-            raise ValueError(f"t: shape (..., {self.batch_shape}) wanted, got {times.shape}")
+            wanted = ", ".join(["...", *map(str, self.batch_shape)])
+            raise ValueError(f"t: shape ({wanted}) wanted, got {times.shape}")
         return self._evaluate(times, check_order(order))
 
     def _block(self, t: Array, order: int) -> Array:

@@ -234,6 +234,6 @@ def _squared_angle(x: Array, order: int) -> list[Array]:
     g = np.where(z > 0, angle / np.sqrt(np.where(z > 0, z, 1.0)), 1.0)
     if order < 2:
         return [angle**2, -2 * g][: order + 1]
-    small = z < 0.1
+    small = x > 0.95
     direct = 2 * (1 - x * g) / np.where(small, 1.0, z)
     return [angle**2, -2 * g, np.where(small, np.polyval(_ANGLE_BEND, (1 - x) / 2), direct)]

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from rbcourse._numerics import EPS, Array, as_finite, check_broadcast, first_index
 from rbcourse.conversions import quaternion_from_matrix
-from rbcourse.curves import BlockwiseCurve, check_times, least_over_time
+from rbcourse.curves import BlockwiseCurve, check_times, least_over_time, which_curve
 from rbcourse.jets import Jet, angular_velocity, exp, multiply, product, rotation, slerp
 from rbcourse.polynomials import hermite
-from rbcourse.quaternion import quaternion_multiply
+from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import exp_so3, log_so3, right_jacobian_inverse_so3
 
 
@@ -128,17 +128,47 @@ class Bezier(QuaternionCurve):
 
 
 class NormalizedCubic(QuaternionCurve):
-    """The `Curve` of a cubic in the space of quaternions, Q(0) = 1."""
+    """The `Curve` of a cubic of quaternions, of norm 1 at its start and of another at its end.
 
-    def __init__(self, given: Given, end: Array, end_rate: Array) -> None:
+    Its components are those seen from the goal: there Q(1) is real, and does not round w1 away,
+    however large it is.
+
+    Attributes
+    ----------
+    margin : ndarray, shape (...)
+        How near the curve comes to where it is not unique, or jumps.
+    margin_time : ndarray, shape (...)
+        When that is.
+    """
+
+    def __init__(self, given: Given, norm: Array, growth: Array) -> None:
         super().__init__(given)
-        start = np.zeros_like(end)
-        start[..., 0] = 1
-        start_rate = _rate(start, given.w0)
-        self._vectors = [_components(x) for x in (start, end, start_rate, end_rate)]
+        turn = quaternion_from_matrix(given.turn)
+        self._start = multiply(self._start, _components(turn))
+        start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
+        end_rate = growth[..., None] * one + _rate(one, given.w1)
+        ends = start, norm[..., None] * one, _rate(start, given.w0), norm[..., None] * end_rate
+        self._vectors = [_components(x) for x in ends]
 
     def _quaternion(self, t: Array, order: int) -> Jet:
         return _cubic(self._vectors, t, order)
+
+    @property
+    def margin(self) -> Array:
+        """How near the curve comes to where it is not unique, or jumps."""
+        return self._least[1]
+
+    @property
+    def margin_time(self) -> Array:
+        """When the margin is reached."""
+        return self._least[0]
+
+    @cached_property
+    def _least(self) -> tuple[Array, Array]:
+        return least_over_time(self._room, self.batch_shape)
+
+    def _room(self, t: Array) -> Array:
+        raise NotImplementedError
 
 
 class QuaternionCubic(NormalizedCubic):
@@ -153,8 +183,8 @@ class QuaternionCubic(NormalizedCubic):
     """
 
     def __init__(self, given: Given) -> None:
-        end = quaternion_from_matrix(given.turn)
-        super().__init__(given, end, _rate(end, given.w1))
+        norm = np.ones(given.w0.shape[:-1])
+        super().__init__(given, norm, 0 * norm)
 
     def _quaternion(self, t: Array, order: int) -> Jet:
         Q = super()._quaternion(t, order)
@@ -162,27 +192,38 @@ class QuaternionCubic(NormalizedCubic):
         check_times(t, lost, len(self.batch_shape), "the cubic of quaternions is zero")
         return Q
 
-    @property
-    def margin(self) -> Array:
-        """The least norm of the cubic."""
-        return self._least[1]
-
-    @property
-    def margin_time(self) -> Array:
-        """When the margin is reached."""
-        return self._least[0]
-
-    @cached_property
-    def _least(self) -> tuple[Array, Array]:
-        def norm(t: Array) -> Array:
-            [Q] = _cubic(self._vectors, t, 0)
-            return np.linalg.norm(Q, axis=0)
-
-        return least_over_time(norm, self.batch_shape)
-
     @cached_property
     def _scale(self) -> Array:
         return np.abs(self._vectors).max(axis=(0, 1))
+
+    def _room(self, t: Array) -> Array:
+        return np.linalg.norm(_cubic(self._vectors, t, 0)[0], axis=0)
+
+
+class CayleyCubic(NormalizedCubic):
+    """The `Curve` of a cubic in Cayley's parameters.
+
+    Attributes
+    ----------
+    margin : ndarray, shape (...)
+        About the least time in which it turns by a radian: ‖Q‖/(1 + ‖Q'‖), at its least.
+    margin_time : ndarray, shape (...)
+        When that is.
+    """
+
+    def __init__(self, given: Given) -> None:
+        turn = quaternion_from_matrix(given.turn)
+        infinite = np.argwhere(turn[..., 0] == 0)
+        if len(infinite):
+            raise ValueError(
+                f"R0 and R1{which_curve(infinite[0])} are a half-turn apart: no Cayley parameters"
+            )
+        growth = np.sum(turn[..., 1:] * given.w1, axis=-1) / (2 * turn[..., 0])
+        super().__init__(given, 1 / turn[..., 0], growth)
+
+    def _room(self, t: Array) -> Array:
+        Q, rate = (np.linalg.norm(x, axis=0) for x in _cubic(self._vectors, t, 1))
+        return Q / (1 + rate)
 
 
 def exponential_cubic_so3(
@@ -283,7 +324,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
            [0., 1., 0.]])
     """
     given = to_given(R0, R1, w0, w1)
-    for name, w in (("w0", given.w0), ("w1", given.w1)):
+    for name, w in (("w0", w0), ("w1", w1)):
         fast = np.linalg.norm(w, axis=-1) >= 3 * np.pi
         if fast.any():
             raise ValueError(f"{first_index(name, fast)}: a norm below 3π is wanted")
@@ -396,7 +437,7 @@ def quaternion_cubic_so3(
     return QuaternionCubic(to_given(R0, R1, w0, w1))
 
 
-def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> NormalizedCubic:
+def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> CayleyCubic:
     """Return the cubic in Cayley's parameters about R0 with these ends.
 
     Parameters
@@ -409,7 +450,7 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
 
     Returns
     -------
-    NormalizedCubic
+    CayleyCubic
         A `Curve` that meets all four ends. Cayley's parameters of a turn by a about the unit
         vector n are g = tan(a/2) n; its quaternion is (1, g) over its norm, and along a curve
         2 g' = w + g × w + (g·w) g.
@@ -443,19 +484,7 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    given = to_given(R0, R1, w0, w1)
-    quaternion = quaternion_from_matrix(given.turn)
-    infinite = quaternion[..., 0] == 0
-    if infinite.any():
-        raise ValueError(
-            f"{first_index('R1', infinite)} is a half-turn from R0: no Cayley parameters"
-        )
-    g = quaternion[..., 1:] / quaternion[..., :1]
-    along = np.sum(g * given.w1, axis=-1, keepdims=True) * g
-    g_rate = (given.w1 + np.cross(g, given.w1) + along) / 2
-    one = np.ones((*g.shape[:-1], 1))
-    end, end_rate = (np.concatenate(x, axis=-1) for x in ((one, g), (0 * one, g_rate)))
-    return NormalizedCubic(given, end, end_rate)
+    return CayleyCubic(to_given(R0, R1, w0, w1))
 
 
 def _components(x: Array) -> Array:
