@@ -112,7 +112,7 @@ from rbcourse.so3 import (
 )
 from rbcourse.uniformity import UniformityTest, uniformity_tests
 
-__version__ = "0.8.0"
+__version__ = "0.9.0"
 
 __all__ = [
     "BASIS_SE3",

@@ -13,18 +13,20 @@ from rbcourse.curves import BlockwiseCurve, Curve
 from rbcourse.optimum import Ends, MinimumAcceleration, from_curve, grid
 from rbcourse.polynomials import cubic_coefficients
 from rbcourse.projected import ProjectedPolynomial
-from rbcourse.relaxation import minimum_acceleration_so3, relax
-from rbcourse.rivals import (
+from rbcourse.quaternion_curves import (
     Bezier,
     ExponentialCubic,
     bezier_legs,
+    other_way,
+    to_given,
+)
+from rbcourse.relaxation import minimum_acceleration_so3, relax
+from rbcourse.rivals import (
     bezier_so3,
     cayley_cubic_so3,
     cumulative_bezier_so3,
     exponential_cubic_so3,
-    other_way,
     quaternion_cubic_so3,
-    to_given,
 )
 from rbcourse.sampling import sample_rotation
 from rbcourse.so3 import exp_so3, hat_so3, log_so3
@@ -41,7 +43,7 @@ FAMILIES = "along", "across"
 NEAR_ZERO = 1e-4
 """What costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖² is not divided by."""
 
-_PART = 256  # problems between two reports
+_PART = 1000  # problems between two reports
 _PANELS = 2000  # panels that are worked out together
 
 
@@ -166,7 +168,7 @@ def survey(
     -------
     dict of str to ndarray, shape (N,)
         ∫ 2 ‖w'‖² dt of the "optimum", NaN where it is not found, and under their names of the
-        others, to about 1e-6 relative.
+        others, to about 1e-7 relative.
 
     Raises
     ------
@@ -189,10 +191,10 @@ def survey(
 
 
 def costs(make: Maker, ends: Ends) -> Array:
-    """Return ∫ 2 ‖w'‖² dt of many curves, each to about 1e-6 relative.
+    """Return ∫ 2 ‖w'‖² dt of many curves, each to about 1e-7 relative.
 
     Each has panels of its own: one on which the rules of Clenshaw and Curtis with 9 and 17 nodes
-    differ by 1e-5 of the cost is halved.
+    differ by 1e-6 of the cost is halved.
 
     Parameters
     ----------
@@ -237,7 +239,7 @@ def costs(make: Maker, ends: Ends) -> Array:
         value = 2 * width * (nodes.integral[-1] @ squares)
         rough = 2 * width * (few.integral[-1] @ squares[::2])
         expected = cost + np.bincount(which, value, count)
-        halved = (np.abs(value - rough) > 1e-5 * expected[which]) & (width > 1e-9)
+        halved = (np.abs(value - rough) > 1e-6 * expected[which]) & (width > 1e-9)
         cost += np.bincount(which[~halved], value[~halved], count)
         which, start, width = (np.repeat(x[halved], 2) for x in (which, start, width / 2))
         start[1::2] += width[1::2]

@@ -41,10 +41,9 @@ class Entry:
     tests: list[str] = field(default_factory=list)
     lessons: list[str] = field(default_factory=list)
 
-    def lacks(self, key: str) -> list[str]:
-        """Return which of the three are wanted and not there."""
-        wanted = ["lessons"] if key in SOURCES["prose"] else ["functions", "tests", "lessons"]
-        return [kind for kind in wanted if not getattr(self, kind)]
+    def lacks(self) -> list[str]:
+        """Return which of the three are not there."""
+        return [kind for kind in ("functions", "tests", "lessons") if not getattr(self, kind)]
 
 
 def collect(root: Path) -> dict[str, Entry]:

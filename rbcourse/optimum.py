@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from rbcourse._numerics import Array, as_finite, check_broadcast
 from rbcourse.curves import Curve
 from rbcourse.projection import nearest
-from rbcourse.rivals import CumulativeBezier, Given, bezier_legs, other_way, to_given
-from rbcourse.so3 import BASIS_SO3
+from rbcourse.quaternion_curves import other_way
+from rbcourse.so3 import BASIS_SO3, exp_so3, log_so3
 
 
 class ConvergenceError(RuntimeError):
@@ -233,7 +233,7 @@ def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
     return w, acceleration
 
 
-CLOSE = 1.5  # when one guess costs less than so many times the other, both are tried
+CLOSE = 2.0  # with legs whose costs are within this factor both ways round are tried
 COARSE = 17  # nodes, on which guesses are made and systems solved
 
 Guess = Callable[[int], Array]
@@ -294,19 +294,16 @@ def solve(
 
 
 def _solutions(solver: Solver, ends: Ends) -> list[Solution | Failure]:
-    slow = (np.clip(w, -1e6, 1e6) for w in (ends.w0, ends.w1))  # for a guess fast enough
-    given = to_given(ends.R0, ends.R1, *slow)
-    first, middle, last = bezier_legs(given)
-    middles = np.stack([middle, other_way(middle)])
-    costs = _cost_of_guesses(given, first, middles, last)
-    cheaper = (costs[1] < costs[0]).astype(int)
+    legs = _legs(ends)
+    bends = legs[:, 1:] - legs[:, :-1]
+    costs = np.sum(bends**2, axis=(1, 3)) + np.sum(bends[:, 0] * bends[:, 1], axis=-1)
+    cheaper = costs.argmin(axis=0)
 
     def attempt(which: NDArray[np.intp], way: NDArray[np.intp]) -> list[Solution | Failure]:
-        legs = first[which], middles[way[which], which], last[which]
-        curve = CumulativeBezier(Given(*(x[which] for x in given)), legs)
-        return _attempt(solver, ends.of(which), from_curve(curve))
+        part = ends.of(which)
+        return _attempt(solver, part, from_curve(_bezier(part.R0, legs[way[which], :, which])))
 
-    found = attempt(np.arange(len(middle)), cheaper)
+    found = attempt(np.arange(len(cheaper)), cheaper)
     failed = np.array([isinstance(solution, Failure) for solution in found], bool)
     doubtful = np.flatnonzero((costs.max(axis=0) < CLOSE * costs.min(axis=0)) | failed)
     if doubtful.size:
@@ -317,13 +314,23 @@ def _solutions(solver: Solver, ends: Ends) -> list[Solution | Failure]:
     return found
 
 
-def _cost_of_guesses(given: Given, first: Array, middles: Array, last: Array) -> Array:
-    """Return about what the curves cost that have one of two middle legs, shape (2, N)."""
-    both = (np.broadcast_to(x, (2, *x.shape)) for x in (*given, first, last))
-    *twice, first, last = both
-    nodes = grid(COARSE)
-    rates = CumulativeBezier(Given(*twice), (first, middles, last))(nodes.t, 2)
-    return np.tensordot(nodes.integral[-1], np.sum(rates**2, axis=-1), axes=1)
+def _legs(ends: Ends) -> Array:
+    """Return the turns between Bézier's control points, shape (2, 3, N, 3): both ways round."""
+    first, last = (np.clip(w, -1e6, 1e6) / 3 for w in (ends.w0, ends.w1))  # fast enough to start
+    back, ahead = exp_so3(np.stack([-first, -last]))
+    middle = log_so3(back @ ends.R0.mT @ ends.R1 @ ahead)
+    return np.stack([[first, middle, last], [first, other_way(middle), last]])
+
+
+def _bezier(R0: Array, legs: Array) -> Callable[[Array], Array]:
+    """Return the curves of `cumulative_bezier_so3` with these legs, shape (N, 3, 3)."""
+
+    def curve(t: Array) -> Array:
+        shares = np.stack([1 - (1 - t) ** 3, t * t * (3 - 2 * t), t**3])
+        first, second, third = exp_so3(shares[..., None, None] * legs.swapaxes(0, 1)[:, None])
+        return R0 @ first @ second @ third
+
+    return curve
 
 
 def _costs(ends: Ends, solutions: list[Solution | Failure]) -> Array:

@@ -303,14 +303,15 @@ def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
 
 
 def _across(c: Array) -> tuple[Array, Array]:
-    """Return two unit vectors across c as rows, shape (N, 2, 3), and c × both as columns."""
-    length = np.linalg.norm(c, axis=-1)
-    x, y, z = np.where(length == 0, [[0.0], [0.0], [1.0]], c.T / np.where(length == 0, 1, length))
-    sign = np.copysign(1, z)
-    share = -1 / (sign + z)
-    first = 1 + sign * share * x * x, sign * share * x * y, -sign * x
-    second = share * x * y, sign + share * y * y, -y
-    across = np.array([first, second]).transpose(2, 0, 1)
+    """Return two unit vectors across c as rows, shape (N, 2, 3), and c × both as columns.
+
+    They are rows of Householder's reflection that takes c to the third axis.
+    """
+    v = c.copy()
+    v[:, 2] += np.copysign(np.sqrt(np.sum(c * c, axis=-1)), c[:, 2])
+    square = np.sum(v * v, axis=-1)
+    twice = v * (2 / np.where(square == 0, 1, square))[:, None]
+    across = np.eye(2, 3) - v[:, :2, None] * twice[:, None]
     return across, hats(c) @ across.mT
 
 

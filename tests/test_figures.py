@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rbcourse as rb
-from rbcourse import figures
+from rbcourse import atlas, figures
 
 FIGURES = Path(__file__).parents[1] / "figures"
 NAIVE = rb.sample_rotation_naive, rb.sample_quaternion_naive
@@ -575,3 +575,39 @@ def test_the_data_of_the_two_spaces():
     assert np.abs(angles - np.transpose([150 * t, 0 * t + 60])).max() < 1e-9
     _, line = configurations(data, "straight for the hand ")
     assert np.abs(line - (tip[0] + t * (tip[-1] - tip[0]))).max() < 2e-4
+
+
+@pytest.mark.source("BK 1", "BK 7")
+@pytest.mark.parametrize(("name", "share"), [("lesson11_median", 0.5), ("lesson11_ninety", 0.9)])
+def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost(name, share):
+    header, rows = committed(name)
+    assert len(rows) == 200
+    cell = 100 + 4 * 10 + 5  # across, 81°, 4.95 rad
+    data = dict(zip(header, rows[cell], strict=True))
+    assert data["family"] == "across"
+    assert [float(data[x]) for x in header[1:4]] == pytest.approx([81, 4.95, 100])
+    ends = atlas.atlas_problems(100, rng=11).of(slice(100 * cell, 100 * cell + 100))
+    best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
+    for way in ("projection", "exponential", "Bézier", "cumulative", "quaternion", "Cayley"):
+        excess = np.sort(rb.acceleration_cost(atlas.WAYS[way](*ends)) / best - 1)
+        assert float(data[f"{way} excess [1]"]) == pytest.approx(
+            excess[int(100 * share) - 1], rel=1e-3
+        )
+
+
+@pytest.mark.source("BK 1", "BK 7")
+def test_all_but_one_of_the_closed_forms_have_the_fourth_power():
+    data = numbers("lesson11_growth")
+    for way in atlas.WAYS:
+        median = data[f"{way} median excess [1]"][:3]
+        slope = np.diff(np.log(median)) / np.diff(np.log(data["size [rad]"][:3]))
+        assert slope == pytest.approx([2 if way == "cumulative" else 4] * 2, abs=0.3), way
+
+
+def test_the_excess_of_a_projection_grows_with_the_third_power_of_the_margin():
+    data = numbers("lesson11_margins")
+    margin, excess = (data[f"projection {name} [1]"] for name in ("margin", "excess"))
+    low = margin < 0.3
+    slope, _ = np.polyfit(np.log(margin[low]), np.log(excess[low]), 1)
+    assert low.sum() > 50
+    assert slope == pytest.approx(-3, abs=0.3)

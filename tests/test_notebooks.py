@@ -102,6 +102,8 @@ def differing_pixels(one, other):
 
 def look_the_same(one, other):
     """As two processors draw: at most 1 in 10,000 pixels differs visibly, the mean by 0.05."""
+    if one == other:
+        return True
     share, mean = differing_pixels(one, other)
     return share < 1e-4 and mean < 0.05
 
@@ -202,6 +204,8 @@ def test_stored_documents_are_fresh(run):
 def test_stored_animations_are_fresh(run):
     """Frame by frame, as pictures; the palette may differ by a shade."""
     for drawn in run[2].glob("*.gif"):
+        if drawn.read_bytes() == (STORED / drawn.name).read_bytes():
+            continue
         frames, stored = (list(gif_frames(file)) for file in (drawn, STORED / drawn.name))
         assert len(frames) == len(stored)
         assert all(look_the_same(*pair) for pair in zip(frames, stored, strict=True)), drawn.name

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse.polynomials import hermite
-from rbcourse.rivals import ExponentialCubic, other_way, to_given
+from rbcourse.quaternion_curves import ExponentialCubic, other_way, to_given
 
 pytestmark = pytest.mark.source("BK 1")
 EPS = np.finfo(float).eps
@@ -350,7 +350,7 @@ def test_half_turns_have_no_cayley_parameters():
         *((np.eye(3), R) for R in exact),
         *zip(*awkward.rounded_half_turns(np.random.default_rng(12), 100), strict=True),
     ):
-        with pytest.raises(ValueError, match=r"^R1 is a half-turn from R0"):
+        with pytest.raises(ValueError, match=r"^R0 and R1 are a half-turn apart"):
             rb.cayley_cubic_so3(R0, R1, REST, REST)
 
 
