@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbcourse._numerics import Array, Rng, as_count, as_generator, blocks
+from rbcourse._numerics import Array, Rng, as_count, as_generator, as_single, blocks
 from rbcourse.curves import BlockwiseCurve, Curve
 from rbcourse.optimum import Ends, MinimumAcceleration, from_curve, grid
 from rbcourse.polynomials import cubic_coefficients
@@ -40,8 +39,6 @@ FASTEST = 9.0
 """The largest √(‖w0‖² + ‖w1‖²) of the atlas, in rad per unit time."""
 FAMILIES = "along", "across"
 """Where the end velocities of the atlas point: along the axis of the displacement, or across."""
-NEAR_ZERO = 1e-4
-"""What costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖² is not divided by."""
 
 _PART = 1000  # problems between two reports
 _PANELS = 2000  # panels that are worked out together
@@ -122,7 +119,7 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     count : int
         How many.
     size : float
-        The radius, in rad, below π.
+        The radius in rad, above 0 and at most π.
     rng : Generator, int or None, optional
         Where the numbers come from.
 
@@ -133,7 +130,7 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     Raises
     ------
     ValueError
-        If `count` is no integer from 1 up, or `rng` makes no numbers.
+        If `count` is no integer from 1 up, `size` is another, or `rng` makes no numbers.
 
     Examples
     --------
@@ -141,8 +138,10 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     >>> bool(np.linalg.norm(ends.w0, axis=-1).max() < 1)
     True
     """
-    count, rng = as_count("count", count), as_generator(rng)
-    radii = size * np.array([[1.0], [2.0], [2.0]]) * np.cbrt(rng.random((3, count)))
+    count, rng, radius = as_count("count", count), as_generator(rng), as_single("size", size)
+    if not 0 < radius <= np.pi:
+        raise ValueError(f"size: a number above 0 and at most π is wanted, got {size}")
+    radii = radius * np.array([[1.0], [2.0], [2.0]]) * np.cbrt(rng.random((3, count)))
     directions = rng.standard_normal((3, count, 3))
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     sigma, w0, w1 = radii[..., None] * directions
@@ -179,7 +178,7 @@ def survey(
     ----------
     BK 1, BK (18), BK 7.
     """
-    parts = list(blocks(len(ends.w0), _PART))
+    parts = list(blocks(len(ends.w0), _PART)) or [slice(0, 0)]
 
     def solve(part: slice) -> Array:
         some = ends.of(part)
@@ -246,118 +245,11 @@ def costs(make: Maker, ends: Ends) -> Array:
     return cost
 
 
-def near_zero(ends: Ends, optimum: Array) -> NDArray[np.bool_]:
-    """Tell which optima cost so little, in view of their ends, that no ratio says anything.
-
-    Parameters
-    ----------
-    ends : Ends
-        N problems.
-    optimum : ndarray, shape (N,)
-        What they cost.
-
-    Returns
-    -------
-    ndarray of bool, shape (N,)
-    """
-    sigma = log_so3(ends.R0.mT @ ends.R1)
-    return optimum < NEAR_ZERO * sum(np.sum(x**2, axis=-1) for x in (sigma, ends.w0, ends.w1))
-
-
-def excesses(ends: Ends, found: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the costs over the optimum, minus 1; NaN where it is near zero, or not found.
-
-    Parameters
-    ----------
-    ends : Ends
-        N problems.
-    found : mapping of str to ndarray, shape (N,)
-        See `survey`.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (N,)
-    """
-    optimum = np.where(near_zero(ends, found["optimum"]), np.nan, found["optimum"])
-    return {way: cost / optimum - 1 for way, cost in found.items() if way != "optimum"}
-
-
-def cell_table(excess: Mapping[str, Array], draws: int, share: float) -> dict[str, Array]:
-    """Return a quantile of the excess in each cell of the atlas, as a table.
-
-    Parameters
-    ----------
-    excess : mapping of str to ndarray, shape (2 * 10 * 10 * draws,)
-        See `excesses`, of `atlas_problems`.
-    draws : int
-        How many there are in each cell.
-    share : float
-        Which quantile: 0.5 for the median.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (2 * 10 * 10,)
-        Family, the middle of the cell, how many problems count, and a `quantile` for each way.
-    """
-    family, turn, speed = np.indices((2, CELLS, CELLS)).reshape(3, -1)
-    cells = {way: x.reshape(-1, draws) for way, x in excess.items()}
-    return {
-        "family": np.array(FAMILIES)[family],
-        "displacement [deg]": (turn + 0.5) * 180 / CELLS,
-        "end velocity [rad]": (speed + 0.5) * FASTEST / CELLS,
-        "problems [1]": np.sum(~np.isnan(next(iter(cells.values()))), axis=-1),
-        **{f"{way} excess [1]": quantile(x, share) for way, x in cells.items()},
-    }
-
-
-def quantile(x: Array, share: float) -> Array:
-    """Return the smallest of the numbers that `share` of them do not pass.
-
-    Parameters
-    ----------
-    x : ndarray, shape (..., N)
-        Numbers; NaN does not count.
-    share : float
-        From 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        With four digits, and eight decimals at most: the costs are no more exact than that.
-
-    Examples
-    --------
-    >>> float(quantile(np.array([3.0, 1.23456, np.nan, 0.1]), 0.5))
-    1.235
-    """
-    return rounded(np.nanquantile(x, share, axis=-1, method="inverted_cdf"))
-
-
-def rounded(x: Array) -> Array:
-    """Return numbers with four digits, and eight decimals at most."""
-    return np.vectorize(lambda y: round(float(f"{y:.4g}"), 8) + 0.0, otypes=[float])(x)
-
-
-def in_words(excess: float) -> str:
-    """Return an excess as text: in percent, or how many times the optimum.
-
-    Examples
-    --------
-    >>> [in_words(x) for x in (-1e-12, 3.141e-3, 0.5, 46.2, 1e9)]
-    ['< 0.01 %', '0.31 %', '50 %', '47 ×', '> 10⁴ ×']
-    """
-    if excess < 1e-4:
-        return "< 0.01 %"
-    if excess < 10:
-        return f"{100 * excess:.2g} %" if excess < 0.1 else f"{100 * excess:.0f} %"
-    return f"{1 + excess:.0f} ×" if excess < 1e4 else "> 10⁴ ×"
-
-
 def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
     """Return what Newton's method finds from other guesses than the projected cubic.
 
-    The guesses are the closed forms, and the exponential cubic the long way round: stationary
-    curves all, of which none is proven to be the best.
+    The guesses are the closed forms but Cayley's, and the exponential cubic the long way round.
+    What is found is stationary; none is proven to be the best.
 
     Parameters
     ----------
@@ -376,7 +268,8 @@ def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]
     BK (19).
     """
     starts = {**WAYS, "long way round": long_way_round}
-    parts = list(blocks(len(ends.w0), _PART))
+    del starts["Cayley"]  # it goes on for long where it leads nowhere
+    parts = list(blocks(len(ends.w0), _PART)) or [slice(0, 0)]
 
     def solve(part: slice) -> Array:
         some = ends.of(part)
@@ -393,7 +286,7 @@ def long_way_round(R0: Array, R1: Array, w0: Array, w1: Array) -> ExponentialCub
 
 
 def bezier_other_way(R0: Array, R1: Array, w0: Array, w1: Array) -> Bezier:
-    """Return the Bézier curves whose middle legs turn the other way round."""
+    """Return the Bézier curves whose middle legs turn the other way round; they must not be 0."""
     given = to_given(R0, R1, w0, w1)
     first, middle, last = bezier_legs(given)
     return Bezier(given, (first, other_way(middle), last))
@@ -439,8 +332,9 @@ def _largest_angle(A: Array, B: Array) -> float:
 
 
 def _cost_from(ends: Ends, guess: Curve) -> Array:
-    curve = MinimumAcceleration(ends, relax(ends, from_curve(guess)), (len(ends.w0),))
-    return np.asarray(curve.cost)
+    with np.errstate(over="ignore", invalid="ignore"):
+        solutions = relax(ends, from_curve(guess))
+    return np.asarray(MinimumAcceleration(ends, solutions, (len(ends.w0),)).cost)
 
 
 def _side_by_side(
@@ -449,9 +343,13 @@ def _side_by_side(
     """Return the work on each part, done in as many threads as there are processors."""
     found = []
     with warnings.catch_warnings(), ThreadPoolExecutor(os.cpu_count()) as pool:
-        warnings.simplefilter("ignore", RuntimeWarning)  # what is not found is NaN
-        for part, result in zip(parts, pool.map(work, parts), strict=True):
-            found.append(result)
-            if report:
-                report(part.stop, parts[-1].stop)
+        warnings.filterwarnings("ignore", ".*did not converge", RuntimeWarning)  # it is NaN
+        try:
+            for part, result in zip(parts, pool.map(work, parts), strict=True):
+                found.append(result)
+                if report:
+                    report(part.stop, parts[-1].stop)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
     return found

@@ -125,6 +125,7 @@ def _panels(curve: Curve) -> Array:
         )
     when = np.broadcast_to(getattr(curve, "margin_time", 0.5), margin.shape).ravel()
     events += [(t, gap / 4) for t, gap in zip(when, margin, strict=True) if gap < 0.25]
+    events += zip(*(np.ravel(x) for x in getattr(curve, "quickest", ((), ()))), strict=True)
     cuts = [np.arange(17) / 16]
     for t, width in events:
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))

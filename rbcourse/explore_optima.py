@@ -41,16 +41,16 @@ def minimum_acceleration_explorer() -> Explorer:
         ax = fig.add_axes((0.13, 0.16, 0.76, 0.71))
         ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
         artists: dict[str, Any] = {}
-        for way, dash in {"optimum": "-", "rival": "--"}.items():
+        for way, name, dash in (("optimum", "optimum", "-"), ("rival", "closed form", "--")):
             for axis in "xyz":
                 artists[f"{way} {axis}"] = new_line(ax, color=COLOURS[axis], ls=dash)
-            ax.plot([], [], color="0.3", ls=dash, label=way)
+            ax.plot([], [], color="0.3", ls=dash, label=name)
         for axis, number in zip("xyz", "₁₂₃", strict=True):
             style: Any = {"color": COLOURS[axis], "va": "center"}
             artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
-        "rival": menu("rival", list(WAYS)),
+        "rival": menu("closed form", list(WAYS)),
         "size": slider("size s", 1.0, 0.05, 1.5, 0.05),
         "k": slider("k (rad)", 1.0, -6.0, 6.0, 0.25),
     }

@@ -229,9 +229,9 @@ def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
 
 def _squared_angle(x: Array, order: int) -> list[Array]:
     """Return arccos(x)² and its derivatives by x; where x is near 1 by a power series."""
-    x = np.minimum(x, 1.0)
+    x = np.clip(x, -1.0, 1.0)
     angle, z = np.arccos(x), (1 - x) * (1 + x)
-    g = np.where(z > 0, angle / np.sqrt(np.where(z > 0, z, 1.0)), 1.0)
+    g = np.where(x < 1, angle / np.sqrt(np.where(x < 1, z, 1.0)), 1.0)
     if order < 2:
         return [angle**2, -2 * g][: order + 1]
     small = x > 0.95

@@ -263,8 +263,9 @@ def solve(
 ) -> MinimumAcceleration:
     """Solve from a cumulative Bézier curve, its middle leg turned the short way or the other.
 
-    The cheaper of the two curves is as a rule next to the cheaper optimum. Where their costs are
-    within a factor of 1.5, or nothing is found, both are tried.
+    The cheaper of the two is as a rule next to the cheaper optimum. Where the costs of both, worked
+    out from the legs as for a curve in space, are within a factor of `CLOSE`, or nothing is found,
+    both are tried.
 
     Raises
     ------
@@ -315,7 +316,10 @@ def _solutions(solver: Solver, ends: Ends) -> list[Solution | Failure]:
 
 
 def _legs(ends: Ends) -> Array:
-    """Return the turns between Bézier's control points, shape (2, 3, N, 3): both ways round."""
+    """Return the turns between Bézier's control points, shape (2, 3, N, 3): both ways round.
+
+    Here and in `_bezier` in matrices: quicker for a single problem.
+    """
     first, last = (np.clip(w, -1e6, 1e6) / 3 for w in (ends.w0, ends.w1))  # fast enough to start
     back, ahead = exp_so3(np.stack([-first, -last]))
     middle = log_so3(back @ ends.R0.mT @ ends.R1 @ ahead)

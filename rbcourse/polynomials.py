@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, check_order
 
 
 def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
@@ -54,6 +54,11 @@ def hermite(ends: Sequence[ArrayLike], t: Array, order: int = 0) -> Array:
     -------
     ndarray
 
+    Raises
+    ------
+    ValueError
+        If `order` is another.
+
     References
     ----------
     BK 6.2.
@@ -63,6 +68,7 @@ def hermite(ends: Sequence[ArrayLike], t: Array, order: int = 0) -> Array:
     >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
     array([0. , 0.5, 1. ])
     """
+    check_order(order)
     weights: list[Array]
     s = 1 - t
     if order == 0:

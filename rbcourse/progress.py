@@ -1,6 +1,8 @@
 """How far a long computation is: a bar in the notebook, which ends as a line."""
 
+import html
 from collections.abc import Callable
+from typing import Any
 
 from IPython.display import display
 
@@ -25,11 +27,11 @@ class Stage:
 
     def _repr_html_(self) -> str:
         bar = f'<progress max="{self.total}" value="{self.done}"></progress> '
-        return f"<div>{bar if self.done < self.total else ''}{self}</div>"
+        return f"<div>{bar if self.done < self.total else ''}{html.escape(repr(self))}</div>"
 
 
 def bar(what: str) -> Callable[[int, int], None]:
-    """Show a bar, and return the function that moves it.
+    """Return a function that shows how much is done: a bar; outside of notebooks, lines.
 
     Parameters
     ----------
@@ -39,18 +41,22 @@ def bar(what: str) -> Callable[[int, int], None]:
     Returns
     -------
     callable
-        ``report(done, total)`` shows how much is done.
+        ``report(done, total)``.
 
     Examples
     --------
     >>> report = bar("Problems")
-    Problems: 0 of 1
     >>> report(2000, 2000)
     Problems: 2,000 of 2,000
     """
-    handle = display(Stage(what, 0, 1), display_id=True)
+    handle: Any = None
 
     def report(done: int, total: int) -> None:
-        handle.update(Stage(what, done, total))
+        nonlocal handle
+        stage = Stage(what, done, total)
+        if handle is None:
+            handle = display(stage, display_id=True)
+        else:
+            handle.update(stage)
 
     return report

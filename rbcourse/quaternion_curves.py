@@ -133,13 +133,6 @@ class NormalizedCubic(QuaternionCurve):
 
     Its components are those seen from the goal: there Q(1) is real, and does not round w1 away,
     however large it is.
-
-    Attributes
-    ----------
-    margin : ndarray, shape (...)
-        How near the curve comes to where it is not unique, or jumps.
-    margin_time : ndarray, shape (...)
-        When that is.
     """
 
     def __init__(self, given: Given, norm: Array, growth: Array) -> None:
@@ -153,23 +146,6 @@ class NormalizedCubic(QuaternionCurve):
 
     def _quaternion(self, t: Array, order: int) -> Jet:
         return _cubic(self._vectors, t, order)
-
-    @property
-    def margin(self) -> Array:
-        """How near the curve comes to where it is not unique, or jumps."""
-        return self._least[1]
-
-    @property
-    def margin_time(self) -> Array:
-        """When the margin is reached."""
-        return self._least[0]
-
-    @cached_property
-    def _least(self) -> tuple[Array, Array]:
-        return least_over_time(self._room, self.batch_shape)
-
-    def _room(self, t: Array) -> Array:
-        raise NotImplementedError
 
 
 class QuaternionCubic(NormalizedCubic):
@@ -197,8 +173,22 @@ class QuaternionCubic(NormalizedCubic):
     def _scale(self) -> Array:
         return np.abs(self._vectors).max(axis=(0, 1))
 
-    def _room(self, t: Array) -> Array:
-        return np.linalg.norm(_cubic(self._vectors, t, 0)[0], axis=0)
+    @property
+    def margin(self) -> Array:
+        """The least norm of the cubic."""
+        return self._least[1]
+
+    @property
+    def margin_time(self) -> Array:
+        """When the margin is reached."""
+        return self._least[0]
+
+    @cached_property
+    def _least(self) -> tuple[Array, Array]:
+        def norm(t: Array) -> Array:
+            return np.linalg.norm(_cubic(self._vectors, t, 0)[0], axis=0)
+
+        return least_over_time(norm, self.batch_shape)
 
 
 class CayleyCubic(NormalizedCubic):
@@ -206,10 +196,8 @@ class CayleyCubic(NormalizedCubic):
 
     Attributes
     ----------
-    margin : ndarray, shape (...)
-        About the least time in which it turns by a radian: ‖Q‖/(1 + ‖Q'‖), at its least.
-    margin_time : ndarray, shape (...)
-        When that is.
+    quickest : tuple of ndarray, shape (...)
+        When it turns most quickly, and about how long it takes for a radian then.
     """
 
     def __init__(self, given: Given) -> None:
@@ -222,9 +210,15 @@ class CayleyCubic(NormalizedCubic):
         growth = np.sum(turn[..., 1:] * given.w1, axis=-1) / (2 * turn[..., 0])
         super().__init__(given, 1 / turn[..., 0], growth)
 
-    def _room(self, t: Array) -> Array:
-        Q, rate = (np.linalg.norm(x, axis=0) for x in _cubic(self._vectors, t, 1))
-        return Q / (1 + rate)
+    @cached_property
+    def quickest(self) -> tuple[Array, Array]:
+        """When it turns most quickly, and about how long it takes for a radian then."""
+
+        def time_for_a_radian(t: Array) -> Array:
+            Q, rate = (np.linalg.norm(x, axis=0) for x in _cubic(self._vectors, t, 1))
+            return Q / (1 + rate)
+
+        return least_over_time(time_for_a_radian, self.batch_shape)
 
 
 def _components(x: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The other closed forms that BK 1 names: curves with the same four ends as the projected cubic."""
+"""Other closed forms with the ends of the projected cubic: the roads that BK 1 names, and kin."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,7 @@ def exponential_cubic_so3(
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
     w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time, of any size.
+        Angular velocities there, body frame, in rad per unit time.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def exponential_cubic_so3(
     -----
     Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
     `log_so3` chooses. The curve itself is smooth everywhere. Velocities along the geodesic give the
-    optimum.
+    optimum among all curves that turn by this vector.
 
     Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
 
@@ -117,9 +117,12 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     """
     given = to_given(R0, R1, w0, w1)
     for name, w in (("w0", w0), ("w1", w1)):
-        fast = np.linalg.norm(w, axis=-1) >= 3 * np.pi
+        speed = np.linalg.norm(w, axis=-1)
+        fast = speed >= 3 * np.pi
         if fast.any():
-            raise ValueError(f"{first_index(name, fast)}: a norm below 3π is wanted")
+            raise ValueError(
+                f"{first_index(name, fast)}: a norm below 3π is wanted, got {speed[fast][0]:.4g}"
+            )
     return Bezier(given, bezier_legs(given))
 
 
@@ -133,7 +136,7 @@ def cumulative_bezier_so3(
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
     w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time, of any size.
+        Angular velocities there, body frame, in rad per unit time.
 
     Returns
     -------
@@ -185,7 +188,7 @@ def quaternion_cubic_so3(
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
     w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time, of any size.
+        Angular velocities there, body frame, in rad per unit time.
 
     Returns
     -------
@@ -240,7 +243,7 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
         Rotation matrices at t = 0 and 1, no half-turn apart; what is none is not repaired (see
         `project_so`).
     w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time, of any size.
+        Angular velocities there, body frame, in rad per unit time.
 
     Returns
     -------

@@ -49,7 +49,7 @@ def shoot_minimum_acceleration_so3(
         If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
         For a single problem, if Newton's method does not converge from either of two guesses: rare
-        for ‖w0‖, ‖w1‖ < 12. For ‖w‖ of 30 it takes seconds to say so, for 1000 minutes.
+        for ‖w0‖, ‖w1‖ < 12. It takes seconds to say so for ‖w‖ of 30, and minutes for 1000.
 
     Warns
     -----

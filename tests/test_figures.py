@@ -130,7 +130,7 @@ def test_every_figure_has_its_files_and_units_in_every_column():
         files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
         assert files - {".gif"} == {".png", ".pdf", ".csv"}
         for column in committed(name)[0]:
-            assert re.search(r" \[(1|m|rad)\]$", column) or column == "frame", column
+            assert re.search(r" \[(1|m|rad)\]$", column) or column in ("frame", "family"), column
 
 
 @pytest.mark.source("BK Fig. 1")
@@ -585,7 +585,8 @@ def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost(name, share):
     cell = 100 + 4 * 10 + 5  # across, 81°, 4.95 rad
     data = dict(zip(header, rows[cell], strict=True))
     assert data["family"] == "across"
-    assert [float(data[x]) for x in header[1:4]] == pytest.approx([81, 4.95, 100])
+    middle = [np.radians(81), 4.95, 100]
+    assert [float(data[x]) for x in header[1:4]] == pytest.approx(middle)
     ends = atlas.atlas_problems(100, rng=11).of(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for way in ("projection", "exponential", "Bézier", "cumulative", "quaternion", "Cayley"):
@@ -609,5 +610,5 @@ def test_the_excess_of_a_projection_grows_with_the_third_power_of_the_margin():
     margin, excess = (data[f"projection {name} [1]"] for name in ("margin", "excess"))
     low = margin < 0.3
     slope, _ = np.polyfit(np.log(margin[low]), np.log(excess[low]), 1)
-    assert low.sum() > 50
+    assert low.sum() > 25
     assert slope == pytest.approx(-3, abs=0.3)

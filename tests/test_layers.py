@@ -53,6 +53,7 @@ LEVELS = {
     "figures": 8,
     "atlas": 9,
     "atlas_figures": 10,
+    "atlas_tables": 10,
     "progress": 0,
     "comparison": 9,
     "frames": 9,
