@@ -246,10 +246,11 @@ def costs(make: Maker, ends: Ends) -> Array:
 
 
 def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
-    """Return what Newton's method finds from other guesses than the projected cubic.
+    """Return what the curves cost that Newton's method finds from several guesses.
 
-    The guesses are the closed forms but Cayley's, and the exponential cubic the long way round.
-    What is found is stationary; none is proven to be the best.
+    The guesses are the closed forms but Cayley's, which seldom leads anywhere when it is far off,
+    and the exponential cubic the long way round. What is found is stationary; none is proven to be
+    the best.
 
     Parameters
     ----------
@@ -267,8 +268,8 @@ def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]
     ----------
     BK (19).
     """
-    starts = {**WAYS, "long way round": long_way_round}
-    del starts["Cayley"]  # it goes on for long where it leads nowhere
+    starts = {way: make for way, make in WAYS.items() if way != "Cayley"}
+    starts["long way round"] = long_way_round
     parts = list(blocks(len(ends.w0), _PART)) or [slice(0, 0)]
 
     def solve(part: slice) -> Array:

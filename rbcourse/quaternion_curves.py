@@ -1,7 +1,7 @@
 """Curves on SO(3) that are quaternions in the making: products, arcs, cubics divided by norms.
 
-Each is R0 times the rotation of a quaternion Q(t), which need not keep its norm. `rivals` has the
-functions that make them.
+Each is a fixed rotation times that of a quaternion Q(t), which need not keep its norm. `rivals` has
+the functions that make them.
 """
 
 from functools import cached_property
@@ -54,7 +54,7 @@ def other_way(turn: Array) -> Array:
 
 
 class QuaternionCurve(BlockwiseCurve):
-    """A `Curve` R0 times the rotation of Q(t); components of many times together in the memory.
+    """A `Curve` that is R0 times the rotation of Q(t), if a subclass does not start elsewhere.
 
     References
     ----------

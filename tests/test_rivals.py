@@ -8,6 +8,7 @@ import mpmath as mp
 import numpy as np
 import oracles
 import pytest
+from numpy.polynomial import Polynomial
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
@@ -545,3 +546,41 @@ def test_the_cost_of_a_sudden_turn_is_not_missed(margin):
     assert rb.acceleration_cost(rb.quaternion_cubic_so3(*given)) == pytest.approx(
         float(want), rel=1e-8
     )
+
+
+@pytest.mark.source("BK 1")
+@pytest.mark.parametrize("short_of", [0.3, 1e-2, 1e-3, 1e-4])
+def test_the_cost_of_cayleys_cubic_near_a_half_turn(short_of):
+    """It turns once more in a time of about the square of what is lacking: panels round that."""
+    angle, w0, w1 = np.pi - short_of, np.array([1.0, 0, 0]), np.array([0, 2.0, 0])
+    n = np.array([1.0, 2, 2]) / 3
+    goal = n / np.tan(short_of / 2)
+    rate = (w1 + np.cross(goal, w1) + goal * (goal @ w1)) / 2
+    square, cube = 3 * goal - w0 - rate, w0 / 2 + rate - 2 * goal
+
+    def squared_acceleration(t):
+        t = t[:, None]
+        g = ((cube * t + square) * t + w0 / 2) * t
+        g1, g2 = (3 * cube * t + 2 * square) * t + w0 / 2, 6 * cube * t + 2 * square
+        spin, bend = g1 - np.cross(g, g1), g2 - np.cross(g, g2)
+        norm = 1 + np.sum(g * g, axis=-1, keepdims=True)
+        slope = 2 * np.sum(g * g1, axis=-1, keepdims=True)
+        return np.sum((2 * bend / norm - 2 * slope * spin / norm**2) ** 2, axis=-1)
+
+    length = sum(Polynomial(c) ** 2 for c in zip(0 * w0, w0 / 2, square, cube, strict=True))
+    quick = [t.real for t in length.deriv().roots() if abs(t.imag) < 1e-6]
+    apart = 2.0 ** -np.arange(1, 42)
+    cuts = np.unique([x for t in (0, 1, *quick) for x in (*(t - apart), t, *(t + apart))])
+    cuts = cuts[(cuts >= 0) & (cuts <= 1)]
+    x, weights = np.polynomial.legendre.leggauss(20)
+    nodes = ((cuts[1:] + cuts[:-1])[:, None] + np.diff(cuts)[:, None] * x) / 2
+    values = squared_acceleration(nodes.ravel()).reshape(nodes.shape)
+    cost = np.sum(values @ weights * np.diff(cuts))  # half a panel, and twice the square
+    curve = rb.cayley_cubic_so3(np.eye(3), rb.exp_so3(angle * n), w0, w1)
+    assert rb.acceleration_cost(curve) == pytest.approx(cost, rel=1e-8)
+
+
+def test_a_cost_of_cayleys_cubic_that_is_beyond_rounding_is_refused():
+    ends = np.eye(3), rb.exp_so3((np.pi - 1e-6) * np.array([1, 2, 2]) / 3), [1, 0, 0], [0, 2, 0]
+    with pytest.raises(RuntimeError, match="leave an uncertainty"):
+        rb.acceleration_cost(rb.cayley_cubic_so3(*ends))
