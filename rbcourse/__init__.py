@@ -8,6 +8,7 @@ from rbcourse.arm import (
     interpolate_joints,
     propagate_joints,
 )
+from rbcourse.chains import bessel_velocities, chain, retime
 from rbcourse.connection import (
     christoffel,
     covariant_derivative,
@@ -110,6 +111,7 @@ from rbcourse.so3 import (
     right_jacobian_so3,
     vee_so3,
 )
+from rbcourse.trajectories import read_path, write_path
 from rbcourse.uniformity import UniformityTest, uniformity_tests
 
 __version__ = "0.9.0"
@@ -130,9 +132,11 @@ __all__ = [
     "arm_forward_kinematics",
     "arm_inverse_kinematics",
     "arm_tip_jacobian",
+    "bessel_velocities",
     "bezier_so3",
     "canonical_quaternion",
     "cayley_cubic_so3",
+    "chain",
     "christoffel",
     "components_from_tangent",
     "compose_planar",
@@ -194,6 +198,8 @@ __all__ = [
     "quaternion_from_rotation_vector",
     "quaternion_from_zyx",
     "quaternion_multiply",
+    "read_path",
+    "retime",
     "right_jacobian_inverse_so3",
     "right_jacobian_so3",
     "rotate_by_quaternion",
@@ -217,6 +223,7 @@ __all__ = [
     "vee_se3",
     "vee_so3",
     "weight_from_inertia",
+    "write_path",
     "zyx_from_matrix",
     "zyx_from_quaternion",
 ]

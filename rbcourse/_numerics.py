@@ -122,18 +122,19 @@ def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
     return array
 
 
-def as_time(t: ArrayLike, batch_ndim: int) -> Array:
-    """Return the times `t`, all in [0, 1], with `batch_ndim` axes of length 1 appended.
+def as_time(t: ArrayLike, batch_ndim: int, domain: tuple[float, float] = (0.0, 1.0)) -> Array:
+    """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
 
     Raises
     ------
     ValueError
-        As `as_finite`; and the message names the first time outside [0, 1].
+        As `as_finite`; and the message names the first time outside the domain.
     """
-    times = as_array("t", t, copy=False)
-    if not (times.min(initial=0) >= 0 and times.max(initial=1) <= 1):
+    times, (start, end) = as_array("t", t, copy=False), domain
+    if not (times.min(initial=start) >= start and times.max(initial=end) <= end):
         times = as_finite("t", t)
-        _check_all((times >= 0) & (times <= 1), "t", times, "a time in [0, 1]")
+        wanted = f"a time in [{start:.17g}, {end:.17g}]"
+        _check_all((times >= start) & (times <= end), "t", times, wanted)
     return times.reshape(times.shape + (1,) * batch_ndim)
 
 

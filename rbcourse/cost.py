@@ -3,6 +3,7 @@
 import numpy as np
 
 from rbcourse._numerics import Array
+from rbcourse.chains import Chain, Retimed
 from rbcourse.curves import Curve
 
 
@@ -24,8 +25,8 @@ def acceleration_cost(curve: Curve) -> Array:
     Raises
     ------
     RuntimeError
-        If the integral does not settle to that, or if the curve all but jumps: ``margin`` below
-        1e-6.
+        If the integral does not settle to that, if the curve all but jumps: ``margin`` below 1e-6,
+        or if the velocity of a `chain` jumps.
 
     See Also
     --------
@@ -87,6 +88,21 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
+    if isinstance(curve, Retimed):
+        rotation, translation = acceleration_cost_parts(curve.curve)
+        return rotation * curve.rate**3, translation * curve.rate**3
+    if isinstance(curve, Chain):
+        jump = np.abs(curve.jumps(1)).max(initial=0)
+        if jump > 1e-9 * (1 + np.abs(curve(curve.times, 1)).max()):
+            raise RuntimeError(f"acceleration cost: the velocity jumps at a joint, by {jump:.3g}")
+        parts = acceleration_cost_parts(curve.legs)
+        rotation, translation = (np.asarray(part / curve.durations**3) for part in parts)
+        return rotation.sum(), translation.sum()
+    return _integral(curve)
+
+
+def _integral(curve: Curve) -> tuple[Array, Array]:
+    """Return the two parts for a curve on [0, 1]."""
     from scipy.integrate import cubature
 
     ends = _panels(curve)

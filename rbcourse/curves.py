@@ -1,8 +1,11 @@
 """What a curve is: a rotation or a pose over time. And the simplest one, the geodesic."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
 from functools import cached_property
+from itertools import pairwise
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +20,14 @@ from rbcourse._numerics import (
 )
 from rbcourse.so3 import hat_so3, log_so3
 
-_BLOCK = 4096  # rotations that are worked out together, in the cache
+Chosen: TypeAlias = NDArray[np.intp]
+BLOCK = 4096  # rotations that are worked out together, in the cache
 
 
 class Curve:
-    """A rotation or a pose over the time t in [0, 1]; called as SciPy's splines are.
+    """A rotation or a pose over time; called as SciPy's splines are.
+
+    The time t is in [0, 1], but for what `retime` and `chain` return.
 
     On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w and ``c(t, 2)``
     the angular acceleration w', both in the body frame: R' = R hat_so3(w).
@@ -32,12 +38,15 @@ class Curve:
 
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``; on SE(3)
-    ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``.
+    ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed as an array of that
+    shape is: ``c[2]`` is its third curve.
 
     Attributes
     ----------
     batch_shape : tuple of int
         The shape of the stack; ``()`` for a single curve.
+    domain : tuple of float
+        The first and the last time.
 
     References
     ----------
@@ -45,6 +54,7 @@ class Curve:
     """
 
     batch_shape: tuple[int, ...]
+    domain: tuple[float, float] = (0.0, 1.0)
 
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
         """Return the curve, or a derivative, at the times t.
@@ -52,7 +62,7 @@ class Curve:
         Parameters
         ----------
         t : array_like
-            Times in [0, 1], of any shape.
+            Times in the domain, of any shape.
         order : {0, 1, 2}, optional
             The curve, its velocity or its acceleration.
 
@@ -63,7 +73,7 @@ class Curve:
         Raises
         ------
         ValueError
-            If a time is not finite or outside [0, 1], or `order` is another.
+            If a time is not finite or outside the domain, or `order` is another.
 
         Examples
         --------
@@ -72,10 +82,38 @@ class Curve:
         >>> c(np.linspace(0, 1, 5)).shape, c(0.5, 1).shape
         ((5, 3, 3), (3,))
         """
-        return self._evaluate(as_time(t, len(self.batch_shape)), check_order(order))
+        return self._evaluate(as_time(t, len(self.batch_shape), self.domain), check_order(order))
+
+    def __getitem__(self, index: Any) -> Self:
+        """Return a curve of the stack, or some as a stack; the index is one for NumPy's arrays.
+
+        Raises
+        ------
+        IndexError
+            If there is no such curve, or no stack.
+
+        Examples
+        --------
+        >>> from rbcourse import exp_so3
+        >>> c = geodesic_so3(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]))
+        >>> c[1](0, 1).round(12), c[:1].batch_shape
+        (array([0. , 0. , 1.5]), (1,))
+        """
+        if not self.batch_shape:
+            raise IndexError("a single curve is no stack, and has no index")
+        numbers = np.arange(math.prod(self.batch_shape)).reshape(self.batch_shape)
+        return self._pick(np.asarray(numbers[index]))
 
     def _evaluate(self, t: Array, order: int) -> Array:
         raise NotImplementedError
+
+    def _pick(self, chosen: Chosen) -> Self:
+        """Return the stack of the curves with these numbers, which count through the stack."""
+        raise NotImplementedError
+
+    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        """Write curve which[i] of the stack at t[i] into out[i]; `which` ascends."""
+        out[...] = self._pick(which)._evaluate(t, order)
 
 
 class BlockwiseCurve(Curve):
@@ -91,7 +129,7 @@ class BlockwiseCurve(Curve):
         shape = np.broadcast_shapes(t.shape, self.batch_shape) + ((3,) if order else (3, 3))
         times = t.reshape(math.prod(t.shape[:free]), *t.shape[free:])
         values = np.empty((len(times), *shape[free:]))
-        rows = max(1, _BLOCK // max(1, math.prod(self.batch_shape)))
+        rows = max(1, BLOCK // max(1, math.prod(self.batch_shape)))
         for block in blocks(len(times), rows):
             values[block] = self._block(times[block], order)
         return values.reshape(shape)
@@ -147,33 +185,44 @@ class AlongGeodesic(Curve):
         self.batch_shape = rotation_vector.shape[:-1]
         self._angle = np.linalg.norm(rotation_vector, axis=-1)
 
-    def _progress(self, t: Array, order: int) -> Array:
+    def _progress(self, t: Array, order: int, angle: Array) -> Array:
         return identity(t, order)
 
+    def _pick(self, chosen: Chosen) -> Self:
+        picked = copy(self)
+        picked.__dict__.pop("_terms", None)
+        picked.R0 = pick(self.R0, chosen, self.batch_shape, core=2)
+        picked.rotation_vector = pick(self.rotation_vector, chosen, self.batch_shape, core=1)
+        picked._angle = pick(self._angle, chosen, self.batch_shape)
+        picked.batch_shape = chosen.shape
+        return picked
+
+    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        angle = self._angle[which]
+        progress = self._progress(t, order, angle)
+        if order:
+            np.multiply(progress[:, None], self.rotation_vector[which], out=out)
+            return
+        shares, R = np.ones((3, len(t))), out.reshape(-1, 9)
+        _write_shares(progress, angle, shares)
+        for curve, run in runs(which):
+            np.matmul(shares[:, run].T, self._terms[:, curve].reshape(3, 9), out=R[run])
+
     def _evaluate(self, t: Array, order: int) -> Array:
-        progress = self._progress(t, order)
+        progress = self._progress(t, order, self._angle)
         if order:
             return progress[..., None] * self.rotation_vector
         if self.batch_shape:
             shares = np.ones((3, *np.broadcast_shapes(t.shape, self.batch_shape)))
-            self._write_shares(progress, shares)
+            _write_shares(progress, self._angle, shares)
             return np.einsum("k...,k...ij->...ij", shares, self._terms)
-        shares, terms = np.ones((3, min(t.size, _BLOCK))), self._terms.reshape(3, 9)
+        shares, terms = np.ones((3, min(t.size, BLOCK))), self._terms.reshape(3, 9)
         R, progress = np.empty((t.size, 9)), progress.reshape(-1)
-        for block in blocks(t.size, _BLOCK):
+        for block in blocks(t.size, BLOCK):
             part = shares[:, : block.stop - block.start]
-            self._write_shares(progress[block], part)
+            _write_shares(progress[block], self._angle, part)
             np.matmul(part.T, terms, out=R[block])
         return R.reshape(*t.shape, 3, 3)
-
-    def _write_shares(self, progress: Array, shares: Array) -> None:
-        """Write sin a and 1 − cos a beside the 1, a the angle, by tan(a/2): NumPy's fastest way."""
-        _, sine, versine = shares
-        tangent = np.tan(progress * (self._angle / 2), out=versine)
-        np.multiply(tangent, tangent, out=sine)
-        sine += 1
-        np.divide(2 * tangent, sine, out=sine)
-        versine *= sine
 
     @cached_property
     def _terms(self) -> Array:
@@ -181,6 +230,16 @@ class AlongGeodesic(Curve):
         axis = self.rotation_vector / np.where(self._angle == 0, 1.0, self._angle)[..., None]
         turn = self.R0 @ hat_so3(axis)
         return np.stack(np.broadcast_arrays(self.R0, turn, turn @ hat_so3(axis)))
+
+
+def _write_shares(progress: Array, angle: Array, shares: Array) -> None:
+    """Write sin a and 1 − cos a beside the 1, a so much of the angle, by tan(a/2): fastest."""
+    _, sine, versine = shares
+    tangent = np.tan(progress * (angle / 2), out=versine)
+    np.multiply(tangent, tangent, out=sine)
+    sine += 1
+    np.divide(2 * tangent, sine, out=sine)
+    versine *= sine
 
 
 def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
@@ -236,6 +295,28 @@ def start_and_rotation_vector(R0: ArrayLike, R1: ArrayLike) -> tuple[Array, Arra
     R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
     check_broadcast(R0=(R0, 2), R1=(R1, 2))
     return R0, log_so3(np.swapaxes(R0, -1, -2) @ R1)
+
+
+def pick(
+    array: NDArray[Any], chosen: Chosen, batch_shape: tuple[int, ...], core: int = 0, lead: int = 0
+) -> NDArray[Any]:
+    """Return what belongs to the chosen curves; the batch axes are behind `lead`, before `core`.
+
+    The numbers count through the shape of the batch, to which that of the array broadcasts.
+    """
+    own = array.shape[lead : array.ndim - core]
+    if own != batch_shape:
+        numbers = np.arange(math.prod(own)).reshape(own)
+        chosen = np.broadcast_to(numbers, batch_shape).reshape(-1)[chosen]
+    flat = array.reshape(*array.shape[:lead], math.prod(own), *array.shape[array.ndim - core :])
+    return np.take(flat, chosen, axis=lead)
+
+
+def runs(which: Chosen) -> Iterator[tuple[int, slice]]:
+    """Yield each curve of an ascending list, and where it stands there."""
+    cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist(), len(which)]
+    for start, end in pairwise(cuts):
+        yield int(which[start]), slice(start, end)
 
 
 def identity(t: Array, order: int) -> Array:

@@ -1,10 +1,13 @@
 """Motions of a rigid body: a rotation curve and a path of the origin, each on its own."""
 
+import math
+from typing import Self
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array, as_finite, check_broadcast
-from rbcourse.curves import Curve, geodesic_so3
+from rbcourse.curves import Chosen, Curve, geodesic_so3, pick
 from rbcourse.polynomials import cubic_coefficients, polynomial
 from rbcourse.projected import ProjectedPolynomial, projected_cubic_so3
 
@@ -29,16 +32,38 @@ class RigidMotion(Curve):
         self.coefficients = coefficients
         self.batch_shape = np.broadcast_shapes(rotation.batch_shape, coefficients.shape[1:-1])
 
+    def _pick(self, chosen: Chosen) -> Self:
+        of_rotation = self._of_rotation(chosen)
+        path = pick(self.coefficients, chosen, self.batch_shape, core=1, lead=1)
+        return type(self)(self.rotation._pick(of_rotation), path)
+
+    def _of_rotation(self, chosen: Chosen) -> Chosen:
+        """Return the numbers of the rotations of the chosen motions."""
+        own = self.rotation.batch_shape
+        return pick(np.arange(math.prod(own)).reshape(own), chosen, self.batch_shape)
+
     def _evaluate(self, t: Array, order: int) -> Array:
-        R = self.rotation._evaluate(t, 0)
-        d = polynomial(self.coefficients, t[..., None], order)
-        if order == 0:
-            A = np.zeros((*np.broadcast_shapes(R.shape[:-2], d.shape[:-1]), 4, 4))
-            A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
-            return A
+        rotation = [self.rotation._evaluate(t, k) for k in sorted({0, order})]
+        return _joined(rotation, polynomial(self.coefficients, t[..., None], order))
+
+    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        rotation = [np.empty((len(t), *((3,) if k else (3, 3)))) for k in sorted({0, order})]
+        for k, values in zip(sorted({0, order}), rotation, strict=True):
+            self.rotation._write_each(t, self._of_rotation(which), k, values)
+        path = pick(self.coefficients, which, self.batch_shape, core=1, lead=1)
+        out[...] = _joined(rotation, polynomial(path, t[..., None], order))
+
+
+def _joined(rotation: list[Array], d: Array) -> Array:
+    """Return poses from R and d; or twists, or accelerations, from R, that of R, and that of d."""
+    R, *turning = rotation
+    batch = np.broadcast_shapes(R.shape[:-2], d.shape[:-1])
+    if turning:
         in_body = (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
-        turning = np.broadcast_to(self.rotation._evaluate(t, order), in_body.shape)
-        return np.concatenate([turning, in_body], axis=-1)
+        return np.concatenate([np.broadcast_to(turning[0], (*batch, 3)), in_body], axis=-1)
+    A = np.zeros((*batch, 4, 4))
+    A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
+    return A
 
 
 class ProjectedMotion(RigidMotion):

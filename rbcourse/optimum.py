@@ -3,13 +3,13 @@
 import warnings
 from collections.abc import Callable
 from functools import cache, cached_property, lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import Array, as_finite, check_broadcast
-from rbcourse.curves import Curve
+from rbcourse.curves import Chosen, Curve, runs
 from rbcourse.projection import nearest
 from rbcourse.quaternion_curves import other_way
 from rbcourse.so3 import BASIS_SO3, exp_so3, log_so3
@@ -155,7 +155,7 @@ class MinimumAcceleration(Curve):
     def __init__(
         self, ends: Ends, solutions: list[Solution | Failure], batch_shape: tuple[int, ...]
     ) -> None:
-        self.ends, self.batch_shape = ends, batch_shape
+        self.ends, self.batch_shape, self._solutions = ends, batch_shape, solutions
         found = {i: s for i, s in enumerate(solutions) if isinstance(s, Solution)}
         nodes, c = np.zeros(len(solutions), int), np.full((len(solutions), 3), np.nan)
         for i, solution in found.items():
@@ -191,12 +191,38 @@ class MinimumAcceleration(Curve):
         c = self.c.reshape(-1, 3)
         return [_rates(self.ends.of(i), in_body(R, c[i])) for i, R in self._parts]
 
+    def _pick(self, chosen: Chosen) -> Self:
+        numbers = chosen.reshape(-1)
+        solutions = [self._solutions[i] for i in numbers]
+        return type(self)(self.ends.of(numbers), solutions, chosen.shape)
+
+    @cached_property
+    def _places(self) -> dict[int, tuple[int, int]]:
+        """For each problem that is solved the number of its part, and its place there."""
+        indices = enumerate(index for index, _ in self._parts)
+        return {int(i): (part, place) for part, index in indices for place, i in enumerate(index)}
+
+    def _series(self, order: int) -> list[Array]:
+        """Return the Chebyshev series of R, w or w', for each number of nodes."""
+        return [part[order - 1] for part in self._velocities] if order else self._rotations
+
+    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        parts = self._series(order)
+        out[...] = np.nan
+        for curve, run in runs(which):
+            if curve in self._places:
+                part, place = self._places[curve]
+                series = parts[part][place]
+                value = chebyshev(t[run], len(series)) @ series.reshape(len(series), -1)
+                out[run] = value.reshape(-1, *out.shape[1:])
+        if order == 0:
+            out[...] = orthogonal(out)
+
     def _evaluate(self, t: Array, order: int) -> Array:
         core = (3,) if order else (3, 3)
         times = t.reshape(-1)
         values = np.full((len(times), len(self.ends.w0), *core), np.nan)
-        parts = [part[order - 1] for part in self._velocities] if order else self._rotations
-        for (index, _), part in zip(self._parts, parts, strict=True):
+        for (index, _), part in zip(self._parts, self._series(order), strict=True):
             series = part.swapaxes(0, 1)
             value = chebyshev(times, len(series)) @ series.reshape(len(series), -1)
             values[:, index] = value.reshape(len(times), len(index), *core)

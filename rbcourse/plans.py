@@ -122,7 +122,7 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     commands = as_plan(plan, "n")  # how many joints there are, the first of them tells
     names = _names(kind, VELOCITIES, commands[0][0].size if commands else 0)
     rows = [[*velocity, duration] for velocity, duration in as_plan(commands, len(names))]
-    _write(file, [*names, DURATION], rows)
+    write_csv(file, [*names, DURATION], rows)
 
 
 def load_plan(file: str | Path, kind: str) -> Commands:
@@ -187,7 +187,7 @@ def save_path(file: str | Path, path: ArrayLike, kind: str) -> None:
     """
     states = as_path(path)
     names = _names(kind, STATES, states.shape[1])
-    _write(file, names, as_single("path", states, "states", len(names)).tolist())
+    write_csv(file, names, as_single("path", states, "states", len(names)).tolist())
 
 
 def load_path(file: str | Path, kind: str) -> Array:
@@ -254,19 +254,11 @@ def _names(kind: str, columns: dict[str, list[str]], joints: int) -> list[str]:
     return columns[kind]
 
 
-def _write(file: str | Path, names: list[str], rows: list[list[float]]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([float(x) for x in row] for row in rows)
-    Path(file).write_text(text.getvalue(), encoding="utf-8", newline="\n")
-
-
 def _read(
     file: str | Path, kind: str, columns: dict[str, list[str]], *last: str
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield the place and the numbers of each line below the first, which has to fit the kind."""
-    lines = _lines(file)
+    lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
     names = [*_names(kind, columns, len(header) - len(last)), *last]
     if header != names or not header:
@@ -275,26 +267,47 @@ def _read(
     for place, row in lines:
         if len(row) != len(names):
             raise ValueError(f"{place}: numbers wanted: {len(names)}, got: {len(row)}")
-        yield place, [_number(f"{place}, {name}", x) for name, x in zip(names, row, strict=True)]
+        yield place, [to_number(f"{place}, {name}", x) for name, x in zip(names, row, strict=True)]
 
 
-def _lines(file: str | Path) -> Iterator[tuple[str, list[str]]]:
-    """Yield the place and the cells of each line of a CSV file; blank lines at its end are none."""
+def csv_lines(file: str | Path) -> Iterator[tuple[str, list[str]]]:
+    """Yield the place and the cells of each line of a CSV file."""
+    for place, line in text_lines(file):
+        try:
+            row = next(csv.reader([line], strict=True), [])
+        except csv.Error as error:
+            raise ValueError(f"{place}: {error}") from error
+        yield place, [cell.strip(" \t") for cell in row]
+
+
+def text_lines(file: str | Path) -> Iterator[tuple[str, str]]:
+    """Yield the place and the text of each line of a file; blank lines at its end are none."""
     content = Path(file).read_bytes()
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = len(re.split(rb"\r\n|\n|\r", content[: error.start]))
         raise ValueError(f"{file}, line {line}: no text in UTF-8") from error
-    for line, cells in enumerate(re.split("\r\n|\n|\r", text.rstrip(" \t\r\n")), start=1):
-        try:
-            row = next(csv.reader([cells], strict=True), [])
-        except csv.Error as error:
-            raise ValueError(f"{file}, line {line}: {error}") from error
-        yield f"{file}, line {line}", [cell.strip(" \t") for cell in row]
+    lines = re.split("\r\n|\n|\r", text.rstrip(" \t\r\n"))
+    yield from ((f"{file}, line {number}", line) for number, line in enumerate(lines, start=1))
 
 
-def _number(place: str, cell: str) -> float:
+def write_csv(file: str | Path, names: list[str], rows: Iterable[Iterable[float]]) -> None:
+    """Write a line of names, then a line for each row, with all digits that numbers need."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([float(x) for x in row] for row in rows)
+    write_text(file, text.getvalue())
+
+
+def write_text(file: str | Path, text: str) -> None:
+    """Write a text file, the same on every system."""
+    Path(file).write_text(text, encoding="utf-8", newline="\n")
+
+
+def to_number(place: str, cell: str) -> float:
+    """Return a finite number, or raise a ValueError that says where there is none."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
         raise ValueError(f"{place}: a finite number wanted, got {cell[:40]!r}")

@@ -3,7 +3,8 @@
 import math
 import warnings
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +13,12 @@ from rbcourse._numerics import EPS, Array, as_angle, as_finite, as_time, check_b
 from rbcourse.curves import (
     AlongGeodesic,
     BlockwiseCurve,
+    Chosen,
     check_times,
     identity,
     least_over_time,
+    pick,
+    runs,
     start_and_rotation_vector,
     which_curve,
 )
@@ -53,6 +57,23 @@ class ProjectedLine(AlongGeodesic):
         if np.any(np.abs(start) > 1e-12) or np.any(np.abs(end - 1) > 1e-12):
             raise ValueError(f"f: f(0) = 0 and f(1) = 1 are wanted, got {start} and {end}")
 
+    def _pick(self, chosen: Chosen) -> Self:
+        picked = super()._pick(chosen)
+        picked.margin = pick(self.margin, chosen, self.batch_shape)
+        if self._f is not identity:
+            picked._f = partial(self._line_of, chosen)
+        return picked
+
+    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        for curve, run in runs(which):
+            out[run] = self[curve]._evaluate(t[run], order)
+
+    def _line_of(self, chosen: Chosen, t: Array, order: int) -> Array:
+        """Return f for the chosen curves; the times have an axis of length 1 for each of theirs."""
+        times = t.shape[: t.ndim - chosen.ndim]
+        values = self._line(t.reshape(times + (1,) * len(self.batch_shape)), order)
+        return pick(values, chosen, self.batch_shape, lead=len(times))
+
     def _line(self, t: Array, order: int) -> Array:
         name, shape = f"f(t, {order})", np.broadcast_shapes(t.shape, self.batch_shape)
         value = as_finite(name, self._f(t.copy(), order))
@@ -61,8 +82,8 @@ class ProjectedLine(AlongGeodesic):
         except ValueError as error:
             raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
 
-    def _progress(self, t: Array, order: int) -> Array:
-        on_line, angle = self._line(t, 0), self._angle
+    def _progress(self, t: Array, order: int, angle: Array) -> Array:
+        on_line = self._line(t, 0)
         lost = line_singular_value(on_line, angle) < 8 * EPS
         check_times(t, lost, len(self.batch_shape), _WHY)
         if order == 0:
@@ -95,6 +116,20 @@ class ProjectedPolynomial(BlockwiseCurve):
         self.coefficients = coefficients
         self.batch_shape = coefficients.shape[1:-2]
 
+    def _pick(self, chosen: Chosen) -> Self:
+        return type(self)(pick(self.coefficients, chosen, self.batch_shape, core=2, lead=1))
+
+    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        """Work M out curve by curve, as matrices times powers of t, and project all of it."""
+        degree, M = len(self.coefficients) - 1, np.empty((order + 1, 9, len(t)))
+        units = np.eye(degree + 1)[:, :, None]
+        powers = [polynomial(units, t, k) for k in range(order + 1)]
+        for curve, run in runs(which):
+            matrix = self.coefficients[:, curve].reshape(degree + 1, 9).T
+            for k in range(order + 1):
+                np.matmul(matrix, powers[k][:, run], out=M[k][:, run])
+        out[...] = self._projected(list(M.reshape(-1, 3, 3, len(t))), t, order)
+
     def _ambient(self, t: Array) -> Array:
         return polynomial(self.coefficients, t[..., None, None])
 
@@ -102,6 +137,10 @@ class ProjectedPolynomial(BlockwiseCurve):
         """Return what `_evaluate` does, with each component of all of it together in the memory."""
         entries = np.ascontiguousarray(np.moveaxis(self.coefficients, (-2, -1), (1, 2)))
         M = [polynomial(entries[:, :, :, None], t, k) for k in range(order + 1)]
+        return self._projected(M, t, order)
+
+    def _projected(self, M: list[Array], t: Array, order: int) -> Array:
+        """Return R, w or w' of the projection of M, components first, with its derivatives."""
         R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
         if not unique.all():
             check_times(t, ~unique, len(self.batch_shape), _WHY)

@@ -6,14 +6,21 @@ the functions that make them.
 
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import EPS, Array, as_finite, check_broadcast
 from rbcourse.conversions import quaternion_from_matrix
-from rbcourse.curves import BlockwiseCurve, check_times, least_over_time, which_curve
+from rbcourse.curves import (
+    BlockwiseCurve,
+    Chosen,
+    check_times,
+    least_over_time,
+    pick,
+    which_curve,
+)
 from rbcourse.jets import Jet, angular_velocity, exp, multiply, product, rotation, slerp
 from rbcourse.polynomials import hermite
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
@@ -64,6 +71,15 @@ class QuaternionCurve(BlockwiseCurve):
     def __init__(self, given: Given) -> None:
         self.batch_shape = given.w0.shape[:-1]
         self._start = _components(quaternion_from_matrix(given.R0))
+        self._controls: list[Array] = []
+
+    def _pick(self, chosen: Chosen) -> Self:
+        picked = object.__new__(type(self))
+        picked.batch_shape = chosen.shape
+        picked._start, *picked._controls = (
+            pick(x, chosen, self.batch_shape, lead=2) for x in [self._start, *self._controls]
+        )
+        return picked
 
     def _quaternion(self, t: Array, order: int) -> Jet:
         raise NotImplementedError
@@ -82,10 +98,10 @@ class ExponentialCubic(QuaternionCurve):
         super().__init__(given)
         end_rate = (right_jacobian_inverse_so3(turn) @ given.w1[..., None])[..., 0]
         vectors = np.zeros_like(turn), turn, given.w0, end_rate
-        self._halves = [_components(x / 2) for x in vectors]
+        self._controls = [_components(x / 2) for x in vectors]
 
     def _quaternion(self, t: Array, order: int) -> Jet:
-        return exp(_cubic(self._halves, t, order))
+        return exp(_cubic(self._controls, t, order))
 
 
 class CumulativeBezier(QuaternionCurve):
@@ -93,7 +109,7 @@ class CumulativeBezier(QuaternionCurve):
 
     def __init__(self, given: Given, legs: Legs) -> None:
         super().__init__(given)
-        self._halves = [_components(leg / 2) for leg in legs]
+        self._controls = [_components(leg / 2) for leg in legs]
 
     def _quaternion(self, t: Array, order: int) -> Jet:
         s = 1 - t
@@ -104,7 +120,7 @@ class CumulativeBezier(QuaternionCurve):
         ]
         first, second, third = (
             exp([beta * half for beta in share[: order + 1]])
-            for share, half in zip(shares, self._halves, strict=True)
+            for share, half in zip(shares, self._controls, strict=True)
         )
         return product(product(first, second), third)
 
@@ -118,11 +134,11 @@ class Bezier(QuaternionCurve):
             exp([_components(leg / 2)])[0] for leg in (np.zeros_like(given.w0), *legs)
         )
         last = multiply(multiply(first, second), third)
-        self._points = start, first, multiply(first, second), last
+        self._controls = [start, first, multiply(first, second), last]
 
     def _quaternion(self, t: Array, order: int) -> Jet:
         share = [t, np.ones_like(t), np.zeros_like(t)][: order + 1]
-        points = [[point, *[np.zeros_like(point)] * order] for point in self._points]
+        points = [[point, *[np.zeros_like(point)] * order] for point in self._controls]
         while len(points) > 1:
             points = [slerp(a, b, share) for a, b in pairwise(points)]
         return points[0]
@@ -142,10 +158,10 @@ class NormalizedCubic(QuaternionCurve):
         start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
         end_rate = growth[..., None] * one + _rate(one, given.w1)
         ends = start, norm[..., None] * one, _rate(start, given.w0), norm[..., None] * end_rate
-        self._vectors = [_components(x) for x in ends]
+        self._controls = [_components(x) for x in ends]
 
     def _quaternion(self, t: Array, order: int) -> Jet:
-        return _cubic(self._vectors, t, order)
+        return _cubic(self._controls, t, order)
 
 
 class QuaternionCubic(NormalizedCubic):
@@ -171,7 +187,7 @@ class QuaternionCubic(NormalizedCubic):
 
     @cached_property
     def _scale(self) -> Array:
-        return np.abs(self._vectors).max(axis=(0, 1))
+        return np.abs(self._controls).max(axis=(0, 1))
 
     @property
     def margin(self) -> Array:
@@ -186,7 +202,7 @@ class QuaternionCubic(NormalizedCubic):
     @cached_property
     def _least(self) -> tuple[Array, Array]:
         def norm(t: Array) -> Array:
-            return np.linalg.norm(_cubic(self._vectors, t, 0)[0], axis=0)
+            return np.linalg.norm(_cubic(self._controls, t, 0)[0], axis=0)
 
         return least_over_time(norm, self.batch_shape)
 
@@ -215,7 +231,7 @@ class CayleyCubic(NormalizedCubic):
         """When it turns most quickly, and about how long it takes for a radian then."""
 
         def time_for_a_radian(t: Array) -> Array:
-            Q, rate = (np.linalg.norm(x, axis=0) for x in _cubic(self._vectors, t, 1))
+            Q, rate = (np.linalg.norm(x, axis=0) for x in _cubic(self._controls, t, 1))
             return Q / (1 + rate)
 
         return least_over_time(time_for_a_radian, self.batch_shape)

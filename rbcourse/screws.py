@@ -1,12 +1,12 @@
 """Screws: what every displacement is (Chasles), and the motion about one axis at one pitch."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import EPS, Array, as_finite, as_unit, check_broadcast
-from rbcourse.curves import Curve
+from rbcourse.curves import Chosen, Curve, pick
 from rbcourse.se3 import exp_se3, inverse_se3, log_se3, pose_from_components
 
 
@@ -111,6 +111,10 @@ class ScrewMotion(Curve):
         self.A0 = A0
         self.twist = twist
         self.batch_shape = twist.shape[:-1]
+
+    def _pick(self, chosen: Chosen) -> Self:
+        A0 = pick(self.A0, chosen, self.batch_shape, core=2)
+        return type(self)(A0, pick(self.twist, chosen, self.batch_shape, core=1))
 
     def _evaluate(self, t: Array, order: int) -> Array:
         moved = t[..., None] * self.twist

@@ -1,0 +1,458 @@
+"""Curves of any duration, and curves through many poses."""
+
+import math
+from collections.abc import Callable
+from inspect import Parameter, signature
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._numerics import Array, as_single, blocks, check_order
+from rbcourse.curves import BLOCK, Chosen, Curve, runs
+from rbcourse.motions import RigidMotion, projected_cubic_se3
+from rbcourse.polynomials import cubic_coefficients, quintic_coefficients
+from rbcourse.projected import projected_cubic_so3
+from rbcourse.so3 import log_so3, right_jacobian_so3
+from rbcourse.trajectories import as_samples
+
+Leg = Callable[..., Curve]
+
+_HALF_TURN = math.pi - 1e-6
+_EQUAL = 1e-12
+_ARRIVED = 1e-6
+
+
+class Retimed(Curve):
+    """A `Curve` that runs through another one evenly, in another time.
+
+    Attributes
+    ----------
+    curve : Curve
+        The other one.
+    rate : float
+        How much of its time passes in a unit of time.
+    """
+
+    def __init__(self, curve: Curve, domain: tuple[float, float]) -> None:
+        self.curve, self.domain, self.batch_shape = curve, domain, curve.batch_shape
+        (start, end), (first, last) = domain, curve.domain
+        self.rate = (last - first) / (end - start)
+
+    def _pick(self, chosen: Chosen) -> Self:
+        return type(self)(self.curve._pick(chosen), self.domain)
+
+    def _evaluate(self, t: Array, order: int) -> Array:
+        (start, end), (first, last) = self.domain, self.curve.domain
+        share = (t - start) / (end - start)
+        values = self.curve._evaluate(np.minimum(first + share * (last - first), last), order)
+        return values * self.rate**order if order else values
+
+
+def retime(curve: Curve, duration: float) -> Retimed:
+    """Return the same curve run through evenly in another time, from the same start on.
+
+    Parameters
+    ----------
+    curve : Curve
+        Or a stack of them.
+    duration : float
+        How long it is to take, in s or what else you measure time in; more than 0.
+
+    Returns
+    -------
+    Retimed
+        A `Curve` on [a, a + duration], a the first time of `curve`, which is 0 but for a `chain`.
+        Velocities and accelerations are per unit of the new time: over k and k² for k times the
+        duration. `acceleration_cost` falls by k³.
+
+    Raises
+    ------
+    ValueError
+        If `curve` is no `Curve`, or `duration` no number above 0.
+
+    See Also
+    --------
+    chain : Through many poses, at times of your own.
+
+    Notes
+    -----
+    To arrive with the angular velocity w after T seconds, make a curve with the end velocity T w,
+    and then let it take T.
+
+    References
+    ----------
+    BK 6.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, geodesic_so3
+    >>> c = retime(geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5])), 3)
+    >>> c.domain, c(3, 1).round(12)
+    ((0.0, 3.0), array([0. , 0. , 0.5]))
+    """
+    if not isinstance(curve, Curve):
+        raise ValueError(f"curve: a Curve wanted, got {curve!r}")
+    time, (start, _) = float(as_single("duration", duration)), curve.domain
+    if not start + time > start:
+        raise ValueError(f"duration is {time}, a time above 0 is wanted")
+    return Retimed(curve, (start, start + time))
+
+
+class Chain(Curve):
+    """A `Curve` of legs, each from one pose to the next.
+
+    At an inner time the later leg counts.
+
+    Attributes
+    ----------
+    times : ndarray, shape (N,)
+        When it is at each pose.
+    velocities : ndarray, shape (N, 3) or (N, 6), or None
+        What it was told to have there, body frame; None where the legs ask for none.
+    legs : Curve
+        The stack of the N − 1 legs, each on [0, 1].
+    durations : ndarray, shape (N − 1,)
+        How long each takes.
+    """
+
+    batch_shape = ()
+
+    def __init__(self, times: Array, legs: Curve, velocities: Array | None) -> None:
+        self.times, self.legs, self.velocities = times, legs, velocities
+        self.domain = float(times[0]), float(times[-1])
+        self.durations = np.diff(times)
+        matrix = legs[0](0.0).shape
+        rates = (3,) if matrix == (3, 3) else (6,)
+        self._cores = matrix, rates, rates
+
+    def jumps(self, order: int) -> Array:
+        """Return what the inner poses change in the curve or a derivative: after, minus before.
+
+        Parameters
+        ----------
+        order : {0, 1, 2}
+
+        Returns
+        -------
+        ndarray, shape (N − 2, …)
+
+        Raises
+        ------
+        ValueError
+            If `order` is another.
+
+        Examples
+        --------
+        >>> from rbcourse import exp_so3, geodesic_so3
+        >>> R = exp_so3([[0, 0, 0], [0, 0, 1], [0, 0, 3]])
+        >>> chain([0, 1, 2], R, leg=geodesic_so3).jumps(1).round(12)
+        array([[0., 0., 1.]])
+        """
+        starts, ends = self.legs([0.0, 1.0], check_order(order))
+        if order:
+            starts, ends = (x / self.durations[:, None] ** order for x in (starts, ends))
+        return starts[1:] - ends[:-1]
+
+    def _evaluate(self, t: Array, order: int) -> Array:
+        times = t.reshape(-1)
+        values = np.empty((len(times), *self._cores[order]))
+        for block in blocks(len(times), BLOCK):
+            part = times[block]
+            if np.all(part[1:] >= part[:-1]):
+                self._write(part, order, values[block])
+            else:
+                in_order, ordered = np.argsort(part), np.empty_like(values[block])
+                self._write(part[in_order], order, ordered)
+                values[block][in_order] = ordered
+        return values.reshape(*t.shape, *self._cores[order])
+
+    def _write(self, times: Array, order: int, out: Array) -> None:
+        """Write the values at ascending times."""
+        first, last = np.searchsorted(self.times[1:-1], times[[0, -1]], side="right")
+        starts = np.searchsorted(times, self.times[first + 1 : last + 1])
+        counts = np.diff([0, *starts.tolist(), len(times)])
+        which = np.repeat(np.arange(first, last + 1), counts)
+        durations = self.durations[which]
+        share = (times - self.times[which]) / durations
+        try:
+            self.legs._write_each(share, which, order, out)
+        except ValueError:
+            for leg, run in runs(which):
+                self._check_leg(leg, share[run], order)
+            raise
+        if order:
+            out /= durations[:, None] ** order
+
+    def _check_leg(self, leg: int, share: Array, order: int) -> None:
+        """Raise the ValueError of a leg, with the times between which it is."""
+        try:
+            self.legs[leg](share, order)
+        except ValueError as error:
+            between = f"{self.times[leg]} and {self.times[leg + 1]}"
+            raise ValueError(f"leg {leg}, between the times {between}, at its {error}") from error
+
+
+def chain(
+    times: ArrayLike,
+    poses: ArrayLike,
+    velocities: ArrayLike | None = None,
+    *,
+    leg: Leg | None = None,
+) -> Chain:
+    """Return a curve that is at given poses at given times, joined by two-point curves.
+
+    Parameters
+    ----------
+    times : array_like, shape (N,)
+        Increasing; two or more.
+    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
+        Poses, or rotation matrices, one for each time.
+    velocities : array_like, shape (N, 6) or (N, 3), optional
+        Twists (ω, v), or angular velocities ω, body frame, per unit of the times: what the curve
+        has at each pose. By default it starts and ends at rest, rests where a pose equals its
+        neighbour (to 1e-12), and has the `bessel_velocities` elsewhere.
+    leg : callable, optional
+        What joins two poses: any function of this package with the arguments (R0, R1) or (A0, A1),
+        and perhaps velocities and accelerations, or one of your own with these names; stacks of
+        them. One for rotations also joins poses: the origin then moves on the polynomial that has
+        the same ends. By default `projected_cubic_so3`, or `projected_cubic_se3`.
+
+    Returns
+    -------
+    Chain
+        A `Curve` on [times[0], times[-1]], with ``legs``, ``velocities`` and ``jumps``.
+
+    Raises
+    ------
+    ValueError
+        If times do not increase; if a matrix is no pose or no rotation; if neighbours are a
+        half-turn apart, to 1e-6; if the numbers do not agree; if `velocities` are given to legs
+        that ask for none; if `leg` asks for other arguments, or does not lead to the next pose. The
+        message names the first place. And what `leg` raises.
+
+    Warns
+    -----
+    RuntimeWarning
+        Where `leg` does.
+
+    See Also
+    --------
+    bessel_velocities : The velocities that are chosen, those of the ends among them.
+    read_path : Times, poses and velocities from a file.
+
+    Notes
+    -----
+    What the joints have, to a few eps of the scale:
+
+    ==========================================================  ==================================
+    `geodesic_so3`, `geodesic_se3`, `screw_se3`,                C⁰: the velocity jumps
+    `projected_line_so3`
+    all that ask for velocities: projected and other cubics,    C¹: the acceleration jumps
+    Bézier's curves, minimum acceleration
+    `projected_quintic_so3`                                     C²
+    ==========================================================  ==================================
+
+    The accelerations that the quintic asks for are those of the parabolas of `bessel_velocities`;
+    0 at both ends and where it rests.
+
+    Singular set: that of the legs; half-turns between neighbours are refused, as they leave open
+    which way to turn. Where a leg is to turn by more than that, put a pose between.
+
+    References
+    ----------
+    BK 6, BK 6.3.
+
+    Examples
+    --------
+    >>> from rbcourse import pose_from_coordinates
+    >>> poses = pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0], [0, 0, 2, 2, 2, 0]])
+    >>> c = chain([0, 2, 3], poses)
+    >>> c(2)[:3, 3].round(12), c([0, 2, 3], 1)[:, 2].round(3) + 0.0
+    (array([2., 0., 0.]), array([0.   , 0.833, 0.   ]))
+    """
+    times, poses, velocities = _as_path(times, poses, velocities)
+    moves = poses.shape[-1] == 4
+    if leg is None:
+        leg = projected_cubic_se3 if moves else projected_cubic_so3
+    wanted = _arguments(leg)
+    if velocities is not None and "w0" not in wanted:
+        raise ValueError("velocities: the legs ask for none")
+    w, d_dot, a, d_bend = _parabolas(times, poses)
+    rests = _rests(poses)
+    for chosen in (w, d_dot, a, d_bend):
+        chosen[rests] = 0
+    if velocities is not None:
+        w, d_dot = velocities[:, :3], _rotated(poses, velocities[:, 3:])
+    elif "w0" in wanted:
+        velocities = _twists(poses, w, d_dot)
+    h = np.diff(times)[:, None]
+    ends = _ends("R{}", poses[:, :3, :3]) | _ends("w{}", w, h) | _ends("a{}", a, h**2)
+    if moves:
+        ends |= _ends("A{}", poses) | _ends("d{}_dot", d_dot, h)
+    unknown = [name for name in wanted if name not in ends]
+    if unknown:
+        raise ValueError(f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}")
+    legs = leg(**{name: ends[name] for name in wanted})
+    if moves and "A0" not in wanted:
+        path = _ends("d{}", poses[:, :3, 3]) | _ends("v{}", d_dot, h) | _ends("a{}", d_bend, h**2)
+        legs = RigidMotion(legs, _coefficients(wanted, *path.values()))
+    _check_arrival(legs, poses)
+    return Chain(times, legs, velocities)
+
+
+def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
+    """Return velocities for a path: at each pose that of the parabola through three neighbours.
+
+    Parameters
+    ----------
+    times : array_like, shape (N,)
+        Increasing; two or more.
+    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
+        Poses, or rotation matrices, one for each time.
+
+    Returns
+    -------
+    ndarray, shape (N, 6) or (N, 3)
+        Twists (ω, v), or angular velocities ω, body frame, per unit of the times.
+
+    Raises
+    ------
+    ValueError
+        If times do not increase, a matrix is no pose or no rotation, or neighbours are a half-turn
+        apart, to 1e-6.
+
+    See Also
+    --------
+    chain : The curve; it takes these velocities but at its ends, where it rests.
+
+    Notes
+    -----
+    Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV); for even times, that of
+    Catmull and Rom. The parabola of the origin is one in R³; that of the rotation is one in the
+    exponential coordinates about the pose in the middle, so that moved poses have moved velocities.
+    The first and the last pose have what the parabolas of their neighbours have there; two poses
+    alone have the constant velocity between them.
+
+    Singular set: half-turns between neighbours.
+
+    References
+    ----------
+    BK 6.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> t = np.array([0, 1, 3])
+    >>> bessel_velocities(t, exp_so3(t[:, None] ** 2 * [0, 0, 0.1])).round(12)  # 2 · 0.1 t
+    array([[0. , 0. , 0. ],
+           [0. , 0. , 0.2],
+           [0. , 0. , 0.6]])
+    """
+    times, poses, _ = _as_path(times, poses)
+    w, d_dot, *_ = _parabolas(times, poses)
+    return _twists(poses, w, d_dot)
+
+
+def _as_path(
+    times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
+) -> tuple[Array, Array, Array | None]:
+    """Return `as_samples`, of two poses or more, no neighbours a half-turn apart."""
+    times, poses, velocities = as_samples(times, poses, velocities)
+    if len(times) < 2:
+        raise ValueError("times, poses: two or more wanted, got 1")
+    far = np.linalg.norm(_turns(poses), axis=-1) > _HALF_TURN
+    if far.any():
+        i = np.argmax(far)
+        raise ValueError(
+            f"poses[{i}] and poses[{i + 1}] are a half-turn apart: put a pose between them, "
+            "to tell which way to turn"
+        )
+    return times, poses, velocities
+
+
+def _turns(poses: Array) -> Array:
+    """Return the rotation vectors from each pose to the next, body frame."""
+    R = poses[:, :3, :3]
+    return log_so3(R[:-1].mT @ R[1:])
+
+
+def _parabolas(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
+    """Return w and d', w' and d'' of the parabolas; d has no components for rotations."""
+    h, turns = np.diff(times)[:, None], _turns(poses)
+    d = poses[:, :3, 3:].reshape(len(poses), -1)
+    w, a = _parabola(h, turns / h)
+    for end, turn in ((0, -turns[0]), (-1, turns[-1])):
+        w[end] = right_jacobian_so3(turn) @ w[end]  # coordinates about the neighbour
+    d_dot, d_bend = _parabola(h, np.diff(d, axis=0) / h)
+    return w, d_dot, a, d_bend
+
+
+def _parabola(h: Array, slopes: Array) -> tuple[Array, Array]:
+    """Return the first and the second derivatives of the parabolas, from chords and their slopes.
+
+    At the ends they are those of the neighbours' parabolas; of one chord, a line.
+    """
+    bend = np.zeros((len(h) + 1, slopes.shape[1]))
+    if len(h) > 1:
+        bend[1:-1] = 2 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
+        bend[0], bend[-1] = bend[1], bend[-2]
+    first, others = slopes[:1] - h[:1] * bend[:1] / 2, slopes + h * bend[1:] / 2
+    return np.concatenate([first, others]), bend
+
+
+def _rests(poses: Array) -> NDArray[np.bool_]:
+    """Tell where a path rests, if it is not told to move: at its ends, and at equal neighbours."""
+    core = (-2, -1)
+    scale = np.maximum(1, np.abs(poses[1:]).max(axis=core))
+    same = np.abs(np.diff(poses, axis=0)).max(axis=core) <= _EQUAL * scale
+    return np.append(True, same) | np.append(same, True)
+
+
+def _rotated(poses: Array, v: Array) -> Array:
+    """Return vectors of body frames in the fixed frame."""
+    return (poses[:, :3, :3] @ v[..., None])[..., 0] if v.size else v
+
+
+def _twists(poses: Array, w: Array, d_dot: Array) -> Array:
+    """Return (w, Rᵀ d'), or w where nothing moves."""
+    return np.concatenate([w, _rotated(poses.mT, d_dot)], axis=-1)
+
+
+def _ends(name: str, values: Array, scale: float | Array = 1.0) -> dict[str, Array]:
+    """Return, by their names, what legs have at their starts and their ends."""
+    return {name.format(0): scale * values[:-1], name.format(1): scale * values[1:]}
+
+
+def _coefficients(
+    wanted: list[str], d0: Array, d1: Array, v0: Array, v1: Array, a0: Array, a1: Array
+) -> Array:
+    """Return the path of the origin that meets as many ends as the rotation does."""
+    if "a0" in wanted:
+        return quintic_coefficients(d0, d1, v0, v1, a0, a1)
+    if "w0" in wanted:
+        return cubic_coefficients(d0, d1, v0, v1)
+    return np.stack([d0, d1 - d0])
+
+
+def _arguments(leg: Leg) -> list[str]:
+    """Return the names of the arguments that a leg cannot do without."""
+    try:
+        parameters = signature(leg).parameters
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"leg: a function that makes curves wanted, got {leg!r}") from error
+    return [name for name, parameter in parameters.items() if parameter.default is Parameter.empty]
+
+
+def _check_arrival(legs: Curve, poses: Array) -> None:
+    """Raise a ValueError that names the first leg that is not at the poses of its ends."""
+    wanted = (len(poses) - 1,), (0, 1)
+    if not isinstance(legs, Curve) or (legs.batch_shape, legs.domain) != wanted:
+        raise ValueError(f"leg: a stack of {len(poses) - 1} curves on [0, 1] wanted, got {legs!r}")
+    values = legs([0.0, 1.0])
+    scale = np.maximum(1, np.abs(poses).max(axis=(-2, -1)))
+    off = np.abs(values - [poses[:-1], poses[1:]]).max(axis=(-2, -1)) / [scale[:-1], scale[1:]]
+    lost = ~(off <= _ARRIVED).all(axis=0)
+    if lost.any():
+        i = np.argmax(lost)
+        raise ValueError(f"leg: it does not lead from poses[{i}] to poses[{i + 1}]")
