@@ -80,10 +80,6 @@ def retime(curve: Curve, duration: float) -> Retimed:
     To arrive with the angular velocity w after T seconds, make a curve with the end velocity T w,
     and then let it take T.
 
-    References
-    ----------
-    BK 6.
-
     Examples
     --------
     >>> from rbcourse import exp_so3, geodesic_so3
@@ -335,10 +331,6 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     alone have the constant velocity between them.
 
     Singular set: half-turns between neighbours.
-
-    References
-    ----------
-    BK 6.
 
     Examples
     --------
