@@ -418,3 +418,105 @@ def test_the_least_over_time_is_found_wherever_it_is():
     assert least <= (np.cos(7 * t) - t).min()
     assert abs(least - (np.cos(7 * when) - when)) < 4 * EPS
     assert [x.shape for x in least_over_time(np.sin, (2, 0))] == [(2, 0), (2, 0)]
+
+
+STACKS = {
+    "geodesic": lambda R, w: rb.geodesic_so3(R[0], R[1]),
+    "line": lambda R, w: rb.projected_line_so3(R[0], R[1]),
+    "timed line": lambda R, w: rb.projected_line_so3(R[0], R[1], quick_for_each),
+    "projected": lambda R, w: rb.projected_cubic_so3(R[0], R[1], w[0], w[1]),
+    "quintic": lambda R, w: rb.projected_quintic_so3(R[0], R[1], w[0], w[1], w[1], w[0]),
+    "exponential": lambda R, w: rb.exponential_cubic_so3(R[0], R[1], w[0], w[1]),
+    "bezier": lambda R, w: rb.bezier_so3(R[0], R[1], w[0], w[1]),
+    "cumulative": lambda R, w: rb.cumulative_bezier_so3(R[0], R[1], w[0], w[1]),
+    "quaternion": lambda R, w: rb.quaternion_cubic_so3(R[0], R[1], w[0], w[1]),
+    "cayley": lambda R, w: rb.cayley_cubic_so3(R[0], R[1], w[0], w[1]),
+    "optimum": lambda R, w: rb.minimum_acceleration_so3(R[0], R[1], w[0], w[1]),
+    "screw": lambda R, w: rb.screw_se3(rb.pose_from_components(R[0], w[0]), np.eye(4)),
+    "motion": lambda R, w: rb.geodesic_se3(rb.pose_from_components(R[0, 0], w[0]), np.eye(4)),
+    "retimed": lambda R, w: rb.retime(rb.geodesic_so3(R[0], R[1]), 0.5),
+}
+
+
+def quick_for_each(t, order):
+    """Another reparameterisation for each of 2 × 3 curves: t^p, p from 1 to 6."""
+    p = np.arange(1, 7).reshape(2, 3)
+    factor = (1, p, p * (p - 1))[order]
+    return factor * t ** np.maximum(p - order, 0)
+
+
+@pytest.fixture(params=STACKS)
+def stack_of_six(request):
+    """A stack of shape (2, 3), and what it gives at some times."""
+    rng = np.random.default_rng(7)
+    R = Rotation.random(12, rng=rng).as_matrix().reshape(2, 2, 3, 3, 3)
+    stack = STACKS[request.param](R, rng.normal(size=(2, 2, 3, 3)))
+    times = np.linspace(*stack.domain, 5)
+    return stack, times, [stack(times, order) for order in range(3)]
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        (1, 2),
+        0,
+        (slice(None), -1),
+        ...,
+        np.array([[True, False, True], [False, False, True]]),
+        ([1, 0, 1], [2, 2, 0]),
+        np.s_[:0],
+        (None, 1, slice(1, None)),
+    ],
+    ids=repr,
+)
+def test_a_stack_is_indexed_as_an_array_is(stack_of_six, index):
+    stack, times, values = stack_of_six
+    picked = stack[index]
+    numbers = np.arange(6).reshape(2, 3)[index]
+    assert picked.batch_shape == numbers.shape
+    for order, value in enumerate(values):
+        want = value.reshape(5, 6, *value.shape[3:])[:, numbers]
+        assert picked(times, order).shape == want.shape
+        assert np.abs(picked(times, order) - want).max(initial=0) < 1e-12
+
+
+def test_what_a_stack_tells_of_its_curves_is_picked_too(stack_of_six):
+    stack, _, _ = stack_of_six
+    for name in ("margin", "margin_time", "converged", "nodes", "c", "rotation_vector", "twist"):
+        if hasattr(stack, name):
+            assert np.allclose(getattr(stack[1, ::2], name), getattr(stack, name)[1, ::2], 1e-12)
+
+
+def test_each_curve_of_a_list_at_its_own_time(stack_of_six):
+    """As a chain asks for it: in one list, ascending."""
+    stack, times, values = stack_of_six
+    which, when = np.array([0, 0, 1, 2, 2, 2]), np.array([3, 1, 4, 0, 2, 2])
+    for order, value in enumerate(values):
+        want = value[when, 1, which]
+        out = np.empty_like(want)
+        stack[1]._write_each(times[when], which, order, out)
+        assert np.abs(out - want).max() < 1e-12
+
+
+def test_a_stack_is_iterated_and_its_end_is_known():
+    stack = rb.geodesic_so3(STARTS[:3], GOALS[:3])
+    assert [c.batch_shape for c in stack] == [(), (), ()]
+    with pytest.raises(IndexError, match="index 3 is out of bounds"):
+        stack[3]
+    with pytest.raises(IndexError, match=r"^a single curve is no stack"):
+        stack[0][0]
+
+
+def test_what_failed_in_a_stack_stays_failed():
+    R = rb.exp_so3([[0, 0, 1], [1, 0, 0]])
+    w = np.array([[0, 0, 0], [90, 300.0, -500]])
+    with pytest.warns(RuntimeWarning):
+        stack = rb.minimum_acceleration_so3(np.eye(3), R, w, -w)
+    assert stack.converged.tolist() == [True, False]
+    assert stack[0].converged
+    assert not stack[1].converged
+    assert np.isnan(stack[1](0.5)).all()
+    out = np.empty((2, 3, 3))
+    stack._write_each(np.array([0.5, 0.5]), np.array([0, 1]), 0, out)
+    assert np.abs(out[0] - stack(0.5)[0]).max() < 1e-14
+    assert np.isnan(out[1]).all()

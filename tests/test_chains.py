@@ -1,0 +1,336 @@
+"""Any duration, and many poses: checked leg by leg against the two-point curves themselves."""
+
+import re
+from functools import partial
+
+import numpy as np
+import oracles
+import pytest
+
+import rbcourse as rb
+
+EPS = np.finfo(float).eps
+RNG = np.random.default_rng(110)
+N = 9
+TIMES = -2 + np.cumsum(RNG.uniform(0.3, 1.7, N))
+ROTATIONS = np.array([oracles.exp_so3(w) for w in RNG.normal(size=(N, 3))])
+POSES = rb.pose_from_components(ROTATIONS, RNG.normal(size=(N, 3)))
+TWISTS = RNG.normal(size=(N, 6))
+H = np.diff(TIMES)
+
+WITHOUT_VELOCITIES = [rb.geodesic_so3, rb.projected_line_so3, rb.geodesic_se3, rb.screw_se3]
+WITH_VELOCITIES = [
+    rb.projected_cubic_so3,
+    rb.exponential_cubic_so3,
+    rb.bezier_so3,
+    rb.cumulative_bezier_so3,
+    rb.quaternion_cubic_so3,
+    rb.cayley_cubic_so3,
+    rb.minimum_acceleration_so3,
+    rb.projected_cubic_se3,
+    rb.minimum_acceleration_se3,
+]
+LEGS = [*WITHOUT_VELOCITIES, *WITH_VELOCITIES, rb.projected_quintic_so3]
+CASES = [
+    pytest.param(leg, poses, id=f"{leg.__name__}-{poses.shape[-1]}")
+    for leg in LEGS
+    for poses in (ROTATIONS, POSES)
+    if poses is POSES or leg.__name__.endswith("so3")
+]
+
+
+def rotated(R, v):
+    return np.einsum("nij,nj->ni", R, v)
+
+
+def two_point_curve(leg, i, velocities):
+    """The curve from pose i to the next in the time of a leg, by its own arguments."""
+    R, h = ROTATIONS[i : i + 2], H[i]
+    w, d_dot = h * velocities[i : i + 2, :3], h * rotated(R, velocities[i : i + 2, 3:])
+    if leg in (rb.geodesic_se3, rb.screw_se3):
+        return leg(*POSES[i : i + 2])
+    if leg in (rb.projected_cubic_se3, rb.minimum_acceleration_se3):
+        return leg(*POSES[i : i + 2], *w, *d_dot)
+    return leg(*R) if leg in WITHOUT_VELOCITIES else leg(*R, *w)
+
+
+@pytest.mark.parametrize(("leg", "poses"), CASES)
+def test_a_chain_is_at_its_poses(leg, poses):
+    c = rb.chain(TIMES, poses, leg=leg)
+    assert c.domain == (TIMES[0], TIMES[-1])
+    assert np.abs(c(TIMES) - poses).max() < 60 * EPS
+    assert np.abs(c(np.nextafter(TIMES[1:], -9)) - poses[1:]).max() < 200 * EPS
+    assert np.abs(c.jumps(0)).max() < 200 * EPS
+
+
+@pytest.mark.parametrize(
+    "leg", [*WITHOUT_VELOCITIES, *WITH_VELOCITIES], ids=lambda leg: leg.__name__
+)
+def test_between_two_poses_it_is_the_two_point_curve(leg):
+    size = 6 if leg.__name__.endswith("se3") else 3
+    given = TWISTS[:, :size] if leg in WITH_VELOCITIES else None
+    c = rb.chain(TIMES, POSES if size == 6 else ROTATIONS, given, leg=leg)
+    share = np.linspace(0, 1, 12)[:-1]
+    for i in range(N - 1):
+        one = two_point_curve(leg, i, TWISTS)
+        t = TIMES[i] + share * H[i]
+        for order, tolerance in enumerate((60, 400, 4000)):
+            off = c(t, order) - one((t - TIMES[i]) / H[i], order) / H[i] ** order
+            assert np.abs(off).max() < tolerance * EPS / H[i] ** order
+
+
+@pytest.mark.parametrize(("leg", "poses"), CASES)
+def test_the_joints_are_as_smooth_as_stated(leg, poses):
+    """The curve just before a joint, against the curve there."""
+    c = rb.chain(TIMES, poses, leg=leg)
+    smooth = {rb.projected_quintic_so3: 2}.get(leg, int(leg in WITH_VELOCITIES))
+    inner = TIMES[1:-1]
+    for order in range(3):
+        jumps = c(inner, order) - c(np.nextafter(inner, -9), order)
+        assert np.abs(jumps - c.jumps(order)).max() < 1e-12
+        assert (np.abs(jumps).max() < 1e-12) == (order <= smooth) or leg in WITHOUT_VELOCITIES
+    assert leg not in WITHOUT_VELOCITIES or np.abs(c.jumps(1)).max() > 0.1
+
+
+def test_optima_by_shooting_are_legs_too():
+    c, other = (
+        rb.chain(TIMES[:3], ROTATIONS[:3], TWISTS[:3, :3], leg=leg)
+        for leg in (rb.shoot_minimum_acceleration_so3, rb.minimum_acceleration_so3)
+    )
+    t = np.linspace(*c.domain, 20)
+    assert np.abs(c(t) - other(t)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("leg", "poses"), CASES)
+def test_it_has_the_velocities_that_it_is_given(leg, poses):
+    velocities = TWISTS[:, : 3 if poses is ROTATIONS else 6]
+    if leg in WITHOUT_VELOCITIES:
+        with pytest.raises(ValueError, match=r"^velocities: the legs ask for none"):
+            rb.chain(TIMES, poses, velocities, leg=leg)
+    else:
+        c = rb.chain(TIMES, poses, velocities, leg=leg)
+        assert np.abs(c(TIMES, 1) - velocities).max() < 400 * EPS
+        assert np.abs(c.jumps(1)).max() < 1e-12
+        assert np.array_equal(c.velocities, velocities)
+
+
+@pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"])
+def test_without_velocities_it_has_bessels_but_rests_at_its_ends(poses):
+    c, chosen = rb.chain(TIMES, poses), rb.bessel_velocities(TIMES, poses)
+    assert np.abs(c(TIMES[1:-1], 1) - chosen[1:-1]).max() < 400 * EPS
+    assert not c(TIMES[[0, -1]], 1).round(14).any()
+    assert not c.velocities[[0, -1]].any()
+
+
+def test_bessels_velocities_are_those_of_the_parabola_through_three():
+    """Of R_i exp(x(t)), x through the logarithms of the neighbours; and of d."""
+    chosen = rb.bessel_velocities(TIMES, POSES)
+    for i in range(N):
+        m = min(max(i, 1), N - 2)
+        three = slice(m - 1, m + 2)
+        t = TIMES[three] - TIMES[i]
+        x = [oracles.log_so3(ROTATIONS[m].T @ R) for R in ROTATIONS[three]]
+        parabola = np.polynomial.Polynomial.fit
+        turn = [parabola(t, component, 2) for component in np.transpose(x)]
+        here, rate = ([p(0) for p in part] for part in (turn, [p.deriv() for p in turn]))
+        w = oracles.right_jacobian_so3(here) @ rate
+        d_dot = [parabola(t, component, 2).deriv()(0) for component in POSES[three, :3, 3].T]
+        assert np.abs(chosen[i, :3] - w).max() < 200 * EPS
+        assert np.abs(chosen[i, 3:] - ROTATIONS[i].T @ d_dot).max() < 200 * EPS
+
+
+def test_moved_poses_have_moved_velocities():
+    """Moved in the fixed frame not at all; by another body frame as that frame sees them."""
+    A = rb.pose_from_coordinates([0.4, -1, 2, 3, 1, 5])
+    chosen = rb.bessel_velocities(TIMES, POSES)
+    assert np.abs(rb.bessel_velocities(TIMES, A @ POSES) - chosen).max() < 200 * EPS
+    turned = rb.bessel_velocities(TIMES, ROTATIONS @ A[:3, :3])
+    assert np.abs(turned - chosen[:, :3] @ A[:3, :3]).max() < 200 * EPS
+
+
+def test_of_two_poses_the_velocity_is_constant():
+    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])
+    assert np.abs(w - oracles.log_so3(ROTATIONS[0].T @ ROTATIONS[1]) / 2).max() < 10 * EPS
+
+
+@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
+def test_equal_neighbours_are_a_rest(leg):
+    poses = POSES if leg.__name__.endswith("se3") else ROTATIONS
+    poses = poses[[0, 1, 2, 2, 3]]
+    poses[3, :3, :3] @= rb.exp_so3([1e-15, 0, 0])
+    c = rb.chain(range(5), poses, leg=leg)
+    assert np.abs(c([2.1, 2.5, 2.9]) - poses[2]).max() < 40 * EPS
+    assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
+
+
+def test_the_quintic_bends_as_the_parabola_does():
+    c = rb.chain(TIMES, POSES, leg=rb.projected_quintic_so3)
+    d = POSES[:, :3, 3]
+    for i in range(1, N - 1):
+        bends = [
+            2 * np.polyfit(TIMES[i - 1 : i + 2] - TIMES[i], x, 2)[0] for x in d[i - 1 : i + 2].T
+        ]
+        assert np.abs(c(TIMES[i], 2)[3:] - ROTATIONS[i].T @ bends).max() < 1e-12
+    assert np.abs(c(TIMES[[0, -1]], 2)).max() < 1e-12
+
+
+def test_times_in_any_order_and_shape():
+    c = rb.chain(TIMES, POSES)
+    t = RNG.uniform(*c.domain, size=(3, 5000))
+    for order in range(3):
+        values = c(t, order)
+        one_by_one = [c(x, order) for x in t[1, ::500]]
+        assert np.abs(values[1, ::500] - one_by_one).max() < 1e-12
+    assert c(t[:0]).shape == (0, 5000, 4, 4)
+    assert c([], 1).shape == (0, 6)
+    assert c(TIMES[3], 2).shape == (6,)
+
+
+def test_own_functions_make_legs():
+    def slow(R0, R1):
+        return rb.projected_line_so3(R0, R1, lambda t, k: [t**2 * (3 - 2 * t), 6 * t * (1 - t)][k])
+
+    c = rb.chain(TIMES, POSES, leg=slow)
+    assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # its turn rests at each pose
+    one = slow(*ROTATIONS[2:4])
+    assert np.abs(c(TIMES[2] + 0.3 * H[2])[:3, :3] - one(0.3)).max() < 40 * EPS
+    frozen = partial(rb.projected_line_so3, f=lambda t, k: [t, 1 + 0 * t][k])
+    assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
+
+
+HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "leg", "message"),
+    [
+        (([0, 1, 1], ROTATIONS[:3]), None, "times[2] is 1.0, a time after 1.0 is wanted"),
+        (([0, 2, 1], POSES[:3]), None, "times[2] is 1.0, a time after 2.0 is wanted"),
+        (([0, np.nan, 1], POSES[:3]), None, "times[1] is nan"),
+        (([0, 1], POSES[:3]), None, "times, poses: as many of each wanted, got 2 and 3"),
+        (([0], POSES[:1]), None, "times, poses: two or more wanted, got 1"),
+        (([0, 1], POSES[0]), None, "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got (4, 4)"),
+        (([0, 1], [np.eye(2)] * 2), None, "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got"),
+        (([0, 1], [np.eye(4), 2 * np.eye(4)]), None, "poses[1] is no pose (project_se gives"),
+        (([0, 1], [-np.eye(3)] * 2), None, "poses[0] is no rotation (project_so gives"),
+        (([0, 1], HALF_TURN), None, "poses[0] and poses[1] are a half-turn apart: put a pose"),
+        (([0, 1], POSES[:2], TWISTS[:2, :3]), None, "velocities: shape (N, 6) wanted, got (2, 3)"),
+        (([0, 1], POSES[:2], TWISTS[:3]), None, "velocities: 2 wanted, one a pose, got 3"),
+        (([0, 1], ROTATIONS[:2]), rb.geodesic_se3, "leg: it asks for A0; there are R0, R1, w0"),
+        (([0, 1], ROTATIONS[:2]), rb.exp_so3, "leg: it asks for w; there are R0, R1, w0, w1, a0"),
+        (([0, 1], ROTATIONS[:2]), 3, "leg: a function that makes curves wanted, got 3"),
+        (([0, 1], ROTATIONS[:2]), lambda R0: R0, "leg: a stack of 1 curves on [0, 1] wanted"),
+        (
+            (range(4), ROTATIONS[:4]),
+            lambda R0, R1: rb.geodesic_so3(R0, R1[[0, 2, 1]]),
+            "leg: it does not lead from poses[1] to poses[2]",
+        ),
+        (
+            ([0, 1], ROTATIONS[:2]),
+            lambda R0, R1: rb.retime(rb.geodesic_so3(R0, R1), 2),
+            "leg: a stack of 1 curves on [0, 1] wanted",
+        ),
+    ],
+)
+def test_what_is_no_path_is_refused(arguments, leg, message):
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        rb.chain(*arguments, leg=leg)
+
+
+def test_times_outside_are_refused():
+    with pytest.raises(ValueError, match=r"^t is 3.5, a time in \[1, 3\] is wanted"):
+        rb.chain([1, 3], POSES[:2])(3.5)
+
+
+def test_a_leg_that_is_lost_is_named():
+    """Velocities for which the cubic through a turn of 2 rad is of rank 1 in its middle."""
+    turn = np.array([0, 0, 2.0])
+    R = rb.exp_so3([[0, 0, 0], -turn / 2, turn / 2])
+    w = np.array([[0, 0, 0], [0, 0, -4 / np.tan(1)], [0, 0, -4 / np.tan(1)]])
+    with pytest.warns(RuntimeWarning, match=r"of curve \[1\]"):
+        c = rb.chain([0, 1, 2], R, w)
+    message = "^leg 1, between the times 1.0 and 2.0, at its t = 0.5: the nearest rotation is not"
+    for t in (1.5, [0.2, 0.7, 1.5, 1.7], [1.7, 1.5]):
+        with pytest.raises(ValueError, match=message):
+            c(t)
+
+
+@pytest.mark.parametrize("duration", [1e-9, 0.25, 3, 1e12])
+def test_retimed_curves_are_run_through_evenly(duration):
+    for c in (rb.chain(TIMES, POSES), rb.projected_cubic_se3(*POSES[:2], *TWISTS[:4, :3])):
+        again = rb.retime(c, duration)
+        (first, last), (start, end) = c.domain, again.domain
+        assert (start, end) == (first, first + duration)
+        share = np.linspace(0, 1, 7)
+        rate = (last - first) / (end - start)
+        for order in range(3):
+            want = c(np.minimum(first + share * (last - first), last), order) * rate**order
+            got = again(np.minimum(start + share * (end - start), end), order)
+            assert np.abs(got - want).max() < 1e-6 * np.abs(want).max() + EPS
+        there = again([start, end])
+        assert np.abs(there - c([first, last])).max() < 60 * EPS
+
+
+def test_a_retimed_stack_is_a_stack():
+    c = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), 4)
+    assert c(np.zeros(5)).shape == (5, N - 1, 3, 3)
+    assert np.abs(c[2]([1, 4]) - c([1, 4])[:, 2]).max() < 10 * EPS
+    assert rb.retime(rb.retime(c, 3), 8).domain == (0, 8)
+
+
+@pytest.mark.parametrize(
+    ("curve", "duration", "message"),
+    [
+        (np.sin, 1, "curve: a Curve wanted, got"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), 0, "duration is 0.0, a time above 0 is wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), -1, "duration is -1.0, a time above 0 is wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), np.inf, "duration is inf"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), [1, 2], "duration: shape () wanted"),
+        (rb.chain([1e9, 2e9], ROTATIONS[:2]), 1e-9, "duration is 1e-09, a time above 0 is"),
+    ],
+)
+def test_a_bad_duration_is_refused(curve, duration, message):
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        rb.retime(curve, duration)
+
+
+def integral(c, part):
+    """Of the squared acceleration, by Gauss's rule on each half of each leg."""
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    cuts = np.sort(np.append(TIMES, TIMES[:-1] + H / 2))
+    halves = np.diff(cuts)[:, None] / 2
+    t = cuts[:-1, None] + halves * (1 + nodes)
+    return np.sum(halves * weights * np.sum(c(t, 2)[..., part] ** 2, axis=-1))
+
+
+def test_what_chains_and_retimed_curves_cost():
+    c = rb.chain(TIMES, POSES)
+    rotation, translation = rb.acceleration_cost_parts(c)
+    assert rotation == pytest.approx(2 * integral(c, slice(3)), rel=1e-9)
+    assert translation == pytest.approx(integral(c, slice(3, 6)), rel=1e-9)
+    twice = rb.retime(c, 2 * (TIMES[-1] - TIMES[0]))
+    assert rb.acceleration_cost(twice) == pytest.approx(rb.acceleration_cost(c) / 8, rel=1e-12)
+    stack = rb.projected_cubic_so3(ROTATIONS[:-1], ROTATIONS[1:], TWISTS[1:, :3], TWISTS[1:, 3:])
+    third = rb.acceleration_cost(rb.retime(stack, 1 / 3))
+    assert np.allclose(third, 27 * rb.acceleration_cost(stack), rtol=1e-12, atol=0)
+
+
+def test_a_velocity_that_jumps_costs_more_than_can_be_said():
+    with pytest.raises(
+        RuntimeError, match=r"^acceleration cost: the velocity jumps at a joint, by"
+    ):
+        rb.acceleration_cost(rb.chain(TIMES, POSES, leg=rb.geodesic_se3))
+    assert rb.acceleration_cost(rb.chain([0, 9], POSES[:2], leg=rb.geodesic_se3)) == 0
+
+
+def test_neither_reads_nor_writes_the_callers_arrays_later():
+    times, poses, twists = TIMES.copy(), POSES.copy(), TWISTS.copy()
+    for array in (times, poses, twists):
+        array.flags.writeable = False
+    c = rb.chain(times, poses, twists)
+    before = c(TIMES)
+    for array in (times, poses, twists):
+        array.flags.writeable = True
+        array[:] = 0
+    assert np.array_equal(c(TIMES), before)
+    assert np.array_equal(c.velocities, TWISTS)
