@@ -1,11 +1,22 @@
-"""Where the kernels of all tests listen."""
+"""How lessons are run as tests: nbval runs and compares the cells, then all is compared as stored.
+
+That is what nbval leaves out: files, the form of the outputs, cells whose output it ignores.
+"""
 
 import tempfile
 from functools import partial
+from pathlib import Path
 
 import nbval.kernel
+import pytest
+from freshness import changed_lines, stale_figures
+from nbformat import NotebookNode
+from nbval.plugin import IPyNbFile
 
-from rbcourse.lessons import kernel_address
+from rbcourse.lessons import kernel_address, lesson_paths, normalised
+
+ROOT = Path(__file__).parent
+LESSONS = lesson_paths(ROOT / "notebooks")
 
 
 def pytest_configure(config):
@@ -14,3 +25,74 @@ def pytest_configure(config):
     config.add_cleanup(folder.cleanup)
     address = kernel_address(folder.name)
     nbval.kernel.KernelManager = partial(nbval.kernel.KernelManager, **address)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path, parent):
+    """Collect a lesson as such; other notebooks are nbval's alone."""
+    collected = yield
+    return [Lesson.from_parent(parent, path=file_path)] if file_path in LESSONS else collected
+
+
+class Lesson(IPyNbFile):
+    """A notebook whose last item compares what the cells before it gave and drew."""
+
+    def collect(self):
+        """Return the items in their order."""
+        self.cells = list(super().collect())
+        return [*self.cells, Remains.from_parent(self, name="Outputs and figures")]
+
+    def setup(self):
+        """Start the kernel, with an empty folder for figures."""
+        self.figures = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self.displays = {}
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("RBCOURSE_FIGURES", self.figures.name)
+            super().setup()
+
+    def teardown(self):
+        """Stop the kernel, remove the folder."""
+        super().teardown()
+        self.figures.cleanup()
+
+    def get_kernel_message(self, timeout=None, stream="iopub"):
+        """Let outputs that are updated, as progress bars are, end as they do in Jupyter."""
+        message = super().get_kernel_message(timeout, stream)
+        content = message["content"]
+        if name := content.get("transient", {}).get("display_id"):
+            shown = self.displays.setdefault(name, NotebookNode())
+            shown.update(content["data"])
+            content["data"] = shown
+        return message
+
+
+class Remains(pytest.Item):
+    """What the cells of a lesson gave and drew, and what of it is stored."""
+
+    def reportinfo(self):
+        """Return what a report calls it."""
+        return self.path, None, self.nodeid
+
+    def runtest(self):
+        """Fail with a line for each difference."""
+        lesson = self.parent
+        cells = [cell for cell in lesson.cells if not cell.options["skip"]]
+        if unfinished := [cell.name for cell in cells if not finished(cell)]:
+            pytest.fail(f"Not compared, for want of {', '.join(unfinished)}", pytrace=False)
+        for cell in cells:
+            cell.cell.outputs = cell.test_outputs
+            for output in cell.test_outputs:
+                if "execution_count" in output:  # nbval does not count
+                    output.execution_count = cell.cell.execution_count
+        changes = [
+            *changed_lines(lesson.path.read_text("utf-8"), normalised(lesson.nb)),
+            *stale_figures(Path(lesson.figures.name), ROOT / "figures"),
+        ]
+        if changes:
+            pytest.fail("\n".join(changes), pytrace=False)
+
+
+def finished(cell):
+    """Tell whether a cell has run to its end."""
+    outputs = cell.test_outputs
+    return outputs is not None and all(out.output_type != "error" for out in outputs)
