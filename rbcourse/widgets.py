@@ -1,5 +1,6 @@
 """The explorers: for each lesson a picture that follows its sliders."""
 
+from rbcourse.explore_chains import chain_explorer
 from rbcourse.explore_curves import flip_explorer, screw_explorer, theta_explorer
 from rbcourse.explore_optima import cube_explorer, minimum_acceleration_explorer
 from rbcourse.explore_plane import arm_explorer, planar_explorer
@@ -7,6 +8,7 @@ from rbcourse.explore_rotations import projection_explorer, random_explorer, rot
 
 __all__ = [
     "arm_explorer",
+    "chain_explorer",
     "cube_explorer",
     "flip_explorer",
     "minimum_acceleration_explorer",

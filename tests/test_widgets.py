@@ -16,8 +16,8 @@ def explorer(request):
     return getattr(widgets, request.param)()
 
 
-def test_there_are_ten():
-    assert len(widgets.__all__) == 10
+def test_there_are_eleven():
+    assert len(widgets.__all__) == 11
     assert widgets.__all__ == sorted(widgets.__all__)
 
 
@@ -31,6 +31,7 @@ def test_it_shows_something_before_it_is_touched(explorer):
 WITHOUT_UNIT = {"time t", "seed", "rotations", "pull", "y leans", "z leans", "z stretched"} | {
     "size s",
     "turn",
+    "× Bessel's",
 }
 
 
