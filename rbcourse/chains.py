@@ -1,6 +1,7 @@
 """Curves of any duration, and curves through many poses."""
 
 import math
+import warnings
 from collections.abc import Callable
 from inspect import Parameter, signature
 from typing import Self
@@ -8,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, as_single, blocks, check_order
+from rbcourse._numerics import EPS, Array, as_single, blocks, check_order
 from rbcourse.curves import BLOCK, Chosen, Curve, runs
 from rbcourse.motions import RigidMotion, projected_cubic_se3
 from rbcourse.polynomials import cubic_coefficients, quintic_coefficients
@@ -20,6 +21,7 @@ Leg = Callable[..., Curve]
 
 _HALF_TURN = math.pi - 1e-6
 _EQUAL = 1e-12
+_SHORTEST, _LONGEST = 1e-100, 1e100  # that squares do not overflow
 _ARRIVED = 1e-6
 
 
@@ -34,18 +36,17 @@ class Retimed(Curve):
         How much of its time passes in a unit of time.
     """
 
-    def __init__(self, curve: Curve, domain: tuple[float, float]) -> None:
-        self.curve, self.domain, self.batch_shape = curve, domain, curve.batch_shape
-        (start, end), (first, last) = domain, curve.domain
-        self.rate = (last - first) / (end - start)
+    def __init__(self, curve: Curve, rate: float, domain: tuple[float, float]) -> None:
+        self.curve, self.rate, self.domain = curve, rate, domain
+        self.batch_shape = curve.batch_shape
 
     def _pick(self, chosen: Chosen) -> Self:
-        return type(self)(self.curve._pick(chosen), self.domain)
+        return type(self)(self.curve._pick(chosen), self.rate, self.domain)
 
     def _evaluate(self, t: Array, order: int) -> Array:
         (start, end), (first, last) = self.domain, self.curve.domain
-        share = (t - start) / (end - start)
-        values = self.curve._evaluate(np.minimum(first + share * (last - first), last), order)
+        inner = np.minimum(first + (t - start) * self.rate, last)
+        values = self.curve._evaluate(np.where(t == end, last, inner), order)
         return values * self.rate**order if order else values
 
 
@@ -69,7 +70,8 @@ def retime(curve: Curve, duration: float) -> Retimed:
     Raises
     ------
     ValueError
-        If `curve` is no `Curve`, or `duration` no number above 0.
+        If `curve` is no `Curve`, `duration` no number above 0, or so short that accelerations
+        overflow or that it vanishes beside the first time.
 
     See Also
     --------
@@ -89,10 +91,14 @@ def retime(curve: Curve, duration: float) -> Retimed:
     """
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve wanted, got {curve!r}")
-    time, (start, _) = float(as_single("duration", duration)), curve.domain
-    if not start + time > start:
+    time, (start, end) = float(as_single("duration", duration)), curve.domain
+    if time <= 0:
         raise ValueError(f"duration is {time}, a time above 0 is wanted")
-    return Retimed(curve, (start, start + time))
+    if start + time == start:
+        raise ValueError(f"duration is {time}: that vanishes beside the first time, {start}")
+    if time < _SHORTEST * (end - start):
+        raise ValueError(f"duration is {time}: too short, accelerations would overflow")
+    return Retimed(curve, (end - start) / time, (start, start + time))
 
 
 class Chain(Curve):
@@ -185,8 +191,8 @@ class Chain(Curve):
         try:
             self.legs[leg](share, order)
         except ValueError as error:
-            between = f"{self.times[leg]} and {self.times[leg + 1]}"
-            raise ValueError(f"leg {leg}, between the times {between}, at its {error}") from error
+            during = f"leg {leg}, from {self.times[leg]} to {self.times[leg + 1]}"
+            raise ValueError(f"{during}, in its own time from 0 to 1: {error}") from error
 
 
 def chain(
@@ -203,11 +209,11 @@ def chain(
     times : array_like, shape (N,)
         Increasing; two or more.
     poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses, or rotation matrices, one for each time.
+        Poses, or rotation matrices, to 1e-9, one for each time.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists (ω, v), or angular velocities ω, body frame, per unit of the times: what the curve
         has at each pose. By default it starts and ends at rest, rests where a pose equals its
-        neighbour (to 1e-12), and has the `bessel_velocities` elsewhere.
+        neighbour, to rounding, and has the `bessel_velocities` elsewhere.
     leg : callable, optional
         What joins two poses: any function of this package with the arguments (R0, R1) or (A0, A1),
         and perhaps velocities and accelerations, or one of your own with these names; stacks of
@@ -224,8 +230,10 @@ def chain(
     ValueError
         If times do not increase; if a matrix is no pose or no rotation; if neighbours are a
         half-turn apart, to 1e-6; if the numbers do not agree; if `velocities` are given to legs
-        that ask for none; if `leg` asks for other arguments, or does not lead to the next pose. The
-        message names the first place. And what `leg` raises.
+        that ask for none; if `leg` asks for other arguments, raises one, or does not lead to the
+        next pose, to 1e-6. The message names the first place.
+    ConvergenceError
+        If `leg` does.
 
     Warns
     -----
@@ -289,7 +297,7 @@ def chain(
     unknown = [name for name in wanted if name not in ends]
     if unknown:
         raise ValueError(f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}")
-    legs = leg(**{name: ends[name] for name in wanted})
+    legs = _made(leg, {name: ends[name] for name in wanted})
     if moves and "A0" not in wanted:
         path = _ends("d{}", poses[:, :3, 3]) | _ends("v{}", d_dot, h) | _ends("a{}", d_bend, h**2)
         legs = RigidMotion(legs, _coefficients(wanted, *path.values()))
@@ -353,6 +361,11 @@ def _as_path(
     times, poses, velocities = as_samples(times, poses, velocities)
     if len(times) < 2:
         raise ValueError("times, poses: two or more wanted, got 1")
+    h = np.diff(times)
+    odd = ~((h > _SHORTEST) & (h < _LONGEST))
+    if odd.any():
+        i = np.argmax(odd)
+        raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too near, or too far")
     far = np.linalg.norm(_turns(poses), axis=-1) > _HALF_TURN
     if far.any():
         i = np.argmax(far)
@@ -395,9 +408,9 @@ def _parabola(h: Array, slopes: Array) -> tuple[Array, Array]:
 
 def _rests(poses: Array) -> NDArray[np.bool_]:
     """Tell where a path rests, if it is not told to move: at its ends, and at equal neighbours."""
-    core = (-2, -1)
-    scale = np.maximum(1, np.abs(poses[1:]).max(axis=core))
-    same = np.abs(np.diff(poses, axis=0)).max(axis=core) <= _EQUAL * scale
+    change, d = np.abs(np.diff(poses, axis=0)), np.abs(poses[1:, :3, 3:])
+    same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
+    same &= np.all(change[:, :3, 3:] <= 4 * EPS * d, axis=(1, 2))
     return np.append(True, same) | np.append(same, True)
 
 
@@ -436,15 +449,32 @@ def _arguments(leg: Leg) -> list[str]:
     return [name for name, parameter in parameters.items() if parameter.default is Parameter.empty]
 
 
+def _made(leg: Leg, ends: dict[str, Array]) -> Curve:
+    """Return the stack of legs; what it warns of is told where `chain` is called."""
+    with warnings.catch_warnings(record=True, action="always") as warned:
+        try:
+            legs = leg(**ends)
+        except ValueError as error:
+            raise ValueError(f"leg, in its own time from 0 to 1: {error}") from error
+    for warning in warned:
+        warnings.warn(warning.message, stacklevel=3)
+    count, size = len(next(iter(ends.values()))), 4 if "A0" in ends else 3
+    if not isinstance(legs, Curve) or (legs.batch_shape, legs.domain) != ((count,), (0, 1)):
+        raise ValueError(f"leg: a stack of {count} curves on [0, 1] wanted, got {legs!r}")
+    shape = legs[0](0.0).shape
+    if shape != (size, size):
+        raise ValueError(f"leg: curves of shape ({size}, {size}) wanted, got {shape}")
+    return legs
+
+
 def _check_arrival(legs: Curve, poses: Array) -> None:
     """Raise a ValueError that names the first leg that is not at the poses of its ends."""
-    wanted = (len(poses) - 1,), (0, 1)
-    if not isinstance(legs, Curve) or (legs.batch_shape, legs.domain) != wanted:
-        raise ValueError(f"leg: a stack of {len(poses) - 1} curves on [0, 1] wanted, got {legs!r}")
-    values = legs([0.0, 1.0])
-    scale = np.maximum(1, np.abs(poses).max(axis=(-2, -1)))
-    off = np.abs(values - [poses[:-1], poses[1:]]).max(axis=(-2, -1)) / [scale[:-1], scale[1:]]
-    lost = ~(off <= _ARRIVED).all(axis=0)
+    starts, ends = legs([0.0, 1.0])
+    missed = np.abs(np.stack([starts - poses[:-1], ends - poses[1:]]))
+    missed[..., :3, 3:] -= 64 * EPS * np.abs(poses[1:, :3, 3:])
+    lost = ~(missed <= _ARRIVED).all(axis=(0, 2, 3))
     if lost.any():
         i = np.argmax(lost)
+        if np.isnan(missed[:, i]).any():
+            raise ValueError(f"leg: it found no curve from poses[{i}] to poses[{i + 1}] (NaN)")
         raise ValueError(f"leg: it does not lead from poses[{i}] to poses[{i + 1}]")

@@ -4,7 +4,7 @@ import numpy as np
 
 from rbcourse._numerics import Array
 from rbcourse.chains import Chain, Retimed
-from rbcourse.curves import Curve
+from rbcourse.curves import Curve, which_curve
 
 
 def acceleration_cost(curve: Curve) -> Array:
@@ -92,9 +92,11 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
         rotation, translation = acceleration_cost_parts(curve.curve)
         return rotation * curve.rate**3, translation * curve.rate**3
     if isinstance(curve, Chain):
-        jump = np.abs(curve.jumps(1)).max(initial=0)
-        if jump > 1e-9 * (1 + np.abs(curve(curve.times, 1)).max()):
-            raise RuntimeError(f"acceleration cost: the velocity jumps at a joint, by {jump:.3g}")
+        jumps, speeds = np.abs(curve.jumps(1)), np.abs(curve(curve.times, 1))
+        for half in (slice(3), slice(3, None)):  # rad and m
+            jump = jumps[:, half].max(initial=0)
+            if jump > 1e-9 * speeds[:, half].max(initial=0):
+                raise RuntimeError(f"acceleration cost: a velocity jumps at a joint, by {jump:.3g}")
         parts = acceleration_cost_parts(curve.legs)
         rotation, translation = (np.asarray(part / curve.durations**3) for part in parts)
         return rotation.sum(), translation.sum()
@@ -132,6 +134,10 @@ def _panels(curve: Curve) -> Array:
     """
     curve = getattr(curve, "rotation", curve)
     w, a = (np.linalg.norm(curve([0, 1], k)[..., :3], axis=-1).reshape(2, -1) for k in (1, 2))
+    if not np.isfinite(w).all():
+        lost = np.unravel_index(np.argmin(np.isfinite(w).all(axis=0)), curve.batch_shape)
+        which = which_curve(np.array(lost, int))
+        raise RuntimeError(f"acceleration cost{which}: the curve is NaN, it did not converge")
     speeds = (w + np.sqrt(a)).max(axis=-1, initial=0)
     events = [(0.0, 1 / (1 + speeds[0])), (1.0, 1 / (1 + speeds[1]))]
     margin = np.ravel(getattr(curve, "margin", ()))
@@ -139,7 +145,7 @@ def _panels(curve: Curve) -> Array:
         raise RuntimeError(
             f"acceleration cost: the curve all but jumps (margin {margin.min():.1e})"
         )
-    when = np.broadcast_to(getattr(curve, "margin_time", 0.5), margin.shape).ravel()
+    when = np.broadcast_to(np.ravel(getattr(curve, "margin_time", 0.5)), margin.shape)
     events += [(t, gap / 4) for t, gap in zip(when, margin, strict=True) if gap < 0.25]
     events += zip(*(np.ravel(x) for x in getattr(curve, "quickest", ((), ()))), strict=True)
     cuts = [np.arange(17) / 16]

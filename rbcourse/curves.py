@@ -109,7 +109,7 @@ class Curve:
 
     def _pick(self, chosen: Chosen) -> Self:
         """Return the stack of the curves with these numbers, which count through the stack."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no index")
 
     def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         """Write curve which[i] of the stack at t[i] into out[i]; `which` ascends."""

@@ -33,7 +33,8 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     >>> cubic_coefficients(0.0, 1.0, 0.0, 0.0)
     array([ 0.,  0.,  3., -2.])
     """
-    return _stack(x0, v0, -3 * x0 + 3 * x1 - 2 * v0 - v1, 2 * x0 - 2 * x1 + v0 + v1)
+    gap = x1 - x0
+    return _stack(x0, v0, 3 * gap - 2 * v0 - v1, v0 + v1 - 2 * gap)
 
 
 def hermite(ends: Sequence[ArrayLike], t: Array, order: int = 0) -> Array:

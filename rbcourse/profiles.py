@@ -70,6 +70,7 @@ def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> list[A
         ax.set(ylabel=f"{label}\n({unit})", xlim=(t[0], t[-1]))
         ax.set_ylim(0, 1.08 * np.max(values))
     axes[-1].set_xlabel("time (s)")
+    axes[0].figure.align_ylabels(axes)
     return lines
 
 

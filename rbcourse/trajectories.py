@@ -46,7 +46,7 @@ def write_path(
     times : array_like, shape (N,)
         In s, increasing.
     poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses, or rotation matrices: these as CSV only.
+        Poses, or rotation matrices, to 1e-9: these as CSV only.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists (ω, v), or angular velocities ω: body frame, as curves give them, in rad/s and m/s.
         As CSV only.
@@ -158,6 +158,8 @@ def as_samples(times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None 
         If a shape is another, a time is not after the one before, or a matrix is no pose or no
         rotation; the message names the first.
     """
+    if np.size(times) == 0:
+        raise ValueError("times, poses: one or more wanted, got none")
     times, poses = as_single("times", times, "N"), as_finite("poses", poses, "n", "n")
     size = poses.shape[-1]
     if poses.ndim != 3 or size not in (3, 4):

@@ -198,6 +198,7 @@ def test_own_functions_make_legs():
     assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
 
 
+FAR = rb.pose_from_components(ROTATIONS, POSES[:, :3, 3] + [5e5, 5.3e6, 100])
 HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
 
 
@@ -208,6 +209,8 @@ HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
         (([0, 2, 1], POSES[:3]), None, "times[2] is 1.0, a time after 2.0 is wanted"),
         (([0, np.nan, 1], POSES[:3]), None, "times[1] is nan"),
         (([0, 1], POSES[:3]), None, "times, poses: as many of each wanted, got 2 and 3"),
+        (([], POSES[:0]), None, "times, poses: one or more wanted, got none"),
+        (([0, 1e-200], POSES[:2]), None, "times[0] and times[1] are 1e-200 apart: too near, or"),
         (([0], POSES[:1]), None, "times, poses: two or more wanted, got 1"),
         (([0, 1], POSES[0]), None, "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got (4, 4)"),
         (([0, 1], [np.eye(2)] * 2), None, "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got"),
@@ -224,6 +227,27 @@ HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
             (range(4), ROTATIONS[:4]),
             lambda R0, R1: rb.geodesic_so3(R0, R1[[0, 2, 1]]),
             "leg: it does not lead from poses[1] to poses[2]",
+        ),
+        (
+            ([0, 1], FAR[:2]),
+            lambda R0, R1: rb.geodesic_so3(R0, R1 @ rb.exp_so3([0, 0, 2e-6])),
+            "leg: it does not lead from poses[0] to poses[1]",
+        ),
+        (
+            ([0, 1], POSES[:2]),
+            lambda A0, A1: rb.geodesic_so3(A0[:, :3, :3], A1[:, :3, :3]),
+            "leg: curves of shape (4, 4) wanted, got (3, 3)",
+        ),
+        (
+            ([0, 1], POSES[:2]),
+            lambda R0, R1: rb.geodesic_se3(POSES[:1], POSES[1:2]),
+            "leg: curves of shape (3, 3) wanted, got (4, 4)",
+        ),
+        (([0, 1], POSES[:2]), lambda R0, R1: None, "leg: a stack of 1 curves on [0, 1] wanted"),
+        (
+            ([0, 1], ROTATIONS[:2], 90 * TWISTS[:2, :3]),
+            rb.bezier_so3,
+            "leg, in its own time from 0 to 1: w0[0]: a norm below",
         ),
         (
             ([0, 1], ROTATIONS[:2]),
@@ -247,9 +271,10 @@ def test_a_leg_that_is_lost_is_named():
     turn = np.array([0, 0, 2.0])
     R = rb.exp_so3([[0, 0, 0], -turn / 2, turn / 2])
     w = np.array([[0, 0, 0], [0, 0, -4 / np.tan(1)], [0, 0, -4 / np.tan(1)]])
-    with pytest.warns(RuntimeWarning, match=r"of curve \[1\]"):
+    with pytest.warns(RuntimeWarning, match=r"of curve \[1\]") as warned:
         c = rb.chain([0, 1, 2], R, w)
-    message = "^leg 1, between the times 1.0 and 2.0, at its t = 0.5: the nearest rotation is not"
+    assert warned[0].filename == __file__
+    message = "^leg 1, from 1.0 to 2.0, in its own time from 0 to 1: t = 0.5: the nearest rotation"
     for t in (1.5, [0.2, 0.7, 1.5, 1.7], [1.7, 1.5]):
         with pytest.raises(ValueError, match=message):
             c(t)
@@ -262,11 +287,11 @@ def test_retimed_curves_are_run_through_evenly(duration):
         (first, last), (start, end) = c.domain, again.domain
         assert (start, end) == (first, first + duration)
         share = np.linspace(0, 1, 7)
-        rate = (last - first) / (end - start)
+        rate = (last - first) / duration
         for order in range(3):
-            want = c(np.minimum(first + share * (last - first), last), order) * rate**order
-            got = again(np.minimum(start + share * (end - start), end), order)
-            assert np.abs(got - want).max() < 1e-6 * np.abs(want).max() + EPS
+            t = np.minimum(start + share * (end - start), end)
+            want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
+            assert np.abs(again(t, order) - want).max() <= 1e-9 * np.abs(want).max()
         there = again([start, end])
         assert np.abs(there - c([first, last])).max() < 60 * EPS
 
@@ -286,7 +311,8 @@ def test_a_retimed_stack_is_a_stack():
         (rb.geodesic_so3(*ROTATIONS[:2]), -1, "duration is -1.0, a time above 0 is wanted"),
         (rb.geodesic_so3(*ROTATIONS[:2]), np.inf, "duration is inf"),
         (rb.geodesic_so3(*ROTATIONS[:2]), [1, 2], "duration: shape () wanted"),
-        (rb.chain([1e9, 2e9], ROTATIONS[:2]), 1e-9, "duration is 1e-09, a time above 0 is"),
+        (rb.chain([1e9, 2e9], ROTATIONS[:2]), 1e-9, "duration is 1e-09: that vanishes beside"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), 1e-160, "duration is 1e-160: too short, accelerations"),
     ],
 )
 def test_a_bad_duration_is_refused(curve, duration, message):
@@ -316,9 +342,7 @@ def test_what_chains_and_retimed_curves_cost():
 
 
 def test_a_velocity_that_jumps_costs_more_than_can_be_said():
-    with pytest.raises(
-        RuntimeError, match=r"^acceleration cost: the velocity jumps at a joint, by"
-    ):
+    with pytest.raises(RuntimeError, match=r"^acceleration cost: a velocity jumps at a joint, by"):
         rb.acceleration_cost(rb.chain(TIMES, POSES, leg=rb.geodesic_se3))
     assert rb.acceleration_cost(rb.chain([0, 9], POSES[:2], leg=rb.geodesic_se3)) == 0
 
@@ -334,3 +358,33 @@ def test_neither_reads_nor_writes_the_callers_arrays_later():
         array[:] = 0
     assert np.array_equal(c(TIMES), before)
     assert np.array_equal(c.velocities, TWISTS)
+
+
+def test_far_from_the_origin_it_is_the_same_motion():
+    """Eastings and northings at 1 kHz, slow: no rests, no jumps, and a cost."""
+    t = np.arange(200) / 1000
+    here = rb.pose_from_coordinates(t[:, None] * [0, 0, 4e-3, 4e-3, 0, 0])
+    far = here.copy()
+    far[:, :3, 3] += [5e5, 5.3e6, 100]
+    c, other = rb.chain(t, far), rb.chain(t, here)
+    assert np.abs(c.velocities[1:-1, [2, 3]] / 4e-3 - 1).max() < 1e-3
+    assert np.abs(c.velocities - other.velocities).max() < 1e-5
+    assert np.abs(c.jumps(1)).max() < 1e-12
+    assert rb.acceleration_cost_parts(c)[0] == pytest.approx(
+        rb.acceleration_cost_parts(other)[0], rel=1e-9
+    )
+
+
+def test_from_epoch_times_on_a_duration_is_kept():
+    c = rb.chain(1.3e9 + TIMES, ROTATIONS)
+    again = rb.retime(c, 1e-3)
+    assert again.rate == (c.domain[1] - c.domain[0]) / 1e-3
+    assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
+
+
+def test_an_optimum_that_is_not_found_is_named():
+    V = np.zeros((4, 3))
+    V[2] = [200, -300, 150]
+    message = r"^leg: it found no curve from poses\[1\] to poses\[2\] \(NaN\)"
+    with pytest.warns(RuntimeWarning), pytest.raises(ValueError, match=message):
+        rb.chain(range(4), ROTATIONS[:4], V, leg=rb.minimum_acceleration_so3)

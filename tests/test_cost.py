@@ -136,3 +136,20 @@ def test_what_does_not_settle_is_no_number():
     line = rb.projected_line_so3(np.eye(3), rb.exp_so3([0, 0, 1.0]), rough)
     with pytest.raises(RuntimeError, match="100 subdivisions leave an uncertainty of"):
         rb.acceleration_cost(line)
+
+
+def test_stacks_of_any_shape_have_costs():
+    for curve in (rb.projected_cubic_so3, rb.quaternion_cubic_so3):
+        turns = rb.exp_so3(np.linspace(0.5, 2.9, 12).reshape(2, 6, 1) * [0.6, 0, 0.8])
+        stack = curve(np.eye(3), turns, np.zeros(3), [0, 2, 0])
+        costs = rb.acceleration_cost(stack)
+        assert costs.shape == (2, 6)
+        assert costs[1, 4] == pytest.approx(rb.acceleration_cost(stack[1, 4]), rel=1e-9)
+
+
+def test_of_a_curve_that_was_not_found_there_is_no_cost():
+    R, w = rb.exp_so3([[0, 0, 1], [1, 0, 0]]), np.array([[0, 0, 0], [90, 300.0, -500]])
+    with pytest.warns(RuntimeWarning):
+        stack = rb.minimum_acceleration_so3(np.eye(3), R, w, -w)
+    with pytest.raises(RuntimeError, match=r"^acceleration cost of curve \[1\]: the curve is NaN"):
+        rb.acceleration_cost(stack)

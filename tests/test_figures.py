@@ -130,7 +130,10 @@ def test_every_figure_has_its_files_and_units_in_every_column():
         files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
         assert files - {".gif"} == {".png", ".pdf", ".csv"}
         for column in committed(name)[0]:
-            assert re.search(r" \[(1|m|rad)\]$", column) or column in ("frame", "family"), column
+            assert re.search(r" \[(1|m|rad|s|(m|rad)/s²?)\]$", column) or column in (
+                "frame",
+                "family",
+            ), column
 
 
 @pytest.mark.source("BK Fig. 1")

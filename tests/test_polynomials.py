@@ -27,7 +27,7 @@ def test_both_meet_their_ends():
 def test_the_cubic_is_the_papers():
     R0, R1, V0, V1 = RNG.normal(size=(4, 3, 3))
     printed = [R0, V0, -3 * R0 + 3 * R1 - 2 * V0 - V1, 2 * R0 - 2 * R1 + V0 + V1]
-    assert np.array_equal(cubic_coefficients(R0, R1, V0, V1), printed)
+    assert np.abs(cubic_coefficients(R0, R1, V0, V1) - printed).max() < 20 * EPS
 
 
 @pytest.mark.parametrize(
