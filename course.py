@@ -18,15 +18,18 @@ import argparse
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
+import tomllib
+from datetime import date
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
-PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 UV = shutil.which("uv")
+TESTED = ("lessons", "grading", "test")  # the extras whose ranges are tested
 PEERS = ("peers", "peers-torch")  # the latter may take several GB on Linux
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
 
@@ -40,7 +43,13 @@ def main():
     parser = argparse.ArgumentParser(prog="course.py", description=__doc__.splitlines()[0])
     tasks = parser.add_subparsers(dest="task", required=True, metavar="TASK")
     tasks.add_parser("figures", help="run every lesson; rewrite its outputs and figures/")
-    tasks.add_parser("test", help="run every test, the lessons too; further words go to pytest")
+    test = tasks.add_parser("test", help="run every test, lessons too; further words go to pytest")
+    releases = test.add_mutually_exclusive_group()
+    for name in ("oldest", "newest"):
+        help_ = "with the %s releases that pyproject.toml allows; without the lessons" % name
+        releases.add_argument(
+            "--" + name, dest="releases", action="store_const", const=name, help=help_
+        )
     lab = tasks.add_parser("lab", help="open the lessons; further words go to JupyterLab")
     lab.add_argument("--edit", action="store_true", help="the originals, not the copies in work/")
     lecture = tasks.add_parser("lecture", help="show a lesson to a class, large and without code")
@@ -63,15 +72,17 @@ def main():
     known, further = parser.parse_known_args()
     if further and known.task not in ("test", "lab", "browser"):
         parser.error("%s takes no %s" % (known.task, " ".join(further)))
+    if known.task == "test" and known.releases:
+        venv = set_up_range(known.releases)
+        # what the lessons store belongs to the releases of environment.txt
+        stored = ["--deselect=notebooks", "--deselect=tests/test_notebooks.py"]
+        test_in(venv, *(stored + further))
+        return
     set_up()
     if known.task == "figures":
         run("-m", "rbcourse.lessons", "regenerate")
     elif known.task == "test":
-        # a worker for each processor, with one thread each; file by file in their order: the
-        # lessons come last, and fill what time is left
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        files = ["--dist", "loadfile", "--no-loadscope-reorder"]
-        run("-m", "pytest", "-n", "auto", *(files + further))
+        test_in(VENV, *further)
     elif known.task == "lab":
         open_lab(known.edit, further)
     elif known.task == "lecture":
@@ -104,11 +115,16 @@ def main():
 
 
 def run(*words):
-    """Run Python in the environment, in the folder of the course; stop if it fails.
+    """Run Python in .venv."""
+    run_in(VENV, *words)
+
+
+def run_in(venv, *words):
+    """Run Python in an environment, in the folder of the course; stop if it fails.
 
     Ctrl-C reaches the job too, and the job decides: JupyterLab asks first.
     """
-    job = subprocess.Popen([str(PYTHON)] + list(words), cwd=ROOT)
+    job = subprocess.Popen([str(python(venv))] + list(words), cwd=ROOT)
     while True:
         try:
             code = job.wait()
@@ -117,6 +133,16 @@ def run(*words):
             pass
     if code:
         sys.exit(code)
+
+
+def test_in(venv, *words):
+    """Run the tests: a worker for each processor, with one thread each.
+
+    File by file in their order: the lessons come last, and fill what time is left.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    files = ("--dist", "loadfile", "--no-loadscope-reorder")
+    run_in(venv, "-m", "pytest", "-n", "auto", *(files + words))
 
 
 def open_lab(edit, further):
@@ -152,31 +178,58 @@ def look_in_browser(further):
 
 
 def set_up():
-    """Make .venv if it is not there, was left unfinished, or is out of date."""
-    stamp = VENV / "made-by-course.txt"
-    wanted = fingerprint(ROOT / "environment.txt", ROOT)
+    """Make .venv, from environment.txt."""
+    make(VENV, fingerprint(ROOT / "environment.txt", ROOT), "-r", "environment.txt")
+
+
+def set_up_range(releases):
+    """Make .venv-oldest or .venv-newest, anew each day, for there may be newer releases."""
+    venv = ROOT / (".venv-" + releases)
+    words = ["-e", ".[%s]" % ",".join(TESTED)] + (lower_bounds() if releases == "oldest" else [])
+    make(venv, fingerprint(ROOT / "pyproject.toml", ROOT, date.today()), *words)
+    return venv
+
+
+def lower_bounds():
+    """Return what pyproject.toml requires, each at the lower bound of its range."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    ranges = project["dependencies"] + [line for name in TESTED for line in extras[name]]
+    return [re.sub(">=([^,]+).*", r"==\1", line) for line in ranges]
+
+
+def make(venv, wanted, *words):
+    """Make an environment if it is not there, was left unfinished, or is not the one wanted."""
+    stamp = venv / "made-by-course.txt"
     found = stamp.read_text() if stamp.exists() else None
-    if found == wanted and PYTHON.exists():
+    if found == wanted and python(venv).exists():
         return
-    if found is None and os.path.lexists(VENV):
-        sys.exit(".venv was not made by course.py: move it away or delete it, then try again.")
-    if Path(sys.prefix).resolve() == VENV.resolve():
+    if found is None and os.path.lexists(venv):
+        sys.exit(
+            "%s was not made by course.py: move it away or delete it, then try again." % venv.name
+        )
+    if Path(sys.prefix).resolve() == venv.resolve():
         sys.exit("The environment has to be made anew: leave it first with 'deactivate'.")
-    print("Setting up .venv, once; about a minute", end="", flush=True)
+    print("Setting up %s; about a minute" % venv.name, end="", flush=True)
     try:
-        if VENV.exists():
-            shutil.rmtree(VENV)
+        if venv.exists():
+            shutil.rmtree(venv)
     except OSError as error:
-        sys.exit("\n.venv is in use (%s). Close JupyterLab and try again." % error)
+        sys.exit("\n%s is in use (%s). Close JupyterLab and try again." % (venv.name, error))
     if UV:
-        patiently(UV, "venv", "--seed", "--python", sys.executable, str(VENV))
+        patiently(UV, "venv", "--seed", "--python", sys.executable, str(venv))
     else:
-        patiently(sys.executable, "-m", "venv", str(VENV))
+        patiently(sys.executable, "-m", "venv", str(venv))
     stamp.write_text("unfinished")
-    install("-r", "environment.txt")
-    patiently(str(PYTHON), "-c", "import matplotlib.pyplot")  # looks for fonts, once
+    install(venv, *words)
+    patiently(str(python(venv)), "-c", "import matplotlib.pyplot")  # looks for fonts, once
     stamp.write_text(wanted)
     print(" done.", flush=True)
+
+
+def python(venv):
+    """Return the path of an environment's Python."""
+    return venv / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
 def set_up_extra(name):
@@ -185,7 +238,7 @@ def set_up_extra(name):
     wanted = fingerprint(ROOT / "pyproject.toml")
     if not stamp.exists() or stamp.read_text() != wanted:
         print("Installing what %s needs" % name, end="", flush=True)
-        install("-e", ".[%s]" % name)
+        install(VENV, "-e", ".[%s]" % name)
         stamp.write_text(wanted)
         print(" done.", flush=True)
 
@@ -214,13 +267,13 @@ def find_chromium():
     return shutil.which("chromium")
 
 
-def install(*words):
-    """Install into .venv, with uv where it is on the PATH."""
+def install(venv, *words):
+    """Install into an environment, with uv where it is on the PATH."""
     if UV:
-        patiently(UV, "pip", "install", "--python", str(PYTHON), *words)
+        patiently(UV, "pip", "install", "--python", str(python(venv)), *words)
     else:
-        pip = [str(PYTHON), "-m", "pip", "install", "--disable-pip-version-check", "--no-compile"]
-        patiently(*(pip + list(words)))
+        pip = ("-m", "pip", "install", "--disable-pip-version-check", "--no-compile")
+        patiently(str(python(venv)), *(pip + words))
 
 
 def patiently(*command):

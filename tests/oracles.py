@@ -19,6 +19,11 @@ def exact_norm(w):
     return mp.sqrt(mp.fsum(mp.mpf(x) ** 2 for x in w))
 
 
+def exact_polynomial(coefficients, t):
+    """The sum of c_k t^k; the caller sets the precision."""
+    return mp.fsum(c * t**k for k, c in enumerate(coefficients))
+
+
 def exact_exp(w):
     """Rodrigues' formula, as an mpmath matrix; the caller sets the precision."""
     angle, W = exact_norm(w), exact_hat([mp.mpf(x) for x in w])

@@ -152,7 +152,7 @@ def slerp_case(angle):
 
 def _at(t, *coefficients):
     columns = zip(*coefficients, strict=True)
-    return [mp.polyval([mp.mpf(float(c)) for c in column][::-1], t) for column in columns]
+    return [oracles.exact_polynomial([mp.mpf(float(c)) for c in column], t) for column in columns]
 
 
 def slerp_errors(angle):

@@ -5,9 +5,11 @@ import re
 import subprocess
 import sys
 import tomllib
+from datetime import date
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from textwrap import dedent
+from types import SimpleNamespace
 from zipfile import ZipFile
 
 import pytest
@@ -128,6 +130,7 @@ def test_even_python_2_can_read_the_script_that_tells_it_so():
         ([], "required: TASK"),
         (["figures", "06"], "figures takes no 06"),
         (["lint", "--fix"], "lint takes no --fix"),
+        (["test", "--oldest", "--newest"], "not allowed with argument --oldest"),
     ],
 )
 def test_a_wrong_task_is_named(words, said):
@@ -136,23 +139,28 @@ def test_a_wrong_task_is_named(words, said):
     assert said in done.stderr
 
 
-@pytest.fixture
-def setting_up(tmp_path, monkeypatch):
-    """course.py in a folder of its own, where set-up only writes down what it would run."""
+def course_module():
     spec = spec_from_file_location("course", ROOT / "course.py")
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
-    done = []
+    return module
+
+
+@pytest.fixture
+def setting_up(tmp_path, monkeypatch):
+    """course.py in a folder of its own, where set-up only writes down what it would run."""
+    module, done = course_module(), []
 
     def pretend(*command):
         done.append(command)
-        module.PYTHON.parent.mkdir(parents=True, exist_ok=True)
-        module.PYTHON.touch()
+        if "venv" in command:
+            python = module.python(Path(command[-1]))
+            python.parent.mkdir(parents=True)
+            python.touch()
 
     (tmp_path / "environment.txt").write_text("numpy")
     monkeypatch.setattr(module, "ROOT", tmp_path)
     monkeypatch.setattr(module, "VENV", tmp_path / ".venv")
-    monkeypatch.setattr(module, "PYTHON", tmp_path / ".venv" / "bin" / "python")
     monkeypatch.setattr(module, "patiently", pretend)
     return module, done
 
@@ -169,7 +177,7 @@ def test_set_up_is_done_once(setting_up):
     "disturb",
     [
         lambda module: (module.ROOT / "environment.txt").write_text("scipy"),
-        lambda module: module.PYTHON.unlink(),
+        lambda module: module.python(module.VENV).unlink(),
         lambda module: (module.VENV / "made-by-course.txt").write_text("unfinished"),
     ],
     ids=["the environment has changed", "its Python is gone", "it was interrupted"],
@@ -196,7 +204,7 @@ def test_an_environment_of_somebody_else_is_left_alone(setting_up):
 def test_the_environment_in_use_is_not_made_anew(setting_up, monkeypatch):
     module, _ = setting_up
     module.set_up()
-    module.PYTHON.unlink()
+    module.python(module.VENV).unlink()
     monkeypatch.setattr(sys, "prefix", str(module.VENV))
     with pytest.raises(SystemExit, match="deactivate"):
         module.set_up()
@@ -229,6 +237,70 @@ def test_a_task_for_problem_sets_runs_its_module(setting_up, tmp_path, monkeypat
     assert ran == [["-m", f"rbcourse.{name}", *map(str, map(Path, more))]]
 
 
+RANGES = """
+[project]
+dependencies = ["numpy>=2.0"]
+optional-dependencies.lessons = ["voila>=0.5.8,<0.6"]
+optional-dependencies.grading = ["nbgrader>=0.9,!=0.9.1"]
+optional-dependencies.test = ["mpmath==1.2"]
+optional-dependencies.lint = ["ruff==0.1"]
+"""
+BOUNDS = ["numpy==2.0", "voila==0.5.8", "nbgrader==0.9", "mpmath==1.2"]
+
+
+@pytest.mark.parametrize(
+    ("releases", "folder", "installed"),
+    [
+        ([], ".venv", ["-r", "environment.txt"]),
+        (["--oldest"], ".venv-oldest", ["-e", ".[lessons,grading,test]", *BOUNDS]),
+        (["--newest"], ".venv-newest", ["-e", ".[lessons,grading,test]"]),
+    ],
+)
+def test_tests_run_in_the_environment_that_is_asked_for(
+    setting_up, monkeypatch, releases, folder, installed
+):
+    """With what is stored only where it was drawn; with the further words, last, everywhere."""
+    module, done = setting_up
+    (module.ROOT / "pyproject.toml").write_text(RANGES)
+    ran = []
+    monkeypatch.setattr(module, "run_in", lambda venv, *words: ran.append((venv, words)))
+    monkeypatch.setattr(sys, "argv", ["course.py", "test", *releases, "-q", "tests/test_so3.py"])
+    module.main()
+    ((venv, words),) = ran
+    assert venv == module.ROOT / folder
+    assert [path for path in module.ROOT.iterdir() if path.is_dir()] == [venv]
+    assert done[1][-len(installed) :] == tuple(installed)
+    assert all(str(module.python(venv)) in command for command in done[1:])
+    assert words[:2] == ("-m", "pytest")
+    assert words[-2:] == ("-q", "tests/test_so3.py")
+    left_out = [word for word in words if word.startswith("--deselect=")]
+    stored = ["--deselect=notebooks", "--deselect=tests/test_notebooks.py"]
+    assert left_out == (stored if releases else [])
+
+
+@pytest.mark.parametrize("releases", ["oldest", "newest"])
+def test_an_environment_of_a_range_is_made_once_a_day(setting_up, monkeypatch, releases):
+    module, done = setting_up
+    (module.ROOT / "pyproject.toml").write_text(RANGES)
+    for day, commands in ((1, 3), (1, 3), (2, 6)):
+        today = SimpleNamespace(today=lambda day=day: date(2026, 1, day))
+        monkeypatch.setattr(module, "date", today)
+        module.set_up_range(releases)
+        assert len(done) == commands
+
+
+def test_every_range_has_a_lower_bound_which_is_tested():
+    extras = PROJECT["optional-dependencies"]
+    wanted = [*PROJECT["dependencies"]]
+    wanted += [line for name in ("lessons", "grading", "test") for line in extras[name]]
+    bounds = [Requirement(line) for line in course_module().lower_bounds()]
+    assert len({bound.name for bound in bounds}) == len(bounds)
+    for range_, bound in zip(map(Requirement, wanted), bounds, strict=True):
+        (lowest,) = [part for part in range_.specifier if part.operator == ">="]
+        assert (bound.name, str(bound.specifier)) == (range_.name, f"=={lowest.version}")
+        assert range_.specifier.contains(lowest.version)
+
+
 @pytest.mark.parametrize("missing", [[], ["peers-torch"], ["peers", "peers-torch"]])
 def test_bench_goes_on_without_what_does_not_install(setting_up, monkeypatch, capsys, missing):
     module, done = setting_up
@@ -255,9 +327,7 @@ def test_bench_goes_on_without_what_does_not_install(setting_up, monkeypatch, ca
 
 
 def test_what_a_command_said_last_is_kept_when_it_fails():
-    spec = spec_from_file_location("course", ROOT / "course.py")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = course_module()
     with pytest.raises(module.SetUpError, match=r"^no network\n$"):
         module.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
 
