@@ -34,6 +34,13 @@ def pytest_collect_file(file_path, parent):
     return [Lesson.from_parent(parent, path=file_path)] if file_path in LESSONS else collected
 
 
+@pytest.fixture(autouse=True)
+def _elsewhere(request, tmp_path_factory, monkeypatch):
+    """Let the examples of README.md and CONVENTIONS.md write their files into another folder."""
+    if request.node.path.suffix == ".md":
+        monkeypatch.chdir(tmp_path_factory.mktemp("examples"))
+
+
 class Lesson(IPyNbFile):
     """A notebook whose last item compares what the cells before it gave and drew."""
 

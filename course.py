@@ -30,7 +30,6 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 UV = shutil.which("uv")
 TESTED = ("lessons", "grading", "test")  # the extras whose ranges are tested
-PEERS = ("peers", "peers-torch")  # the latter may take several GB on Linux
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
 
 
@@ -104,8 +103,7 @@ def main():
     elif known.task == "ledger":
         run("-m", "rbcourse.ledger")
     elif known.task == "bench":
-        for name in PEERS:
-            set_up_peers(name)
+        set_up_peers()
         run("-m", "benchmarks")
     else:
         set_up_extra("lint")
@@ -243,12 +241,12 @@ def set_up_extra(name):
         print(" done.", flush=True)
 
 
-def set_up_peers(name):
-    """Install what bench compares with; what cannot be had is named, and left out."""
+def set_up_peers():
+    """Install what bench compares with besides; where that cannot be had, it is left out."""
     try:
-        set_up_extra(name)
+        set_up_extra("peers")
     except SetUpError as error:
-        print("%s\nThe run goes on without %s." % (error, name), flush=True)
+        print("%s\nThe run goes on without." % error, flush=True)
 
 
 def find_chromium():

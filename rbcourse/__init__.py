@@ -114,7 +114,7 @@ from rbcourse.so3 import (
 from rbcourse.trajectories import read_path, write_path
 from rbcourse.uniformity import UniformityTest, uniformity_tests
 
-__version__ = "0.9.0"
+__version__ = "0.10.0"
 
 __all__ = [
     "BASIS_SE3",

@@ -92,7 +92,8 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
         rotation, translation = acceleration_cost_parts(curve.curve)
         return rotation * curve.rate**3, translation * curve.rate**3
     if isinstance(curve, Chain):
-        jumps, speeds = np.abs(curve.jumps(1)), np.abs(curve(curve.times, 1))
+        moments = np.append(curve.times, curve.times[:-1] + curve.durations / 2)
+        jumps, speeds = np.abs(curve.jumps(1)), np.abs(curve(moments, 1))
         for half in (slice(3), slice(3, None)):  # rad and m
             jump = jumps[:, half].max(initial=0)
             if jump > 1e-9 * speeds[:, half].max(initial=0):

@@ -345,6 +345,8 @@ def test_a_velocity_that_jumps_costs_more_than_can_be_said():
     with pytest.raises(RuntimeError, match=r"^acceleration cost: a velocity jumps at a joint, by"):
         rb.acceleration_cost(rb.chain(TIMES, POSES, leg=rb.geodesic_se3))
     assert rb.acceleration_cost(rb.chain([0, 9], POSES[:2], leg=rb.geodesic_se3)) == 0
+    stops = rb.chain(TIMES, POSES, 0 * TWISTS, leg=rb.minimum_acceleration_se3)
+    assert 0 < rb.acceleration_cost(stops) < np.inf
 
 
 def test_neither_reads_nor_writes_the_callers_arrays_later():
