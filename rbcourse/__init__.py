@@ -8,7 +8,8 @@ from rbcourse.arm import (
     interpolate_joints,
     propagate_joints,
 )
-from rbcourse.chains import bessel_velocities, chain, retime
+from rbcourse.bessel import bessel_velocities
+from rbcourse.chains import chain, retime
 from rbcourse.connection import (
     christoffel,
     covariant_derivative,

@@ -1,27 +1,22 @@
 """Curves of any duration, and curves through many poses."""
 
-import math
 import warnings
 from collections.abc import Callable
 from inspect import Parameter, signature
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbcourse._numerics import EPS, Array, as_single, blocks, check_order
+from rbcourse.bessel import SHORTEST, as_path, parabolas_and_rests, rotated, twists
 from rbcourse.curves import BLOCK, Chosen, Curve, runs
 from rbcourse.motions import RigidMotion, projected_cubic_se3
 from rbcourse.polynomials import cubic_coefficients, quintic_coefficients
 from rbcourse.projected import projected_cubic_so3
-from rbcourse.so3 import log_so3, right_jacobian_so3
-from rbcourse.trajectories import as_samples
 
 Leg = Callable[..., Curve]
 
-_HALF_TURN = math.pi - 1e-6
-_EQUAL = 1e-12
-_SHORTEST, _LONGEST = 1e-100, 1e100  # that squares do not overflow
 _ARRIVED = 1e-6
 
 
@@ -96,7 +91,7 @@ def retime(curve: Curve, duration: float) -> Retimed:
         raise ValueError(f"duration is {time}, a time above 0 is wanted")
     if start + time == start:
         raise ValueError(f"duration is {time}: that vanishes beside the first time, {start}")
-    if time < _SHORTEST * (end - start):
+    if time < SHORTEST * (end - start):
         raise ValueError(f"duration is {time}: too short, accelerations would overflow")
     return Retimed(curve, (end - start) / time, (start, start + time))
 
@@ -275,21 +270,18 @@ def chain(
     >>> c(2)[:3, 3].round(12), c([0, 2, 3], 1)[:, 2].round(3) + 0.0
     (array([2., 0., 0.]), array([0.   , 0.833, 0.   ]))
     """
-    times, poses, velocities = _as_path(times, poses, velocities)
+    times, poses, velocities = as_path(times, poses, velocities)
     moves = poses.shape[-1] == 4
     if leg is None:
         leg = projected_cubic_se3 if moves else projected_cubic_so3
     wanted = _arguments(leg)
     if velocities is not None and "w0" not in wanted:
         raise ValueError("velocities: the legs ask for none")
-    w, d_dot, a, d_bend = _parabolas(times, poses)
-    rests = _rests(poses)
-    for chosen in (w, d_dot, a, d_bend):
-        chosen[rests] = 0
+    w, d_dot, a, d_bend = parabolas_and_rests(times, poses)
     if velocities is not None:
-        w, d_dot = velocities[:, :3], _rotated(poses, velocities[:, 3:])
+        w, d_dot = velocities[:, :3], rotated(poses, velocities[:, 3:])
     elif "w0" in wanted:
-        velocities = _twists(poses, w, d_dot)
+        velocities = twists(poses, w, d_dot)
     h = np.diff(times)[:, None]
     ends = _ends("R{}", poses[:, :3, :3]) | _ends("w{}", w, h) | _ends("a{}", a, h**2)
     if moves:
@@ -303,125 +295,6 @@ def chain(
         legs = RigidMotion(legs, _coefficients(wanted, *path.values()))
     _check_arrival(legs, poses)
     return Chain(times, legs, velocities)
-
-
-def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
-    """Return velocities for a path: at each pose that of the parabola through three neighbours.
-
-    Parameters
-    ----------
-    times : array_like, shape (N,)
-        Increasing; two or more.
-    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses, or rotation matrices, one for each time.
-
-    Returns
-    -------
-    ndarray, shape (N, 6) or (N, 3)
-        Twists (ω, v), or angular velocities ω, body frame, per unit of the times.
-
-    Raises
-    ------
-    ValueError
-        If times do not increase, a matrix is no pose or no rotation, or neighbours are a half-turn
-        apart, to 1e-6.
-
-    See Also
-    --------
-    chain : The curve; it takes these velocities but at its ends, where it rests.
-
-    Notes
-    -----
-    Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV); for even times, that of
-    Catmull and Rom. The parabola of the origin is one in R³; that of the rotation is one in the
-    exponential coordinates about the pose in the middle, so that moved poses have moved velocities.
-    The first and the last pose have what the parabolas of their neighbours have there; two poses
-    alone have the constant velocity between them.
-
-    Singular set: half-turns between neighbours.
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3
-    >>> t = np.array([0, 1, 3])
-    >>> bessel_velocities(t, exp_so3(t[:, None] ** 2 * [0, 0, 0.1])).round(12)  # 2 · 0.1 t
-    array([[0. , 0. , 0. ],
-           [0. , 0. , 0.2],
-           [0. , 0. , 0.6]])
-    """
-    times, poses, _ = _as_path(times, poses)
-    w, d_dot, *_ = _parabolas(times, poses)
-    return _twists(poses, w, d_dot)
-
-
-def _as_path(
-    times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
-) -> tuple[Array, Array, Array | None]:
-    """Return `as_samples`, of two poses or more, no neighbours a half-turn apart."""
-    times, poses, velocities = as_samples(times, poses, velocities)
-    if len(times) < 2:
-        raise ValueError("times, poses: two or more wanted, got 1")
-    h = np.diff(times)
-    odd = ~((h > _SHORTEST) & (h < _LONGEST))
-    if odd.any():
-        i = np.argmax(odd)
-        raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too near, or too far")
-    far = np.linalg.norm(_turns(poses), axis=-1) > _HALF_TURN
-    if far.any():
-        i = np.argmax(far)
-        raise ValueError(
-            f"poses[{i}] and poses[{i + 1}] are a half-turn apart: put a pose between them, "
-            "to tell which way to turn"
-        )
-    return times, poses, velocities
-
-
-def _turns(poses: Array) -> Array:
-    """Return the rotation vectors from each pose to the next, body frame."""
-    R = poses[:, :3, :3]
-    return log_so3(R[:-1].mT @ R[1:])
-
-
-def _parabolas(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
-    """Return w and d', w' and d'' of the parabolas; d has no components for rotations."""
-    h, turns = np.diff(times)[:, None], _turns(poses)
-    d = poses[:, :3, 3:].reshape(len(poses), -1)
-    w, a = _parabola(h, turns / h)
-    for end, turn in ((0, -turns[0]), (-1, turns[-1])):
-        w[end] = right_jacobian_so3(turn) @ w[end]  # coordinates about the neighbour
-    d_dot, d_bend = _parabola(h, np.diff(d, axis=0) / h)
-    return w, d_dot, a, d_bend
-
-
-def _parabola(h: Array, slopes: Array) -> tuple[Array, Array]:
-    """Return the first and the second derivatives of the parabolas, from chords and their slopes.
-
-    At the ends they are those of the neighbours' parabolas; of one chord, a line.
-    """
-    bend = np.zeros((len(h) + 1, slopes.shape[1]))
-    if len(h) > 1:
-        bend[1:-1] = 2 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
-        bend[0], bend[-1] = bend[1], bend[-2]
-    first, others = slopes[:1] - h[:1] * bend[:1] / 2, slopes + h * bend[1:] / 2
-    return np.concatenate([first, others]), bend
-
-
-def _rests(poses: Array) -> NDArray[np.bool_]:
-    """Tell where a path rests, if it is not told to move: at its ends, and at equal neighbours."""
-    change, d = np.abs(np.diff(poses, axis=0)), np.abs(poses[1:, :3, 3:])
-    same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
-    same &= np.all(change[:, :3, 3:] <= 4 * EPS * d, axis=(1, 2))
-    return np.append(True, same) | np.append(same, True)
-
-
-def _rotated(poses: Array, v: Array) -> Array:
-    """Return vectors of body frames in the fixed frame."""
-    return (poses[:, :3, :3] @ v[..., None])[..., 0] if v.size else v
-
-
-def _twists(poses: Array, w: Array, d_dot: Array) -> Array:
-    """Return (w, Rᵀ d'), or w where nothing moves."""
-    return np.concatenate([w, _rotated(poses.mT, d_dot)], axis=-1)
 
 
 def _ends(name: str, values: Array, scale: float | Array = 1.0) -> dict[str, Array]:

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
+from rbcourse.bessel import bessel_velocities
 from rbcourse.bodies import draw_box, move_box
-from rbcourse.chains import Chain, bessel_velocities, chain
+from rbcourse.chains import Chain, chain
 from rbcourse.curves import Curve
 from rbcourse.explorer import Explorer, look, menu, new_figure, new_line, new_space, numbers, slider
 from rbcourse.figures import COLOURS

@@ -122,37 +122,6 @@ def test_without_velocities_it_has_bessels_but_rests_at_its_ends(poses):
     assert not c.velocities[[0, -1]].any()
 
 
-def test_bessels_velocities_are_those_of_the_parabola_through_three():
-    """Of R_i exp(x(t)), x through the logarithms of the neighbours; and of d."""
-    chosen = rb.bessel_velocities(TIMES, POSES)
-    for i in range(N):
-        m = min(max(i, 1), N - 2)
-        three = slice(m - 1, m + 2)
-        t = TIMES[three] - TIMES[i]
-        x = [oracles.log_so3(ROTATIONS[m].T @ R) for R in ROTATIONS[three]]
-        parabola = np.polynomial.Polynomial.fit
-        turn = [parabola(t, component, 2) for component in np.transpose(x)]
-        here, rate = ([p(0) for p in part] for part in (turn, [p.deriv() for p in turn]))
-        w = oracles.right_jacobian_so3(here) @ rate
-        d_dot = [parabola(t, component, 2).deriv()(0) for component in POSES[three, :3, 3].T]
-        assert np.abs(chosen[i, :3] - w).max() < 200 * EPS
-        assert np.abs(chosen[i, 3:] - ROTATIONS[i].T @ d_dot).max() < 200 * EPS
-
-
-def test_moved_poses_have_moved_velocities():
-    """Moved in the fixed frame not at all; by another body frame as that frame sees them."""
-    A = rb.pose_from_coordinates([0.4, -1, 2, 3, 1, 5])
-    chosen = rb.bessel_velocities(TIMES, POSES)
-    assert np.abs(rb.bessel_velocities(TIMES, A @ POSES) - chosen).max() < 200 * EPS
-    turned = rb.bessel_velocities(TIMES, ROTATIONS @ A[:3, :3])
-    assert np.abs(turned - chosen[:, :3] @ A[:3, :3]).max() < 200 * EPS
-
-
-def test_of_two_poses_the_velocity_is_constant():
-    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])
-    assert np.abs(w - oracles.log_so3(ROTATIONS[0].T @ ROTATIONS[1]) / 2).max() < 10 * EPS
-
-
 @pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
 def test_equal_neighbours_are_a_rest(leg):
     poses = POSES if leg.__name__.endswith("se3") else ROTATIONS

@@ -44,6 +44,7 @@ LEVELS = {
     "quaternion_curves": 6,
     "rivals": 7,
     "screws": 6,
+    "bessel": 6,
     "chains": 8,
     "cost": 9,
     "trajectories": 5,
