@@ -16,7 +16,7 @@ _EQUAL = 1e-12
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
-    """Return velocities for a path: at each pose that of the parabola through three neighbours.
+    """Return velocities for a path: at each pose of the parabola through it and its neighbours.
 
     Parameters
     ----------
@@ -106,9 +106,9 @@ def _parabolas(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
 
 def parabolas_and_rests(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
     """Return the same, but 0 where a path rests: at its ends, and at equal neighbours."""
-    change, d = np.abs(np.diff(poses, axis=0)), np.abs(poses[1:, :3, 3:])
+    change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
     same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
-    same &= np.all(change[:, :3, 3:] <= 4 * EPS * d, axis=(1, 2))
+    same &= np.all(change[:, :3, 3:] <= 64 * EPS * far, axis=(1, 2))
     rates = _parabolas(times, poses)
     for values in rates:
         values[np.append(True, same) | np.append(same, True)] = 0

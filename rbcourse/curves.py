@@ -90,7 +90,9 @@ class Curve:
         Raises
         ------
         IndexError
-            If there is no such curve, or no stack.
+            If there is no such curve.
+        TypeError
+            If there is no stack.
 
         Examples
         --------
@@ -100,7 +102,7 @@ class Curve:
         (array([0. , 0. , 1.5]), (1,))
         """
         if not self.batch_shape:
-            raise IndexError("a single curve is no stack, and has no index")
+            raise TypeError("a single curve is no stack, and has no index")
         numbers = np.arange(math.prod(self.batch_shape)).reshape(self.batch_shape)
         return self._pick(np.asarray(numbers[index]))
 
@@ -188,6 +190,9 @@ class AlongGeodesic(Curve):
     def _progress(self, t: Array, order: int, angle: Array) -> Array:
         return identity(t, order)
 
+    def _progress_each(self, t: Array, which: Chosen, order: int) -> Array:
+        return identity(t, order)
+
     def _pick(self, chosen: Chosen) -> Self:
         picked = copy(self)
         picked.__dict__.pop("_terms", None)
@@ -198,13 +203,12 @@ class AlongGeodesic(Curve):
         return picked
 
     def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        angle = self._angle[which]
-        progress = self._progress(t, order, angle)
+        progress = self._progress_each(t, which, order)
         if order:
             np.multiply(progress[:, None], self.rotation_vector[which], out=out)
             return
         shares, R = np.ones((3, len(t))), out.reshape(-1, 9)
-        _write_shares(progress, angle, shares)
+        _write_shares(progress, self._angle[which], shares)
         for curve, run in runs(which):
             np.matmul(shares[:, run].T, self._terms[:, curve].reshape(3, 9), out=R[run])
 

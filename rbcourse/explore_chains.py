@@ -28,10 +28,10 @@ POSES = pose_from_coordinates(
 SHARES = np.array([0.0, 0.35, 0.65, 1.0])
 """When each is reached, of the whole time."""
 LEGS: dict[str, Any] = {
+    "geodesics": geodesic_se3,
     "projected cubics": projected_cubic_se3,
     "optima": minimum_acceleration_se3,
     "projected quintics": projected_quintic_so3,
-    "geodesics": geodesic_se3,
 }
 _EDGES = np.array([0.9, 0.6, 0.3])
 _LONGEST = 12.0

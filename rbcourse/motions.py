@@ -49,7 +49,10 @@ class RigidMotion(Curve):
     def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         rotation = [np.empty((len(t), *((3,) if k else (3, 3)))) for k in sorted({0, order})]
         for k, values in zip(sorted({0, order}), rotation, strict=True):
-            self.rotation._write_each(t, self._of_rotation(which), k, values)
+            if self.rotation.batch_shape:
+                self.rotation._write_each(t, self._of_rotation(which), k, values)
+            else:
+                values[...] = self.rotation._evaluate(t, k)
         path = pick(self.coefficients, which, self.batch_shape, core=1, lead=1)
         out[...] = _joined(rotation, polynomial(path, t[..., None], order))
 

@@ -31,6 +31,11 @@ def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
     -------
     dict of str to ndarray
 
+    Raises
+    ------
+    ValueError
+        If it is no single motion on SE(3).
+
     Examples
     --------
     >>> from rbcourse import geodesic_se3, pose_from_coordinates
@@ -39,7 +44,10 @@ def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
     {'t [s]': [0.0, 1.0], 'angular speed [rad/s]': [1.0, 1.0], 'speed [m/s]': [5.0, 5.0]}
     """
     t = np.linspace(*motion.domain, samples)
-    halves = np.split(motion(t, order), 2, axis=-1)
+    rates = motion(t, order)
+    if rates.shape != (samples, 6):
+        raise ValueError("motion: a single curve on SE(3) wanted")
+    halves = np.split(rates, 2, axis=-1)
     norms = (np.linalg.norm(half, axis=-1) for half in halves)
     return {_TIME: t, **dict(zip(RATES[order], norms, strict=True))}
 
@@ -68,7 +76,8 @@ def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> list[A
         lines += ax.plot(t, values, color=COLOURS["path"])
         label, unit = name.removesuffix("]").split(" [")
         ax.set(ylabel=f"{label}\n({unit})", xlim=(t[0], t[-1]))
-        ax.set_ylim(0, 1.08 * np.max(values))
+        low, high = 1.08 * min(np.min(values), 0), 1.08 * max(np.max(values), 0)
+        ax.set_ylim(low, high if high > low else 1)
     axes[-1].set_xlabel("time (s)")
     axes[0].figure.align_ylabels(axes)
     return lines
@@ -92,8 +101,9 @@ def describe_profiles(data: Table, knots: ArrayLike) -> str:
     parts = []
     for name, values in _columns(data):
         label, unit = name.removesuffix("]").split(" [")
-        largest = int(np.argmax(np.round(values, 9)))
-        parts.append(f"{label} up to {in_words(values[largest], values[largest])} {unit}")
+        scale, largest = np.abs(values).max(), int(np.argmax(np.round(values, 9)))
+        low = f"from {in_words(values.min(), scale)} " if values.min() < -0.01 * scale else ""
+        parts.append(f"{label} {low}up to {in_words(values[largest], scale)} {unit}")
         parts[-1] += f" at {in_words(t[largest], t[-1])} s"
     when = ", ".join(in_words(knot, t[-1]) for knot in np.asarray(knots))
     return f"Over time: {'; '.join(parts)}. The poses are reached at {when} s."

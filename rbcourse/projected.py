@@ -53,7 +53,7 @@ class ProjectedLine(AlongGeodesic):
         self._angle = as_angle(self._angle)
         self.margin = 2 * np.cos(self._angle / 2)
         _warn_if_nearly_singular(self.margin)
-        start, end = self._line(as_time([0, 1], len(self.batch_shape)), 0)
+        start, end = self._line(as_time([0, 1], len(self.batch_shape)), 0, self.batch_shape)
         if np.any(np.abs(start) > 1e-12) or np.any(np.abs(end - 1) > 1e-12):
             raise ValueError(f"f: f(0) = 0 and f(1) = 1 are wanted, got {start} and {end}")
 
@@ -64,18 +64,21 @@ class ProjectedLine(AlongGeodesic):
             picked._f = partial(self._line_of, chosen)
         return picked
 
-    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        for curve, run in runs(which):
-            out[run] = self[curve]._evaluate(t[run], order)
+    def _progress_each(self, t: Array, which: Chosen, order: int) -> Array:
+        if self._f is identity:
+            return self._progress(t, order, self._angle[which])
+        parts = [(self[curve], t[run]) for curve, run in runs(which)]
+        return np.concatenate([one._progress(times, order, one._angle) for one, times in parts])
 
     def _line_of(self, chosen: Chosen, t: Array, order: int) -> Array:
         """Return f for the chosen curves; the times have an axis of length 1 for each of theirs."""
         times = t.shape[: t.ndim - chosen.ndim]
-        values = self._line(t.reshape(times + (1,) * len(self.batch_shape)), order)
+        t = t.reshape(times + (1,) * len(self.batch_shape))
+        values = self._line(t, order, self.batch_shape)
         return pick(values, chosen, self.batch_shape, lead=len(times))
 
-    def _line(self, t: Array, order: int) -> Array:
-        name, shape = f"f(t, {order})", np.broadcast_shapes(t.shape, self.batch_shape)
+    def _line(self, t: Array, order: int, batch_shape: tuple[int, ...]) -> Array:
+        name, shape = f"f(t, {order})", np.broadcast_shapes(t.shape, batch_shape)
         value = as_finite(name, self._f(t.copy(), order))
         try:
             return np.broadcast_to(value, shape)
@@ -83,15 +86,15 @@ class ProjectedLine(AlongGeodesic):
             raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
 
     def _progress(self, t: Array, order: int, angle: Array) -> Array:
-        on_line = self._line(t, 0)
+        on_line = self._line(t, 0, angle.shape)
         lost = line_singular_value(on_line, angle) < 8 * EPS
-        check_times(t, lost, len(self.batch_shape), _WHY)
+        check_times(t, lost, angle.ndim, _WHY)
         if order == 0:
             return theta(on_line, angle)
-        slope, speed = theta(on_line, angle, 1), self._line(t, 1)
+        slope, speed = theta(on_line, angle, 1), self._line(t, 1, angle.shape)
         if order == 1:
             return slope * speed
-        return theta(on_line, angle, 2) * speed**2 + slope * self._line(t, 2)
+        return theta(on_line, angle, 2) * speed**2 + slope * self._line(t, 2, angle.shape)
 
 
 class ProjectedPolynomial(BlockwiseCurve):

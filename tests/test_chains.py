@@ -8,6 +8,7 @@ import oracles
 import pytest
 
 import rbcourse as rb
+from rbcourse.motions import RigidMotion
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(110)
@@ -359,3 +360,54 @@ def test_an_optimum_that_is_not_found_is_named():
     message = r"^leg: it found no curve from poses\[1\] to poses\[2\] \(NaN\)"
     with pytest.warns(RuntimeWarning), pytest.raises(ValueError, match=message):
         rb.chain(range(4), ROTATIONS[:4], V, leg=rb.minimum_acceleration_so3)
+
+
+def test_a_dwell_is_a_rest_wherever_it_is_seen_from():
+    """Poses equal but for the rounding of their products, at the origin of the frame too."""
+    stay = POSES[[0, 1, 1, 2]]
+    for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
+        seen = np.stack([frame @ A for A in stay])
+        seen[2] = (frame @ POSES[5]) @ (rb.inverse_se3(POSES[5]) @ stay[2])
+        seen[:, :3, :3] = rb.project_so(seen[:, :3, :3])
+        c = rb.chain(range(4), seen)
+        assert not c.velocities[1:3].any()
+
+
+def test_near_neighbours_are_no_rest_and_near_half_turns_no_half_turns():
+    R = rb.exp_so3(np.arange(3)[:, None] * [0, 0, 1e-6])
+    assert np.abs(rb.chain(range(3), R).velocities[1] - [0, 0, 1e-6]).max() < 1e-12
+    c = rb.chain([0, 1], rb.exp_so3([[0, 0, 0], [0, 0, np.pi - 1e-5]]))
+    assert np.abs(rb.log_so3(c(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
+
+
+def test_durations_of_any_size():
+    c = rb.chain([0, 1e50], POSES[:2])
+    assert rb.retime(c, 1e-40).domain == (0, 1e-40)
+    far = POSES[:3].copy()
+    far[:, :3, 3] *= 1e11
+    assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
+
+
+def test_a_small_jump_of_the_velocity_is_seen_beside_fast_motion():
+    """Legs that start a little faster than the ones before end: in the turning alone."""
+
+    def uneven(R0, R1, w0, w1):
+        return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1)
+
+    fast = rb.pose_from_components(ROTATIONS, 1e6 * POSES[:, :3, 3])
+    with pytest.raises(RuntimeError, match="a velocity jumps at a joint"):
+        rb.acceleration_cost(rb.chain(TIMES, fast, leg=uneven))
+
+
+def test_many_ways_and_one_turn():
+    """A leg whose rotation is one for all."""
+
+    def sliding(A0, A1):
+        path = np.stack([A0[:, :3, 3], A1[:, :3, 3] - A0[:, :3, 3]])
+        return RigidMotion(rb.geodesic_so3(np.eye(3), np.eye(3)), path)
+
+    places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
+    c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))
+    t = np.linspace(*c.domain, 50)
+    for order in range(3):
+        assert np.abs(c(t, order) - other(t, order)).max() < 1e-12

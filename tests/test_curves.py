@@ -422,6 +422,7 @@ def test_the_least_over_time_is_found_wherever_it_is():
 
 STACKS = {
     "geodesic": lambda R, w: rb.geodesic_so3(R[0], R[1]),
+    "from one start": lambda R, w: rb.geodesic_so3(np.eye(3), R[1]),
     "line": lambda R, w: rb.projected_line_so3(R[0], R[1]),
     "timed line": lambda R, w: rb.projected_line_so3(R[0], R[1], quick_for_each),
     "projected": lambda R, w: rb.projected_cubic_so3(R[0], R[1], w[0], w[1]),
@@ -496,6 +497,9 @@ def test_each_curve_of_a_list_at_its_own_time(stack_of_six):
         out = np.empty_like(want)
         stack[1]._write_each(times[when], which, order, out)
         assert np.abs(out - want).max() < 1e-12
+        if order == 0:
+            R = out[:, :3, :3]
+            assert np.abs(R.mT @ R - np.eye(3)).max() < 10 * EPS
 
 
 def test_a_stack_is_iterated_and_its_end_is_known():
@@ -503,8 +507,8 @@ def test_a_stack_is_iterated_and_its_end_is_known():
     assert [c.batch_shape for c in stack] == [(), (), ()]
     with pytest.raises(IndexError, match="index 3 is out of bounds"):
         stack[3]
-    with pytest.raises(IndexError, match=r"^a single curve is no stack"):
-        stack[0][0]
+    with pytest.raises(TypeError, match=r"^a single curve is no stack"):
+        list(stack[0])
 
 
 def test_what_failed_in_a_stack_stays_failed():

@@ -117,6 +117,12 @@ def test_quaternions_go_on_without_a_change_of_sign(tmp_path):
     assert np.abs(np.diff(q, axis=0)).max() < 0.05
 
 
+def test_no_zero_of_a_quaternion_has_a_minus(tmp_path):
+    R = rb.exp_so3([[0, 0, 3], [0, 0, 3.3], [0, 0, 3.6]])
+    rb.write_path(tmp_path / "path.csv", [0, 1, 2], R)
+    assert "-0.0," not in (tmp_path / "path.csv").read_text("utf-8")
+
+
 def test_what_others_write_is_read(tmp_path):
     """Comments, blank lines, tabs, four digits; a mark of the byte order, CRLF, blanks, quotes."""
     text = "# ground truth\n# timestamp tx ty tz qx qy qz qw\n\n1305031098.6659\t1 2 3 "
@@ -125,6 +131,8 @@ def test_what_others_write_is_read(tmp_path):
     assert times.tolist() == [1305031098.6659]
     want = Rotation.from_quat([0.6574, 0.6126, -0.2949, -0.3248]).as_matrix()
     assert np.abs(poses[0, :3, :3] - want).max() < 8 * EPS
+    (tmp_path / "b.tum").write_text("0 0 0 0 0 0 0 1.0009\n", "utf-8")
+    assert np.array_equal(rb.read_path(tmp_path / "b.tum")[1][0], np.eye(4))
     text = "\ufeff" + PLAIN.replace(",", " , ") + '\r\n"0",1, 2 ,3,1,0,0,0\r\n\r\n'
     (tmp_path / "a.csv").write_bytes(text.encode())
     times, poses, _ = rb.read_path(tmp_path / "a.csv")
@@ -160,8 +168,8 @@ NUMBER = "a finite number wanted, got"
         ),
         (
             "a.tum",
-            "0 0 0 0 0 0 0 1.002\n",
-            ", line 1: a quaternion of norm 1 wanted, got one of 1.002",
+            "0 0 0 0 0 0 0 1.0011\n",
+            ", line 1: a quaternion of norm 1 wanted, got one of 1.0011",
         ),
         ("a.tum", GOOD + "\udcff\n", ", line 2: no text in UTF-8"),
         ("a.csv", "", ", line 1: time [s], x [m], "),
