@@ -22,6 +22,8 @@ RATIOS = [
     ("the same with velocity and acceleration", "closed forms with derivatives", ""),
     ("{} random rotation matrices", "random rotation matrices", ""),
     ("{} random quaternions", "random quaternions", ""),
+    ("a chain of 1,000 poses at {} times", "chain at N times", "projected cubics"),
+    ("the same of geodesics", "chain at N times", "geodesics"),
     ("minimum acceleration, BK Figure 4c", "optimum, one problem", "4c"),
     ("minimum acceleration, {} random problems at once", "optimum, stacked", "random"),
     ("{} frames of two cubes as GIF", "cubes as GIF", ""),

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 
 import rbcourse as rb
+from benchmarks.chains import LEGS, chain_of_poses
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.optima import CASES, one_optimum, stacked_optimum
 from benchmarks.rivals import closed_forms, closed_forms_with_derivatives
@@ -56,6 +57,8 @@ def all_contests(peers, rng, sizes=SIZES, cases=tuple(CASES), problems=1000, fra
             yield replace(task(n, peers, rng), weigh=n == max(sizes))
     for task in (closed_forms, closed_forms_with_derivatives):
         yield from (task(n, rng) for n in sizes[::3])
+    for legs in LEGS:
+        yield from (chain_of_poses(n, rng, legs) for n in sizes[::3])
     yield from (one_optimum(case) for case in cases)
     yield stacked_optimum(problems, rng)
     yield imports()

@@ -60,7 +60,7 @@ def chain_explorer() -> Explorer:
         }
         artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
         for i, (name, high) in enumerate(_WAYS.items()):
-            ax = fig.add_axes((0.66, 0.59 - 0.45 * i, 0.32, 0.33))
+            ax = fig.add_axes((0.66, 0.62 - 0.48 * i, 0.32, 0.29))
             ax.set(xlim=(0, _LONGEST), ylim=(0, high), xticks=[0, 4, 8, 12])
             ax.set_title(name)
             artists |= {
