@@ -228,8 +228,8 @@ def chain(
     ValueError
         If times do not increase; if a matrix is no pose or no rotation; if neighbours are a
         half-turn apart, to 1e-6; if the numbers do not agree; if `velocities` are given to legs
-        that ask for none; if `leg` asks for other arguments, raises one, or does not lead to the
-        next pose, to 1e-6. The message names the first place.
+        that ask for none; if `leg` asks for other arguments, refuses these, or does not lead to
+        the next pose, to 1e-6. The message names the first place.
     ConvergenceError
         If `leg` does.
 
@@ -258,8 +258,9 @@ def chain(
     The accelerations that the quintic asks for are those of the parabolas of `bessel_velocities`,
     also where velocities are given; 0 at both ends and where it rests.
 
-    A million times take about as long as on one leg: with geodesics of rotations, which are quick,
-    two to three times as long, and up to twice as long where the times are in no order.
+    A million times take about as long as on one leg: up to three times as long with geodesics,
+    projected lines and quaternion cubics of rotations alone, which are quick, and up to twice as
+    long where the times are in no order.
 
     Singular set: that of the legs; half-turns between neighbours are refused, as they leave open
     which way to turn. Where a leg is to turn by more than that, put a pose between.

@@ -93,6 +93,13 @@ def test_the_joints_are_as_smooth_as_stated(leg, poses):
     assert leg not in WITHOUT_VELOCITIES or np.abs(c.jumps(1)).max() > 0.1
 
 
+def test_optima_are_rotations_between_their_nodes():
+    """Their series are cut off at 3e-12."""
+    c = rb.chain(TIMES, ROTATIONS, 8 * TWISTS[:, :3], leg=rb.minimum_acceleration_so3)
+    R = c(np.linspace(*c.domain, 300))
+    assert np.abs(R.mT @ R - np.eye(3)).max() < 10 * EPS
+
+
 def test_optima_by_shooting_are_legs_too():
     c, other = (
         rb.chain(TIMES[:3], ROTATIONS[:3], TWISTS[:3, :3], leg=leg)

@@ -52,3 +52,15 @@ def test_what_is_said():
         "Over time: speed up to 2.5 m/s at 1 s; turn up to 1 rad/s at 0 s. "
         "The poses are reached at 0, 1.5 s."
     )
+
+
+def test_what_never_changes_has_axes_too():
+    fig, axes = plt.subplots(2)
+    draw_profiles(axes, TABLE | {"speed [m/s]": [0, 0, 0], "turn [rad/s]": [-1, 0, 3]}, [])
+    assert [ax.get_ylim() for ax in axes] == [(0, 1), pytest.approx((-1.08, 3.24))]
+    plt.close(fig)
+
+
+def test_of_rotations_alone_there_is_no_profile():
+    with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) wanted"):
+        profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)

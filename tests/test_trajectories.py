@@ -118,7 +118,7 @@ def test_quaternions_go_on_without_a_change_of_sign(tmp_path):
 
 
 def test_no_zero_of_a_quaternion_has_a_minus(tmp_path):
-    R = rb.exp_so3([[0, 0, 3], [0, 0, 3.3], [0, 0, 3.6]])
+    R = rb.exp_so3([[0, 0, 0], [0, 0, 4], [0, 0, 2]])
     rb.write_path(tmp_path / "path.csv", [0, 1, 2], R)
     assert "-0.0," not in (tmp_path / "path.csv").read_text("utf-8")
 
