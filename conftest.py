@@ -13,7 +13,7 @@ from freshness import changed_lines, stale_figures
 from nbformat import NotebookNode
 from nbval.plugin import IPyNbFile
 
-from rbcourse.lessons import kernel_address, lesson_paths, normalised
+from rbcourse.course.notebooks import kernel_address, lesson_paths, normalised
 
 ROOT = Path(__file__).parent
 LESSONS = lesson_paths(ROOT / "notebooks")

@@ -80,29 +80,29 @@ def main():
         return
     set_up()
     if known.task == "figures":
-        run("-m", "rbcourse.lessons", "regenerate")
+        run("-m", "rbcourse.course.notebooks", "regenerate")
     elif known.task == "test":
         test_in(VENV, *further)
     elif known.task == "lab":
         open_lab(known.edit, further)
     elif known.task == "lecture":
         if known.check:
-            run("-m", "rbcourse.rehearsal", known.lesson)
+            run("-m", "rbcourse.course.rehearsal", known.lesson)
         else:
-            run("-m", "rbcourse.lecture", known.lesson, *["--no-browser"] * known.no_browser)
+            run("-m", "rbcourse.course.lecture", known.lesson, *["--no-browser"] * known.no_browser)
     elif known.task == "check":
-        run("-m", "rbcourse.submission", known.file)
+        run("-m", "rbcourse.assignments.check", known.file)
     elif known.task == "handout":
-        run("-m", "rbcourse.handout", known.set)
+        run("-m", "rbcourse.assignments.handout", known.set)
     elif known.task == "collect":
         due = ["--due", known.due] if known.due else []
-        run("-m", "rbcourse.collection", known.folder, *due)
+        run("-m", "rbcourse.assignments.collect", known.folder, *due)
     elif known.task == "grade":
-        run("-m", "rbcourse.grading", *known.sets)
+        run("-m", "rbcourse.assignments.grade", *known.sets)
     elif known.task == "browser":
         look_in_browser(further)
     elif known.task == "ledger":
-        run("-m", "rbcourse.ledger")
+        run("-m", "rbcourse.course.ledger")
     elif known.task == "bench":
         set_up_peers()
         run("-m", "benchmarks")
@@ -147,7 +147,7 @@ def test_in(venv, *words):
 def open_lab(edit, further):
     """Open JupyterLab; a root user need not be told what he is."""
     if not edit:
-        run("-m", "rbcourse.lessons", "copy")
+        run("-m", "rbcourse.course.notebooks", "copy")
     keep_lab_quiet()
     words = ["--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work"))]
     if hasattr(os, "geteuid") and os.geteuid() == 0:

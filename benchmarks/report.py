@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.contest import OURS, SPREADS
-from rbcourse.figures import csv_text
+from rbcourse.draw.save import csv_text
 
 HERE = Path(__file__).parent
 CSV = HERE / "benchmarks.csv"

@@ -3,7 +3,7 @@
 import rbcourse as rb
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.rotations import cubic_ends
-from rbcourse.atlas import WAYS
+from rbcourse.study.atlas import WAYS
 
 
 def closed_forms(n, rng):

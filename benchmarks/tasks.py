@@ -24,7 +24,7 @@ from benchmarks.rotations import (
     random_quaternions,
     random_rotations,
 )
-from rbcourse import animate, bodies
+from rbcourse.draw import animate, bodies
 
 SIZES = tuple(10**k for k in range(7))
 

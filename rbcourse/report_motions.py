@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array, as_single
-from rbcourse.animate import Animation, animate
 from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
+from rbcourse.draw.animate import Animation, animate
+from rbcourse.draw.arm import arm_table, describe_arm, moving_arm
+from rbcourse.draw.plane import describe_route, extent_of, moving_route, route_table
 from rbcourse.planar import interpolate_planar, propagate_planar
 from rbcourse.plans import Plan, as_path
-from rbcourse.postures import arm_table, describe_arm, moving_arm
-from rbcourse.routes import describe_route, extent_of, moving_route, route_table
 
 
 def interpolate_rigid_body(

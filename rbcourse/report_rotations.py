@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import Array, Rng, as_count, as_generator, as_single, as_tolerance, as_unit
-from rbcourse.animate import Animation, animate
 from rbcourse.conversions import rotation_vector_from_quaternion
-from rbcourse.figures import Table
+from rbcourse.draw.animate import Animation, animate
+from rbcourse.draw.save import Table
+from rbcourse.draw.spheres import describe_images, image_table, moving_images
 from rbcourse.projection import is_se, is_so, project_se, project_so
 from rbcourse.quaternion import is_unit_quaternion, project_quaternion, rotate_by_quaternion
 from rbcourse.sampling import (
@@ -25,7 +26,6 @@ from rbcourse.sampling import (
     sample_rotation_naive,
 )
 from rbcourse.so3 import exp_so3, log_so3
-from rbcourse.spheres import describe_images, image_table, moving_images
 
 _V0 = np.array([0.0, 0.0, 1.0])
 _V1 = np.array([0.0, 0.2, 0.0]) + _V0

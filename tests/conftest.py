@@ -1,6 +1,6 @@
 import pytest
 
-from rbcourse.ledger import MISPRINTS, SOURCES
+from rbcourse.course.ledger import MISPRINTS, SOURCES
 
 
 def pytest_collection_modifyitems(items):

@@ -4,7 +4,7 @@ import inspect
 
 import pytest
 
-from rbcourse import assignment as rr
+from rbcourse import report as rr
 
 SIGNATURES = {
     "check_SOn": ["m", "epsilon"],

@@ -10,7 +10,7 @@ from nbformat.v4 import new_code_cell
 from PIL import Image
 from tiny import MODULE, lesson_at
 
-from rbcourse import lessons
+from rbcourse.course import notebooks
 
 ROOT = Path(__file__).parents[1]
 STORED = ROOT / "figures"
@@ -142,7 +142,7 @@ def test_of_a_notebook_all_is_compared_but_the_pictures():
 
 
 BAR = """\
-from rbcourse.progress import bar
+from rbcourse.study.progress import bar
 report = bar("Steps")
 report(1, 2)
 report(2, 2)"""
@@ -158,7 +158,7 @@ def lesson(tmp_path):
     path = lesson_at(tmp_path, shown, new_code_cell(DRAW), new_code_cell("6 * 7"))
     for folder in ("figures", "tests"):
         (tmp_path / folder).mkdir()
-    path.write_text(lessons.execute(path, tmp_path / "figures"), encoding="utf-8")
+    path.write_text(notebooks.execute(path, tmp_path / "figures"), encoding="utf-8")
     for name in ("conftest.py", "pyproject.toml", "tests/freshness.py", "tests/nbval_sanitize.cfg"):
         shutil.copyfile(ROOT / name, tmp_path / name)
     return path

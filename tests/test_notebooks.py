@@ -10,10 +10,10 @@ import pytest
 from freshness import BASE64
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from rbcourse import lessons
+from rbcourse.course import notebooks
 
 ROOT = Path(__file__).parents[1]
-LESSONS = lessons.lesson_paths(ROOT / "notebooks")
+LESSONS = notebooks.lesson_paths(ROOT / "notebooks")
 STORED = ROOT / "figures"
 TAGS = {
     "hide-input",

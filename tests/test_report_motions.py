@@ -6,8 +6,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import rbcourse as rb
-from rbcourse import assignment as rr
-from rbcourse.figures import COLOURS
+from rbcourse import report as rr
+from rbcourse.draw.save import COLOURS
 
 RNG = np.random.default_rng(9)
 PATH, ARM_PATH = RNG.uniform(-3, 3, (12, 3)), RNG.uniform(-3, 3, (12, 2))

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rbcourse as rb
-from rbcourse import assignment as rr
+from rbcourse import report as rr
 
 EPS = np.finfo(float).eps
 NINE = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]

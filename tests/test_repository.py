@@ -215,14 +215,14 @@ def test_the_environment_in_use_is_not_made_anew(setting_up, monkeypatch):
     ("words", "wanted"),
     [
         (["handout", "ps1"], ["handout", "ps1"]),
-        (["check", "my work/ps1.ipynb"], ["submission", "HERE/my work/ps1.ipynb"]),
-        (["collect", "in"], ["collection", "HERE/in"]),
+        (["check", "my work/ps1.ipynb"], ["check", "HERE/my work/ps1.ipynb"]),
+        (["collect", "in"], ["collect", "HERE/in"]),
         (
             ["collect", "in", "--due", "2026-12-01"],
-            ["collection", "HERE/in", "--due", "2026-12-01"],
+            ["collect", "HERE/in", "--due", "2026-12-01"],
         ),
-        (["grade"], ["grading"]),
-        (["grade", "ps1", "ps2"], ["grading", "ps1", "ps2"]),
+        (["grade"], ["grade"]),
+        (["grade", "ps1", "ps2"], ["grade", "ps1", "ps2"]),
     ],
 )
 def test_a_task_for_problem_sets_runs_its_module(setting_up, tmp_path, monkeypatch, words, wanted):
@@ -234,7 +234,7 @@ def test_a_task_for_problem_sets_runs_its_module(setting_up, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     module.main()
     name, *more = [word.replace("HERE", str(tmp_path)) for word in wanted]
-    assert ran == [["-m", f"rbcourse.{name}", *map(str, map(Path, more))]]
+    assert ran == [["-m", f"rbcourse.assignments.{name}", *map(str, map(Path, more))]]
 
 
 RANGES = """
@@ -408,5 +408,5 @@ def test_the_wheel_carries_types_and_style(wheel):
     names = ZipFile(wheel).namelist()
     assert "rbcourse/py.typed" in names
     assert {"rbcourse/rbcourse.mplstyle", "rbcourse/paper.mplstyle"} <= set(names)
-    assert "rbcourse/lecture_view/index.html.j2" in names
+    assert "rbcourse/course/lecture_view/index.html.j2" in names
     assert not [name for name in names if name.startswith(("tests", "notebooks"))]

@@ -5,7 +5,7 @@ from pathlib import Path
 import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from rbcourse.lessons import KERNEL
+from rbcourse.course.notebooks import KERNEL
 
 ANSWERS = {"square-answer": "def square(x):\n    return x * x", "half-answer": "half = 0.5"}
 

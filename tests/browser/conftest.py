@@ -42,9 +42,8 @@ def home(tmp_path_factory):
     env |= {"HOME": str(home), "USERPROFILE": str(home), "PYTHONPATH": str(ROOT)}
     for folder in ("notebooks", "benchmarks"):
         shutil.copytree(ROOT / folder, home / "course" / folder)
-    subprocess.run(
-        [sys.executable, "-m", "rbcourse.lessons", "copy"], cwd=home / "course", env=env, check=True
-    )
+    words = [sys.executable, "-m", "rbcourse.course.notebooks", "copy"]
+    subprocess.run(words, cwd=home / "course", env=env, check=True)
     return home / "course", env
 
 

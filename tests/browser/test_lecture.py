@@ -23,7 +23,7 @@ SMALL = """(least) => {
 
 def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, pictures):
     course, env = home
-    words = ["rbcourse.lecture", lesson[:2], "--no-browser"]
+    words = ["rbcourse.course.lecture", lesson[:2], "--no-browser"]
     with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
         page.set_viewport_size({"width": 1024, "height": 768})
         page.goto(found[1], timeout=120_000)
@@ -43,7 +43,7 @@ def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, pictures):
 
 def test_the_keys_of_a_remote_control_turn_the_pages(home, page):
     course, env = home
-    words = ["rbcourse.lecture", "02", "--no-browser"]
+    words = ["rbcourse.course.lecture", "02", "--no-browser"]
     with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
         page.set_viewport_size({"width": 1024, "height": 768})
         page.goto(found[1], timeout=120_000)

@@ -6,8 +6,8 @@ import time
 import nbformat
 from pages import NOTE, centre, open_in_lab, run_all
 
-from rbcourse import widgets
-from rbcourse.lessons import KERNEL
+from rbcourse import explore
+from rbcourse.course.notebooks import KERNEL
 
 HELD = 1.5
 SOLVES = {"cube_explorer": 2}  # the slider that is held where the last one only moves the time
@@ -15,7 +15,7 @@ SOLVES = {"cube_explorer": 2}  # the slider that is held where the last one only
 
 def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     course, _ = home
-    sources = ["from rbcourse import widgets", *(f"widgets.{name}()" for name in widgets.__all__)]
+    sources = ["from rbcourse import explore", *(f"explore.{name}()" for name in explore.__all__)]
     cells = [nbformat.v4.new_code_cell(source) for source in sources]
     notebook = nbformat.v4.new_notebook(cells=cells, metadata={"kernelspec": KERNEL})
     nbformat.write(notebook, course / "work" / "speed.ipynb")
@@ -24,10 +24,10 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     run_all(page)
     explorers = page.locator(".rbcourse-explorer")
     explorers.last.wait_for()
-    assert explorers.count() == len(widgets.__all__)
+    assert explorers.count() == len(explore.__all__)
     page.set_viewport_size({"width": 1280, "height": 800})
     page.evaluate(NOTE)
-    for name, explorer in zip(widgets.__all__, explorers.all(), strict=True):
+    for name, explorer in zip(explore.__all__, explorers.all(), strict=True):
         centre(page, explorer)
         handles = explorer.locator(".noUi-handle").all()
         held = handles[SOLVES.get(name, -1)]
@@ -70,5 +70,5 @@ def hold(page, handle):
 
 
 def kind(name):
-    figure = getattr(widgets, name)()._fig
+    figure = getattr(explore, name)()._fig
     return "3-D" if any(ax.name == "3d" for ax in figure.axes) else "2-D"

@@ -1,0 +1,1 @@
+"""Problem sets: marking, handing out, collecting and grading."""

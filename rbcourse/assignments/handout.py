@@ -1,0 +1,374 @@
+"""A problem set as one file for the students: the notebook, what it needs, and how to begin."""
+
+import argparse
+import io
+import json
+import logging
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+import nbformat
+from nbformat import NotebookNode
+from nbgrader.converters import GenerateAssignment
+from nbgrader.coursedir import CourseDirectory
+from nbgrader.utils import capture_log
+from traitlets.config import Config
+from traitlets.config.loader import PyFileConfigLoader
+
+# what a student needs of environment.txt
+NEEDED = ["numpy", "scipy", "matplotlib", "pillow", "anywidget", "ipykernel", "ipywidgets"]
+NEEDED += ["jupyterlab", "nbclient", "nbformat"]
+LEFTOVER = re.compile(
+    r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
+    re.IGNORECASE,
+)
+REGION = re.compile(
+    r"BEGIN (SOLUTION|HIDDEN TESTS|MARK SCHEME).*?\n(.*?)^[^\n]*END \1", re.M | re.S
+)
+README = """\
+Problem set {name}
+
+You need Python 3.11 or newer. Open a terminal in this folder, the one that holds
+requirements.txt, and type:
+
+Windows PowerShell
+    py -m venv .venv
+    .venv\\Scripts\\python -m pip install -r requirements.txt
+    .venv\\Scripts\\jupyter lab {name}.ipynb
+
+macOS and Linux
+    python3 -m venv .venv
+    .venv/bin/python -m pip install -r requirements.txt
+    .venv/bin/jupyter lab {name}.ipynb
+
+On later days the last line is enough.
+
+Before you hand in, save the notebook and type, on Windows
+    .venv\\Scripts\\python -m rbcourse.assignments.check {name}.ipynb
+and on macOS and Linux
+    .venv/bin/python -m rbcourse.assignments.check {name}.ipynb
+It checks the notebook and writes to_submit/{name}.ipynb. Hand in that file.
+
+When something fails
+- "No module named venv", on Debian and Ubuntu: sudo apt install python3-venv
+- pip finds no matching version: python3 --version (Windows: py --version) must say 3.11 or more.
+- An installation stopped half way: delete the folder .venv and begin again.
+- The notebook is broken: copy original/{name}.ipynb over it. That starts the set again.
+- A cell runs for ever: in the menu Kernel, Restart Kernel.
+- Anything else: send your teacher the whole message.
+"""
+
+
+def find_set(name: str, assignments: Path) -> Path:
+    """Return the folder of a problem set; a private one goes before that of the course.
+
+    Parameters
+    ----------
+    name : str
+        As ``"ps1"``.
+    assignments : Path
+        The course folder of nbgrader.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ValueError
+        If there is no such set; the message names those that there are.
+    """
+    folders = [p for step in ("source", "private") for p in sorted(assignments.glob(f"{step}/*/"))]
+    sets = {p.name: p for p in folders if (p / f"{p.name}.ipynb").is_file()}
+    if name not in sets:
+        there = ", ".join(sorted(sets)) or "none; this is run in the folder of the course"
+        raise ValueError(f"There is no problem set {name}; there are: {there}.")
+    return sets[name]
+
+
+def read_config(assignments: Path) -> Config:
+    """Return what nbgrader_config.py says.
+
+    Parameters
+    ----------
+    assignments : Path
+        The folder in which it is, if there is one.
+
+    Returns
+    -------
+    traitlets.config.Config
+    """
+    if not (assignments / "nbgrader_config.py").is_file():
+        return Config()
+    return PyFileConfigLoader("nbgrader_config.py", path=str(assignments)).load_config()
+
+
+def release(name: str, assignments: Path) -> dict[str, bytes]:
+    """Return what ``nbgrader generate_assignment`` makes, checked to give nothing away.
+
+    Neither the gradebook nor the folder of releases is touched.
+
+    Parameters
+    ----------
+    name : str
+        The problem set.
+    assignments : Path
+        The course folder of nbgrader.
+
+    Returns
+    -------
+    dict of str to bytes
+        Each file of the set, by its path in the folder of the set.
+
+    Raises
+    ------
+    ValueError
+        If there is no such set, nbgrader cannot release it, or the release would give away a
+        solution, a hidden test or a mark scheme.
+    """
+    source, config = find_set(name, assignments), read_config(assignments)
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(source, Path(folder, "source", name))
+        # nbgrader looks for nothing outside, and writes nowhere else
+        config.CourseDirectory.root = os.path.realpath(folder)
+        config.CourseDirectory.source_directory = "source"
+        config.CourseDirectory.assignment_id = name
+        config.GenerateAssignment.no_database = True
+        config.SaveCells.enabled = False
+        maker = GenerateAssignment(
+            CourseDirectory(config=config), config=config, log=quiet_log("release")
+        )
+        done = capture_log(maker)
+        if not done["success"]:
+            raise ValueError(f"{name} cannot be released: {last_line(done)}")
+        made = Path(folder, "release", name)
+        files = {
+            path.relative_to(made).as_posix(): path.read_bytes()
+            for path in sorted(made.rglob("*"))
+            if path.is_file()
+        }
+    _refuse_leaks(name, nbformat.read(source / f"{name}.ipynb", as_version=4), files)
+    return files
+
+
+def quiet_log(name: str) -> logging.Logger:
+    """Return a log for nbgrader that is printed nowhere.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    logging.Logger
+    """
+    log = logging.getLogger(f"{__name__}.{name}")
+    log.propagate = False
+    log.addHandler(logging.NullHandler())
+    return log
+
+
+def last_line(done: dict[str, str]) -> str:
+    """Return what went wrong in a run of nbgrader, as one line.
+
+    Parameters
+    ----------
+    done : dict
+        What `nbgrader.utils.capture_log` returns.
+
+    Returns
+    -------
+    str
+        The message of the refusal, if there is one, or of the first exception.
+    """
+    raised = re.findall(r"^ *([\w.]+(?:Error|Exception|Entry)): (.*)$", done.get("log", ""), re.M)
+    refused = [what for kind, what in raised if kind.endswith("RefusedError")]
+    lines = refused or [what for _, what in raised] or done["error"].strip().splitlines()[-1:]
+    return lines[0]
+
+
+def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> None:
+    """Raise a ValueError if a file shows what the students shall not see."""
+    released = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
+    for cell in released.cells:
+        where = f"cell {cell.metadata.get('nbgrader', {}).get('grade_id') or cell.get('id')}"
+        if cell.get("outputs") or cell.get("execution_count"):
+            raise ValueError(f"{name}, {where}: outputs are left")
+        if cell.get("attachments") and cell.metadata.get("nbgrader", {}).get("solution"):
+            raise ValueError(f"{name}, {where}: nbgrader leaves the attachment of an answer there")
+        left = LEFTOVER.search(cell.source)
+        if left:
+            raise ValueError(f"{name}, {where}: {left[0].strip()!r} is left over")
+    secrets = secret_lines(source)
+    for path, content in files.items():
+        text = content.decode("utf-8", errors="replace")
+        if path.endswith(".ipynb"):
+            if path != f"{name}.ipynb":
+                raise ValueError(f"{name}: {path} is a second notebook; a set has one")
+            text = "\n".join(_strings(json.loads(text)))
+        shown = next((line for line in secrets if line in text), None) or LEFTOVER.search(text)
+        if shown:
+            shown = shown if isinstance(shown, str) else shown[0]
+            raise ValueError(f"{name}: {path} gives away {shown!r}")
+
+
+def secret_lines(notebook: NotebookNode, *, solutions: bool = True) -> list[str]:
+    """Return the lines inside the regions that nbgrader removes, but for short and common ones.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        As a teacher writes it.
+    solutions : bool
+        Whether the code of solutions is among them.
+
+    Returns
+    -------
+    list of str
+    """
+    inside: set[str] = set()
+    for cell in notebook.cells:
+        for kind, region in REGION.findall(cell.source):
+            if solutions or kind != "SOLUTION" or cell.cell_type == "markdown":
+                inside |= {line.strip() for line in region.splitlines()}
+    texts = [REGION.sub("", cell.source) for cell in notebook.cells]
+    outside = {line.strip() for text in texts for line in text.splitlines()}
+    return sorted(
+        line
+        for line in inside - outside
+        if len(line) >= 12 and not line.startswith(("import ", "from ", "raise "))
+    )
+
+
+def _strings(value: object) -> list[str]:
+    if isinstance(value, dict):
+        return [text for pair in value.items() for part in pair for text in _strings(part)]
+    if isinstance(value, list):
+        return [text for part in value for text in _strings(part)]
+    return [value] if isinstance(value, str) else []
+
+
+def student_requirements(environment: str, wheel: str) -> str:
+    """Return the requirements of the students.
+
+    Parameters
+    ----------
+    environment : str
+        The text of environment.txt.
+    wheel : str
+        The name of the file with the package.
+
+    Returns
+    -------
+    str
+        A pin for each library that a student needs, and the package.
+
+    Raises
+    ------
+    ValueError
+        If environment.txt lacks a pin.
+    """
+    pins = dict(
+        re.findall(r"^(([\w-]+)==\S+)", line)[0][::-1]
+        for line in environment.splitlines()
+        if "==" in line
+    )
+    missing = [name for name in NEEDED if name not in pins]
+    if missing:
+        raise ValueError(f"environment.txt has no pin for {', '.join(missing)}")
+    return "".join(f"{line}\n" for line in [*(pins[name] for name in NEEDED), f"./{wheel}"])
+
+
+def build_wheel(course: Path) -> tuple[str, bytes]:
+    """Build the package, the same byte for byte each time; nothing is asked for outside.
+
+    Parameters
+    ----------
+    course : Path
+        The folder with pyproject.toml.
+
+    Returns
+    -------
+    name : str
+    content : bytes
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        code = "import sys; from flit_core import buildapi; buildapi.build_wheel(sys.argv[1])"
+        subprocess.run(
+            [sys.executable, "-c", code, folder],
+            cwd=course,
+            env={**os.environ, "SOURCE_DATE_EPOCH": "315532800"},  # the first day a zip knows
+            check=True,
+            capture_output=True,
+        )
+        (built,) = Path(folder).glob("*.whl")
+        return built.name, built.read_bytes()
+
+
+def make_handout(name: str, assignments: Path, course: Path) -> Path:
+    """Write ``handouts/NAME.zip``, which is what the students get; the same bytes each time.
+
+    Parameters
+    ----------
+    name : str
+        The problem set.
+    assignments : Path
+        The course folder of nbgrader.
+    course : Path
+        The folder with environment.txt and the package.
+
+    Returns
+    -------
+    Path
+        The file; it is replaced as a whole or left as it was.
+
+    Raises
+    ------
+    ValueError
+        As `release`, and if a file of the set has a name that the handout needs.
+    """
+    files = release(name, assignments)
+    wheel, content = build_wheel(course)
+    environment = (course / "environment.txt").read_text("utf-8")
+    own = {
+        f"original/{name}.ipynb": files[f"{name}.ipynb"],
+        "requirements.txt": student_requirements(environment, wheel).encode(),
+        "README.txt": README.format(name=name).replace("\n", "\r\n").encode("ascii"),
+        wheel: content,
+    }
+    if files.keys() & own.keys():
+        raise ValueError(
+            f"{name}: {min(files.keys() & own.keys())} is a name that the handout needs"
+        )
+    packed = io.BytesIO()
+    with ZipFile(packed, "w") as archive:
+        for path, data in sorted({**files, **own}.items()):
+            entry = ZipInfo(f"{name}/{path}")  # of the first day a zip knows
+            entry.create_system, entry.external_attr = 3, 0o644 << 16
+            archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
+    target = assignments / "handouts" / f"{name}.zip"
+    target.parent.mkdir(exist_ok=True)
+    part = target.with_suffix(".part")
+    part.write_bytes(packed.getvalue())
+    part.replace(target)
+    return target
+
+
+def main() -> None:
+    """Make a handout from the command line, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.handout")
+    parser.add_argument("set", help="its name: ps1")
+    try:
+        print(make_handout(parser.parse_args().set, Path("notebooks", "assignments"), Path()))
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

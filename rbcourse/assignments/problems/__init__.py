@@ -1,0 +1,1 @@
+"""The problems: answers, inputs, and common mistakes with their hints."""

@@ -1,0 +1,226 @@
+"""A lesson in front of a class: large, without its code, run anew, and asking nobody outside."""
+
+import argparse
+import logging
+import os
+import re
+import secrets
+import signal
+import socket
+import sys
+import tempfile
+import threading
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbformat import NotebookNode
+from tornado.ioloop import IOLoop
+from traitlets.config import Config
+from voila.app import Voila
+
+from rbcourse.course.notebooks import lesson_paths
+
+HOST = "127.0.0.1"
+TEMPLATES = Path(__file__).with_name("lecture_view")
+# of the extensions of JupyterLab only those that draw widgets
+WIDGETS = [
+    "@jupyter-widgets/jupyterlab-manager",
+    "@voila-dashboards/widgets-manager8",
+    "anywidget",
+]
+
+
+def find_lesson(number: str, folder: Path) -> Path:
+    """Return the lesson of a number.
+
+    Parameters
+    ----------
+    number : str
+        With or without a leading zero.
+    folder : Path
+        Where the lessons are.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ValueError
+        If there is no such lesson; the message names those that there are.
+    """
+    paths = {path.name[:2]: path for path in lesson_paths(folder)}
+    if number.zfill(2) not in paths:
+        there = ", ".join(paths) or "none; this is run in the folder of the course"
+        raise ValueError(f"There is no lesson {number}; there are: {there}.")
+    return paths[number.zfill(2)]
+
+
+def mark_sections(notebook: NotebookNode) -> None:
+    """Note in the cells' metadata where a folded section opens, and how many close.
+
+    A section that is stored collapsed reaches to the next heading of its level or a higher one.
+    The run sheet is folded too: it has the answers, and is not for the class.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        It is changed in place: a heading that opens a section becomes a cell of its own.
+    """
+    cells: list[NotebookNode] = []
+    levels: list[int] = []
+    for cell in notebook.cells:
+        level = _heading_level(cell)
+        while levels and 0 < level <= levels[-1]:
+            levels.pop()
+            cells[-1].metadata.lecture.closes += 1
+        collapsed = cell.metadata.get("jp-MarkdownHeadingCollapsed", False)
+        folded = level and (collapsed or cell.source.startswith("## Run sheet"))
+        parts = _heading_and_rest(cell) if folded else [cell]
+        for part in parts:
+            part.metadata.lecture = NotebookNode(opens=False, closes=0)
+        if folded:
+            parts[0].metadata.lecture.opens = True
+            levels.append(level)
+        cells += parts
+    if levels:
+        cells[-1].metadata.lecture.closes += len(levels)
+    notebook.cells = cells
+
+
+def _heading_level(cell: NotebookNode) -> int:
+    """Return the level of the heading that a cell begins with, 0 if it begins with none."""
+    match = re.match(r"\s*(#{1,6}) ", cell.source)
+    return len(match[1]) if match and cell.cell_type == "markdown" else 0
+
+
+def _heading_and_rest(cell: NotebookNode) -> list[NotebookNode]:
+    heading, _, rest = cell.source.lstrip().partition("\n")
+    first = NotebookNode({**cell, "source": heading})
+    if not rest.strip():
+        return [first]
+    return [first, nbformat.v4.new_markdown_cell(rest)]
+
+
+def _prepare(handler: Any, notebook: NotebookNode, cwd: str) -> NotebookNode:
+    """Make a notebook ready to be shown; Voila calls this before it runs it."""
+    mark_sections(notebook)
+    title = re.search(r"^# (.*)", notebook.cells[0].source) if notebook.cells else None
+    if title:
+        notebook.metadata.title = title[1]
+    return notebook
+
+
+def serve(path: Path, begin: Callable[[str], None]) -> None:
+    """Serve a lesson until Ctrl-C, or until the event loop is stopped; then end its kernels.
+
+    Nothing of the user's settings is read, and nothing is written but to a temporary folder.
+
+    Parameters
+    ----------
+    path : Path
+        The notebook; it is only read.
+    begin : callable
+        Called with the address, which contains a token, as soon as the server listens.
+    """
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        _set_environment(Path(folder))
+        settings = {
+            "VoilaConfiguration": {
+                "prelaunch_hook": _prepare,
+                "strip_sources": False,
+                "show_tracebacks": True,
+                "allow_template_override": "NO",
+                "allow_theme_override": "NO",
+                "file_allowlist": [],
+                "extension_allowlist": WIDGETS,
+            },
+            "VoilaExporter": {"exclude_input_prompt": True, "exclude_output_prompt": True},
+            "VoilaExecutor": {"timeout": 120},
+        }
+        app = Voila.instance(
+            config=Config(settings),
+            config_file_paths=[],
+            connection_dir_root=folder,
+            notebook_path=str(path.resolve()),
+            ip=HOST,
+            port=_free_port(),
+            token=secrets.token_hex(24),
+            open_browser=False,
+            log_level=logging.ERROR,  # it warns of what is meant: that nobody has signed the lesson
+        )
+        logging.getLogger("tornado.general").setLevel(logging.ERROR)
+        app.initialize([])
+        app.template_paths.insert(0, str(TEMPLATES))
+        loop = IOLoop.current()
+        loop.add_callback(lambda: begin(f"http://{HOST}:{app.port}/?token={app.token}"))
+        app.start()
+
+
+def _set_environment(folder: Path) -> None:
+    """Point Jupyter, IPython and the lessons to a temporary folder."""
+    names = {
+        "JUPYTER_CONFIG_DIR": "config",
+        "JUPYTER_DATA_DIR": "data",
+        "JUPYTER_RUNTIME_DIR": "runtime",
+        "IPYTHONDIR": "ipython",
+        "RBCOURSE_FIGURES": "figures",
+    }
+    for variable, name in names.items():
+        (folder / name).mkdir()
+        os.environ[variable] = str(folder / name)
+    for variable in ("JUPYTER_PATH", "JUPYTER_CONFIG_PATH"):
+        os.environ.pop(variable, None)
+    os.environ["JUPYTER_NO_CONFIG"] = "1"
+    profile = folder / "ipython" / "profile_default"
+    profile.mkdir()
+    # kernels need not say that others on this machine could listen in
+    (profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40")
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def present(path: Path, browser: bool) -> None:
+    """Show a lesson in the browser until Ctrl-C.
+
+    Parameters
+    ----------
+    path : Path
+    browser : bool
+        Whether to open it; the address is printed anyway.
+    """
+
+    def begin(address: str) -> None:
+        print(f"{path.name} is shown at {address}", flush=True)
+        print("Stop it with Ctrl-C.", flush=True)
+        if browser:
+            # some browsers return only when they are closed
+            threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a script ignores Ctrl-C
+    serve(path, begin)
+
+
+def main() -> None:
+    """Show a lesson from the command line, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="python -m rbcourse.course.lecture")
+    parser.add_argument("lesson", help="its number: 01")
+    parser.add_argument("--no-browser", action="store_true", help="print the address only")
+    words = parser.parse_args()
+    try:
+        path = find_lesson(words.lesson, Path("notebooks"))
+    except ValueError as error:
+        sys.exit(str(error))
+    present(path, browser=not words.no_browser)
+
+
+if __name__ == "__main__":
+    main()

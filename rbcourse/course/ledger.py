@@ -1,0 +1,188 @@
+"""The ledger: where each equation of the texts is implemented, tested and taught."""
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import nbformat
+
+from rbcourse.course.notebooks import lesson_paths
+
+KEY = re.compile(
+    r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)|errata \d+)",
+    re.ASCII,
+)
+SOURCES: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("sources.toml").read_text(encoding="utf-8")
+)
+MISPRINTS = {f"errata {i}": row for i, row in enumerate(SOURCES["misprints"], start=1)}
+
+
+@dataclass
+class Entry:
+    """Where one entry of the texts is to be found.
+
+    Attributes
+    ----------
+    functions : list of str
+        Such as ``so3.hat_so3``, within `rbcourse`; constants too, such as ``so3.BASIS_SO3``.
+    tests : list of str
+        Such as ``test_so3.py::test_hat``, within tests/.
+    lessons : list of str
+        Such as ``06_geodesics.ipynb, 3``, within notebooks/.
+    """
+
+    functions: list[str] = field(default_factory=list)
+    tests: list[str] = field(default_factory=list)
+    lessons: list[str] = field(default_factory=list)
+
+    def lacks(self) -> list[str]:
+        """Return which of the three are not there."""
+        return [kind for kind in ("functions", "tests", "lessons") if not getattr(self, kind)]
+
+
+def collect(root: Path) -> dict[str, Entry]:
+    """Return where each entry and each misprint is to be found.
+
+    Functions come from the References of their docstrings, constants from what stands below them,
+    tests from their marks ``source``, lessons from the keys in their headings.
+
+    Parameters
+    ----------
+    root : Path
+        The folder of the course.
+
+    Returns
+    -------
+    dict of str to Entry
+        With the keys of sources.toml, in that order, then ``errata 1`` and so on.
+
+    Raises
+    ------
+    ValueError
+        If a key is used that sources.toml does not have; it names the place.
+    """
+    found = {key: Entry() for key in [*SOURCES["entries"], *MISPRINTS]}
+    finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
+    for kind, finder in finders.items():
+        for place, text in finder(root):
+            for key in dict.fromkeys(KEY.findall(text)):
+                if key not in found:
+                    raise ValueError(f"{place}: {key} is no entry of sources.toml")
+                getattr(found[key], kind).append(place)
+    return found
+
+
+def _functions(root: Path) -> Iterator[tuple[str, str]]:
+    package = root / "rbcourse"
+    for path in sorted(package.rglob("*.py")):
+        module = ".".join(path.relative_to(package).with_suffix("").parts)
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        for node, below in zip(body, [*body[1:], None], strict=True):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                docstring = ast.get_docstring(node) or ""
+                _, _, references = docstring.partition("References\n----------\n")
+                yield f"{module}.{node.name}", references.partition("\n\n")[0]
+            elif isinstance(node, ast.Assign) and isinstance(below, ast.Expr):
+                yield f"{module}.{ast.unparse(node.targets[0])}", ast.unparse(below)
+
+
+def _tests(root: Path) -> Iterator[tuple[str, str]]:
+    for path in sorted((root / "tests").rglob("test_*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                marks = [m for m in map(ast.unparse, node.decorator_list) if "mark.source(" in m]
+                yield f"{path.relative_to(root / 'tests').as_posix()}::{node.name}", " ".join(marks)
+
+
+def _headings(root: Path) -> Iterator[tuple[str, str]]:
+    for path in lesson_paths(root / "notebooks"):
+        for cell in nbformat.read(path, as_version=4).cells:
+            if cell.cell_type == "markdown" and cell.source.startswith("#"):
+                heading = cell.source.splitlines()[0]
+                number = re.match(r"## (\d+) ·", heading)
+                place = number[1] if number else heading.lstrip("# ").partition(" (")[0]
+                yield f"{path.name}, {place}", heading
+
+
+def render(found: dict[str, Entry]) -> str:
+    """Return the ledger as a page.
+
+    Parameters
+    ----------
+    found : dict of str to Entry
+        As `collect` returns it.
+
+    Returns
+    -------
+    str
+        Markdown, with links into the repository.
+    """
+    lines = [
+        "# Ledger",
+        "",
+        "Where each equation, proposition, remark and figure of the two texts is implemented, "
+        "tested and taught, and what is misprinted in our copies of them. Written by "
+        "`python3 course.py ledger` from the docstrings, the marks of the tests and the headings "
+        "of the lessons; not by hand.",
+    ]
+    for text, title in SOURCES["texts"].items():
+        rows = [
+            (key, what, *map(_links, _places(found[key])))
+            for key, what in SOURCES["entries"].items()
+            if key.startswith(text)
+        ]
+        lines += ["", f"## {text}: {title}", ""]
+        lines += _table(("", "what", "code", "tests", "lessons"), rows)
+    rows = [
+        (number, row["where"], row["printed"], row["holds"], _links(_places(found[key])[1]))
+        for number, (key, row) in enumerate(MISPRINTS.items(), start=1)
+    ]
+    lines += [
+        "",
+        "## Misprints",
+        "",
+        "The tests show that the one does not hold, and the other does. (21 only looks like one.)",
+        "",
+    ]
+    lines += _table(("", "where", "as printed in our copy", "what holds", "tests"), rows)
+    lines.append("")
+    return "\n".join(lines)
+
+
+def _places(entry: Entry) -> list[list[tuple[str, str]]]:
+    """Return name and file of what was found, of each of the three kinds."""
+    places = [(name, *name.rsplit(".", 1)) for name in entry.functions]
+    functions = [(name, f"rbcourse/{module.replace('.', '/')}.py") for name, module, _ in places]
+    tests = [(name, f"tests/{name.split('::')[0]}") for name in entry.tests]
+    lessons = [
+        (f"{name[:2]} {'§ ' * place.isdigit()}{place}", f"notebooks/{name}")
+        for name, place in (lesson.split(", ", 1) for lesson in entry.lessons)
+    ]
+    return [functions, tests, lessons]
+
+
+def _links(found: list[tuple[str, str]]) -> str:
+    return "<br>".join(f"[{name.rpartition('::')[2]}]({file})" for name, file in found)
+
+
+def _table(head: tuple[str, ...], rows: Iterable[Iterable[object]]) -> list[str]:
+    lines = head, ["---"] * len(head), *rows
+    return [f"| {' | '.join(map(str, cells))} |" for cells in lines]
+
+
+def main() -> None:
+    """Write LEDGER.md, in the folder of the course."""
+    try:
+        Path("LEDGER.md").write_text(render(collect(Path())), encoding="utf-8", newline="\n")
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,271 @@
+"""The lessons as files: executed so that what is stored is the same, byte for byte, each time."""
+
+import argparse
+import hashlib
+import json
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient import NotebookClient
+from nbformat import NotebookNode
+from nbformat.sign import NotebookNotary
+
+KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+
+
+def lesson_paths(folder: Path) -> list[Path]:
+    """Return the lessons of a folder in the order of the course; assignments are none.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    list of Path
+    """
+    return sorted(folder.glob("[0-9][0-9]_*.ipynb"))
+
+
+def execute(path: Path, figures: Path) -> str:
+    """Run a lesson from top to bottom in a new kernel and return what is to be stored.
+
+    Parameters
+    ----------
+    path : Path
+        The notebook; it is only read.
+    figures : Path
+        The folder that its figures go to.
+
+    Returns
+    -------
+    str
+        The notebook with its outputs, normalised.
+
+    Raises
+    ------
+    nbclient.exceptions.CellExecutionError
+        If a cell fails.
+    """
+    notebook = nbformat.read(path, as_version=4)
+    client = NotebookClient(
+        notebook,
+        kernel_name=KERNEL["name"],
+        record_timing=False,
+        coalesce_streams=True,
+        store_widget_state=False,
+        timeout=120,
+        extra_arguments=["--log-level=ERROR"],
+        resources={"metadata": {"path": str(path.parent)}},
+    )
+    kernel = client.create_kernel_manager()
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        for name, value in kernel_address(folder).items():
+            setattr(kernel, name, value)
+        own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": folder}
+        client.execute(env={**os.environ, **own})
+    return normalised(notebook)
+
+
+def kernel_address(folder: str) -> dict[str, str]:
+    """Return where a kernel shall listen, as settings of its manager.
+
+    At files, except on Windows: a port that is found free may be taken by another program before
+    the kernel takes it.
+
+    Parameters
+    ----------
+    folder : str
+        For the files; its name must be short, 80 characters at most.
+
+    Returns
+    -------
+    dict of str to str
+    """
+    if os.name == "nt":
+        return {}
+    return {"transport": "ipc", "ip": os.path.join(folder, "kernel")}
+
+
+def normalised(notebook: NotebookNode) -> str:
+    """Return a notebook as text without what differs from run to run or machine to machine.
+
+    Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
+    random ids of 32 hexadecimal digits are numbered in the order of appearance. Of a widget, which
+    lives with its kernel, the still is stored that it gives beside itself.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        It is changed in place.
+
+    Returns
+    -------
+    str
+    """
+    notebook.metadata.kernelspec = dict(KERNEL)
+    notebook.metadata.language_info = {"name": "python"}
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    for output in (output for cell in cells for output in cell.outputs):
+        output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)
+        for texts, key in ((output, "text"), (output.get("data", {}), "text/plain")):
+            if key in texts:
+                texts[key] = re.sub(r"0x[0-9a-fA-F]{6,16}", "0x0", texts[key])
+    notebook.metadata.pop("widgets", None)
+    for cell, ran in zip(cells, _with_numbered_ids([c.outputs for c in cells]), strict=True):
+        cell.outputs = ran
+    return nbformat.writes(notebook) + "\n"
+
+
+def _with_numbered_ids(ran: list[Any]) -> list[Any]:
+    numbers, names = count(1), dict[str, str]()
+    text = re.sub(
+        r"(?<![0-9a-f])[0-9a-f]{32}(?![0-9a-f])",
+        lambda match: names.setdefault(match[0], f"{next(numbers):032x}"),
+        json.dumps(ran),
+    )
+    return [nbformat.from_dict(part) for part in json.loads(text)]
+
+
+def regenerate(lessons: Path, figures: Path) -> None:
+    """Execute every lesson, then rewrite the stored outputs and the figures.
+
+    Nothing is rewritten unless every lesson ran; figures that no lesson draws are removed.
+
+    Parameters
+    ----------
+    lessons, figures : Path
+        The two folders.
+
+    Raises
+    ------
+    ValueError
+        If there are no lessons.
+    """
+    if not lesson_paths(lessons):
+        raise ValueError(f"{lessons}: no lessons here; this is run in the folder of the course")
+    with tempfile.TemporaryDirectory() as folder:
+        texts = {}
+        for path in lesson_paths(lessons):
+            print(f"{path.stem} ...", end=" ", flush=True)
+            start = time.perf_counter()
+            texts[path] = execute(path, Path(folder))
+            print(f"{time.perf_counter() - start:.1f} s", flush=True)
+        for path, text in texts.items():
+            path.write_text(text, encoding="utf-8", newline="\n")
+        figures.mkdir(exist_ok=True)
+        drawn = {file.name: file for file in Path(folder).iterdir()}
+        for name, file in drawn.items():
+            shutil.copyfile(file, figures / name)
+        for stale in [file for file in figures.iterdir() if file.name not in drawn]:
+            stale.unlink()
+    print(f"{len(texts)} lessons, {len(drawn)} files in {figures.name}/")
+
+
+def copy_lessons(lessons: Path, work: Path) -> None:
+    """Copy the lessons to a folder to work in, trusted; what was written there is never touched.
+
+    A lesson that is new to the folder is copied. One that has changed since it was copied takes
+    the place of its copy if the cells of that are as they were, run or not, and is laid beside it
+    otherwise.
+
+    Parameters
+    ----------
+    lessons, work : Path
+        From where and to where.
+
+    Raises
+    ------
+    ValueError
+        If a lesson is no notebook; nothing of it is written.
+    """
+    work.mkdir(exist_ok=True)
+    record, notary = work / ".copied.json", NotebookNotary()
+    copied = _read_record(record)
+    for path in lesson_paths(lessons):
+        lesson, target = path.read_bytes(), work / path.name
+        notebook = _parsed(path)
+        last, now = copied.get(path.name), [_digest(lesson), _digest(_cells(lesson))]
+        if target.exists() and last and last[0] == now[0]:
+            continue
+        if not _left_alone(target, lesson, last):
+            target = next(p for p in _numbered(target) if not p.exists())
+            print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
+        target.write_bytes(lesson)
+        try:
+            notary.sign(notebook)
+        except OSError as error:
+            print(f"{target.name} is copied, but not marked as trusted: {error}")
+        copied[path.name] = now
+        part = record.with_suffix(".part")
+        part.write_text(json.dumps(copied, indent=1), encoding="utf-8")
+        part.replace(record)
+    notary.store.close()
+
+
+def _read_record(record: Path) -> dict[str, list[str]]:
+    """Return what was copied when; nothing where the record is lost or damaged."""
+    try:
+        copied = json.loads(record.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return copied if isinstance(copied, dict) else {}
+
+
+def _left_alone(target: Path, lesson: bytes, last: list[str] | None) -> bool:
+    """Tell whether a copy is absent, the lesson itself, or as it was copied but for its outputs."""
+    if not target.exists():
+        return True
+    content = target.read_bytes()
+    return content == lesson or (last is not None and last[1] == _digest(_cells(content)))
+
+
+def _parsed(path: Path) -> NotebookNode:
+    try:
+        return nbformat.read(path, as_version=4)
+    except ValueError as error:
+        raise ValueError(f"{path.name} is no notebook: {str(error)[:80]}") from error
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+
+
+def _cells(content: bytes) -> bytes:
+    """Return what a person writes in a notebook; all of it where it cannot be read as one."""
+    try:
+        cells = nbformat.reads(content.decode(), as_version=4).cells
+        return json.dumps([(cell.cell_type, cell.source) for cell in cells]).encode()
+    except Exception:
+        return content
+
+
+def _numbered(path: Path) -> Iterator[Path]:
+    return (path.with_stem(f"{path.stem}_{number}") for number in count(2))
+
+
+def main() -> None:
+    """Run a task from the command line, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="python -m rbcourse.course.notebooks")
+    parser.add_argument("task", choices=["regenerate", "copy"])
+    task = parser.parse_args().task
+    try:
+        if task == "regenerate":
+            regenerate(Path("notebooks"), Path("figures"))
+        else:
+            copy_lessons(Path("notebooks"), Path("work"))
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Pictures: artists on axes that the caller owns, and figures as files."""

@@ -1,0 +1,364 @@
+"""An arm on its way: artists on axes that the caller owns."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Arc, Circle
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.arm import LINKS, arm_forward_kinematics
+from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.plans import as_path
+
+_LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
+
+
+def arm_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> dict[str, Array]:
+    """Return a path of an arm as a table: one row for each state.
+
+    Parameters
+    ----------
+    path : array_like, shape (states, n)
+        Joint angles, in rad.
+    lengths : array_like, shape (n,), optional
+        Lengths of the links, in m.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The joint angles; then, for each link, where it ends: the last end is the tip.
+    """
+    path = as_path(path)
+    ends = arm_forward_kinematics(path, lengths).joints[:, 1:]
+    table = {f"theta{i} [rad]": angle for i, angle in enumerate(path.T)}
+    for i, end in enumerate(np.moveaxis(ends, 1, 0), start=1):
+        table |= {f"x{i} [m]": end[:, 0], f"y{i} [m]": end[:, 1]}
+    return table
+
+
+def draw_posture(ax: Axes, data: Table) -> list[Any]:
+    """Draw an arm with its joint angles and the frames at the centres of its links.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    data : mapping of str to array_like, shape (1,)
+        An `arm_table`.
+
+    Returns
+    -------
+    list of artists
+        The links; then for each link its two axes.
+
+    References
+    ----------
+    RR 4.
+    """
+    (q,), (joints,) = _angles(data), _joints(data)
+    headings = np.append(0, np.cumsum(q))
+    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.6)
+    for i, (joint, before, after) in enumerate(
+        zip(joints[:-1], headings[:-1], headings[1:], strict=True)
+    ):
+        ax.annotate(f"J{i}", joint, (-8, -22), textcoords="offset points", ha="right")
+        ax.plot(*np.transpose([joint, joint + 0.9 * _towards(before)]), color="0.6", lw=1, ls="--")
+        low, high = sorted(np.degrees([before, after]))
+        ax.add_patch(Arc(joint, 1.2, 1.2, theta1=low, theta2=high, lw=1.5, color="0.3"))
+        x, y = joint + 0.8 * _towards((before + after) / 2)
+        ax.text(x, y, f"$θ_{i}$", ha="center", va="center")
+        artists += _draw_frame(ax, joints[i : i + 2].mean(axis=0), after)
+    ax.annotate("tip", joints[-1], (8, 8), textcoords="offset points")
+    ax.margins(0.15)
+    ax.set(xlabel="x (m)", ylabel="y (m)")
+    ax.set_aspect("equal")
+    return artists
+
+
+def draw_tip_velocities(ax: Axes, data: Table) -> list[Any]:
+    """Draw an arm, and at its tip the columns of the Jacobian as arrows.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw; it is made to show all that the arm can reach.
+    data : mapping of str to array_like, shape (1,)
+        An `arm_table`.
+
+    Returns
+    -------
+    list of artists
+        The links; then an arrow for each joint, half as long as the tip goes for each radian.
+
+    References
+    ----------
+    RR 4.
+    """
+    show_reach(ax, data)
+    (joints,) = _joints(data)
+    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.6)
+    for i, column in enumerate(_columns(joints).T):
+        colour = _LOOKS[i % len(_LOOKS)][0]
+        artists.append(_draw_arrow(ax, joints[-1], column / 2, colour, f"motor {i} runs"))
+    return artists
+
+
+def moving_arm(ax: Axes, data: Table, shown: Iterable[int]) -> Callable[[int], list[Any]]:
+    """Draw an arm, pale, in some of its states; return what moves it along its way.
+
+    Dotted circles bound what the tip can reach.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw; it is made to show all that the arm can reach, lengths equal on both axes.
+    data : mapping of str to array_like, shape (states,)
+        An `arm_table`.
+    shown : iterable of int
+        In which states it is drawn pale.
+
+    Returns
+    -------
+    callable
+        ``update(i)`` moves the arm to state i, draws the way of the tip up to there, and returns
+        the artists that move.
+
+    References
+    ----------
+    RR 4.3, RR Fig. 8, RR Fig. 9.
+    """
+    joints = _joints(data)
+    show_reach(ax, data)
+    for i in shown:
+        ax.plot(*joints[i].T, "o-", color="0.82", lw=3, ms=6, zorder=1.5)
+    (links,) = ax.plot([], [], "o-", color=COLOURS["z"], lw=4, ms=8, zorder=3)
+    (way,) = ax.plot([], [], color=COLOURS["path"], lw=2.5, zorder=4)
+
+    def update(i: int) -> list[Any]:
+        links.set_data(*joints[i].T)
+        way.set_data(*joints[: i + 1, -1].T)
+        return [links, way]
+
+    return update
+
+
+def draw_arm_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
+    """Draw the ways of the tip of an arm; pale, the arm at their ends, and half-way of the last.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw; it is made to show all that the arm can reach.
+    ways : mapping of str to mapping of str to array_like
+        An `arm_table` for each name, at most three.
+
+    Returns
+    -------
+    list of Line2D
+        The ways.
+
+    References
+    ----------
+    RR 4.3.
+    """
+    *_, last = ways.values()
+    show_reach(ax, last)
+    joints = _joints(last)
+    for i in (0, len(joints) // 2, -1):
+        ax.plot(*joints[i].T, "o-", color="0.75", lw=4, ms=8, zorder=1.5)
+    for i, word in ((0, "start"), (-1, "goal")):
+        ax.annotate(word, joints[i, -1], (0, -18), textcoords="offset points", ha="center")
+    return [
+        ax.plot(*_joints(data)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
+        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
+    ]
+
+
+def draw_joint_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
+    """Draw the same ways in the plane of the two joint angles.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    ways : mapping of str to mapping of str to array_like
+        An `arm_table` of a two-link arm for each name, at most three.
+
+    Returns
+    -------
+    list of Line2D
+
+    References
+    ----------
+    RR 4.1.
+    """
+    lines = [
+        ax.plot(*np.degrees(_angles(data)).T, color=colour, ls=ls, label=name)[0]
+        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
+    ]
+    ax.set(xlabel="$θ_0$ (degrees)", ylabel="$θ_1$ (degrees)")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
+    return lines
+
+
+def show_reach(ax: Axes, data: Table) -> None:
+    """Make axes show all that an arm can reach; dotted circles bound it."""
+    lengths = _lengths(_joints(data))
+    outer, inner = lengths.sum(), max(0.0, 2 * lengths.max() - lengths.sum())
+    for radius in (outer, inner):
+        ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))
+    edge = 1.08 * outer
+    ax.set(xlim=(-edge, edge), ylim=(-edge, edge), xlabel="x (m)", ylabel="y (m)")
+    ax.set_aspect("equal")
+
+
+def describe_posture(data: Table) -> str:
+    """Return in words what `draw_posture` shows.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (1,)
+        An `arm_table`.
+
+    Returns
+    -------
+    str
+    """
+    (q,), (joints,) = _angles(data), _joints(data)
+    places = ", ".join(_said(place, _lengths(joints[None]).sum()) for place in joints)
+    return (
+        "An arm, each link with the x and y axes of its frame at its centre. Its joint angles are "
+        f"{_degrees(q)} degrees, each measured from the link before; its joints, and "
+        f"then its tip, are at {places} m."
+    )
+
+
+def describe_ways(ways: Mapping[str, Table]) -> str:
+    """Return in words what `draw_arm_ways` and `draw_joint_ways` show.
+
+    Parameters
+    ----------
+    ways : mapping of str to mapping of str to array_like
+        As for these.
+
+    Returns
+    -------
+    str
+    """
+    said = [
+        f"{name}: {_length(_joints(data)[:, -1]):.1f} m and "
+        f"{np.degrees(_length(_angles(data))):.0f} degrees"
+        for name, data in ways.items()
+    ]
+    start, goal = map(_degrees, _angles(next(iter(ways.values())))[[0, -1]])
+    return (
+        f"Ways of an arm from joint angles of {start} to {goal} degrees: of its tip in the room, "
+        f"and in the plane of the angles. How long they are: {'; '.join(said)}."
+    )
+
+
+def describe_arm(data: Table) -> str:
+    """Return in words how an arm goes.
+
+    Parameters
+    ----------
+    data : mapping of str to array_like, shape (states,)
+        An `arm_table`.
+
+    Returns
+    -------
+    str
+    """
+    angles, joints = _angles(data), _joints(data)
+    lengths, tip = _lengths(joints), joints[:, -1]
+    reach = lengths.sum()
+    turned = np.abs(np.diff(angles, axis=0)).sum(axis=0)
+    start, end = (_said(place, reach) for place in tip[[0, -1]])
+    return (
+        f"An arm with links of {_listed(in_words(x, x) for x in lengths)} m turns its joints "
+        f"from {_degrees(angles[0])} to {_degrees(angles[-1])} degrees, by {_degrees(turned)} "
+        f"degrees in all. From state to state its tip covers {in_words(_length(tip), reach)} m, "
+        f"from {start} to {end} m; its way is drawn in red."
+    )
+
+
+def describe_tip_velocities(postures: Mapping[str, Table]) -> str:
+    """Return in words what `draw_tip_velocities` shows on several axes.
+
+    Parameters
+    ----------
+    postures : mapping of str to mapping of str to array_like
+        An `arm_table` of one row for each name.
+
+    Returns
+    -------
+    str
+    """
+    said = []
+    for name, data in postures.items():
+        x, y = _columns(_joints(data)[0])
+        said.append(f"{name}: they point to {_degrees(np.arctan2(y, x))} degrees")
+    return (
+        "An arm, with an arrow at its tip for each joint: how fast the tip goes when only the "
+        f"motor of that joint runs, at half its length. {'; '.join(said)}."
+    )
+
+
+def _angles(data: Table) -> Array:
+    return np.stack([np.asarray(x) for key, x in data.items() if key.startswith("theta")], axis=-1)
+
+
+def _joints(data: Table) -> Array:
+    """Return the joints and the tip, shape (states, n + 1, 2)."""
+    x, y = ([np.asarray(v) for key, v in data.items() if key[0] == letter] for letter in "xy")
+    ends = np.stack([np.stack(x, axis=-1), np.stack(y, axis=-1)], axis=-1)
+    return np.concatenate([np.zeros_like(ends[:, :1]), ends], axis=1)
+
+
+def _columns(joints: Array) -> Array:
+    """Return the columns of the Jacobian: from each joint to the tip, turned to the left."""
+    x, y = (joints[-1] - joints[:-1]).T
+    return np.array([-y, x])
+
+
+def _draw_frame(ax: Axes, origin: Array, heading: float) -> list[Any]:
+    along, left = 0.45 * _towards(heading), 0.45 * _towards(heading + np.pi / 2)
+    for axis, (x, y) in {"x": origin + along - 0.3 * left, "y": origin + 1.3 * left}.items():
+        ax.text(x, y, axis, color=COLOURS[axis], ha="center", va="center")
+    return [
+        _draw_arrow(ax, origin, arrow, COLOURS[axis]) for axis, arrow in (("x", along), ("y", left))
+    ]
+
+
+def _draw_arrow(ax: Axes, start: Array, along: Array, colour: str, label: str | None = None) -> Any:
+    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 4, "width": 0.008}
+    return ax.quiver(*start, *along, color=colour, label=label, **style)
+
+
+def _towards(heading: float) -> Array:
+    return np.array([np.cos(heading), np.sin(heading)])
+
+
+def _length(places: Array) -> float:
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+
+def _lengths(joints: Array) -> Array:
+    return np.linalg.norm(np.diff(joints[0], axis=0), axis=1)
+
+
+def _listed(said: Iterable[str]) -> str:
+    *others, last = said
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _degrees(angles: Array) -> str:
+    return _listed(f"{angle:.0f}" for angle in np.degrees(angles).round() + 0.0)
+
+
+def _said(place: Array, scale: float) -> str:
+    x, y = (in_words(value, scale) for value in place)
+    return f"({x}, {y})"

@@ -1,0 +1,306 @@
+"""A class full of submissions is graded in one go, and none of them harms another."""
+
+import csv
+import html
+import json
+import os
+import re
+import shutil
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_notebook
+from nbgrader.api import Gradebook
+from tiny_set import ANSWERS, write_tiny_set
+from traitlets.config import Config
+
+from rbcourse.assignments.autograding import configure
+from rbcourse.assignments.grade import grade, grade_all, sets_submitted
+from rbcourse.assignments.handout import read_config, release
+
+ROOT = Path(__file__).parents[2]
+HIDDEN = ["square(-3)==9", "isclose(half,0.5)"]
+MEMORY = 700_000_000
+
+
+def cell(notebook, grade_id):
+    """The cell of a name."""
+    (found,) = [
+        c for c in notebook.cells if c.metadata.get("nbgrader", {}).get("grade_id") == grade_id
+    ]
+    return found
+
+
+class Class:
+    """A course folder with the tiny set, and students who hand in."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        write_tiny_set(folder)
+        (folder / "nbgrader_config.py").write_text(
+            "from rbcourse.assignments.autograding import configure\n"
+            "c = get_config()\nconfigure(c)\n"
+            "c.Execute.timeout = 2\n"
+        )
+        self.given = release("ps0", folder)["ps0.ipynb"]
+
+    def submit(self, student, change=None, **answers):
+        """Hand in the right answers, but for those that are given, changed."""
+        notebook = nbformat.reads(self.given.decode(), as_version=4)
+        given = {name.replace("_", "-") + "-answer": text for name, text in answers.items()}
+        for name, text in (ANSWERS | {"words-answer": "It is."} | given).items():
+            cell(notebook, name).source = text
+        if change:
+            change(notebook)
+        self.submit_bytes(student, json.dumps(notebook).encode())
+
+    def submit_bytes(self, student, content, name="ps0.ipynb"):
+        path = self.folder / "submitted" / student / "ps0" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+
+    def rows(self):
+        with (self.folder / "ps0-grades.csv").open(encoding="utf-8-sig", newline="") as table:
+            return {row["student"]: row for row in csv.DictReader(table)}
+
+    def graded(self, student):
+        return self.folder / "autograded" / student / "ps0" / "ps0.ipynb"
+
+    def feedback(self, student):
+        """The text of the feedback."""
+        page = (self.folder / "feedback" / student / "ps0" / "ps0.html").read_text("utf-8")
+        return html.unescape(re.sub(r"<[^>]*>", "", page.split("<body>", 1)[1]))
+
+
+def rewrite_tests(notebook):
+    for name in ("square-test", "half-test"):
+        found = cell(notebook, name)
+        found.source = "pass"
+        found.metadata.nbgrader.points = 100
+        found.metadata.tags = ["skip-execution"]
+    cell(notebook, "half-test").metadata.nbgrader.grade = False
+    cell(notebook, "half-test").cell_type = "raw"
+    del cell(notebook, "half-test")["outputs"], cell(notebook, "half-test")["execution_count"]
+    cell(notebook, "half-answer").metadata.nbgrader.solution = False
+
+
+def delete_and_copy(notebook):
+    copied = nbformat.from_dict(cell(notebook, "square-answer"))
+    gone = {"square-test", "half-answer", "imports"}
+    notebook.cells = [
+        c for c in notebook.cells if c.metadata.get("nbgrader", {}).get("grade_id") not in gone
+    ]
+    notebook.cells.append(copied)
+
+
+def strip_metadata(notebook):
+    for found in notebook.cells:
+        found.metadata = {}
+
+
+NOSY = """
+import os, sys
+def square(x):
+    with open("seen.txt", "a") as file:
+        print(x, In[-1], file=file)
+    print(In, x)
+    raise AssertionError(In[-1])
+### BEGIN HIDDEN TESTS
+print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
+"""
+LOUD = """
+import sys
+from IPython.display import HTML, display
+display(HTML("<p>" * 10**7))
+try:
+    while True:
+        print("on and on" * 1000, file=sys.stderr)
+finally:
+    half = 0.5
+"""
+
+
+def hand_in_all(course):
+    with Gradebook(f"sqlite:///{course.folder / 'gradebook.db'}") as gradebook:
+        gradebook.update_or_create_assignment("ps0", duedate="2026-01-01 00:00:00")
+    warned = "import warnings\ndef square(x):\n    warnings.warn('old')\n    return x * x"
+    course.submit("good one", square=warned)
+    stamp = course.folder / "submitted" / "good one" / "ps0" / "timestamp.txt"
+    stamp.write_text("2026-01-01 01:30:00 UTC")
+    course.submit("rewrites", rewrite_tests, square="square = None", half="half = 3")
+    course.submit("deletes", delete_and_copy)
+    course.submit("replaces", square="\nimport math\nmath.isclose = lambda *a, **k: True")
+    course.submit("renames", square="def quadrat(x):\n    return x * x", half="half = = 1")
+    course.submit(
+        "half right", square="def square(x):\n    return 2 * x", half="import sys\nsys.exit()"
+    )
+    course.submit(
+        "endless", square="def square(x):\n    while True: pass", half="half = 0.5\n'x' * 10**9"
+    )
+    stubborn = "import time\nwhile True:\n    try: time.sleep(1)\n    except BaseException: pass"
+    course.submit("stubborn", half=stubborn)
+    course.submit("loud", half=LOUD, square=ANSWERS["square-answer"] + "\nprint('x' * 10**9)")
+    course.submit("dies", half="import os\nos._exit(1)")
+    course.submit("nosy", square=NOSY)
+    course.submit("stripped", strip_metadata)
+    course.submit_bytes("pdf", b"%PDF-1.7 \xff")
+    course.submit_bytes("broken", b'{"cells": [')
+    course.submit_bytes("empty", b"")
+    course.submit_bytes(
+        "other set", nbformat.writes(new_notebook(cells=[new_code_cell()])).encode()
+    )
+    course.submit_bytes("wrong name", course.given, "PS0.ipynb")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """All of them graded at once: the table, and how long it took."""
+    course = Class(tmp_path_factory.mktemp("a course"))
+    hand_in_all(course)
+    start = time.perf_counter()
+    grade("ps0", course.folder, memory=MEMORY)
+    return SimpleNamespace(course=course, rows=course.rows(), took=time.perf_counter() - start)
+
+
+@pytest.mark.parametrize(
+    ("student", "square", "half", "remarks"),
+    [
+        ("good one", "2", "1", []),
+        ("rewrites", "0", "0", []),
+        ("deletes", "2", "0", ["square-test was missing", "half-answer was missing"]),
+        ("renames", "0", "0", []),
+        ("half right", "0", "0", []),
+        ("endless", "0", "1", ["cell square-test: stopped after 2 s", "half-answer: "]),
+        ("loud", "2", "1", ["square-answer: ", "answer cell half-answer: prints without end"]),
+        ("nosy", "0", "1", []),
+    ],
+)
+def test_points_and_remarks(ran, student, square, half, remarks):
+    row = ran.rows[student]
+    assert (row["square-test"], row["half-test"]) == (square, half), row
+    assert row["automatic"] == row["total"] == str(int(square) + int(half))
+    assert row["maximum"] == "6"
+    assert row["by hand"] == "words-answer"
+    for remark in remarks:
+        assert remark in row["remarks"]
+    assert "refused" not in row["remarks"]
+    if not remarks:
+        assert row["remarks"] == ""
+
+
+@pytest.mark.parametrize(
+    ("student", "why"),
+    [
+        ("replaces", "answer cell square-answer, line 3 replaces math.isclose: grade by hand"),
+        ("stubborn", "answer cell half-answer cannot be stopped"),
+        ("dies", "Python ended in or before answer cell half-answer: grade by hand"),
+        ("stripped", "no problem of the set is in it: another notebook, or made anew"),
+        ("other set", "no problem of the set is in it: another notebook, or made anew"),
+        ("pdf", "ps0.ipynb is no notebook, but a PDF or an archive under another name"),
+        ("broken", "ps0.ipynb is no notebook: "),
+        ("empty", "ps0.ipynb is empty"),
+        ("wrong name", "there is no ps0.ipynb, but PS0.ipynb"),
+    ],
+)
+def test_what_is_refused_is_told_why(ran, student, why):
+    assert ran.rows[student]["remarks"].startswith(f"refused: {why}")
+    assert ran.rows[student]["total"] == ""
+    assert not ran.course.graded(student).exists()
+
+
+def test_tests_are_as_they_were_given(ran):
+    for student in ("rewrites", "deletes"):
+        notebook = nbformat.read(ran.course.graded(student), as_version=4)
+        assert "BEGIN HIDDEN TESTS" in cell(notebook, "square-test").source
+        assert cell(notebook, "half-test").metadata.nbgrader.points == 1
+        assert cell(notebook, "half-test").cell_type == "code"
+
+
+def test_time_and_files_stay_small(ran):
+    assert ran.took < 120
+    for student in ("endless", "loud"):
+        assert ran.course.graded(student).stat().st_size < 500_000
+
+
+def test_feedback_shows_points_and_no_hidden_tests(ran):
+    for path in (ran.course.folder / "feedback").glob("*/ps0/ps0.html"):
+        text = re.sub(r"\s", "", ran.course.feedback(path.parents[1].name))
+        assert not [line for line in HIDDEN if line in text], path
+        assert "Likesigns" not in text
+        assert "(Score:" in text
+    assert "ps0 (Score: 3.0 / 6.0)" in ran.course.feedback("good one")
+    nosy = ran.course.feedback("nosy")
+    assert "False False" in nosy
+
+
+def test_feedback_says_where_unseen_tests_fail(ran):
+    unseen = "others, which are not shown, fail"
+    assert unseen in ran.course.feedback("half right")
+    assert unseen not in ran.course.feedback("good one")
+
+
+def test_grading_again_keeps_what_a_human_gave(tmp_path):
+    course = Class(tmp_path)
+    course.submit("ann")
+    assert [path.name for path in grade_all([], tmp_path)] == ["ps0-grades.csv"]
+    with Gradebook(f"sqlite:///{tmp_path / 'gradebook.db'}") as gradebook:
+        gradebook.find_grade("words-answer", "ps0", "ps0", "ann").manual_score = 2.5
+        comment = gradebook.find_comment("words-answer", "ps0", "ps0", "ann")
+        comment.manual_comment = "Well put."
+        gradebook.db.commit()
+    grade("ps0", tmp_path)
+    row = course.rows()["ann"]
+    assert (row["words-answer"], row["automatic"], row["total"]) == ("2.5", "3", "5.5")
+    assert row["by hand"] == ""
+    assert "Well put." in course.feedback("ann")
+    assert "Score: 5.5 / 6.0" in course.feedback("ann")
+    course.submit("ann", words="It is not.")
+    grade("ps0", tmp_path)
+    changed = "words-answer is another answer than when it was graded before"
+    assert course.rows()["ann"]["remarks"] == changed
+    course.submit_bytes("ann", b"")
+    grade("ps0", tmp_path)
+    assert course.rows()["ann"]["remarks"] == "refused: ps0.ipynb is empty"
+    with Gradebook(f"sqlite:///{tmp_path / 'gradebook.db'}") as gradebook:
+        assert gradebook.find_submission("ps0", "ann").score == 2.5
+
+
+def test_late_is_told_in_hours(ran):
+    assert ran.rows["good one"]["late"] == "1.5 h"
+    assert ran.rows["nosy"]["late"] == ""
+
+
+def test_a_gradebook_is_made_also_where_the_environment_is_not_activated(monkeypatch):
+    """nbgrader calls alembic by its name."""
+    monkeypatch.setenv("PATH", os.defpath)
+    configure(Config())
+    assert Path(shutil.which("alembic")).parent == Path(sys.executable).parent
+
+
+def test_a_set_without_submissions_and_an_unknown_one_are_told(tmp_path):
+    write_tiny_set(tmp_path)
+    assert sets_submitted(tmp_path) == []
+    with pytest.raises(ValueError, match="There is no submission of ps0"):
+        grade("ps0", tmp_path)
+    with pytest.raises(ValueError, match="no problem set ps7; there are: ps0"):
+        grade_all(["ps7"], tmp_path)
+    with pytest.raises(ValueError, match="There are no submissions"):
+        grade_all([], tmp_path)
+
+
+def test_a_submission_that_takes_too_long_is_ended_with_all_it_started(tmp_path):
+    course = Class(tmp_path)
+    course.submit("ann", half="import time\nwhile True:\n    time.sleep(9)")
+    grade("ps0", tmp_path, seconds=2)
+    assert course.rows()["ann"]["remarks"] == "refused: not done after 2 s"
+
+
+def test_the_commands_of_nbgrader_are_set_in_the_same_way():
+    """All that grading needs is in the configuration that nbgrader's own commands read."""
+    wanted = Config()
+    configure(wanted)
+    assert read_config(ROOT / "notebooks" / "assignments") == wanted

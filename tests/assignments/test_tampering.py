@@ -1,0 +1,98 @@
+"""What replaces the means of the tests is found; what students write every day is not."""
+
+import pytest
+
+from rbcourse.assignments.tampering import find_in_cells, find_tampering, names_relied_on
+
+LOCKED = [
+    "import math, numpy as np\nfrom rbcourse import marking\ndef helper(): pass",
+    "assert all(isinstance(v, float) for v in np.ravel(answer(2)))",
+]
+RELIED = names_relied_on(LOCKED)
+
+
+def found(source):
+    return find_tampering(source, RELIED, {"np", "math", "marking"})
+
+
+def test_what_the_locked_cells_import_define_and_use_is_relied_on():
+    assert {"math", "np", "marking", "helper", "all", "isinstance", "float"} == RELIED
+
+
+@pytest.mark.parametrize(
+    ("source", "what"),
+    [
+        ("import numpy as np; np.allclose = lambda *a, **k: True", "replaces np.allclose"),
+        ("from rbcourse import marking; marking.check = print", "replaces marking.check"),
+        ("import numpy.testing as t\nt.assert_allclose = print", "replaces t.assert_allclose"),
+        ("import builtins\nbuiltins.AssertionError = int", "imports builtins"),
+        ("setattr(np.testing, 'assert_allclose', print)", "replaces parts of np.testing"),
+        ("other = np\nother.allclose = print", "replaces other.allclose"),
+        ("del np.allclose", "replaces np.allclose"),
+        ("np.linalg.norm += 1", "replaces np.linalg.norm"),
+        ("np.allclose.__code__ = f.__code__", "replaces np.allclose.__code__"),
+        ("np.__dict__['allclose'] = print", "uses __dict__"),
+        ("vars(np)['allclose'] = print", "replaces parts of np"),
+        ("import sys\nsys.modules['numpy'] = None", "replaces sys.modules"),
+        ("import sys\nsys.displayhook(2.0)", "uses displayhook"),
+        ("get_ipython().run_cell('1')", "uses a magic or a shell"),
+        ("shell = get_ipython()", "uses a magic or a shell"),
+        ("!ls", "uses a magic or a shell"),
+        ("%run other.py", "uses a magic or a shell"),
+        ("%%time\nnp.allclose = print", "replaces np.allclose"),
+        ("eval('1')", "uses eval"),
+        ("from unittest import mock", "imports unittest"),
+        ("class math:\n    isclose = print", "gives math another meaning"),
+        ("import json as math", "gives math another meaning"),
+        ("all = print", "gives all another meaning"),
+        ("def f():\n    global np\n    np = 1", "gives np another meaning"),
+        ("class Yes:\n    def __eq__(self, other):\n        return True", "defines __eq__"),
+    ],
+)
+def test_what_replaces_the_means_of_the_tests_is_found(source, what):
+    assert what in [said for _, said in found(source)]
+    assert what in [
+        said for *_, said in find_in_cells([*((text, False) for text in LOCKED), (source, True)])
+    ]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from matplotlib import pyplot as plt",
+        "import matplotlib.pyplot as plt\nplt.rcParams['font.size'] = 9\nplt.rcParams.update({})",
+        "%matplotlib inline",
+        "%config InlineBackend.figure_format = 'retina'",
+        "%%time\nx = 1",
+        "np.eye?",
+        "import numpy as np, math\nfrom math import pi\nimport math as m",
+        "class Arm:\n    def __init__(self):\n        self.x = 1\narm = Arm()\narm.y = 2",
+        "T = np.eye(4)\nT.shape = 2, 8\nT[0] = 1\nsetattr(T, 'shape', (16,))",
+        "fig, ax = plt.subplots()\nax.mine = 1",
+        "def norm(np):\n    math = 1\n    return np",
+        "[np for np in range(3)]",
+        "np.random.seed(0)\nnp.set_printoptions(precision=3)",
+        "from IPython.display import HTML, display",
+        "import re\nre.compile('a')",
+        "sum = 3",
+        "this is no Python (",
+    ],
+)
+def test_what_students_write_every_day_is_not(source):
+    assert found(source) == []
+
+
+def test_the_line_is_that_of_the_cell():
+    assert found("\n\nx = 1\nnp.allclose = print") == [(4, "replaces np.allclose")]
+    assert found("%%time\nx = 1\nnp.allclose = print") == [(3, "replaces np.allclose")]
+
+
+def test_pyplot_may_be_imported_in_either_way():
+    relied = names_relied_on(["import matplotlib.pyplot as plt"])
+    for source in ("from matplotlib import pyplot as plt", "import matplotlib.pyplot as plt"):
+        assert find_tampering(source, relied) == []
+    assert find_tampering("from json import tool as plt", relied)
+
+
+def test_what_the_locked_cells_do_themselves_is_in_order():
+    assert find_in_cells([("import math\nmath.tau = 6", False), ("x = 1", True)]) == []

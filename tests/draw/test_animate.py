@@ -1,0 +1,166 @@
+"""Animations: every frame is what a full drawing would be, and players need no network."""
+
+import base64
+import io
+import re
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from PIL import Image
+
+import rbcourse as rb
+from rbcourse.draw import animate, bodies
+
+A1 = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
+TIMES = np.linspace(0, 1, 12)
+TABLE = bodies.motion_table(TIMES, rb.screw_se3(np.eye(4), A1)(TIMES))
+
+
+def cube():
+    fig, ax = plt.subplots(figsize=(3, 3), dpi=60, subplot_kw={"projection": "3d"}, layout="none")
+    return fig, bodies.moving_cubes([ax], {"cube": TABLE}, side=1)
+
+
+def save(folder, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(folder))
+    fig, update = cube()
+    return animate.save_animation(fig, "cube", TABLE, 'a "cube"', update, 12, seconds=3)
+
+
+def frames_of(file):
+    with Image.open(file) as picture:
+        for i in range(picture.n_frames):
+            picture.seek(i)
+            yield np.asarray(picture.convert("RGB"), dtype=int)
+
+
+def test_frames_are_what_a_full_drawing_gives():
+    fig, update = cube()
+    drawn = animate.render(fig, update, 12)
+    for i in (0, 5, 11):
+        for artist in update(i):
+            artist.set_animated(False)
+        full = io.BytesIO()
+        fig.savefig(full, format="png", dpi=60)
+        want = np.asarray(Image.open(full).convert("RGB"))
+        off = np.abs(np.asarray(drawn[i], dtype=int) - want).max(axis=-1)
+        assert (off > 16).mean() < 0.01  # stars are drawn before the cube, not after it
+    plt.close(fig)
+
+
+def test_the_gif_shows_each_frame_in_its_colours(tmp_path, monkeypatch):
+    save(tmp_path, monkeypatch)
+    fig, update = cube()
+    drawn = [np.asarray(frame, dtype=int) for frame in animate.render(fig, update, 12)]
+    plt.close(fig)
+    shown = list(frames_of(tmp_path / "cube.gif"))
+    assert len(shown) == 12
+    for frame, want in zip(shown, drawn, strict=True):
+        assert np.abs(frame - want).max() <= 24
+        assert np.abs(frame - want).mean() < 1
+        assert np.array_equal(frame[0, 0], [255, 255, 255])
+    with Image.open(tmp_path / "cube.gif") as picture:
+        assert picture.info["loop"] == 0
+        assert picture.info["duration"] == 250
+
+
+@pytest.mark.parametrize(("count", "seconds"), [(60, 4), (100, 1.99), (3, 1), (7, 0.5)])
+def test_a_gif_takes_its_time(count, seconds):
+    shades = [Image.new("L", (4, 4), 2 * i) for i in range(count)]
+    with Image.open(io.BytesIO(animate.gif(shades, seconds))) as picture:
+        assert picture.n_frames == count
+        total = 0
+        for i in range(count):
+            picture.seek(i)
+            total += picture.info["duration"]
+    assert total == round(1000 * seconds)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": "a b"}, "name: a word"),
+        ({"name": "1x"}, "name: a word"),
+        ({"frames": 0}, "frames: 1 to 50 a second wanted, got 0"),
+        ({"frames": 51}, "frames: 1 to 50 a second wanted, got 51 in 1.0 s"),
+        ({"seconds": -1.0}, "frames: 1 to 50 a second"),
+        ({"seconds": float("nan")}, "frames: 1 to 50 a second"),
+    ],
+)
+def test_what_would_not_play_is_refused(change, message):
+    fig, update = cube()
+    given = {"name": "cube", "alt": "", "update": update, "frames": 12, "seconds": 1.0} | change
+    with pytest.raises(ValueError, match=message):
+        animate.animate(fig, **given)
+    plt.close(fig)
+
+
+@pytest.mark.parametrize(
+    ("still", "count", "shown"), [(-1, 12, 5), (-1, 11, 5), (5, 12, 2), (0, 12, 0)]
+)
+def test_the_player_starts_with_the_still_frame(still, count, shown):
+    fig, update = cube()
+    before = fig.canvas
+    animation = animate.animate(fig, "cube", "", update, count, still=still)
+    assert fig.canvas is before
+    assert not any(artist.get_animated() for artist in update(0))
+    page = animation._repr_html_()
+    first = re.search(r'src="(data:[^"]*)"', page)[1]
+    frames = re.findall(r'"(data:[^"]*)"', page.split("const frames")[1])
+    assert f'value="{shown}"' in page
+    assert frames[shown] == first
+    still_png = Image.open(io.BytesIO(base64.b64decode(first.split(",")[1]))).convert("RGB")
+    want = animation.pictures[still % count].convert("RGB")
+    assert np.array_equal(still_png, want)
+    plt.close(fig)
+
+
+def test_two_players_of_one_name_do_not_meet():
+    pages = []
+    for alt in ("one", "other"):
+        fig, update = cube()
+        pages.append(animate.animate(fig, "cube", alt, update, 2)._repr_html_())
+        plt.close(fig)
+    one, other = (re.search(r'id="(\w+)"', page)[1] for page in pages)
+    assert one != other
+    assert f'querySelectorAll("#{one}")' in pages[0]
+
+
+def test_the_files_are_saved_and_the_figure_closed(tmp_path, monkeypatch):
+    animation = save(tmp_path, monkeypatch)
+    names = {"cube.gif", "cube.png", "cube.pdf", "cube.csv"}
+    assert {file.name for file in tmp_path.iterdir()} == names
+    assert animation.still == 11  # the last
+    still = Image.open(tmp_path / "cube.png").convert("RGB")
+    assert np.array_equal(still, animation.pictures[11].convert("RGB"))
+    assert (tmp_path / "cube.csv").read_text().startswith("t [1],x [m],")
+    assert plt.get_fignums() == []
+    assert repr(animation) == 'cube: a "cube"'
+
+
+def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
+    pages = [save(tmp_path / folder, monkeypatch)._repr_html_() for folder in ("a", "b")]
+    assert pages[0] == pages[1]
+    for name in ("cube.gif", "cube.png", "cube.pdf", "cube.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_the_player_has_all_it_needs(tmp_path, monkeypatch):
+    animation = save(tmp_path, monkeypatch)
+    page = animation._repr_html_()
+    assert not re.search(r"https?:|src=\"(?!data:)", page)
+    assert 'alt="a &quot;cube&quot;"' in page
+    assert page.count("data:image/png;base64,") == 1 + 6  # the still, and every second frame
+    assert 'max="5"' in page
+    assert "setInterval(step, 500)" in page
+    assert "<div hidden>" in page  # no dead buttons where scripts do not run
+
+
+def test_columns_of_different_shapes_are_refused_and_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+    fig, update = cube()
+    with pytest.raises(ValueError, match="one shape wanted"):
+        animate.save_animation(fig, "bad", {"t [1]": [0, 1], "x [m]": [0]}, "", update, 2)
+    assert list(tmp_path.iterdir()) == []
+    plt.close(fig)

@@ -1,0 +1,132 @@
+"""Cubes and paths are drawn where the table says."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbcourse.draw import bodies
+
+A1 = rb.pose_from_coordinates([0.3, -0.5, 1.0, 4, 5, 3])
+TIMES = np.linspace(0, 1, 6)
+SCREW, GEODESIC = rb.screw_se3(np.eye(4), A1), rb.geodesic_se3(np.eye(4), A1)
+MOTIONS = {
+    "geodesic": bodies.motion_table(TIMES, GEODESIC(TIMES)),
+    "screw": bodies.motion_table(TIMES, SCREW(TIMES)),
+}
+
+
+@pytest.fixture
+def axes():
+    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "3d"})
+    yield axes
+    plt.close(fig)
+
+
+def corners(cube):
+    """The corners of the six faces and of the square, in space."""
+    return np.asarray(cube._faces)[:, :4]
+
+
+def test_a_motion_table_holds_the_poses():
+    table = MOTIONS["screw"]
+    assert list(table)[:4] == ["t [1]", "x [m]", "y [m]", "z [m]"]
+    assert np.array_equal(table["t [1]"], TIMES)
+    assert np.array_equal(table["R23 [1]"], SCREW(TIMES)[:, 1, 2])
+    assert np.array_equal(table["y [m]"], SCREW(TIMES)[:, 1, 3])
+
+
+@pytest.mark.source("BK Fig. 5")
+def test_a_cube_has_six_faces_and_a_square_on_one(axes):
+    in_body = corners(bodies.draw_box(axes[0], np.eye(4), 2.0))
+    faces, square = in_body[:6], in_body[6]
+    assert np.all(np.abs(faces) == 1)
+    centres = {tuple(face.mean(axis=0)) for face in faces}
+    assert centres == {tuple(s * e) for e in np.eye(3) for s in (1, -1)}
+    edges = np.linalg.norm(np.roll(faces, -1, axis=1) - faces, axis=-1)
+    assert np.all(edges == 2)
+    assert np.all(square[:, 2] > 1)
+    assert np.all(np.abs(square[:, :2]) == 0.5)
+
+
+@pytest.mark.source("BK Fig. 5")
+def test_cubes_are_where_the_poses_are(axes):
+    *cubes, stars = bodies.draw_cube_motion(axes[0], MOTIONS["screw"], 2.0)
+    in_body = corners(bodies.draw_box(axes[1], np.eye(4), 2.0))
+    assert len(cubes) == 6
+    for cube, A in zip(cubes, SCREW(TIMES), strict=True):
+        assert np.abs(corners(cube) - (in_body @ A[:3, :3].T + A[:3, 3])).max() < 1e-14
+    assert np.array_equal(stars.get_data_3d(), SCREW(TIMES)[:, :3, 3].T)
+    low, high = np.array([axes[0].get_xlim(), axes[0].get_ylim(), axes[0].get_zlim()]).T
+    drawn = np.concatenate([corners(cube).reshape(-1, 3) for cube in cubes])
+    assert np.all((drawn.min(axis=0) > low) & (drawn.max(axis=0) < high))
+    assert np.allclose(np.divide(*(axes[0].get_box_aspect()[:2])), np.divide(*(high - low)[:2]))
+
+
+def test_moving_cubes_move(axes):
+    update = bodies.moving_cubes(axes, MOTIONS, side=1.5)
+    in_body = corners(bodies.draw_box(axes[0], np.eye(4), 1.5))
+    for i in (0, 3, 5):
+        for cube, curve in zip(update(i), (GEODESIC, SCREW), strict=True):
+            A = curve(TIMES[i])
+            assert np.abs(corners(cube) - (in_body @ A[:3, :3].T + A[:3, 3])).max() < 1e-14
+    assert [ax.get_title() for ax in axes] == ["geodesic", "screw"]
+
+
+def test_short_motions_can_be_drawn(axes):
+    few = {name: {key: part[:3] for key, part in table.items()} for name, table in MOTIONS.items()}
+    assert len(bodies.moving_cubes(axes, few, side=1)(2)) == 2
+
+
+def test_ways_are_the_paths_and_differ_in_colour_and_dashes(axes):
+    lines = bodies.draw_ways(axes[0], MOTIONS)
+    for line, curve in zip(lines, (GEODESIC, SCREW), strict=True):
+        assert np.array_equal(line.get_data_3d(), curve(TIMES)[:, :3, 3].T)
+    assert len({line.get_color() for line in lines}) == 2
+    assert len({line.get_linestyle() for line in lines}) == 2
+
+
+def test_the_frame_is_drawn_at_the_start_and_once_at_each_end(axes):
+    bodies.draw_ways(axes[0], MOTIONS)
+    other = bodies.motion_table(TIMES, rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES))
+    bodies.draw_ways(axes[1], {**MOTIONS, "back": other})
+    assert [len(ax.texts) for ax in axes] == [2 * 3, 3 * 3]
+
+
+def test_the_square_is_seen_on_the_face_that_is_turned_to_the_eye():
+    """From slightly above: in perspective it would sink into the top."""
+    turns = rb.exp_so3(np.outer(np.linspace(0, 6, 20), [0, 0, 1]))
+    for R in turns:
+        fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "3d"})
+        motion = bodies.motion_table([0], rb.pose_from_components(R, [[0, 0, 0]]))
+        bodies.draw_cube_motion(ax, motion, 2.0)
+        fig.canvas.draw()
+        red, green, blue = np.moveaxis(np.asarray(fig.canvas.buffer_rgba())[..., :3], -1, 0)
+        assert ((red > 180) & (green < 130) & (blue < 60)).any()
+        plt.close(fig)
+
+
+def test_straight_ways_can_be_drawn(axes):
+    bodies.draw_ways(axes[0], {"geodesic": MOTIONS["geodesic"]})
+    assert np.isfinite([axes[0].elev, axes[0].azim]).all()
+
+
+def test_descriptions_give_numbers():
+    assert f"geodesic {np.linalg.norm(A1[:3, 3]):.2f} m" in bodies.describe_ways(MOTIONS)
+    said = bodies.describe_cube_motion(MOTIONS["geodesic"])
+    angle = np.degrees(np.linalg.norm([0.3, -0.5, 1.0]))
+    assert "at 6 times on its way from (0, 0, 0) to (4, 5, 3) m" in said
+    assert ", ".join([f"{angle / 5:.0f}"] * 5) in said
+    same = {"one": MOTIONS["screw"], "two": MOTIONS["screw"]}
+    assert "side by side: one, two." in bodies.describe_moving_cubes(same)
+    assert "one and two agree at all times." in bodies.describe_moving_cubes(same)
+    t = np.linspace(0, 1, 6)
+    bump = 4 * t * (1 - t) ** 2  # most at 1/3, of the six times at 0.4
+    turned = rb.exp_so3(np.radians(50) * bump[:, None] * [0, 0.6, 0.8])
+    upright = np.broadcast_to(np.eye(3), turned.shape)
+    both = {
+        name: bodies.motion_table(t, rb.pose_from_components(R, [0, 0, 0]))
+        for name, R in {"upright": upright, "tilted": turned}.items()
+    }
+    said = bodies.describe_moving_cubes(both)
+    assert f"upright and tilted differ most at t = 0.40, by {50 * bump.max():.0f} degrees." in said

@@ -1,0 +1,112 @@
+"""Rectangles are drawn where the table says, and described by its numbers."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbcourse.draw import plane
+
+PATH = np.array([[0, 0, 0], [3, 0, 0.5], [3, 2, -2.0], [1, 4, -2.0]])
+TABLE = plane.route_table(PATH)
+
+
+@pytest.fixture
+def ax():
+    fig, ax = plt.subplots()
+    yield ax
+    plt.close(fig)
+
+
+def corners(pose, length):
+    """Of the rectangle and of its nose, by complex numbers."""
+    x, y, theta = pose
+    turn = length * np.exp(1j * theta)
+    outline = complex(x, y) + turn * np.array([-2 - 1j, 2 - 1j, 2 + 1j, -2 + 1j]) / 4
+    return outline, complex(x, y) + turn * 0.5
+
+
+def assert_body(outline, nose, pose, length):
+    wanted, tip = corners(pose, length)
+    assert np.abs(outline.get_xy()[:4] @ [1, 1j] - wanted).max() < 1e-14
+    assert abs(nose.get_xydata()[1] @ [1, 1j] - tip) < 1e-14
+
+
+def assert_all_is_seen(ax, length):
+    low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
+    for pose in PATH:
+        for point in corners(pose, length)[0]:
+            assert low[0] < point.real < high[0]
+            assert low[1] < point.imag < high[1]
+    assert ax.get_aspect() == 1
+
+
+def test_a_route_table_holds_the_path():
+    assert list(TABLE) == ["x [m]", "y [m]", "theta [rad]"]
+    assert np.array_equal(np.transpose(list(TABLE.values())), PATH)
+
+
+@pytest.mark.source("RR 3.3")
+def test_rectangles_stand_at_the_poses_and_all_is_seen(ax):
+    way, *bodies = plane.draw_route(ax, TABLE, 1.5, shown=[0, 2, 3])
+    assert {text.get_text(): text.xy[0] for text in ax.texts} == {"start": 0, "goal": 1}
+    assert np.array_equal(np.transpose(way.get_data()), PATH[:, :2])
+    for i, outline, nose in zip([0, 2, 3], bodies[::2], bodies[1::2], strict=True):
+        assert_body(outline, nose, PATH[i], 1.5)
+    assert_all_is_seen(ax, 1.5)
+    assert ax.get_xlabel() == "x (m)"
+
+
+@pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
+def test_the_rectangle_moves_and_leaves_its_way(ax):
+    update = plane.moving_route(ax, TABLE, 0.8, shown=[1, 3])
+    assert_all_is_seen(ax, 0.8)
+    for ghost, nose, i in zip(ax.patches[:2], ax.lines[:2], (1, 3), strict=True):
+        assert_body(ghost, nose, PATH[i], 0.8)
+    for i in (0, 3, 1):
+        way, outline, nose = update(i)
+        assert_body(outline, nose, PATH[i], 0.8)
+        assert np.array_equal(np.transpose(way.get_data()), PATH[: i + 1, :2])
+
+
+def test_two_ways_are_compared(ax):
+    raised = PATH + np.array([0, 1, 0]) * [[0], [1], [2], [0.5]]
+    pair = {"one": TABLE, "other": plane.route_table(raised)}
+    point = [0.3, -0.2]
+    artists = plane.draw_compared(ax, pair, 1, shown=[1], points=[[0, 0], point])
+    for (way, outline, nose), path, c in zip(
+        [artists[:3], artists[3:]], [PATH, raised], [0, complex(*point)], strict=True
+    ):
+        wanted = path[:, :2] @ [1, 1j] + c * np.exp(1j * path[:, 2])
+        assert np.abs(np.transpose(way.get_data()) @ [1, 1j] - wanted).max() < 1e-14
+        assert_body(outline, nose, path[1], 1)
+    for one, other in zip(artists[:3], artists[3:], strict=True):
+        assert one.get_linestyle() != other.get_linestyle()
+    assert [artists[0].get_label(), artists[3].get_label()] == ["one", "other"]
+    assert ax.get_ylim()[1] > 4.5
+    way = plane.draw_compared(ax, pair, 1, shown=[1])[3]
+    assert np.abs(np.transpose(way.get_data()) - raised[:, :2]).max() < 1e-14
+    said = plane.describe_compared({"here": pair})
+    assert (
+        said
+        == "Rectangles on two ways each. here: one and other, the centres apart by 2 m at most."
+    )
+
+
+def test_the_description_says_from_where_to_where_and_how_it_turns():
+    said = plane.describe_route(TABLE)
+    assert "from (0, 0) m, heading 0 degrees, to (1, 4) m, heading -115 degrees" in said
+    assert f"its centre covers {3 + 2 + np.sqrt(8):.2f} m" in said
+    assert "by 29 degrees to the left and 143 degrees to the right." in said
+    still = plane.describe_route(plane.route_table([[1, -0.001, -0.004], [1, -0.001, 0]]))
+    assert "from (1, 0) m, heading 0 degrees" in still
+    assert "it turns by less than a degree." in still
+    assert plane.describe_routes({"one": TABLE}) == f"one: {said}"
+
+
+def test_a_rectangle_of_a_drawing_is_that_of_its_matrix(ax):
+    """The nose is half a length ahead, as the lesson says."""
+    pose = [4, 2, 0.5]
+    _, nose = plane.draw_body(ax, np.array(pose), 1.2, "k")
+    ahead = rb.matrix_from_planar(pose) @ [0.6, 0, 1]
+    assert np.abs(nose.get_xydata()[1] - ahead[:2]).max() < 1e-14

@@ -1,0 +1,89 @@
+"""Every explorer: complete, readable, and safe wherever its sliders are."""
+
+import re
+
+import ipywidgets
+import numpy as np
+import pytest
+from sweeps import settings
+
+from rbcourse import explore
+from rbcourse.explore.explorer import LABELS
+
+
+@pytest.fixture(scope="module", params=explore.__all__)
+def explorer(request):
+    return getattr(explore, request.param)()
+
+
+def test_there_are_eleven():
+    assert len(explore.__all__) == 11
+    assert explore.__all__ == sorted(explore.__all__)
+
+
+def test_it_shows_something_before_it_is_touched(explorer):
+    assert len(explorer.picture.png) > 5_000
+    assert explorer.notice.value == ""
+    assert explorer.said.value.count("<tr") >= 2
+    assert not explorer.play.playing
+
+
+WITHOUT_UNIT = {"time t", "seed", "rotations", "pull", "y leans", "z leans", "z stretched"} | {
+    "size s",
+    "turn",
+    "× Bessel's",
+}
+
+
+def test_every_label_has_its_unit(explorer):
+    for control in explorer.controls.values():
+        label = control.description
+        if isinstance(control, ipywidgets.FloatSlider) and label not in WITHOUT_UNIT:
+            assert re.search(r"\((°|°/s|m|m/s|rad|s)\)$", label), label
+
+
+def test_the_keyboard_reaches_every_control(explorer):
+    reached = (ipywidgets.FloatSlider, ipywidgets.ToggleButtons, ipywidgets.Dropdown)
+    assert all(isinstance(control, reached) for control in explorer.controls.values())
+    assert all(
+        control.continuous_update
+        for control in explorer.controls.values()
+        if hasattr(control, "step")
+    )
+
+
+def test_every_setting_gives_a_picture_and_says_something(explorer):
+    """Each slider at eight places, and all pairs of ends, drawn in full."""
+    first = explorer.values
+    chosen = [s for i, s in enumerate(settings(explorer)) if len(s) == 2 or i % 13 == 0]
+    for setting in chosen:
+        explorer.put(**first | setting)
+        assert explorer.picture.png.startswith(b"\x89PNG")
+        assert explorer.said.value.count("<tr") >= 2 or explorer.notice.value, setting
+        assert not re.search(r"\bnan\b", explorer.said.value), setting
+        assert not re.search(r"[-−]0\.?0*(?![.\d])", explorer.said.value), setting
+    explorer.restart()
+
+
+def test_all_letters_are_large_enough(explorer):
+    from matplotlib.text import Text
+
+    for text in explorer._fig.findobj(Text):
+        if text.get_visible() and text.get_text().strip():
+            assert text.get_fontsize() >= LABELS, text.get_text()
+
+
+def test_every_artist_is_on_the_figure_and_named_once(explorer):
+    artists = list(explorer.artists.values())
+    assert len({id(artist) for artist in artists}) == len(artists)
+    assert all(artist.get_figure() is explorer._fig for artist in artists)
+
+
+def test_playing_runs_through_the_whole_range(explorer):
+    seen = []
+    explorer.play.playing = True
+    for step in np.linspace(0, explorer.play.max, 5).astype(int):
+        explorer.play.value = int(step)
+        seen.append(explorer.picture.png)
+    assert len(set(seen)) >= 4
+    explorer.restart()

@@ -1,0 +1,178 @@
+"""The atlas: its problems, what curves cost in it, and what is read off."""
+
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbcourse.study import atlas
+
+DRAWS = 6
+PROBLEMS = atlas.atlas_problems(DRAWS, rng=1)
+FOUND = atlas.survey(PROBLEMS.of(slice(0, None, 12)))
+SOME = atlas.random_problems(60, 3, rng=2)
+
+
+def turns(ends):
+    return rb.log_so3(np.swapaxes(ends.R0, -1, -2) @ ends.R1)
+
+
+def norms(x):
+    return np.linalg.norm(x, axis=-1)
+
+
+def test_each_cell_has_its_displacements_and_end_velocities():
+    family, turn, speed, _ = np.indices((2, 10, 10, DRAWS)).reshape(4, -1)
+    sigma, w = turns(PROBLEMS), np.stack([PROBLEMS.w0, PROBLEMS.w1])
+    assert np.array_equal(np.floor(norms(sigma) / (np.pi / 10)), turn)
+    assert np.array_equal(np.floor(np.hypot(*norms(w)) / 0.9), speed)
+    along = np.abs(np.sum(w * sigma, axis=-1)) / norms(w) / norms(sigma)
+    assert np.abs(along[:, family == 0] - 1).max() < 1e-9
+    assert along[:, family == 1].max() < 1e-9
+
+
+def test_velocities_point_both_ways_and_all_ways_across():
+    cosine = np.sum(PROBLEMS.w0 * PROBLEMS.w1, axis=-1) / norms(PROBLEMS.w0) / norms(PROBLEMS.w1)
+    along, across = cosine.reshape(2, -1)
+    assert np.abs(np.sort(along)[[0, -1]] - [-1, 1]).max() < 1e-9
+    assert np.abs(np.abs(along) - 1).max() < 1e-9
+    for way in (-1, 1):
+        assert np.mean(np.sign(along) == way) > 0.4
+    assert np.mean(np.abs(across) < np.cos(np.pi / 4)) == pytest.approx(0.5, abs=0.1)
+
+
+def test_random_problems_fill_balls():
+    ends = atlas.random_problems(4000, 1.5, rng=3)
+    for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
+        share = (norms(x) / radius) ** 3  # of the volume: uniform
+        assert share.max() < 1 + 1e-9
+        assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
+        assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
+
+
+@pytest.mark.parametrize(
+    "make", [atlas.atlas_problems, lambda n, rng: atlas.random_problems(n, 1, rng=rng)]
+)
+def test_a_seed_gives_the_same_problems_again(make):
+    one, again, other = make(2, rng=5), make(2, rng=5), make(2, rng=6)
+    assert all(np.array_equal(a, b) for a, b in zip(one, again, strict=True))
+    assert not any(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+    with pytest.raises(ValueError, match=r"an integer from 1 up wanted, got 0"):
+        make(0, rng=5)
+
+
+@pytest.mark.parametrize("size", [0, -1, 3.2, np.nan, "a", [1, 2]])
+def test_an_impossible_size_is_named(size):
+    with pytest.raises(ValueError, match=r"^size"):
+        atlas.random_problems(2, size)
+
+
+@pytest.mark.source("BK (18)")
+@pytest.mark.parametrize("way", atlas.WAYS)
+def test_costs_are_the_integral(way):
+    make = atlas.WAYS[way]
+    costs = atlas.costs(make, SOME.of(slice(20)))
+    for k in range(20):
+        exact = rb.acceleration_cost(make(*(x[k] for x in SOME)))
+        assert costs[k] == pytest.approx(exact, rel=1e-6)
+
+
+def test_a_projection_that_all_but_jumps_is_integrated_too():
+    """A turn from rest by a little less than 180°: the margin is 2 cos(89.9°)."""
+    turn, rest = np.radians([[0, 0, 179.8]]), np.zeros((1, 3))
+    ends = atlas.Ends(np.eye(3)[None], rb.exp_so3(turn), rest, rest)
+    curve = rb.projected_cubic_so3(*(x[0] for x in ends))
+    assert curve.margin < 0.004
+    assert atlas.costs(atlas.projection, ends)[0] == pytest.approx(
+        rb.acceleration_cost(curve), rel=1e-6
+    )
+
+
+def test_a_survey_has_the_optimum_and_every_way():
+    assert list(FOUND) == ["optimum", *atlas.WAYS]
+    some = PROBLEMS.of(slice(0, None, 12))
+    assert np.array_equal(FOUND["optimum"], rb.minimum_acceleration_so3(*some).cost)
+    for way, make in atlas.WAYS.items():
+        assert np.array_equal(FOUND[way], atlas.costs(make, some))
+        assert np.all(FOUND[way] > (1 - 1e-6) * FOUND["optimum"])
+
+
+def test_a_survey_tells_how_far_it_is():
+    told = []
+    few = PROBLEMS.of(slice(1100))
+    atlas.survey(few, lambda *done: told.append(done), ways={})
+    assert told == [(1000, 1100), (1100, 1100)]
+
+
+def test_a_survey_of_nothing_is_empty():
+    none = PROBLEMS.of(slice(0))
+    for found in (atlas.survey(none), atlas.several_starts(none)):
+        assert {cost.shape for cost in found.values()} == {(0,)}
+
+
+def test_an_error_ends_a_survey():
+    def refuses(*ends):
+        raise ValueError("no curve")
+
+    with pytest.raises(ValueError, match="no curve"):
+        atlas.survey(SOME, ways={"none": refuses})
+
+
+def test_what_is_not_found_is_nan_and_silent():
+    ends = atlas.Ends(*(x[:3].copy() for x in SOME))
+    ends.w0[1], ends.w1[1] = [1e3, 0, 0], [0, 1e3, 0]
+    found = atlas.survey(ends, ways={"exponential": rb.exponential_cubic_so3})
+    assert np.isnan(found["optimum"]).tolist() == [False, True, False]
+    assert np.isfinite(found["exponential"]).all()
+
+
+@pytest.mark.source("BK (19)")
+def test_the_optimum_is_the_lowest_of_several_starts():
+    """From the projected cubic the solver turns the wrong way round in a good part of them."""
+    used, found = rb.minimum_acceleration_so3(*SOME).cost, atlas.several_starts(SOME)
+    assert list(found) == [*list(atlas.WAYS)[:-1], "long way round"]
+    lowest = np.nanmin(list(found.values()), axis=0)
+    assert used == pytest.approx(np.minimum(used, lowest), rel=1e-9)
+    assert 5 < np.sum(found["projection"] > lowest * (1 + 1e-6)) < 30
+
+
+@pytest.mark.parametrize("make", [atlas.long_way_round, atlas.bezier_other_way])
+def test_the_other_way_round_meets_the_same_ends(make):
+    curve = make(*SOME)
+    for t, R, w in ((0, SOME.R0, SOME.w0), (1, SOME.R1, SOME.w1)):
+        assert np.abs(curve(t) - R).max() < 1e-13
+        assert np.abs(curve(t, 1) - w).max() < 1e-12
+
+
+@pytest.mark.parametrize(("make", "rate"), [(atlas.long_way_round, 1), (atlas.bezier_other_way, 3)])
+def test_the_other_way_round_turns_by_what_is_left_of_a_full_turn(make, rate):
+    """About one axis, with the velocities of a turn by 1 − 2π: then it is at constant speed."""
+    e = np.eye(3)[1]
+    w = np.array([(1 - 2 * np.pi) * e]) if rate == 1 else np.array([[0.0, 0, 0]])
+    curve = make(np.eye(3)[None], rb.exp_so3([e]), w, w)
+    speed = curve(np.linspace(0, 1, 201), 1)[:, 0, 1]
+    assert np.trapezoid(speed, dx=1 / 200) == pytest.approx(1 - 2 * np.pi, abs=1e-3)
+    if rate == 1:
+        assert speed == pytest.approx(np.full(201, 1 - 2 * np.pi))
+
+
+@pytest.mark.source("BK Prop. 3")
+def test_which_curves_go_along_with_moved_and_exchanged_ends():
+    reversible = "projection", "Bézier", "quaternion"
+    for way, make in atlas.WAYS.items():
+        off = atlas.defects(make, SOME, rng=1)
+        assert list(off) == ["left", "right", "reversed"]
+        assert max(off["left"], off["right"]) < 1e-11, way
+        assert off["reversed"] < 1e-11 if way in reversible else off["reversed"] > 0.1, way
+
+
+def test_what_is_not_invariant_is_seen():
+    """σ taken about I: right-invariant it is not, and neither left."""
+
+    def about_the_identity(R0, R1, w0, w1):
+        return lambda t: rb.exp_so3(
+            rb.log_so3(R0) * (1 - t[:, None, None]) + rb.log_so3(R1) * t[:, None, None]
+        )
+
+    off = atlas.defects(about_the_identity, SOME, rng=1)
+    assert min(off["left"], off["right"]) > 0.1
+    assert off["reversed"] < 1e-12

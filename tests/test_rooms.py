@@ -1,0 +1,144 @@
+"""Rooms import one way, nothing imports in a circle, and the package itself loads NumPy alone."""
+
+import ast
+import subprocess
+import sys
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+import rbcourse
+
+PACKAGE = Path(rbcourse.__file__).parent
+MAY_IMPORT = {  # the rooms, beside the core and itself, that a room may import
+    "core": set(),
+    "draw": set(),
+    "explore": {"draw"},
+    "study": {"draw"},
+    "report": {"draw"},
+    "course": None,  # not even the core
+    "assignments": {"draw", "course"},
+}
+LIBRARIES = {
+    "core": {"numpy", "scipy"},
+    "draw": {"PIL", "matplotlib", "mpl_toolkits"},
+    "explore": {"anywidget", "ipywidgets", "matplotlib", "traitlets"},
+    "study": {"IPython", "matplotlib"},
+    "report": {"matplotlib"},
+    "course": {"nbclient", "nbformat", "tornado", "traitlets", "voila"},
+    "assignments": {"IPython", "matplotlib", "nbclient", "nbconvert", "nbformat", "nbgrader"}
+    | {"psutil", "traitlets"},
+}
+
+
+def modules(package):
+    """The modules of a package by their dotted names below it, the package itself as ""."""
+    for path in package.rglob("*.py"):
+        parts = path.relative_to(package).with_suffix("").parts
+        yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+
+
+def room(module):
+    first = module.split(".")[0]
+    return first if first in MAY_IMPORT else "core"
+
+
+def imports(module, path, known):
+    """What a module imports anywhere, inside functions too: modules of the package, libraries."""
+    inner, outer = set(), set()
+    here = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [(alias.name, []) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = ["rbcourse", *here[: len(here) + 1 - node.level]] if node.level else []
+            name = ".".join([*filter(None, base), *filter(None, [node.module])])
+            names = [(name, [alias.name for alias in node.names])]
+        for name, members in names:
+            top, _, below = name.partition(".")
+            if top != "rbcourse":
+                outer.add(top)
+            else:
+                submodules = [".".join(filter(None, [below, member])) for member in members]
+                found = [name for name in submodules if name in known]
+                inner.update(found)
+                if len(found) < len(members) or not members:
+                    inner.add(below)
+    return inner, outer
+
+
+def faults(package):
+    """Each import that the rules forbid, as "a imports b"; and the first circle that is found."""
+    known = dict(modules(package))
+    graph = {}
+    for module, path in known.items():
+        inner, outer = imports(module, path, known)
+        graph[module], own = inner - {module}, room(module)
+        allowed = {own} if MAY_IMPORT[own] is None else {own, "core", *MAY_IMPORT[own]}
+        for other in sorted(inner):
+            top = other == "" and module != ""  # what imports all of the core, for its version
+            if room(other) not in allowed or (own == "core" and top):
+                yield f"{module} imports {other or 'rbcourse'}"
+        libraries = LIBRARIES["core"] | LIBRARIES[own] | set(sys.stdlib_module_names)
+        yield from (f"{module} imports {name}" for name in sorted(outer - libraries))
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        yield "a circle: " + " imports ".join(reversed(error.args[1]))
+
+
+def test_imports_keep_the_rules():
+    assert list(faults(PACKAGE)) == []
+
+
+@pytest.mark.parametrize(
+    ("files", "fault"),
+    [
+        (
+            {"so3.py": "def late():\n    from rbcourse.draw import bodies"},
+            "so3 imports draw.bodies",
+        ),
+        ({"so3.py": "from .draw.bodies import box"}, "so3 imports draw.bodies"),
+        ({"so3.py": "import rbcourse"}, "so3 imports rbcourse"),
+        ({"so3.py": "import matplotlib.pyplot"}, "so3 imports matplotlib"),
+        ({"draw/plane.py": "from rbcourse.explore import x"}, "draw.plane imports explore"),
+        ({"course/a.py": "from rbcourse.so3 import x"}, "course.a imports so3"),
+        ({"course/a.py": "from rbcourse.draw.bodies import x"}, "course.a imports draw.bodies"),
+        (
+            {"draw/a.py": "from .b import x", "draw/b.py": "from rbcourse.draw import a"},
+            "a circle: draw.a imports draw.b imports draw.a",
+        ),
+    ],
+)
+def test_each_fault_is_seen(tmp_path, files, fault):
+    there = {"so3.py": "", "draw/__init__.py": "", "draw/bodies.py": "", "explore/__init__.py": ""}
+    for name, text in {"__init__.py": "from rbcourse.so3 import x", **there, **files}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, "utf-8")
+    assert fault in list(faults(tmp_path)) or fault.startswith("a circle")
+    assert len(list(faults(tmp_path))) == 1 + (fault == "so3 imports rbcourse")
+
+
+def test_import_loads_numpy_only():
+    code = """
+        import sys, numpy
+        before = set(sys.modules)
+        import rbcourse
+        print(*set(sys.modules) - before)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", dedent(code)], capture_output=True, text=True, check=True
+    )
+    loaded = {name.split(".")[0] for name in done.stdout.split()}
+    assert loaded - set(sys.stdlib_module_names) - {"numpy"} == {"rbcourse"}
+    rooms = {name for name in done.stdout.split() if name.startswith("rbcourse.")}
+    assert {room(name.removeprefix("rbcourse.")) for name in rooms} == {"core"}
+
+
+def test_every_public_name_is_listed_once_and_documented():
+    assert len(set(rbcourse.__all__)) == len(rbcourse.__all__)
+    for name in rbcourse.__all__:
+        assert getattr(rbcourse, name).__doc__, name
