@@ -9,7 +9,7 @@ import rbcourse as rb
 from benchmarks import references
 from benchmarks.contest import OURS, Contest, Method
 from rbcourse import textbook
-from rbcourse.polynomials import cubic_coefficients, polynomial
+from rbcourse.projected_cubic import cubic_coefficients, polynomial
 
 SAMPLE = 100
 """So many of the N items are held against the truth."""

@@ -1,61 +1,35 @@
-"""Rigid-body motion, taught by code that runs: rotations, poses, projections and curves."""
+"""Rigid-body motion, taught by code that runs: rotations, poses, projections and curves.
 
-from rbcourse.arm import (
-    Posture,
-    arm_forward_kinematics,
-    arm_inverse_kinematics,
-    arm_tip_jacobian,
-    interpolate_joints,
-    propagate_joints,
-)
-from rbcourse.bessel import bessel_velocities
-from rbcourse.chains import chain, retime
-from rbcourse.connection import (
-    christoffel,
-    covariant_derivative,
-    geodesic_flow,
-    structure_constants,
-)
+The names below are the everyday ones. The modules have more: `rbcourse.metrics` the connection and
+inner products, `rbcourse.planar` and `rbcourse.arm` the plane, `rbcourse.sampling` the naive
+samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f,
+`rbcourse.textbook` the main algorithms as on the board.
+"""
+
+from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling
+from rbcourse.chains import bessel_velocities, chain
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
     quaternion_from_matrix,
     quaternion_from_rotation_vector,
-    quaternion_from_zyx,
     rotation_vector_from_quaternion,
     zyx_from_matrix,
-    zyx_from_quaternion,
 )
 from rbcourse.cost import acceleration_cost, acceleration_cost_parts
-from rbcourse.curves import Curve, geodesic_so3
-from rbcourse.inertia import inertia_from_weight, weight_from_inertia
-from rbcourse.line import f, line_singular_value, theta
-from rbcourse.metrics import (
-    METRIC_SE3,
-    METRIC_SO3,
-    components_from_tangent,
-    inner_ga,
-    inner_gl,
-    inner_left_invariant,
-    inner_se3,
-    inner_so3,
-    semi_riemannian_metric_se3,
-    tangent_from_components,
+from rbcourse.curves import Curve, geodesic_so3, retime
+from rbcourse.files import read_path, write_path
+from rbcourse.metrics import METRIC_SE3, METRIC_SO3, geodesic_flow
+from rbcourse.motions import (
+    geodesic_se3,
+    minimum_acceleration_se3,
+    projected_cubic_se3,
+    screw_from_pose,
+    screw_se3,
 )
-from rbcourse.motions import geodesic_se3, projected_cubic_se3
-from rbcourse.optimum import ConvergenceError
-from rbcourse.planar import (
-    compose_planar,
-    exp_planar,
-    interpolate_planar,
-    inverse_planar,
-    log_planar,
-    matrix_from_planar,
-    planar_from_matrix,
-    propagate_planar,
-)
-from rbcourse.plans import load_path, load_plan, save_path, save_plan
-from rbcourse.projected import projected_cubic_so3, projected_line_so3, projected_quintic_so3
+from rbcourse.optimum import ConvergenceError, minimum_acceleration_so3
+from rbcourse.projected_cubic import projected_cubic_so3, projected_quintic_so3
+from rbcourse.projected_line import projected_line_so3
 from rbcourse.projection import (
     distance_to_so,
     is_se,
@@ -66,33 +40,25 @@ from rbcourse.projection import (
     project_so_weighted,
 )
 from rbcourse.quaternion import (
-    canonical_quaternion,
     is_unit_quaternion,
     project_quaternion,
-    quaternion_conjugate,
     quaternion_multiply,
     rotate_by_quaternion,
     slerp,
-    slerp_long,
 )
-from rbcourse.relaxation import minimum_acceleration_se3, minimum_acceleration_so3
 from rbcourse.rivals import (
+    CLOSED_FORMS,
     bezier_so3,
     cayley_cubic_so3,
     cumulative_bezier_so3,
     exponential_cubic_so3,
     quaternion_cubic_so3,
 )
-from rbcourse.sampling import (
-    sample_quaternion,
-    sample_quaternion_naive,
-    sample_rotation,
-    sample_rotation_naive,
-)
-from rbcourse.screws import Screw, screw_from_pose, screw_se3
+from rbcourse.sampling import sample_quaternion, sample_rotation
 from rbcourse.se3 import (
     BASIS_SE3,
     adjoint_se3,
+    components_from_pose,
     coordinates_from_pose,
     exp_se3,
     hat_se3,
@@ -105,6 +71,7 @@ from rbcourse.se3 import (
 from rbcourse.shooting import shoot_minimum_acceleration_so3
 from rbcourse.so3 import (
     BASIS_SO3,
+    angle_between,
     exp_so3,
     hat_so3,
     log_so3,
@@ -112,119 +79,94 @@ from rbcourse.so3 import (
     right_jacobian_so3,
     vee_so3,
 )
-from rbcourse.trajectories import read_path, write_path
-from rbcourse.uniformity import UniformityTest, uniformity_tests
 
-__version__ = "0.10.0"
+__version__ = "0.11.0"
 
-__all__ = [
-    "BASIS_SE3",
+__all__ = [  # noqa: RUF022 - by subject, not by alphabet
+    # rotations
     "BASIS_SO3",
-    "METRIC_SE3",
+    "hat_so3",
+    "vee_so3",
+    "exp_so3",
+    "log_so3",
+    "angle_between",
+    "right_jacobian_so3",
+    "right_jacobian_inverse_so3",
+    # rotations by other numbers
+    "quaternion_multiply",
+    "rotate_by_quaternion",
+    "slerp",
+    "quaternion_from_matrix",
+    "matrix_from_quaternion",
+    "quaternion_from_rotation_vector",
+    "rotation_vector_from_quaternion",
+    "matrix_from_zyx",
+    "zyx_from_matrix",
+    # poses
+    "BASIS_SE3",
+    "hat_se3",
+    "vee_se3",
+    "exp_se3",
+    "log_se3",
+    "adjoint_se3",
+    "inverse_se3",
+    "pose_from_components",
+    "components_from_pose",
+    "pose_from_coordinates",
+    "coordinates_from_pose",
+    # membership and projection
+    "is_so",
+    "is_se",
+    "is_unit_quaternion",
+    "project_so",
+    "project_se",
+    "project_quaternion",
+    "project_so_weighted",
+    "orthonormalize_gram_schmidt",
+    "distance_to_so",
+    # random rotations
+    "sample_rotation",
+    "sample_quaternion",
+    # metrics
     "METRIC_SO3",
-    "ConvergenceError",
+    "METRIC_SE3",
+    "geodesic_flow",
+    # curves between two rotations or poses
     "Curve",
-    "Posture",
-    "Screw",
-    "UniformityTest",
+    "geodesic_so3",
+    "geodesic_se3",
+    "screw_se3",
+    "screw_from_pose",
+    "projected_line_so3",
+    "projected_cubic_so3",
+    "projected_cubic_se3",
+    "projected_quintic_so3",
+    # the optimum, and what curves cost
+    "minimum_acceleration_so3",
+    "minimum_acceleration_se3",
+    "shoot_minimum_acceleration_so3",
+    "ConvergenceError",
     "acceleration_cost",
     "acceleration_cost_parts",
-    "adjoint_se3",
-    "arm_forward_kinematics",
-    "arm_inverse_kinematics",
-    "arm_tip_jacobian",
-    "bessel_velocities",
-    "bezier_so3",
-    "canonical_quaternion",
-    "cayley_cubic_so3",
-    "chain",
-    "christoffel",
-    "components_from_tangent",
-    "compose_planar",
-    "coordinates_from_pose",
-    "covariant_derivative",
-    "cumulative_bezier_so3",
-    "distance_to_so",
-    "exp_planar",
-    "exp_se3",
-    "exp_so3",
+    # other closed forms
+    "CLOSED_FORMS",
     "exponential_cubic_so3",
-    "f",
-    "geodesic_flow",
-    "geodesic_se3",
-    "geodesic_so3",
-    "hat_se3",
-    "hat_so3",
-    "inertia_from_weight",
-    "inner_ga",
-    "inner_gl",
-    "inner_left_invariant",
-    "inner_se3",
-    "inner_so3",
-    "interpolate_joints",
-    "interpolate_planar",
-    "inverse_planar",
-    "inverse_se3",
-    "is_se",
-    "is_so",
-    "is_unit_quaternion",
-    "line_singular_value",
-    "load_path",
-    "load_plan",
-    "log_planar",
-    "log_se3",
-    "log_so3",
-    "matrix_from_planar",
-    "matrix_from_quaternion",
-    "matrix_from_zyx",
-    "minimum_acceleration_se3",
-    "minimum_acceleration_so3",
-    "orthonormalize_gram_schmidt",
-    "planar_from_matrix",
-    "pose_from_components",
-    "pose_from_coordinates",
-    "project_quaternion",
-    "project_se",
-    "project_so",
-    "project_so_weighted",
-    "projected_cubic_se3",
-    "projected_cubic_so3",
-    "projected_line_so3",
-    "projected_quintic_so3",
-    "propagate_joints",
-    "propagate_planar",
-    "quaternion_conjugate",
+    "bezier_so3",
+    "cumulative_bezier_so3",
     "quaternion_cubic_so3",
-    "quaternion_from_matrix",
-    "quaternion_from_rotation_vector",
-    "quaternion_from_zyx",
-    "quaternion_multiply",
-    "read_path",
+    "cayley_cubic_so3",
+    # paths through many poses, and files
     "retime",
-    "right_jacobian_inverse_so3",
-    "right_jacobian_so3",
-    "rotate_by_quaternion",
-    "rotation_vector_from_quaternion",
-    "sample_quaternion",
-    "sample_quaternion_naive",
-    "sample_rotation",
-    "sample_rotation_naive",
-    "save_path",
-    "save_plan",
-    "screw_from_pose",
-    "screw_se3",
-    "semi_riemannian_metric_se3",
-    "shoot_minimum_acceleration_so3",
-    "slerp",
-    "slerp_long",
-    "structure_constants",
-    "tangent_from_components",
-    "theta",
-    "uniformity_tests",
-    "vee_se3",
-    "vee_so3",
-    "weight_from_inertia",
+    "chain",
+    "bessel_velocities",
+    "read_path",
     "write_path",
-    "zyx_from_matrix",
-    "zyx_from_quaternion",
+    # modules with more
+    "arm",
+    "files",
+    "metrics",
+    "planar",
+    "projected_line",
+    "quaternion",
+    "sampling",
 ]

@@ -1,247 +1,14 @@
-"""Arguments checked by name, and the functions that need care near zero."""
+"""Numerical care: ratios near zero, sine and cosine from one tangent, blocks that fit the cache."""
 
 import math
-from collections.abc import Iterator, Sequence
-from operator import index
+from collections.abc import Iterator
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.floating[Any]]
-Rng: TypeAlias = "np.random.Generator | int | None"  # loads no numpy.random
 EPS = float(np.finfo(np.float64).eps)
-
-
-def as_array(
-    name: str, value: ArrayLike, *core: int | str, stacked: bool = True, copy: bool = True
-) -> Array:
-    """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
-
-    A letter in `core` stands for any size from 1 up, the same at each of its places, and "n+1" for
-    any from 2 up: ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes
-    are batch axes; with ``stacked=False`` there may be none. With ``copy=False`` the array may be
-    the caller's own.
-
-    Raises
-    ------
-    ValueError
-        If `value` is ragged, not made of real numbers, or of another shape; the message names the
-        argument, the wanted and the given.
-    """
-    given: Any
-    try:
-        given = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(
-            f"{name}: an array of numbers wanted, got rows of unequal length"
-        ) from error
-    if given.dtype.kind not in "biuf":
-        raise ValueError(f"{name}: real numbers wanted, got dtype {given.dtype}")
-    if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
-        wanted = ", ".join([*["..."] * stacked, *map(str, core)])
-        raise ValueError(f"{name}: shape ({wanted}) wanted, got {given.shape}")
-    array: Array = given.astype(np.float64, copy=copy)
-    return array
-
-
-def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
-    """Return `as_array` of the arguments, where no entry may be NaN or infinite.
-
-    Raises
-    ------
-    ValueError
-        As `as_array`; and the message names the first entry that is not finite.
-    """
-    array = as_array(name, value, *core, stacked=stacked)
-    _check_all(np.isfinite(array), name, array, "a finite number")
-    return array
-
-
-def as_single(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of one array of the shape `core`, no stack of them.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`.
-    """
-    return as_finite(name, value, *core, stacked=False)
-
-
-def as_unit(name: str, value: ArrayLike, size: int) -> Array:
-    """Return `as_finite` of vectors, each over its norm.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first vector that is zero.
-    """
-    array = as_finite(name, value, size)
-    largest = np.abs(array).max(axis=-1, keepdims=True)
-    if not largest.all():
-        entry = first_index(name, largest[..., 0] == 0)
-        raise ValueError(f"{entry} is zero: it has no direction")
-    scaled = array / largest  # so that no square overflows
-    return scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
-
-
-def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
-    """Return `as_finite` of square matrices that are symmetric, to 1e-12 of the largest entry.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first matrix that is not symmetric.
-    """
-    half = as_finite(name, value, size, size) / 2  # so that nothing overflows
-    mirrored = np.swapaxes(half, -1, -2)
-    skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (half - mirrored, half))
-    crooked = skew > 1e-12 * largest
-    if crooked.any():
-        raise ValueError(f"{first_index(name, crooked)} is not symmetric")
-    return half + mirrored
-
-
-def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
-    """Return matrices, or columns, over powers of two; the largest entries are in [0.5, 1)."""
-    _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))
-    return np.ldexp(matrix, -exponent)
-
-
-def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of the arguments, where all entries must lie in [0, 1].
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first entry outside [0, 1].
-    """
-    array = as_finite(name, value, *core)
-    _check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
-    return array
-
-
-def as_time(t: ArrayLike, batch_ndim: int, domain: tuple[float, float] = (0.0, 1.0)) -> Array:
-    """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first time outside the domain.
-    """
-    times, (start, end) = as_array("t", t, copy=False), domain
-    if not (times.min(initial=start) >= start and times.max(initial=end) <= end):
-        times = as_finite("t", t)
-        wanted = f"a time in [{start:.17g}, {end:.17g}]"
-        _check_all((times >= start) & (times <= end), "t", times, wanted)
-    return times.reshape(times.shape + (1,) * batch_ndim)
-
-
-def as_angle(angle: ArrayLike) -> Array:
-    """Return angles of rotation, all in [0, π]; what is larger by rounding only becomes π.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first angle outside [0, π].
-    """
-    angles = as_finite("angle", angle)
-    within = (angles >= 0) & (angles <= np.pi * (1 + 4 * EPS))
-    _check_all(within, "angle", angles, "an angle in [0, π]")
-    return np.minimum(angles, np.pi)
-
-
-def as_tolerance(name: str, value: float) -> float:
-    """Return a tolerance, or raise a ValueError if it is not a number from 0 up."""
-    tolerance = as_array(name, value)
-    if tolerance.ndim or not tolerance >= 0:
-        raise ValueError(f"{name}: a number from 0 up wanted, got {value!r}")
-    return float(tolerance)
-
-
-def as_count(name: str, value: int) -> int:
-    """Return a count, or raise a ValueError if it is not an integer from 1 up."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
-        raise ValueError(f"{name}: an integer from 1 up wanted, got {value!r}")
-    return int(value)
-
-
-def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
-    """Return the shape of a batch: () for None, (n,) for n; a ValueError if it is no shape."""
-    given: Any = () if size is None else size
-    try:
-        shape = tuple(map(index, given if isinstance(given, tuple | list) else [given]))
-    except TypeError as error:
-        raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}") from error
-    if any(length < 0 for length in shape):
-        raise ValueError(f"size: lengths from 0 up wanted, got {size!r}")
-    return shape
-
-
-def as_generator(rng: Rng) -> "np.random.Generator":
-    """Return a generator of random numbers, or raise a ValueError if `rng` makes none."""
-    try:
-        return np.random.default_rng(rng)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"rng: a Generator, a seed or None wanted, got {rng!r}") from error
-
-
-def blocks(count: int, size: int) -> Iterator[slice]:
-    """Yield slices that cut `count` things into parts of at most `size`."""
-    for start in range(0, count, size):
-        yield slice(start, min(start + size, count))
-
-
-def at_cache_line(*shape: int) -> Array:
-    """Return an array that begins at a cache line, not yet written: there NumPy is faster."""
-    raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)
-
-
-def check_order(order: int) -> int:
-    """Return `order`, the order of a derivative, or raise a ValueError if it is not 0, 1 or 2."""
-    if not isinstance(order, int | np.integer) or order not in (0, 1, 2):
-        raise ValueError(f"order: 0, 1 or 2 wanted, got {order!r}")
-    return order
-
-
-def _check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
-    if not passes.all():
-        value = array[~passes][0]
-        raise ValueError(f"{first_index(name, ~passes)} is {value}, {wanted} is wanted")
-
-
-def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
-    """Return how the first chosen entry is called: ``R[0, 2]``, or ``R`` where there is one."""
-    first = ", ".join(str(i) for i in np.argwhere(chosen)[0])
-    return f"{name}[{first}]" if first else name
-
-
-def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:
-    if len(shape) < len(core):
-        return False
-    tail = shape[len(shape) - len(core) :]
-    letters = {c: size for c, size in zip(core, tail, strict=True) if isinstance(c, str)}
-    wanted = [letters[c] if isinstance(c, str) else c for c in core]
-    return list(tail) == wanted and all(size > ("+1" in c) for c, size in letters.items())
-
-
-def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
-    """Return the common batch shape of arrays, each given with the number of its core axes.
-
-    Raises
-    ------
-    ValueError
-        If there is none; the message gives every argument with its batch shape.
-    """
-    batches = {name: array.shape[: array.ndim - core] for name, (array, core) in arguments.items()}
-    try:
-        return np.broadcast_shapes(*batches.values())
-    except ValueError as error:
-        listed = ", ".join(f"{name} {batch}" for name, batch in batches.items())
-        raise ValueError(f"batch shapes do not broadcast: {listed}") from error
 
 
 def sinc(x: Array) -> Array:
@@ -268,3 +35,29 @@ def _over_square(gap: Array, x: Array, limit: float) -> Array:
     """Return gap/x². Its users multiply by x² again, so below 1e-4 the limit is exact enough."""
     tiny = np.abs(x) < 1e-4
     return np.where(tiny, limit, gap / np.where(tiny, 1.0, x) ** 2)
+
+
+def sine_and_versine(half: Array) -> tuple[Array, Array]:
+    """Return sin a and 1 − cos a of a = 2 `half`, from tan(a/2), which NumPy computes fastest."""
+    tangent = np.tan(half)
+    sine = 2 * tangent / (1 + tangent * tangent)
+    return sine, tangent * sine
+
+
+def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
+    """Return matrices, or columns, over powers of two; the largest entries are in [0.5, 1)."""
+    _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))
+    return np.ldexp(matrix, -exponent)
+
+
+def blocks(count: int, size: int) -> Iterator[slice]:
+    """Yield slices that divide `count` items into parts of at most `size`."""
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
+
+
+def at_cache_line(*shape: int) -> Array:
+    """Return an uninitialised array aligned to a cache line, where NumPy is faster."""
+    raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)

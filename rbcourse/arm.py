@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import EPS, Array, as_finite, as_single, first_index
-from rbcourse.plans import Plan, interpolate, propagate
+from rbcourse._checks import as_finite, as_single, first_index
+from rbcourse._numerics import EPS, Array
+from rbcourse.planar import Plan, interpolate, propagate
 
 LINKS = (2.0, 1.5)
 """The lengths of the links in the report, in m (RR 4)."""

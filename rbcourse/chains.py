@@ -1,194 +1,34 @@
-"""Curves of any duration, and curves through many poses."""
+"""Curves through many poses: velocities there by Bessel's method, and legs that join them."""
 
+from __future__ import annotations
+
+import math
 import warnings
 from collections.abc import Callable
 from inspect import Parameter, signature
-from typing import Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import EPS, Array, as_single, blocks, check_order
-from rbcourse.bessel import SHORTEST, as_path, parabolas_and_rests, rotated, twists
-from rbcourse.curves import BLOCK, Chosen, Curve, runs
+from rbcourse._checks import check_order
+from rbcourse._numerics import EPS, Array
+from rbcourse.curves import SHORTEST, Chosen, Curve, SingularTime
 from rbcourse.motions import RigidMotion, projected_cubic_se3
-from rbcourse.polynomials import cubic_coefficients, quintic_coefficients
-from rbcourse.projected import projected_cubic_so3
+from rbcourse.projected_cubic import (
+    cubic_coefficients,
+    projected_cubic_so3,
+    quintic_coefficients,
+)
+from rbcourse.se3 import check_path
+from rbcourse.so3 import log_so3, right_jacobian_so3
 
 Leg = Callable[..., Curve]
 
+LONGEST = 1e100  # of a duration
+_HALF_TURN = math.pi - 1e-6
+_EQUAL = 1e-12
 _ARRIVED = 1e-6
-
-
-class Retimed(Curve):
-    """A `Curve` that runs through another one evenly, in another time.
-
-    Attributes
-    ----------
-    curve : Curve
-        The other one.
-    rate : float
-        How much of its time passes in a unit of time.
-    """
-
-    def __init__(self, curve: Curve, rate: float, domain: tuple[float, float]) -> None:
-        self.curve, self.rate, self.domain = curve, rate, domain
-        self.batch_shape = curve.batch_shape
-
-    def _pick(self, chosen: Chosen) -> Self:
-        return type(self)(self.curve._pick(chosen), self.rate, self.domain)
-
-    def _evaluate(self, t: Array, order: int) -> Array:
-        (start, end), (first, last) = self.domain, self.curve.domain
-        inner = np.minimum(first + (t - start) * self.rate, last)
-        values = self.curve._evaluate(np.where(t == end, last, inner), order)
-        return values * self.rate**order if order else values
-
-
-def retime(curve: Curve, duration: float) -> Retimed:
-    """Return the same curve run through evenly in another time, from the same start on.
-
-    Parameters
-    ----------
-    curve : Curve
-        Or a stack of them.
-    duration : float
-        How long it is to take, in s or what else you measure time in; more than 0.
-
-    Returns
-    -------
-    Retimed
-        A `Curve` on [a, a + duration], a the first time of `curve`, which is 0 but for a `chain`.
-        Velocities and accelerations are per unit of the new time: over k and k² for k times the
-        duration. `acceleration_cost` falls by k³.
-
-    Raises
-    ------
-    ValueError
-        If `curve` is no `Curve`, `duration` no number above 0, or so short that accelerations
-        overflow or that it vanishes beside the first time.
-
-    See Also
-    --------
-    chain : Through many poses, at times of your own.
-
-    Notes
-    -----
-    To arrive with the angular velocity w after T seconds, make a curve with the end velocity T w,
-    and then let it take T. A chain that takes k times as long is at its poses at a + k (t − a).
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3, geodesic_so3
-    >>> c = retime(geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5])), 3)
-    >>> c.domain, c(3, 1).round(12)
-    ((0.0, 3.0), array([0. , 0. , 0.5]))
-    """
-    if not isinstance(curve, Curve):
-        raise ValueError(f"curve: a Curve wanted, got {curve!r}")
-    time, (start, end) = float(as_single("duration", duration)), curve.domain
-    if time <= 0:
-        raise ValueError(f"duration is {time}, a time above 0 is wanted")
-    if start + time == start:
-        raise ValueError(f"duration is {time}: that vanishes beside the first time, {start}")
-    if time < SHORTEST * (end - start):
-        raise ValueError(f"duration is {time}: too short, accelerations would overflow")
-    return Retimed(curve, (end - start) / time, (start, start + time))
-
-
-class Chain(Curve):
-    """A `Curve` of legs, each from one pose to the next.
-
-    At an inner time the later leg counts.
-
-    Attributes
-    ----------
-    times : ndarray, shape (N,)
-        When it is at each pose.
-    velocities : ndarray, shape (N, 3) or (N, 6), or None
-        What it was told to have there, body frame; None where the legs ask for none.
-    legs : Curve
-        The stack of the N − 1 legs, each on [0, 1].
-    durations : ndarray, shape (N − 1,)
-        How long each takes.
-    """
-
-    batch_shape = ()
-
-    def __init__(self, times: Array, legs: Curve, velocities: Array | None) -> None:
-        self.times, self.legs, self.velocities = times, legs, velocities
-        self.domain = float(times[0]), float(times[-1])
-        self.durations = np.diff(times)
-        matrix = legs[0](0.0).shape
-        rates = (3,) if matrix == (3, 3) else (6,)
-        self._cores = matrix, rates, rates
-
-    def jumps(self, order: int) -> Array:
-        """Return what the inner poses change in the curve or a derivative: after, minus before.
-
-        Parameters
-        ----------
-        order : {0, 1, 2}
-
-        Returns
-        -------
-        ndarray, shape (N − 2, …)
-
-        Raises
-        ------
-        ValueError
-            If `order` is another.
-
-        Examples
-        --------
-        >>> from rbcourse import exp_so3, geodesic_so3
-        >>> R = exp_so3([[0, 0, 0], [0, 0, 1], [0, 0, 3]])
-        >>> chain([0, 1, 2], R, leg=geodesic_so3).jumps(1).round(12)
-        array([[0., 0., 1.]])
-        """
-        starts, ends = self.legs([0.0, 1.0], check_order(order))
-        if order:
-            starts, ends = (x / self.durations[:, None] ** order for x in (starts, ends))
-        return starts[1:] - ends[:-1]
-
-    def _evaluate(self, t: Array, order: int) -> Array:
-        times = t.reshape(-1)
-        values = np.empty((len(times), *self._cores[order]))
-        in_order = None if np.all(times[1:] >= times[:-1]) else np.argsort(times)
-        for block in blocks(len(times), BLOCK):
-            if in_order is None:
-                self._write(times[block], order, values[block])
-            else:
-                part = in_order[block]
-                written = np.empty((len(part), *self._cores[order]))
-                self._write(times[part], order, written)
-                values[part] = written
-        return values.reshape(*t.shape, *self._cores[order])
-
-    def _write(self, times: Array, order: int, out: Array) -> None:
-        """Write the values at ascending times."""
-        first, last = np.searchsorted(self.times[1:-1], times[[0, -1]], side="right")
-        starts = np.searchsorted(times, self.times[first + 1 : last + 1])
-        counts = np.diff([0, *starts.tolist(), len(times)])
-        which = np.repeat(np.arange(first, last + 1), counts)
-        durations = self.durations[which]
-        share = (times - self.times[which]) / durations
-        try:
-            self.legs._write_each(share, which, order, out)
-        except ValueError:
-            for leg, run in runs(which):
-                self._check_leg(leg, share[run], order)
-            raise
-        if order:
-            out /= durations[:, None] ** order
-
-    def _check_leg(self, leg: int, share: Array, order: int) -> None:
-        """Raise the ValueError of a leg, with the times between which it is."""
-        try:
-            self.legs[leg](share, order)
-        except ValueError as error:
-            during = f"leg {leg}, from {self.times[leg]} to {self.times[leg + 1]}"
-            raise ValueError(f"{during}, in its own time from 0 to 1: {error}") from error
 
 
 def chain(
@@ -277,18 +117,18 @@ def chain(
     >>> c(2)[:3, 3].round(12), c([0, 2, 3], 1)[:, 2].round(3) + 0.0
     (array([2., 0., 0.]), array([0.   , 0.833, 0.   ]))
     """
-    times, poses, velocities = as_path(times, poses, velocities)
+    times, poses, velocities = _checked(times, poses, velocities)
     moves = poses.shape[-1] == 4
     if leg is None:
         leg = projected_cubic_se3 if moves else projected_cubic_so3
     wanted = _arguments(leg)
     if velocities is not None and "w0" not in wanted:
         raise ValueError("velocities: the legs ask for none")
-    w, d_dot, a, d_bend = parabolas_and_rests(times, poses)
+    w, d_dot, a, d_bend = _parabolas_and_rests(times, poses)
     if velocities is not None:
-        w, d_dot = velocities[:, :3], rotated(poses, velocities[:, 3:])
+        w, d_dot = velocities[:, :3], _rotated(poses, velocities[:, 3:])
     elif "w0" in wanted:
-        velocities = twists(poses, w, d_dot)
+        velocities = _twists(poses, w, d_dot)
     h = np.diff(times)[:, None]
     ends = _ends("R{}", poses[:, :3, :3]) | _ends("w{}", w, h) | _ends("a{}", a, h**2)
     if moves:
@@ -302,6 +142,145 @@ def chain(
         legs = RigidMotion(legs, _coefficients(wanted, *path.values()))
     _check_arrival(legs, poses)
     return Chain(times, legs, velocities)
+
+
+class Chain(Curve):
+    """A `Curve` of legs, each from one pose to the next.
+
+    At an inner time the later leg counts.
+
+    Attributes
+    ----------
+    times : ndarray, shape (N,)
+        When it is at each pose.
+    velocities : ndarray, shape (N, 3) or (N, 6), or None
+        What it was told to have there, body frame; None where the legs ask for none.
+    legs : Curve
+        The stack of the N − 1 legs, each on [0, 1].
+    durations : ndarray, shape (N − 1,)
+        How long each takes.
+    """
+
+    batch_shape = ()
+
+    def __init__(self, times: Array, legs: Curve, velocities: Array | None) -> None:
+        self.times, self.legs, self.velocities = times, legs, velocities
+        self.domain = float(times[0]), float(times[-1])
+        self.durations = np.diff(times)
+        self.size = legs.size
+
+    def jumps(self, order: int) -> Array:
+        """Return what the inner poses change in the curve or a derivative: after, minus before.
+
+        Parameters
+        ----------
+        order : {0, 1, 2}
+
+        Returns
+        -------
+        ndarray, shape (N − 2, …)
+
+        Raises
+        ------
+        ValueError
+            If `order` is another.
+
+        Examples
+        --------
+        >>> from rbcourse import exp_so3, geodesic_so3
+        >>> R = exp_so3([[0, 0, 0], [0, 0, 1], [0, 0, 3]])
+        >>> chain([0, 1, 2], R, leg=geodesic_so3).jumps(1).round(12)
+        array([[0., 0., 1.]])
+        """
+        starts, ends = self.legs([0.0, 1.0], check_order(order))
+        if order:
+            starts, ends = (x / self.durations[:, None] ** order for x in (starts, ends))
+        return starts[1:] - ends[:-1]
+
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        """Let the legs write their values, each in its own time."""
+        times, values = t[:, 0], out[:, 0]
+        if np.any(times[1:] < times[:-1]):
+            in_order = np.argsort(times)
+            written = np.empty_like(out)
+            self._at(t[in_order], which, order, written)
+            values[in_order] = written[:, 0]
+            return
+        first, last = np.searchsorted(self.times[1:-1], times[[0, -1]], side="right")
+        starts = np.searchsorted(times, self.times[first + 1 : last + 1])
+        counts = np.diff([0, *starts.tolist(), len(times)])
+        legs = np.repeat(np.arange(first, last + 1), counts)
+        durations = self.durations[legs]
+        share = (times - self.times[legs]) / durations
+        try:
+            self.legs._at(share[None], legs, order, values[None])
+        except SingularTime as error:
+            start, end = self.times[error.curve : error.curve + 2]
+            raise ValueError(
+                f"leg {error.curve}, from {start} to {end}, in its own time from 0 to 1: "
+                f"{error.reason}"
+            ) from error
+        if order:
+            values /= durations[:, None] ** order
+
+    def _unit_legs(self) -> tuple[Curve, Any]:
+        """Return the legs; a velocity that jumps at a joint has no acceleration cost."""
+        moments = np.append(self.times, self.times[:-1] + self.durations / 2)
+        jumps, speeds = np.abs(self.jumps(1)), np.abs(self(moments, 1))
+        for half in (slice(3), slice(3, None)):  # rad and m
+            jump = jumps[:, half].max(initial=0)
+            if jump > 1e-9 * speeds[:, half].max(initial=0):
+                raise RuntimeError(f"acceleration cost: a velocity jumps at a joint, by {jump:.3g}")
+        return self.legs, self.durations
+
+
+def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
+    """Return velocities for a path: at each pose of the parabola through it and its neighbours.
+
+    Parameters
+    ----------
+    times : array_like, shape (N,)
+        Increasing; two or more.
+    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
+        Poses, or rotation matrices, one for each time.
+
+    Returns
+    -------
+    ndarray, shape (N, 6) or (N, 3)
+        Twists (ω, v), or angular velocities ω, body frame, per unit of the times.
+
+    Raises
+    ------
+    ValueError
+        If times do not increase, a matrix is no pose or no rotation, or neighbours are a half-turn
+        apart, to 1e-6.
+
+    See Also
+    --------
+    chain : The curve; it takes these velocities but at its ends, where it rests.
+
+    Notes
+    -----
+    Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV); for even times, that of
+    Catmull and Rom. The parabola of the origin is one in R³; that of the rotation is one in the
+    exponential coordinates about the pose in the middle, so that moved poses have moved velocities.
+    The first and the last pose have what the parabolas of their neighbours have there; two poses
+    alone have the constant velocity between them.
+
+    Singular set: half-turns between neighbours.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> t = np.array([0, 1, 3])
+    >>> bessel_velocities(t, exp_so3(t[:, None] ** 2 * [0, 0, 0.1])).round(12)  # 2 · 0.1 t
+    array([[0. , 0. , 0. ],
+           [0. , 0. , 0.2],
+           [0. , 0. , 0.6]])
+    """
+    times, poses, _ = _checked(times, poses)
+    w, d_dot, *_ = _parabolas(times, poses)
+    return _twists(poses, w, d_dot)
 
 
 def _ends(name: str, values: Array, scale: float | Array = 1.0) -> dict[str, Array]:
@@ -341,9 +320,9 @@ def _made(leg: Leg, ends: dict[str, Array]) -> Curve:
     count, size = len(next(iter(ends.values()))), 4 if "A0" in ends else 3
     if not isinstance(legs, Curve) or (legs.batch_shape, legs.domain) != ((count,), (0, 1)):
         raise ValueError(f"leg: a stack of {count} curves on [0, 1] wanted, got {legs!r}")
-    shape = legs[0](0.0).shape
-    if shape != (size, size):
-        raise ValueError(f"leg: curves of shape ({size}, {size}) wanted, got {shape}")
+    if legs.size != size:
+        given = f"({legs.size}, {legs.size})"
+        raise ValueError(f"leg: curves of shape ({size}, {size}) wanted, got {given}")
     return legs
 
 
@@ -358,3 +337,77 @@ def _check_arrival(legs: Curve, poses: Array) -> None:
         if np.isnan(missed[:, i]).any():
             raise ValueError(f"leg: it found no curve from poses[{i}] to poses[{i + 1}] (NaN)")
         raise ValueError(f"leg: it does not lead from poses[{i}] to poses[{i + 1}]")
+
+
+def _checked(
+    times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
+) -> tuple[Array, Array, Array | None]:
+    """Return `check_path` of two poses or more, no neighbours a half-turn apart."""
+    times, poses, velocities = check_path(times, poses, velocities)
+    if len(times) < 2:
+        raise ValueError("times, poses: two or more wanted, got 1")
+    with np.errstate(over="ignore"):
+        h = np.diff(times)
+    odd = ~((h > SHORTEST) & (h < LONGEST))
+    if odd.any():
+        i = np.argmax(odd)
+        raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too near, or too far")
+    far = np.linalg.norm(_turns(poses), axis=-1) > _HALF_TURN
+    if far.any():
+        i = np.argmax(far)
+        raise ValueError(
+            f"poses[{i}] and poses[{i + 1}] are a half-turn apart: put a pose between them, "
+            "to tell which way to turn"
+        )
+    return times, poses, velocities
+
+
+def _turns(poses: Array) -> Array:
+    """Return the rotation vectors from each pose to the next, body frame."""
+    R = poses[:, :3, :3]
+    return log_so3(R[:-1].mT @ R[1:])
+
+
+def _parabolas(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
+    """Return w and d', w' and d'' of the parabolas; d has no components for rotations."""
+    h, turns = np.diff(times)[:, None], _turns(poses)
+    d = poses[:, :3, 3:].reshape(len(poses), -1)
+    w, a = _parabola(h, turns / h)
+    for end, turn in ((0, -turns[0]), (-1, turns[-1])):
+        w[end] = right_jacobian_so3(turn) @ w[end]  # coordinates about the neighbour
+    d_dot, d_bend = _parabola(h, np.diff(d, axis=0) / h)
+    return w, d_dot, a, d_bend
+
+
+def _parabolas_and_rests(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
+    """Return the same, but 0 where a path rests: at its ends, and at equal neighbours."""
+    change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
+    same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
+    same &= np.all(change[:, :3, 3:] <= 64 * EPS * far, axis=(1, 2))
+    rates = _parabolas(times, poses)
+    for values in rates:
+        values[np.append(True, same) | np.append(same, True)] = 0
+    return rates
+
+
+def _parabola(h: Array, slopes: Array) -> tuple[Array, Array]:
+    """Return the first and the second derivatives of the parabolas, from chords and their slopes.
+
+    At the ends they are those of the neighbours' parabolas; of one chord, a line.
+    """
+    bend = np.zeros((len(h) + 1, slopes.shape[1]))
+    if len(h) > 1:
+        bend[1:-1] = 2 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
+        bend[0], bend[-1] = bend[1], bend[-2]
+    first, others = slopes[:1] - h[:1] * bend[:1] / 2, slopes + h * bend[1:] / 2
+    return np.concatenate([first, others]), bend
+
+
+def _rotated(poses: Array, v: Array) -> Array:
+    """Return vectors of body frames in the fixed frame."""
+    return (poses[:, :3, :3] @ v[..., None])[..., 0] if v.size else v
+
+
+def _twists(poses: Array, w: Array, d_dot: Array) -> Array:
+    """Return (w, Rᵀ d'), or w where nothing moves."""
+    return np.concatenate([w, _rotated(poses.mT, d_dot)], axis=-1)

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import EPS, Array, as_finite, sinc
+from rbcourse._checks import as_finite
+from rbcourse._jets import matrix
+from rbcourse._numerics import EPS, Array, sinc
 from rbcourse.quaternion import canonical_quaternion
 
 
@@ -40,24 +42,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    w, x, y, z = np.moveaxis(as_finite("q", q, 4), -1, 0)
-    R = np.empty((*w.shape, 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = (
-        w * w + x * x - y * y - z * z,
-        2 * (x * y - w * z),
-        2 * (x * z + w * y),
-    )
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = (
-        2 * (x * y + w * z),
-        w * w - x * x + y * y - z * z,
-        2 * (y * z - w * x),
-    )
-    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = (
-        2 * (x * z - w * y),
-        2 * (y * z + w * x),
-        w * w - x * x - y * y + z * z,
-    )
-    return R
+    return matrix(np.moveaxis(as_finite("q", q, 4), -1, 0))
 
 
 def quaternion_from_matrix(R: ArrayLike) -> Array:
@@ -69,7 +54,7 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices; what is none is not repaired (see `project_so`).
+        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
@@ -226,7 +211,7 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices; what is none is not repaired (see `project_so`).
+        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------

@@ -1,10 +1,16 @@
 """What a curve costs: the acceleration functional of BK (18)."""
 
+from __future__ import annotations
+
 import numpy as np
 
-from rbcourse._numerics import Array
-from rbcourse.chains import Chain, Retimed
+from rbcourse._numerics import EPS, Array, blocks
 from rbcourse.curves import Curve, which_curve
+from rbcourse.optimum import grid
+
+_TOGETHER = 2000  # panels that are evaluated at once
+_HALVINGS = 30
+_MOST = 50_000  # panels that may be halved at once
 
 
 def acceleration_cost(curve: Curve) -> Array:
@@ -25,7 +31,7 @@ def acceleration_cost(curve: Curve) -> Array:
     Raises
     ------
     RuntimeError
-        If the integral does not settle to that, if the curve all but jumps: ``margin`` below 1e-6,
+        If the integral does not settle to that, if the curve almost jumps: ``margin`` below 1e-6,
         or if the velocity of a `chain` jumps.
 
     See Also
@@ -88,70 +94,90 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
-    if isinstance(curve, Retimed):
-        rotation, translation = acceleration_cost_parts(curve.curve)
-        return rotation * curve.rate**3, translation * curve.rate**3
-    if isinstance(curve, Chain):
-        moments = np.append(curve.times, curve.times[:-1] + curve.durations / 2)
-        jumps, speeds = np.abs(curve.jumps(1)), np.abs(curve(moments, 1))
-        for half in (slice(3), slice(3, None)):  # rad and m
-            jump = jumps[:, half].max(initial=0)
-            if jump > 1e-9 * speeds[:, half].max(initial=0):
-                raise RuntimeError(f"acceleration cost: a velocity jumps at a joint, by {jump:.3g}")
-        parts = acceleration_cost_parts(curve.legs)
-        rotation, translation = (np.asarray(part / curve.durations**3) for part in parts)
-        return rotation.sum(), translation.sum()
-    return _integral(curve)
+    legs, durations = curve._unit_legs()
+    parts = integral(legs, _panels(legs), 1e-10)
+    rotation, translation = (
+        (part.reshape(legs.batch_shape) / durations**3).reshape(*curve.batch_shape, -1).sum(axis=-1)
+        for part in parts
+    )
+    return rotation, translation
 
 
-def _integral(curve: Curve) -> tuple[Array, Array]:
-    """Return the two parts for a curve on [0, 1]."""
-    from scipy.integrate import cubature
+def integral(curve: Curve, ends: Array, tolerance: float) -> tuple[Array, Array]:
+    """Return ∫ 2 ‖w'‖² dt and ∫ ‖d''‖² dt for each curve of a stack on [0, 1], by halving panels.
 
-    ends = _panels(curve)
-    widths = np.diff(ends)
+    A panel is halved while the rules of Clenshaw and Curtis with 9 and 17 nodes differ there by
+    more than `tolerance` times the cost; each curve has panels of its own.
 
-    def integrand(share: Array) -> Array:
-        """Return the sum over all panels, at one share of each."""
-        squares = np.moveaxis(curve(ends[:-1] + share * widths, 2) ** 2, 1, -1) @ widths
-        rotation, translation = squares[..., :3].sum(axis=-1), squares[..., 3:].sum(axis=-1)
-        return np.stack([2 * rotation, translation], axis=-1)
+    Parameters
+    ----------
+    curve : Curve
+    ends : ndarray, shape (n + 1,)
+        The ends of the panels at the start, from 0 to 1.
+    tolerance : float
 
-    integral = cubature(integrand, [0], [1], rtol=1e-10, atol=1e-20, max_subdivisions=100)
-    if integral.status != "converged" or not np.isfinite(integral.estimate).all():
-        raise RuntimeError(
-            f"acceleration cost: {integral.subdivisions} subdivisions leave an uncertainty of "
-            f"{np.max(integral.error):.1e} in {np.max(integral.estimate):.6g} (see margin)"
-        )
-    rotation, translation = np.moveaxis(integral.estimate, -1, 0)
-    return rotation[()], translation[()]
+    Returns
+    -------
+    rotation, translation : ndarray, shape (count,)
+
+    Raises
+    ------
+    RuntimeError
+        If the integral does not settle.
+    """
+    fine, rough = grid(17), grid(9)
+    cost = np.zeros((2, curve.count))
+    which = np.repeat(np.arange(curve.count), len(ends) - 1)
+    start, width = np.tile(ends[:-1], curve.count), np.tile(np.diff(ends), curve.count)
+    for _ in range(_HALVINGS):
+        value, error = np.empty((2, len(which))), np.empty((2, len(which)))
+        for part in blocks(len(which), _TOGETHER):
+            a = np.empty((17, len(which[part]), *curve._core(2)))
+            curve._at(start[part] + fine.t[:, None] * width[part], which[part], 2, a)
+            squares = np.stack([2 * _squares(a[..., :3]), _squares(a[..., 3:])])
+            value[:, part] = width[part] * (fine.integral[-1] @ squares)
+            rest = value[:, part] - width[part] * (rough.integral[-1] @ squares[:, ::2])
+            error[:, part] = np.abs(rest)
+        expected = cost + _sums(which, value, curve.count)
+        coarse = (error > tolerance * expected[:, which] + 1e-20).any(axis=0)
+        lost = coarse & (width < 256 * EPS * (start + width))  # beyond the resolution of the times
+        if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
+            break
+        cost += _sums(which[~coarse], value[:, ~coarse], curve.count)
+        which, start, width = (np.repeat(x[coarse], 2) for x in (which, start, width / 2))
+        start[1::2] += width[1::2]
+        if not len(which):
+            return cost[0], cost[1]
+    raise RuntimeError(
+        f"acceleration cost: halved panels leave an uncertainty of {error.sum(axis=1).max():.1e} "
+        f"in {expected.max():.6g} (see margin)"
+    )
+
+
+def _squares(a: Array) -> Array:
+    return np.sum(a**2, axis=-1)
+
+
+def _sums(which: Array, values: Array, count: int) -> Array:
+    """Return the sums of the rows of values over the panels of each curve."""
+    return np.stack([np.bincount(which, row, count) for row in values])
 
 
 def _panels(curve: Curve) -> Array:
-    """Return the ends of panels of time: sixteenths, and ever smaller to where the curve is fast.
+    """Return the ends of panels: sixteenths, and ever smaller ones to where the curve is quick.
 
-    It is fast where it starts and ends, as its velocities and accelerations say, and near its
-    margin.
+    It may be quick at its start and end, as its velocities and accelerations there tell, and at
+    its `_events`.
     """
-    curve = getattr(curve, "rotation", curve)
     w, a = (np.linalg.norm(curve([0, 1], k)[..., :3], axis=-1).reshape(2, -1) for k in (1, 2))
     if not np.isfinite(w).all():
-        lost = np.unravel_index(np.argmin(np.isfinite(w).all(axis=0)), curve.batch_shape)
-        which = which_curve(np.array(lost, int))
-        raise RuntimeError(f"acceleration cost{which}: the curve is NaN, it did not converge")
+        lost = which_curve(int(np.argmin(np.isfinite(w).all(axis=0))), curve.batch_shape)
+        raise RuntimeError(f"acceleration cost{lost}: the curve is NaN, it did not converge")
     speeds = (w + np.sqrt(a)).max(axis=-1, initial=0)
-    events = [(0.0, 1 / (1 + speeds[0])), (1.0, 1 / (1 + speeds[1]))]
-    margin = np.ravel(getattr(curve, "margin", ()))
-    if margin.min(initial=np.inf) < 1e-6:
-        raise RuntimeError(
-            f"acceleration cost: the curve all but jumps (margin {margin.min():.1e})"
-        )
-    when = np.broadcast_to(np.ravel(getattr(curve, "margin_time", 0.5)), margin.shape)
-    events += [(t, gap / 4) for t, gap in zip(when, margin, strict=True) if gap < 0.25]
-    events += zip(*(np.ravel(x) for x in getattr(curve, "quickest", ((), ()))), strict=True)
+    ends = [(0.0, 1 / (1 + speeds[0])), (1.0, 1 / (1 + speeds[1]))]
     cuts = [np.arange(17) / 16]
-    for t, width in events:
+    for when, width in ends + curve._events():
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
-        cuts += [np.append(t - apart, t), t + apart]
+        cuts += [np.append(when - apart, when), when + apart]
     times = np.unique(np.concatenate(cuts))
     return times[(times >= 0) & (times <= 1)]

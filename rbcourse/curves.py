@@ -1,33 +1,88 @@
-"""What a curve is: a rotation or a pose over time. And the simplest one, the geodesic."""
+"""Rotations and poses over time: what a curve is, its boundary conditions, and the geodesic."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
 from copy import copy
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Self, TypeAlias
+from typing import Any, ClassVar, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import (
-    Array,
-    as_finite,
-    as_time,
-    blocks,
-    check_broadcast,
-    check_order,
-)
-from rbcourse.so3 import hat_so3, log_so3
+from rbcourse._checks import as_finite, as_single, as_time, check_broadcast, check_order
+from rbcourse._numerics import Array, blocks, sine_and_versine
+from rbcourse.so3 import hat, log_so3
 
 Chosen: TypeAlias = NDArray[np.intp]
-BLOCK = 4096  # rotations that are worked out together, in the cache
+BLOCK = 4096  # rotations that are evaluated together, in the cache
+LONG_RUN = 8  # times on one curve for which a matrix product of their own pays
+SHORTEST = 1e-100  # of a duration
+
+
+class Ends(NamedTuple):
+    """Boundary conditions at t = 0 and 1, all of one batch shape: rotations and body velocities.
+
+    Attributes
+    ----------
+    R0, R1 : ndarray, shape (..., 3, 3)
+        Rotation matrices.
+    w0, w1 : ndarray, shape (..., 3)
+        Angular velocities, body frame, in rad per unit time.
+    """
+
+    R0: Array
+    R1: Array
+    w0: Array
+    w1: Array
+
+    @property
+    def turn(self) -> Array:
+        """R0ᵀ R1."""
+        return np.swapaxes(self.R0, -1, -2) @ self.R1
+
+    def flat(self) -> Ends:
+        """Return the same with one batch axis."""
+        rotations = (R.reshape(-1, 3, 3) for R in self[:2])
+        return Ends(*rotations, *(w.reshape(-1, 3) for w in self[2:]))
+
+    def of(self, which: Any) -> Ends:
+        """Return some of the problems, by an index of NumPy's into the batch axes."""
+        return Ends(*(array[which] for array in self))
+
+
+def check_ends(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Ends:
+    """Return the boundary conditions as arrays of one batch shape.
+
+    Validity of the rotations is not checked; see `project_so`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of its shape, or the batches do not broadcast.
+    """
+    rotations = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    velocities = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    named = {"R0": (rotations[0], 2), "R1": (rotations[1], 2)}
+    batch = check_broadcast(**named, w0=(velocities[0], 1), w1=(velocities[1], 1))
+    matrices = (np.broadcast_to(R, (*batch, 3, 3)) for R in rotations)
+    return Ends(*matrices, *(np.broadcast_to(w, (*batch, 3)) for w in velocities))
+
+
+class SingularTime(ValueError):
+    """A curve is not defined at a time; `curve` is its number in the stack."""
+
+    def __init__(self, time: float, curve: int, batch_shape: tuple[int, ...], why: str) -> None:
+        super().__init__(f"t = {time}{which_curve(curve, batch_shape)}: {why}")
+        self.curve, self.reason = curve, f"t = {time}: {why}"
 
 
 class Curve:
     """A rotation or a pose over time; called as SciPy's splines are.
 
-    The time t is in [0, 1], but for what `retime` and `chain` return.
+    The time t is in [0, 1], except for what `retime` and `chain` return.
 
     On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w and ``c(t, 2)``
     the angular acceleration w', both in the body frame: R' = R hat_so3(w).
@@ -55,6 +110,9 @@ class Curve:
 
     batch_shape: tuple[int, ...]
     domain: tuple[float, float] = (0.0, 1.0)
+    size: int = 3  # of its matrices
+    per_curve: ClassVar[dict[str, int]] = {}
+    """Attributes with an entry for each curve: how many of their axes stand before the batch's."""
 
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
         """Return the curve, or a derivative, at the times t.
@@ -82,7 +140,36 @@ class Curve:
         >>> c(np.linspace(0, 1, 5)).shape, c(0.5, 1).shape
         ((5, 3, 3), (3,))
         """
-        return self._evaluate(as_time(t, len(self.batch_shape), self.domain), check_order(order))
+        times = as_time(t, 0, self.domain)
+        values = self._at_all(times.reshape(-1, 1), check_order(order))
+        return values.reshape(times.shape + self.batch_shape + self._core(order))
+
+    def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
+        """Return each curve of the stack, or a derivative, at times of its own.
+
+        Parameters
+        ----------
+        t : array_like, shape (..., *batch_shape)
+            Times in the domain.
+        order : {0, 1, 2}, optional
+            As for a call.
+
+        Returns
+        -------
+        ndarray, shape t.shape + (3, 3) or t.shape + (3,); or with 4 and 6
+
+        Raises
+        ------
+        ValueError
+            As a call, or if `t` does not have that shape.
+        """
+        times, stacked = as_time(t, 0, self.domain), len(self.batch_shape)
+        if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
+            wanted = ", ".join(["...", *map(str, self.batch_shape)])
+            raise ValueError(f"t: shape ({wanted}) wanted, got {times.shape}")
+        rows = math.prod(times.shape[: times.ndim - stacked])
+        values = self._at_all(times.reshape(rows, self.count), check_order(order))
+        return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
         """Return a curve of the stack, or some as a stack; the index is one for NumPy's arrays.
@@ -103,67 +190,82 @@ class Curve:
         """
         if not self.batch_shape:
             raise TypeError("a single curve is no stack, and has no index")
-        numbers = np.arange(math.prod(self.batch_shape)).reshape(self.batch_shape)
-        return self._pick(np.asarray(numbers[index]))
+        return self._picked(np.arange(self.count).reshape(self.batch_shape)[index])
 
-    def _evaluate(self, t: Array, order: int) -> Array:
-        raise NotImplementedError
+    def __repr__(self) -> str:
+        """Return what it is a curve of, how many there are, and when."""
+        group = {3: "SO(3)", 4: "SE(3)"}[self.size]
+        stack = f", stack of shape {self.batch_shape}" if self.batch_shape else ""
+        start, end = self.domain
+        return f"<{type(self).__name__} on {group}{stack}, t in [{start:g}, {end:g}]>"
 
-    def _pick(self, chosen: Chosen) -> Self:
-        """Return the stack of the curves with these numbers, which count through the stack."""
-        raise NotImplementedError(f"{type(self).__name__} has no index")
+    @property
+    def count(self) -> int:
+        """How many curves there are."""
+        return math.prod(self.batch_shape)
 
-    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        """Write curve which[i] of the stack at t[i] into out[i]; `which` ascends."""
-        out[...] = self._pick(which)._evaluate(t, order)
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        """Write curve which[k] of the stack at the times t[:, k] into out[:, k].
 
-
-class BlockwiseCurve(Curve):
-    """A `Curve` on SO(3), or a stack of them, worked out for as many times as fit into the cache.
-
-    References
-    ----------
-    BK 6.
-    """
-
-    def _evaluate(self, t: Array, order: int) -> Array:
-        free = t.ndim - len(self.batch_shape)
-        shape = np.broadcast_shapes(t.shape, self.batch_shape) + ((3,) if order else (3, 3))
-        times = t.reshape(math.prod(t.shape[:free]), *t.shape[free:])
-        values = np.empty((len(times), *shape[free:]))
-        rows = max(1, BLOCK // max(1, math.prod(self.batch_shape)))
-        for block in blocks(len(times), rows):
-            values[block] = self._block(times[block], order)
-        return values.reshape(shape)
-
-    def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
-        """Return each curve of the stack, or a derivative, at times of its own.
+        This is how every curve is evaluated, alone, in a stack, or as the leg of a chain.
 
         Parameters
         ----------
-        t : array_like, shape (..., *batch_shape)
-            Times in [0, 1].
-        order : {0, 1, 2}, optional
-            As for a call.
-
-        Returns
-        -------
-        ndarray, shape t.shape + (3, 3) or t.shape + (3,)
-
-        Raises
-        ------
-        ValueError
-            As a call, or if `t` has not that shape.
+        t : ndarray, shape (T, K), or (T, 1) for the same times on all
+        which : ndarray of int, shape (K,)
+            Numbers that count through the stack.
+        order : {0, 1, 2}
+        out : ndarray, shape (T, K, 3, 3) or (T, K, 3); or with 4 and 6
+            In C order.
         """
-        times, stacked = as_time(t, 0), len(self.batch_shape)
-        if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
-            wanted = ", ".join(["...", *map(str, self.batch_shape)])
-            raise ValueError(f"t: shape ({wanted}) wanted, got {times.shape}")
-        return self._evaluate(times, check_order(order))
-
-    def _block(self, t: Array, order: int) -> Array:
-        """Return the values at times of shape (N, ...): for each curve the same, or its own."""
         raise NotImplementedError
+
+    def _at_all(self, t: Array, order: int) -> Array:
+        """Return all curves at the times t, shape (T, count) or (T, 1), in blocks."""
+        which = np.arange(self.count)
+        values = np.empty((len(t), self.count, *self._core(order)))
+        for rows in blocks(len(t), max(1, BLOCK // max(1, self.count))):
+            self._at(t[rows], which, order, values[rows])
+        return values
+
+    def _core(self, order: int) -> tuple[int, ...]:
+        return (self.size,) * 2 if order == 0 else (3 * self.size - 6,)
+
+    def _picked(self, chosen: Any) -> Self:
+        """Return the stack of the curves with these numbers."""
+        picked = copy(self)
+        picked.batch_shape = np.shape(chosen)
+        for name in list(vars(self)):
+            if isinstance(getattr(type(self), name, None), cached_property):
+                del picked.__dict__[name]
+        for name, lead in self.per_curve.items():
+            value = getattr(self, name)
+            if isinstance(value, Curve):
+                setattr(picked, name, value._picked(chosen))
+            else:
+                flat = self._flat(value, lead)
+                setattr(picked, name, np.take(flat, chosen, axis=lead))
+        return picked
+
+    def _flat(self, values: Array, lead: int = 0) -> Array:
+        """Return an array with one axis for the stack in place of the batch axes."""
+        stacked = lead + len(self.batch_shape)
+        return values.reshape(*values.shape[:lead], self.count, *values.shape[stacked:])
+
+    def _check_defined(self, t: Array, which: Chosen, lost: NDArray[np.bool_], why: str) -> None:
+        """Raise a SingularTime for the first time, shape (T, K), at which a curve is `lost`."""
+        if lost.any():
+            row, k = np.argwhere(lost)[0]
+            time = float(np.broadcast_to(t, lost.shape)[row, k])
+            raise SingularTime(time, int(which[k]), self.batch_shape, why)
+
+    def _events(self) -> list[tuple[float, float]]:
+        """Return when a curve of the stack is quick, and about how long that takes."""
+        return []
+
+    def _unit_legs(self) -> tuple[Curve, Any]:
+        """Return the curves on [0, 1] that it consists of, as a stack, and their durations."""
+        return self, 1.0
 
 
 class AlongGeodesic(Curve):
@@ -181,69 +283,36 @@ class AlongGeodesic(Curve):
     BK 6.1.
     """
 
+    per_curve: ClassVar[dict[str, int]] = {"R0": 0, "rotation_vector": 0, "_angle": 0}
+
     def __init__(self, R0: Array, rotation_vector: Array) -> None:
-        self.R0 = R0
-        self.rotation_vector = rotation_vector
         self.batch_shape = rotation_vector.shape[:-1]
+        self.R0 = np.broadcast_to(R0, (*self.batch_shape, 3, 3))
+        self.rotation_vector = rotation_vector
         self._angle = np.linalg.norm(rotation_vector, axis=-1)
 
-    def _progress(self, t: Array, order: int, angle: Array) -> Array:
+    def _progress(self, t: Array, which: Chosen, order: int) -> Array:
+        """Return p or a derivative, shape (T, K) or (T, 1)."""
         return identity(t, order)
 
-    def _progress_each(self, t: Array, which: Chosen, order: int) -> Array:
-        return identity(t, order)
-
-    def _pick(self, chosen: Chosen) -> Self:
-        picked = copy(self)
-        picked.__dict__.pop("_terms", None)
-        picked.R0 = pick(self.R0, chosen, self.batch_shape, core=2)
-        picked.rotation_vector = pick(self.rotation_vector, chosen, self.batch_shape, core=1)
-        picked._angle = pick(self._angle, chosen, self.batch_shape)
-        picked.batch_shape = chosen.shape
-        return picked
-
-    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        progress = self._progress_each(t, which, order)
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        progress = self._progress(t, which, order)
         if order:
-            np.multiply(progress[:, None], self.rotation_vector[which], out=out)
+            sigma = self._flat(self.rotation_vector)[which]
+            np.multiply(progress[..., None], sigma, out=out)
             return
-        shares, R = np.ones((3, len(t))), out.reshape(-1, 9)
-        _write_shares(progress, self._angle[which], shares)
-        for curve, run in runs(which):
-            np.matmul(shares[:, run].T, self._terms[:, curve].reshape(3, 9), out=R[run])
-
-    def _evaluate(self, t: Array, order: int) -> Array:
-        progress = self._progress(t, order, self._angle)
-        if order:
-            return progress[..., None] * self.rotation_vector
-        if self.batch_shape:
-            shares = np.ones((3, *np.broadcast_shapes(t.shape, self.batch_shape)))
-            _write_shares(progress, self._angle, shares)
-            return np.einsum("k...,k...ij->...ij", shares, self._terms)
-        shares, terms = np.ones((3, min(t.size, BLOCK))), self._terms.reshape(3, 9)
-        R, progress = np.empty((t.size, 9)), progress.reshape(-1)
-        for block in blocks(t.size, BLOCK):
-            part = shares[:, : block.stop - block.start]
-            _write_shares(progress[block], self._angle, part)
-            np.matmul(part.T, terms, out=R[block])
-        return R.reshape(*t.shape, 3, 3)
+        shares = np.ones((3, len(t), len(which)))
+        angle = self._flat(self._angle)[which]
+        shares[1], shares[2] = sine_and_versine(progress * (angle / 2))
+        combine(shares, self._terms, which, out.reshape(*out.shape[:2], 9))
 
     @cached_property
     def _terms(self) -> Array:
         """R0, R0 K and R0 K² of R0 (I + sin a K + (1 − cos a) K²), Rodrigues' formula."""
         axis = self.rotation_vector / np.where(self._angle == 0, 1.0, self._angle)[..., None]
-        turn = self.R0 @ hat_so3(axis)
-        return np.stack(np.broadcast_arrays(self.R0, turn, turn @ hat_so3(axis)))
-
-
-def _write_shares(progress: Array, angle: Array, shares: Array) -> None:
-    """Write sin a and 1 − cos a beside the 1, a so much of the angle, by tan(a/2): fastest."""
-    _, sine, versine = shares
-    tangent = np.tan(progress * (angle / 2), out=versine)
-    np.multiply(tangent, tangent, out=sine)
-    sine += 1
-    np.divide(2 * tangent, sine, out=sine)
-    versine *= sine
+        K = hat(axis)
+        turn = self.R0 @ K
+        return np.stack([self.R0, turn, turn @ K]).reshape(3, self.count, 9)
 
 
 def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
@@ -252,7 +321,7 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices; what is none is not repaired (see `project_so`).
+        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
@@ -294,6 +363,86 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
     return AlongGeodesic(*start_and_rotation_vector(R0, R1))
 
 
+class Retimed(Curve):
+    """A `Curve` reparameterised linearly to another duration.
+
+    Attributes
+    ----------
+    curve : Curve
+        The original.
+    rate : float
+        How much of its time passes in a unit of time.
+    """
+
+    per_curve: ClassVar[dict[str, int]] = {"curve": 0}
+
+    def __init__(self, curve: Curve, rate: float, domain: tuple[float, float]) -> None:
+        self.curve, self.rate, self.domain = curve, rate, domain
+        self.batch_shape, self.size = curve.batch_shape, curve.size
+
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        (start, end), (first, last) = self.domain, self.curve.domain
+        inner = np.minimum(first + (t - start) * self.rate, last)
+        self.curve._at(np.where(t == end, last, inner), which, order, out)
+        if order:
+            out *= self.rate**order
+
+    def _unit_legs(self) -> tuple[Curve, Any]:
+        legs, durations = self.curve._unit_legs()
+        return legs, durations / self.rate
+
+
+def retime(curve: Curve, duration: float) -> Retimed:
+    """Return the curve reparameterised linearly to a new duration, with the same start time.
+
+    Parameters
+    ----------
+    curve : Curve
+        Or a stack of them.
+    duration : float
+        The new duration, in s or any other unit of time; more than 0.
+
+    Returns
+    -------
+    Retimed
+        A `Curve` on [a, a + duration], a the first time of `curve`, which is 0 except for a
+        `chain`. Velocities and accelerations are per unit of the new time: k times the duration
+        divides them by k and k². `acceleration_cost` falls by k³.
+
+    Raises
+    ------
+    ValueError
+        If `curve` is no `Curve`, `duration` no number above 0, or so short that accelerations
+        overflow or that it vanishes beside the first time.
+
+    See Also
+    --------
+    chain : Through many poses, at times of your own.
+
+    Notes
+    -----
+    To arrive with the angular velocity w after T seconds, make a curve with the end velocity T w,
+    then retime it to T. A chain that takes k times as long is at its poses at a + k (t − a).
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, geodesic_so3
+    >>> c = retime(geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5])), 3)
+    >>> c.domain, c(3, 1).round(12)
+    ((0.0, 3.0), array([0. , 0. , 0.5]))
+    """
+    if not isinstance(curve, Curve):
+        raise ValueError(f"curve: a Curve wanted, got {curve!r}")
+    time, (start, end) = float(as_single("duration", duration)), curve.domain
+    if time <= 0:
+        raise ValueError(f"duration is {time}, a time above 0 is wanted")
+    if start + time == start:
+        raise ValueError(f"duration is {time}: that vanishes beside the first time, {start}")
+    if time < SHORTEST * (end - start):
+        raise ValueError(f"duration is {time}: too short, accelerations would overflow")
+    return Retimed(curve, (end - start) / time, (start, start + time))
+
+
 def start_and_rotation_vector(R0: ArrayLike, R1: ArrayLike) -> tuple[Array, Array]:
     """Return R0 as an array, and log_so3(R0ᵀ R1); or raise the ValueError of `geodesic_so3`."""
     R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
@@ -301,50 +450,69 @@ def start_and_rotation_vector(R0: ArrayLike, R1: ArrayLike) -> tuple[Array, Arra
     return R0, log_so3(np.swapaxes(R0, -1, -2) @ R1)
 
 
-def pick(
-    array: NDArray[Any], chosen: Chosen, batch_shape: tuple[int, ...], core: int = 0, lead: int = 0
-) -> NDArray[Any]:
-    """Return what belongs to the chosen curves; the batch axes are behind `lead`, before `core`.
-
-    The numbers count through the shape of the batch, to which that of the array broadcasts.
-    """
-    own = array.shape[lead : array.ndim - core]
-    if own != batch_shape:
-        numbers = np.arange(math.prod(own)).reshape(own)
-        chosen = np.broadcast_to(numbers, batch_shape).reshape(-1)[chosen]
-    flat = array.reshape(*array.shape[:lead], math.prod(own), *array.shape[array.ndim - core :])
-    return np.take(flat, chosen, axis=lead)
-
-
-def runs(which: Chosen) -> Iterator[tuple[int, slice]]:
-    """Yield each curve of an ascending list, and where it stands there."""
-    cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist(), len(which)]
-    for start, end in pairwise(cuts):
-        yield int(which[start]), slice(start, end)
-
-
 def identity(t: Array, order: int) -> Array:
     """Return t, or its derivative."""
     return t if order == 0 else np.full_like(t, order == 1)
 
 
-def check_times(t: Array, lost: NDArray[np.bool_], batch_ndim: int, why: str) -> None:
-    """Raise a ValueError that names the first time (and curve of the stack) that is lost."""
-    if lost.any():
-        first = np.argwhere(lost)[0]
-        time = np.broadcast_to(t, lost.shape)[tuple(first)]
-        raise ValueError(f"t = {time}{which_curve(first[lost.ndim - batch_ndim :])}: {why}")
+def combine(weights: Array, terms: Array, which: Chosen, out: Array) -> None:
+    """Write the sums over n of weights[n] terms[n] of the curves which[k] into out[:, k].
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n, T, K) or (n, T, 1)
+    terms : ndarray, shape (n, count, m)
+    which : ndarray of int, shape (K,)
+    out : ndarray, shape (T, K, m)
+    """
+    if len(which) == 1:
+        np.matmul(weights[:, :, 0].T, terms[:, which[0]], out=out[:, 0])
+    elif weights.shape[2] == 1:
+        out[...] = (weights[:, :, 0].T @ terms[:, which].reshape(len(terms), -1)).reshape(out.shape)
+    elif len(out) == 1 and has_long_runs(which):
+        for curve, run in runs(which):
+            np.matmul(weights[:, 0, run].T, terms[:, curve], out=out[0, run])
+    else:
+        np.einsum("ntk,nkm->tkm", weights, terms[:, which], out=out)
 
 
-def which_curve(index: NDArray[np.intp]) -> str:
-    """Return how a curve of a stack is called, nothing for a single one."""
-    return f" of curve {[int(i) for i in index]}" if len(index) else ""
+def runs(which: Chosen) -> Iterator[tuple[int, slice]]:
+    """Yield each stretch of equal numbers, and where it is."""
+    cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist(), len(which)]
+    for start, end in pairwise(cuts):
+        yield int(which[start]), slice(start, end)
+
+
+def has_long_runs(which: Chosen) -> bool:
+    """Tell whether equal numbers stand together, `LONG_RUN` of them or more in the mean."""
+    return len(which) >= LONG_RUN * (1 + int(np.count_nonzero(np.diff(which))))
+
+
+def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
+    """Return how a curve of a stack is called in messages, nothing for a single one."""
+    index = [int(i) for i in np.unravel_index(curve, batch_shape)] if batch_shape else []
+    return f" of curve {index}" if index else ""
+
+
+def events_of(times: ArrayLike, margins: ArrayLike) -> list[tuple[float, float]]:
+    """Return the times at which margins are small, and about how long curves turn quickly there.
+
+    Raises
+    ------
+    RuntimeError
+        If a margin is below 1e-6.
+    """
+    gaps = np.ravel(margins)
+    if gaps.min(initial=np.inf) < 1e-6:
+        raise RuntimeError(f"acceleration cost: the curve almost jumps (margin {gaps.min():.1e})")
+    when = np.broadcast_to(np.ravel(times), gaps.shape)
+    return [(float(t), gap / 4) for t, gap in zip(when, gaps, strict=True) if gap < 0.25]
 
 
 def least_over_time(
     value: Callable[[Array], Array], batch_shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Return when a function of time is least, and how large: on 129 times, then ever closer.
+    """Return when a function of time is least, and its value: on 129 times, then refined.
 
     Times and values have the shape (N, *batch_shape).
     """

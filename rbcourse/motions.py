@@ -1,15 +1,24 @@
-"""Motions of a rigid body: a rotation curve and a path of the origin, each on its own."""
+"""Motions of a rigid body: a rotation and a path of the origin, each on its own; and screws."""
 
-import math
-from typing import Self
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, check_broadcast
-from rbcourse.curves import Chosen, Curve, geodesic_so3, pick
-from rbcourse.polynomials import cubic_coefficients, polynomial
-from rbcourse.projected import ProjectedPolynomial, projected_cubic_so3
+from rbcourse._checks import as_finite, as_unit, check_broadcast
+from rbcourse._numerics import EPS, Array
+from rbcourse.curves import Chosen, Curve, Ends, geodesic_so3
+from rbcourse.optimum import relax, solve
+from rbcourse.projected_cubic import (
+    ProjectedPolynomial,
+    cubic_coefficients,
+    polynomials,
+    projected_cubic,
+    watched,
+)
+from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
 
 
 class RigidMotion(Curve):
@@ -27,46 +36,31 @@ class RigidMotion(Curve):
     BK 6.3.
     """
 
+    size = 4
+    per_curve: ClassVar[dict[str, int]] = {"rotation": 0, "coefficients": 1}
+
     def __init__(self, rotation: Curve, coefficients: Array) -> None:
-        self.rotation = rotation
-        self.coefficients = coefficients
         self.batch_shape = np.broadcast_shapes(rotation.batch_shape, coefficients.shape[1:-1])
+        shape = (len(coefficients), *self.batch_shape, 3)
+        self.coefficients = np.broadcast_to(coefficients, shape)
+        numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
+        self.rotation = rotation._picked(np.broadcast_to(numbers, self.batch_shape))
 
-    def _pick(self, chosen: Chosen) -> Self:
-        of_rotation = self._of_rotation(chosen)
-        path = pick(self.coefficients, chosen, self.batch_shape, core=1, lead=1)
-        return type(self)(self.rotation._pick(of_rotation), path)
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        """Write (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
+        path = np.moveaxis(self._flat(self.coefficients, 1), 1, -1)
+        d = np.moveaxis(polynomials(path, t, which, order), 0, -1)
+        R, turning = (np.empty((*out.shape[:2], *core)) for core in ((3, 3), (3,)))
+        self.rotation._at(t, which, 0, R)
+        if order == 0:
+            out[..., :3, :3], out[..., :3, 3] = R, d
+            out[..., 3, :3], out[..., 3, 3] = 0, 1
+        else:
+            self.rotation._at(t, which, order, turning)
+            out[..., :3], out[..., 3:] = turning, (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
 
-    def _of_rotation(self, chosen: Chosen) -> Chosen:
-        """Return the numbers of the rotations of the chosen motions."""
-        own = self.rotation.batch_shape
-        return pick(np.arange(math.prod(own)).reshape(own), chosen, self.batch_shape)
-
-    def _evaluate(self, t: Array, order: int) -> Array:
-        rotation = [self.rotation._evaluate(t, k) for k in sorted({0, order})]
-        return _joined(rotation, polynomial(self.coefficients, t[..., None], order))
-
-    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        rotation = [np.empty((len(t), *((3,) if k else (3, 3)))) for k in sorted({0, order})]
-        for k, values in zip(sorted({0, order}), rotation, strict=True):
-            if self.rotation.batch_shape:
-                self.rotation._write_each(t, self._of_rotation(which), k, values)
-            else:
-                values[...] = self.rotation._evaluate(t, k)
-        path = pick(self.coefficients, which, self.batch_shape, core=1, lead=1)
-        out[...] = _joined(rotation, polynomial(path, t[..., None], order))
-
-
-def _joined(rotation: list[Array], d: Array) -> Array:
-    """Return poses from R and d; or twists, or accelerations, from R, that of R, and that of d."""
-    R, *turning = rotation
-    batch = np.broadcast_shapes(R.shape[:-2], d.shape[:-1])
-    if turning:
-        in_body = (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
-        return np.concatenate([np.broadcast_to(turning[0], (*batch, 3)), in_body], axis=-1)
-    A = np.zeros((*batch, 4, 4))
-    A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
-    return A
+    def _events(self) -> list[tuple[float, float]]:
+        return self.rotation._events()
 
 
 class ProjectedMotion(RigidMotion):
@@ -86,7 +80,7 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
-        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
@@ -122,9 +116,8 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
     """
     A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     check_broadcast(A0=(A0, 2), A1=(A1, 2))
-    d0, d1 = A0[..., :3, 3], A1[..., :3, 3]
-    line = np.stack(np.broadcast_arrays(d0, d1 - d0))
-    return RigidMotion(geodesic_so3(A0[..., :3, :3], A1[..., :3, :3]), line)
+    (R0, d0), (R1, d1) = split(A0), split(A1)
+    return RigidMotion(geodesic_so3(R0, R1), np.stack(np.broadcast_arrays(d0, d1 - d0)))
 
 
 def projected_cubic_se3(
@@ -140,8 +133,8 @@ def projected_cubic_se3(
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
-        Poses at t = 0 and 1; what is none is not repaired (see `project_se`), and the last row is
-        not read.
+        Poses at t = 0 and 1. Validity is not checked (see `project_se`); the last row is not
+        read.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
     d0_dot, d1_dot : array_like, shape (..., 3)
@@ -186,28 +179,260 @@ def projected_cubic_se3(
            [ 1.639,  2.633, -1.438],
            [ 0.   ,  0.   ,  0.   ]])
     """
-    R0, R1, path = cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
-    return ProjectedMotion(projected_cubic_so3(R0, R1, w0, w1), path)
+    ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
+    return ProjectedMotion(watched(projected_cubic(ends)), path)
 
 
-def cubic_ends(
+def minimum_acceleration_se3(
     A0: ArrayLike,
     A1: ArrayLike,
     w0: ArrayLike,
     w1: ArrayLike,
     d0_dot: ArrayLike,
     d1_dot: ArrayLike,
-) -> tuple[Array, Array, Array]:
-    """Return the rotations of the ends and the cubic path of the origin between them.
+) -> RigidMotion:
+    """Return the minimum-acceleration motion: the optimum on SO(3), and a cubic in R³.
+
+    Parameters
+    ----------
+    A0, A1 : array_like, shape (..., 4, 4)
+        Poses at t = 0 and 1. Validity is not checked (see `project_se`); the last row is not
+        read.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+    d0_dot, d1_dot : array_like, shape (..., 3)
+        Velocities of the origin there, *fixed* frame, in m per unit time.
+
+    Returns
+    -------
+    RigidMotion
+        A `Curve`: its ``rotation`` is `minimum_acceleration_so3`.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+    ConvergenceError
+        As `minimum_acceleration_so3`.
+
+    Warns
+    -----
+    RuntimeWarning
+        As `minimum_acceleration_so3`.
+
+    See Also
+    --------
+    projected_cubic_se3 : Its near-optimal stand-in, in closed form.
+
+    Notes
+    -----
+    In metric (14) rotation and translation are independent, so each has its own optimum.
+
+    References
+    ----------
+    BK 6.3.
+
+    Examples
+    --------
+    >>> from rbcourse import pose_from_coordinates
+    >>> A1, rest = pose_from_coordinates([0, 0, 1, 2, 0, 0]), [0, 0, 0]
+    >>> c = minimum_acceleration_se3(np.eye(4), A1, rest, rest, rest, rest)
+    >>> c(0.5)[:3, 3].round(9)
+    array([1., 0., 0.])
+    """
+    ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
+    return RigidMotion(solve(relax, ends), path)
+
+
+def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
+    """Return the screw motion from A0 to A1: about one axis, at constant twist.
+
+    Parameters
+    ----------
+    A0, A1 : array_like, shape (..., 4, 4)
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
+
+    Returns
+    -------
+    ScrewMotion
+        A `Curve`: A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1), which turns by π at most.
+        Its covariant acceleration is (0, ω × v): the origin runs on a helix.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+
+    See Also
+    --------
+    geodesic_se3 : The same turn, while the origin runs straight.
+    screw_from_pose : The axis and the pitch.
+
+    Notes
+    -----
+    Singular set: between poses a half-turn apart there are two such motions; ω is the one that
+    `log_so3` returns. Full turns more give more screws, all with other twists.
+
+    It is a geodesic of the indefinite metric (10), not of the metric (14), for which the motion of
+    the origin does not depend on how the body turns. And it depends on which point of the body is
+    called the origin only as its displacement does: every point runs on a helix about the axis.
+
+    References
+    ----------
+    BK 2.6.
+
+    Examples
+    --------
+    >>> A1 = exp_se3([0, 0, np.pi, 0, -np.pi, 2])  # half round the line x = 1, 2 m up
+    >>> screw_se3(np.eye(4), A1)(0.5)[:3, 3].round(12)
+    array([ 1., -1.,  1.])
+    """
+    A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
+    check_broadcast(A0=(A0, 2), A1=(A1, 2))
+    return ScrewMotion(join(*split(A0)), log_se3(inverse_se3(A0) @ A1))
+
+
+class ScrewMotion(Curve):
+    """The `Curve` A0 exp_se3(S t), of constant twist S.
+
+    Attributes
+    ----------
+    A0 : ndarray, shape (..., 4, 4)
+        The start.
+    twist : ndarray, shape (..., 6)
+        S = (ω, v), body frame.
+
+    References
+    ----------
+    BK 2.6.
+    """
+
+    size = 4
+    per_curve: ClassVar[dict[str, int]] = {"A0": 0, "twist": 0}
+
+    def __init__(self, A0: Array, twist: Array) -> None:
+        self.batch_shape, self.twist = twist.shape[:-1], twist
+        self.A0 = np.broadcast_to(A0, (*self.batch_shape, 4, 4))
+
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        S = self._flat(self.twist)[which]
+        if order == 0:
+            out[...] = self._flat(self.A0)[which] @ exp_se3(t[..., None] * S)
+        elif order == 1:
+            out[...] = S
+        else:
+            out[..., :3], out[..., 3:] = 0, np.cross(S[:, :3], S[:, 3:])
+
+
+def screw_from_pose(A: ArrayLike) -> Screw:
+    """Return the screw of a displacement, in the fixed frame: axis, point, angle and slide.
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        Poses. Validity is not checked (see `project_se`); the last row is not read. For
+        the screw from a pose A0 to A1, in the fixed frame, take A1 @ inverse_se3(A0).
+
+    Returns
+    -------
+    Screw
+        ``axis``, ``point``, ``angle`` and ``slide``, and their ``pitch``.
+
+    Raises
+    ------
+    ValueError
+        If `A` is not finite or not of that shape.
+
+    See Also
+    --------
+    screw_se3 : The motion about this screw.
+
+    Notes
+    -----
+    Singular set: a half-turn has two screws, the axis of `log_so3` is taken. Where nothing turns
+    no axis is distinguished; what turns by rounding only, less than 8 eps, counts as a slide alone.
+    Near there axis, slide and pitch are uncertain by a few eps over the angle, relatively, and the
+    point, far away, by a few eps ‖d‖ over its square.
+
+    References
+    ----------
+    BK 2.6.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_se3
+    >>> A = exp_se3([0, 0, 2, 0, -2, 1])  # about the vertical line through x = 1
+    >>> screw = screw_from_pose(A)
+    >>> screw.axis.round(12), screw.point.round(12) + 0.0, float(screw.pitch.round(12))
+    (array([0., 0., 1.]), array([1., 0., 0.]), 0.5)
+    """
+    S = log_se3(A)
+    w, v = S[..., :3], S[..., 3:]
+    angle = np.linalg.norm(w, axis=-1)
+    turns = angle > 8 * EPS
+    along = np.where(turns[..., None], w, v)
+    moves = np.any(along, axis=-1, keepdims=True)
+    axis = np.where(moves, as_unit("A", np.where(moves, along, 1.0), 3), 0.0)
+    angle = np.where(turns, angle, 0.0)
+    point = np.cross(axis, v) / np.where(turns, angle, np.inf)[..., None]
+    return Screw(axis, point, angle, np.vecdot(axis, v))
+
+
+class Screw(NamedTuple):
+    """A turn about an axis, and a slide along it: every displacement is one (Chasles).
+
+    Attributes
+    ----------
+    axis : ndarray, shape (..., 3)
+        The direction of the axis, of unit length; of the slide alone where nothing turns, and 0
+        where nothing moves.
+    point : ndarray, shape (..., 3)
+        The point of the axis nearest to the origin, in m; 0 where nothing turns.
+    angle : ndarray, shape (...)
+        How far it turns, in [0, π] rad.
+    slide : ndarray, shape (...)
+        How far it moves along the axis, in m.
+    """
+
+    axis: Array
+    point: Array
+    angle: Array
+    slide: Array
+
+    @property
+    def pitch(self) -> Array:
+        """The slide for each rad of the turn, in m: inf for a slide alone, NaN for no motion."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.divide(self.slide, self.angle)
+
+
+def _cubic_ends(
+    A0: ArrayLike,
+    A1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    d0_dot: ArrayLike,
+    d1_dot: ArrayLike,
+) -> tuple[Ends, Array]:
+    """Return the checked ends of the rotation, and the cubic path of the origin.
 
     Raises
     ------
     ValueError
         If an argument is not finite, not of its shape, or the batches do not broadcast.
     """
-    A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
-    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
-    v0, v1 = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)
-    check_broadcast(A0=(A0, 2), A1=(A1, 2), w0=(w0, 1), w1=(w1, 1), d0_dot=(v0, 1), d1_dot=(v1, 1))
-    path = cubic_coefficients(A0[..., :3, 3], A1[..., :3, 3], v0, v1)
-    return A0[..., :3, :3], A1[..., :3, :3], path
+    poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
+    w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    v = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)
+    batch = check_broadcast(
+        A0=(poses[0], 2),
+        A1=(poses[1], 2),
+        w0=(w[0], 1),
+        w1=(w[1], 1),
+        d0_dot=(v[0], 1),
+        d1_dot=(v[1], 1),
+    )
+    (R0, d0), (R1, d1) = map(split, poses)
+    rotations = (np.broadcast_to(R, (*batch, 3, 3)) for R in (R0, R1))
+    ends = Ends(*rotations, *(np.broadcast_to(x, (*batch, 3)) for x in w))
+    return ends, cubic_coefficients(d0, d1, *v)

@@ -1,18 +1,100 @@
-"""What both solvers of BK (19) share: the curve they return, and the way to hard problems."""
+"""Minimum acceleration on SO(3), BK (19): R w'' is constant; solved for the whole curve at once."""
+
+from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
 from functools import cache, cached_property, lru_cache
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, as_finite, check_broadcast
-from rbcourse.curves import Chosen, Curve, runs
+from rbcourse._numerics import Array, blocks
+from rbcourse.curves import Chosen, Curve, Ends, check_ends, combine
 from rbcourse.projection import nearest
-from rbcourse.quaternion_curves import other_way
-from rbcourse.so3 import BASIS_SO3, exp_so3, log_so3
+from rbcourse.rivals import other_way
+from rbcourse.so3 import exp_so3, hat, log_so3, vee
+
+CLOSE = 2.0  # with legs whose costs are within this factor both ways round are tried
+COARSE = 17  # nodes, on which guesses are made and systems solved
+STEPS = 25
+EXACT = 3e-12  # what may be left of the equation, and of R in the last Chebyshev coefficients
+LONGEST_STEP = 0.5
+ROUGH = 1e-2  # rad: with shorter steps the fewest nodes are left
+_BLOCK = 128  # problems whose linear systems fit into the cache together
+
+Guess = Callable[[int], Array]
+"""Rotations at the nodes, when told how many: shape (N, n, 3, 3)."""
+
+
+def minimum_acceleration_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> MinimumAcceleration:
+    """Return the minimum-acceleration curve with these ends, by relaxation.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+
+    Returns
+    -------
+    MinimumAcceleration
+        A `Curve`, or a stack of them, that meets all four ends and solves w''' + w × w'' = 0. Its
+        ``converged``, ``residual``, ``iterations`` and ``nodes`` tell how it was found, and ``c``
+        is the constant R w''.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+    ConvergenceError
+        For a single problem, if Newton's method does not converge from either of two guesses. None
+        in ten thousand for ‖w0‖, ‖w1‖ < 12; one draw in thirty up to 30.
+
+    Warns
+    -----
+    RuntimeWarning
+        For a stack, if that happens to some: there the curve is NaN and ``converged`` False.
+
+    See Also
+    --------
+    rbcourse.textbook.minimum_acceleration_so3 : The equation, and SciPy's `solve_bvp`.
+    shoot_minimum_acceleration_so3 : The same by shooting.
+    projected_cubic_so3 : Its near-optimal stand-in, in closed form.
+    acceleration_cost : What both cost.
+
+    Notes
+    -----
+    Singular set: none is known in closed form. (19) is necessary, not sufficient, and has several
+    solutions: a turn by σ and one by σ ± 2π reach the same rotation. Newton's method starts from
+    `cumulative_bezier_so3`, its middle leg turned the short way or the other, whichever curve costs
+    less; where that is in doubt from both, and the better is returned. It is stationary, and not
+    proven to be the best.
+
+    End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
+    R0ᵀR1: the shortest, or one that turns the other way round or once more; as a rule because that
+    costs less.
+
+    References
+    ----------
+    BK (19), BK 6.2, BK Prop. 7.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = minimum_acceleration_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(9) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    >>> c.residual < 1e-12
+    True
+    """
+    return solve(relax, check_ends(R0, R1, w0, w1))
 
 
 class ConvergenceError(RuntimeError):
@@ -33,19 +115,6 @@ class ConvergenceError(RuntimeError):
         )
         self.residual = residual
         self.iterations = iterations
-
-
-class Ends(NamedTuple):
-    """Boundary conditions of N problems: rotations and body angular velocities at t = 0 and 1."""
-
-    R0: Array
-    R1: Array
-    w0: Array
-    w1: Array
-
-    def of(self, which: NDArray[np.bool_] | NDArray[np.intp] | slice) -> "Ends":
-        """Return some of the problems."""
-        return Ends(*(array[which] for array in self))
 
 
 class Solution(NamedTuple):
@@ -111,16 +180,6 @@ def along(matrix: Array, values: Array) -> Array:
     return (matrix @ values.reshape(count, n, -1)).reshape(count, -1, *values.shape[2:])
 
 
-def hats(w: Array) -> Array:
-    """Return `hat_so3` of (..., 3), unchecked."""
-    return (w @ BASIS_SO3.reshape(3, 9)).reshape(*w.shape, 3)
-
-
-def vees(W: Array) -> Array:
-    """Return `vee_so3` of (..., 3, 3), unchecked."""
-    return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
-
-
 def in_body(R: Array, c: Array) -> Array:
     """Return Rᵀc at the nodes, shape (N, n, 3)."""
     return (c[:, None, None] @ R)[:, :, 0]
@@ -137,7 +196,7 @@ class MinimumAcceleration(Curve):
     Attributes
     ----------
     ends : Ends
-        R0, R1, w0, w1, with one batch axis: one entry for each problem, in their order.
+        The boundary conditions, with one batch axis: one entry for each problem.
     converged : bool, or ndarray of bool, shape (...)
         Where a solution was found. Elsewhere the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
@@ -162,6 +221,9 @@ class MinimumAcceleration(Curve):
             nodes[i], c[i] = len(solution.R), solution.c
         same = [np.flatnonzero(nodes == n) for n in np.unique(nodes[nodes > 0])]
         self._parts = [(index, np.stack([found[int(i)].R for i in index])) for index in same]
+        self._part, self._place = np.full((2, len(solutions)), -1)
+        for number, index in enumerate(same):
+            self._part[index], self._place[index] = number, np.arange(len(index))
         residual = np.array([s.residual for s in solutions], float)
         iterations = np.array([s.iterations for s in solutions], int)
         self.c = c.reshape(*batch_shape, 3)
@@ -191,44 +253,34 @@ class MinimumAcceleration(Curve):
         c = self.c.reshape(-1, 3)
         return [_rates(self.ends.of(i), in_body(R, c[i])) for i, R in self._parts]
 
-    def _pick(self, chosen: Chosen) -> Self:
-        numbers = chosen.reshape(-1)
+    def _picked(self, chosen: Any) -> Self:
+        numbers = np.reshape(chosen, -1)
         solutions = [self._solutions[i] for i in numbers]
-        return type(self)(self.ends.of(numbers), solutions, chosen.shape)
-
-    @cached_property
-    def _places(self) -> dict[int, tuple[int, int]]:
-        """For each problem that is solved the number of its part, and its place there."""
-        indices = enumerate(index for index, _ in self._parts)
-        return {int(i): (part, place) for part, index in indices for place, i in enumerate(index)}
+        return type(self)(self.ends.of(numbers), solutions, np.shape(chosen))
 
     def _series(self, order: int) -> list[Array]:
         """Return the Chebyshev series of R, w or w', for each number of nodes."""
         return [part[order - 1] for part in self._velocities] if order else self._rotations
 
-    def _write_each(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        parts = self._series(order)
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         out[...] = np.nan
-        for curve, run in runs(which):
-            if curve in self._places:
-                part, place = self._places[curve]
-                series = parts[part][place]
-                value = chebyshev(t[run], len(series)) @ series.reshape(len(series), -1)
-                out[run] = value.reshape(-1, *out.shape[1:])
+        part, place = self._part[which], self._place[which]
+        for number, series in enumerate(self._series(order)):
+            there = np.flatnonzero(part == number)
+            if there.size:
+                times = t if t.shape[1] == 1 else t[:, there]
+                weights = np.moveaxis(chebyshev(times, series.shape[1]), -1, 0)
+                terms = series.reshape(*series.shape[:2], -1).swapaxes(0, 1)
+                values = np.empty((len(t), len(there), terms.shape[2]))
+                combine(weights, terms, place[there], values)
+                out[:, there] = values.reshape(*values.shape[:2], *self._core(order))
         if order == 0:
             out[...] = orthogonal(out)
 
-    def _evaluate(self, t: Array, order: int) -> Array:
-        core = (3,) if order else (3, 3)
-        times = t.reshape(-1)
-        values = np.full((len(times), len(self.ends.w0), *core), np.nan)
-        for (index, _), part in zip(self._parts, self._series(order), strict=True):
-            series = part.swapaxes(0, 1)
-            value = chebyshev(times, len(series)) @ series.reshape(len(series), -1)
-            values[:, index] = value.reshape(len(times), len(index), *core)
-        time_shape = t.shape[: t.ndim - len(self.batch_shape)]
-        values = values.reshape(*time_shape, *self.batch_shape, *core)
-        return values if order else orthogonal(values)
+    def __repr__(self) -> str:
+        """Return what it is, what it costs, and what is left of the equation."""
+        cost = np.array2string(np.asarray(self.cost), precision=6, threshold=6)
+        return f"{super().__repr__()[:-1]}, cost {cost}, residual < {np.max(self.residual):.0e}>"
 
 
 def velocity(ends: Ends, jerk: Array) -> Array:
@@ -239,7 +291,7 @@ def velocity(ends: Ends, jerk: Array) -> Array:
 
 def defects(ends: Ends, R: Array, c: Array) -> tuple[Array, Array]:
     """Return E = R0 + ∫ R ŵ − R at the nodes, with R w'' = c, and ŵ."""
-    W = hats(velocity(ends, in_body(R, c)))
+    W = hat(velocity(ends, in_body(R, c)))
     return ends.R0[:, None] + along(grid(R.shape[1]).integral, R @ W) - R, W
 
 
@@ -259,13 +311,6 @@ def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
     return w, acceleration
 
 
-CLOSE = 2.0  # with legs whose costs are within this factor both ways round are tried
-COARSE = 17  # nodes, on which guesses are made and systems solved
-
-Guess = Callable[[int], Array]
-"""Rotations at the nodes, when told how many: shape (N, n, 3, 3)."""
-
-
 def from_curve(curve: Callable[[Array], Array]) -> Guess:
     """Return a guess: a stack of curves at the nodes, kept for the next time."""
     return cache(lambda n: np.moveaxis(curve(grid(n).t), 0, 1))
@@ -275,7 +320,7 @@ def first_guess(ends: Ends, R: Array) -> tuple[Array, Array]:
     """Return R of a guess with the right ends, and c for which w'' = Rᵀc gives w most nearly."""
     nodes, R = grid(R.shape[1]), R.copy()
     R[:, 0], R[:, -1] = ends.R0, ends.R1
-    w = vees(R.mT @ along(nodes.derivative, R))
+    w = vee(R.mT @ along(nodes.derivative, R))
     lacking = (w - velocity(ends, np.zeros_like(w))).reshape(len(R), -1, 1)
     effect = along(nodes.twice, R.mT).reshape(len(R), -1, 3)
     return R, np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0]
@@ -284,9 +329,7 @@ def first_guess(ends: Ends, R: Array) -> tuple[Array, Array]:
 Solver = Callable[[Ends, Guess], list[Solution | Failure]]
 
 
-def solve(
-    solver: Solver, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
-) -> MinimumAcceleration:
+def solve(solver: Solver, given: Ends) -> MinimumAcceleration:
     """Solve from a cumulative Bézier curve, its middle leg turned the short way or the other.
 
     The cheaper of the two is as a rule next to the cheaper optimum. Where the costs of both, worked
@@ -295,8 +338,6 @@ def solve(
 
     Raises
     ------
-    ValueError
-        If an argument is not finite or not of its shape, or the batches do not broadcast.
     ConvergenceError
         If both fail, for a single problem.
 
@@ -305,12 +346,9 @@ def solve(
     RuntimeWarning
         If both fail, for some of a stack.
     """
-    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
-    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
-    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
-    rotations = (np.broadcast_to(nearest(R)[0], (*batch, 3, 3)).reshape(-1, 3, 3) for R in (R0, R1))
-    velocities = (np.broadcast_to(w, (*batch, 3)).reshape(-1, 3) for w in (w0, w1))
-    ends = Ends(*rotations, *velocities)
+    batch, ends = given.w0.shape[:-1], given.flat()
+    R0, R1 = (nearest(R)[0] for R in ends[:2])  # written with few digits, (19) would not settle
+    ends = ends._replace(R0=R0, R1=R1)
     with np.errstate(over="ignore", invalid="ignore"):
         solutions = _solutions(solver, ends)
     if not batch and isinstance(solutions[0], Failure):
@@ -380,7 +418,7 @@ def _warn_if_not_converged(curve: MinimumAcceleration) -> None:
 
 
 def _attempt(solver: Solver, ends: Ends, guess: Guess) -> list[Solution | Failure]:
-    """Count what is singular or no number any more as not solved; in a stack, one by one."""
+    """Treat singular or non-finite problems as failures, one problem at a time."""
     try:
         return solver(ends, guess)
     except (FloatingPointError, np.linalg.LinAlgError, ValueError):
@@ -392,3 +430,167 @@ def _attempt(solver: Solver, ends: Ends, guess: Guess) -> list[Solution | Failur
 
 def _part(guess: Guess, which: slice) -> Guess:
     return lambda n: guess(n)[which]
+
+
+def relax(ends: Ends, guess: Guess) -> list[Solution | Failure]:
+    """Solve (19) for a stack, from 17 nodes on; what fails, from 33 nodes on."""
+    found: list[Solution | Failure] = []
+    for block in blocks(len(ends.w0), _BLOCK):
+        found += _refine(ends.of(block), guess(COARSE)[block])
+    failed = [i for i, solution in enumerate(found) if isinstance(solution, Failure)]
+    for block in blocks(len(failed), _BLOCK):
+        again = np.array(failed[block])
+        for i, solution in zip(again, _refine(ends.of(again), guess(33)[again]), strict=True):
+            found[i] = solution
+    return found
+
+
+def _refine(ends: Ends, R: Array) -> list[Solution | Failure]:
+    """Solve (19) on the nodes of the guess, then on more until the coefficients have decayed."""
+    found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
+    intervals = R.shape[1] - 1
+    R, c = first_guess(ends, R)
+    rough = _newton(_State(np.arange(len(R)), ends, R, c, np.zeros(len(R), int)), 1, found)
+    stride = 1
+    while rough and stride < 16:
+        stride *= 2
+        R = orthogonal(along(_interpolation(rough.R.shape[1], intervals * stride + 1), rough.R))
+        R[:, 0], R[:, -1] = rough.ends.R0, rough.ends.R1
+        rough = _newton(rough._replace(R=R), stride, found)
+    return found
+
+
+class _State(NamedTuple):
+    """How far the problems are that are still worked at, and which they are."""
+
+    which: NDArray[np.intp]
+    ends: Ends
+    R: Array
+    c: Array
+    steps: NDArray[np.intp]
+
+    def of(self, part: NDArray[np.bool_]) -> _State:
+        """Return some of them."""
+        if part.all():
+            return self
+        which, ends, R, c, steps = self
+        return _State(which[part], ends.of(part), R[part], c[part], steps[part])
+
+
+def _joined(states: list[_State]) -> _State:
+    which, ends, R, c, steps = zip(*states, strict=True)
+    joined = Ends(*(np.concatenate(array) for array in zip(*ends, strict=True)))
+    return _State(np.concatenate(which), joined, *map(np.concatenate, (R, c, steps)))
+
+
+def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State | None:
+    """Improve R and c, no node turned about any axis of the frame by more than half a rad at once.
+
+    What is solved, or fails, is written into `found`; what wants more nodes is returned.
+    """
+    size = before = np.full(len(now.R), np.inf)
+    finer = []
+    for _ in range(STEPS):
+        E, W = defects(now.ends, now.R, now.c)
+        left = np.abs(E).max(axis=(1, 2, 3))
+        left[np.isnan(left)] = np.inf
+        if stride == 1:
+            solved, enough = np.zeros(len(left), bool), size < ROUGH
+        else:
+            tail, stalled = tails(now.R), (size < 1e-6) & (left > before / 2)
+            solved = (tail < EXACT) & (left < EXACT)
+            enough = (stalled | (tail > EXACT) & (size < 1e3 * tail)) & ~solved
+        done = solved | enough | ~np.isfinite(left)
+        if done.any():
+            for i in np.flatnonzero(done):
+                outcome = float(left[i]), int(now.steps[i])
+                found[now.which[i]] = (
+                    Solution(now.R[i], now.c[i], *outcome) if solved[i] else Failure(*outcome)
+                )
+            if enough.any():
+                finer.append(now.of(enough))
+            if done.all():
+                break
+            now, E, W, left, size = now.of(~done), E[~done], W[~done], left[~done], size[~done]
+        turn, dc = _newton_step(now.R, now.c, E, W, stride)
+        size, before = np.abs(turn).max(axis=(1, 2)), left
+        share = LONGEST_STEP / np.maximum(size, LONGEST_STEP)
+        R, c = _turned(now.R, share[:, None, None] * turn), now.c + share[:, None] * dc
+        now = _State(now.which, now.ends, R, c, now.steps + 1)
+    else:
+        for k, where in enumerate(now.which):
+            found[where] = Failure(float(left[k]), int(now.steps[k]))
+    return _joined(finer) if len(finer) > 1 else next(iter(finer), None)
+
+
+def _turned(R: Array, turn: Array) -> Array:
+    """Return the rotations R turned, in the fixed frame, by Cayley's formula: 2 tan(a/2) for a."""
+    H = hat(turn)
+    share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
+    HR = H @ R
+    return R + share[..., None, None] * (HR + H @ HR / 2)
+
+
+def _newton_step(R: Array, c: Array, E: Array, W: Array, stride: int) -> tuple[Array, Array]:
+    """Return the turns ε of the nodes, in the fixed frame, and the change of c.
+
+    With w'' = Rᵀc, so w = (1 − t) w0 + t w1 + G Rᵀc, the unknowns are R and c. The equation is
+    R' = R ŵ in integral form; its defect is E = R0 + ∫ R ŵ − R. When ε turns R, Rᵀc changes by
+    Rᵀ(ĉ ε + dc), and to first order
+
+        ε = d + ∫ R G Rᵀ (ĉ ε + dc),    d = vee(E Rᵀ + ∫ E ŵ Rᵀ),
+
+    with ε = 0 at the end. It is solved for ĉ ε on every `stride`-th node; the integrals smooth so
+    much that the right side, worked out on all nodes, is as good as a solution on all of them.
+    """
+    nodes, Rt = grid(R.shape[1]), np.ascontiguousarray(R.mT)  # faster to multiply with
+    defect = vee(E @ Rt + along(nodes.integral, E @ W @ Rt))
+    coarse = _coarse_causes(R[:, ::stride], c, defect[:, ::stride])
+    causes = along(_interpolation(coarse.shape[1], len(nodes.t)), coarse)
+    causes[..., 1:] += np.eye(3)
+    effects = along(nodes.integral, R @ along(nodes.twice, Rt @ causes))
+    effects[..., 0] += defect
+    dc = -np.linalg.solve(effects[:, -1, :, 1:], effects[:, -1, :, :1])[..., 0]
+    return effects[..., 0] + (effects[..., 1:] @ dc[:, None, :, None])[..., 0], dc
+
+
+def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
+    """Return ĉ ε that comes from d and from each unit of dc, at the nodes, shape (N, n, 3, 4).
+
+    Only the two components of ε across c count: a linear system for each problem, for these.
+    """
+    count, n = R.shape[:2]
+    nodes, (across, ahead) = grid(n), _across(c)
+    rows, causes = ((x[:, None] @ R).reshape(count, 2 * n, 3) for x in (across, -ahead.mT))
+    between = (rows @ causes.mT) * _for_each_entry(n)
+    system = along(nodes.integral, between.reshape(count, n, -1)).reshape(count, 2 * n, 2 * n)
+    np.einsum("...ii->...i", system)[...] += 1
+    by_c = along(nodes.integral, R @ along(nodes.twice, R.mT))
+    right = across[:, None] @ np.concatenate([defect[..., None], by_c], axis=-1)
+    x = np.linalg.solve(system, right.reshape(count, 2 * n, 4)).reshape(count, n, 2, 4)
+    return ahead[:, None] @ x
+
+
+def _across(c: Array) -> tuple[Array, Array]:
+    """Return two unit vectors across c as rows, shape (N, 2, 3), and c × both as columns.
+
+    They are rows of Householder's reflection that takes c to the third axis.
+    """
+    v = c.copy()
+    v[:, 2] += np.copysign(np.sqrt(np.sum(c * c, axis=-1)), c[:, 2])
+    square = np.sum(v * v, axis=-1)
+    twice = v * (2 / np.where(square == 0, 1, square))[:, None]
+    across = np.eye(2, 3) - v[:, :2, None] * twice[:, None]
+    return across, hat(c) @ across.mT
+
+
+@lru_cache
+def _for_each_entry(n: int) -> Array:
+    """Return the Kronecker product of `twice` with the 2 × 2 matrix of ones."""
+    return np.kron(grid(n).twice, np.ones((2, 2)))
+
+
+@lru_cache
+def _interpolation(few: int, many: int) -> Array:
+    """Return the matrix that goes from the values at some nodes to those at more."""
+    return chebyshev(grid(many).t, few) @ grid(few).series

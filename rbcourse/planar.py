@@ -1,14 +1,23 @@
-"""Rigid bodies in the plane: poses (x, y, theta), the group SE(2), paths.
+"""Rigid bodies in the plane: poses (x, y, theta), the group SE(2), plans and paths.
 
-A pose (x, y, theta) keeps its turns: theta and theta + 2π are the same place of the body, reached
-after another turn. A twist is (vx, vy, omega), in the order of the poses.
+A pose (x, y, theta) counts full turns: theta and theta + 2π are the same orientation, reached after
+another turn. A twist is (vx, vy, omega), in the order of the poses. A plan is a list of commands
+(velocity, duration); a path is an array of states, one row each.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, check_broadcast, scaled, sinc
-from rbcourse.plans import Plan, interpolate, propagate
+from rbcourse._checks import as_count, as_finite, as_single, check_broadcast
+from rbcourse._numerics import Array, scaled, sinc
+
+Plan: TypeAlias = Iterable[tuple[ArrayLike, float]]
+Commands: TypeAlias = list[tuple[Array, float]]
 
 
 def matrix_from_planar(pose: ArrayLike) -> Array:
@@ -59,8 +68,8 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 3, 3)
-        Elements of SE(2). Of what is none the rotation nearest to the upper left block counts;
-        the last row is not read.
+        Elements of SE(2). The rotation nearest to the upper left block is used; the last row is
+        not read.
 
     Returns
     -------
@@ -366,3 +375,69 @@ def _rotated(theta: Array, vector: Array) -> Array:
 def _short(angle: Array) -> Array:
     """Return angles without their full turns; what is within π is left alone."""
     return np.where(np.abs(angle) <= np.pi, angle, np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def as_plan(plan: Plan, size: int | str) -> Commands:
+    """Return a plan as a list of commands, all of them checked.
+
+    `size` is how many numbers a velocity has; "n" takes any.
+
+    Raises
+    ------
+    ValueError
+        If the plan or a command is malformed; the message says which and why.
+    """
+    try:
+        commands = iter(plan)
+    except TypeError as error:
+        raise ValueError(f"plan: a list of (velocity, duration) wanted, got {plan!r}") from error
+    return [as_command(f"plan[{i}]", command, size) for i, command in enumerate(commands)]
+
+
+def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> tuple[Array, float]:
+    """Return one command as arrays; `name` is how it is called in messages."""
+    try:
+        velocity, duration = command
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: (velocity, duration) wanted, got {command!r}") from error
+    d = float(as_single(f"{name} duration", duration))
+    if d < 0:
+        raise ValueError(f"{name} duration is {d}, a duration from 0 up is wanted")
+    return as_single(f"{name} velocity", velocity, size), d
+
+
+def as_states(path: ArrayLike) -> Array:
+    """Return a path as an array of shape (states, k), at least one state.
+
+    Raises
+    ------
+    ValueError
+        If it is none; the message names the first entry that is not finite.
+    """
+    return as_single("path", path, "states", "k")
+
+
+def interpolate(start: Array, goal: Array, steps: int) -> Array:
+    """Return (1 − t) start + t goal at steps + 1 even times t in [0, 1], time first.
+
+    Entries that are equal at both ends stay exactly equal.
+    """
+    t = np.linspace(0, 1, as_count("steps", steps) + 1)
+    batch = check_broadcast(start=(start, 1), goal=(goal, 1))
+    t = t.reshape(-1, *[1] * (len(batch) + 1))
+    return np.where(start == goal, start, (1 - t) * start + t * goal)
+
+
+def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = np.add) -> Array:
+    """Return the states from a start on, one more than commands, time first.
+
+    Each is ``move(state, velocity * duration)`` of the one before it.
+    """
+    path = [start]
+    for i, (velocity, duration) in enumerate(as_plan(plan, start.shape[-1])):
+        try:
+            with np.errstate(over="raise"):
+                path.append(move(path[-1], velocity * duration))
+        except FloatingPointError as error:
+            raise ValueError(f"plan[{i}] leads beyond all numbers") from error
+    return np.array(path)

@@ -1,20 +1,22 @@
 """The nearest rotation, the nearest pose, and membership: in any dimension n."""
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import (
-    EPS,
-    Array,
+from rbcourse._checks import (
     as_array,
     as_finite,
     as_symmetric,
     as_tolerance,
     check_broadcast,
     first_index,
-    scaled,
 )
-from rbcourse.foam import nearest_rotations
+from rbcourse._foam import nearest_rotations
+from rbcourse._numerics import EPS, Array, scaled
+
+NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see margin)"
 
 
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -376,3 +378,16 @@ def project_se(B: ArrayLike) -> Array:
     A[..., :-1, :-1] = project_so(A[..., :-1, :-1])
     A[..., -1, :] = np.eye(A.shape[-1])[-1]
     return A
+
+
+def warn_if_nearly_singular(margin: Array) -> None:
+    """Warn of the first curve of a stack whose margin is below 1e-6."""
+    low = np.argwhere(np.asarray(margin) < 1e-6)
+    if len(low):
+        which = f" of curve {[int(i) for i in low[0]]}" if len(low[0]) else ""
+        warnings.warn(
+            f"margin < 1e-6{which}: at some time the nearest rotation is nearly not unique, and "
+            "the curve almost jumps there",
+            RuntimeWarning,
+            stacklevel=4,
+        )

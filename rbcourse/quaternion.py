@@ -3,9 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import (
-    EPS,
-    Array,
+from rbcourse._checks import (
     as_array,
     as_finite,
     as_time,
@@ -13,8 +11,10 @@ from rbcourse._numerics import (
     as_unit,
     check_broadcast,
     first_index,
-    sinc,
 )
+from rbcourse._jets import multiply
+from rbcourse._jets import slerp as slerp_jet
+from rbcourse._numerics import EPS, Array
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -87,9 +87,7 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """
     p, q = as_finite("p", p, 4), as_finite("q", q, 4)
     check_broadcast(p=(p, 1), q=(q, 1))
-    (a, u), (b, v) = _split(p), _split(q)
-    scalar = a * b - np.sum(u * v, axis=-1, keepdims=True)
-    return np.concatenate([scalar, a * v + b * u + np.cross(u, v)], axis=-1)
+    return np.moveaxis(multiply(np.moveaxis(p, -1, 0), np.moveaxis(q, -1, 0)), 0, -1)
 
 
 def quaternion_conjugate(q: ArrayLike) -> Array:
@@ -221,7 +219,8 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     array([[ 0.6,  0. , -0.8,  0. ],
            [ 0. ,  1. ,  0. ,  0. ]])
     """
-    w, v = _split(as_finite("q", q, 4))
+    q = as_finite("q", q, 4)
+    w, v = q[..., :1], q[..., 1:]
     half_turn = np.abs(w) < 4 * EPS
     size = np.abs(v)
     first = np.argmax(size > size.max(axis=-1, keepdims=True) - 1e-8, axis=-1)[..., None]
@@ -271,12 +270,15 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
            [0.   , 0.   , 0.   , 1.   ]])
     """
     q0, q1 = as_finite("q0", q0, 4), as_finite("q1", q1, 4)
-    u = as_time(t, len(check_broadcast(q0=(q0, 1), q1=(q1, 1))) + 1)
-    q1 = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1)
-    angle = 2 * np.arctan2(_norm(q1 - q0), _norm(q1 + q0))
-    weight0 = (1 - u) * sinc((1 - u) * angle) / sinc(angle)
-    weight1 = u * sinc(u * angle) / sinc(angle)
-    return weight0 * q0 + weight1 * q1
+    batch = check_broadcast(q0=(q0, 1), q1=(q1, 1))
+    u = as_time(t, len(batch))
+    nearer = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1)
+    arc = (
+        np.moveaxis(np.broadcast_to(q, (*batch, 4)), -1, 0).reshape(4, *[1] * np.ndim(t), *batch)
+        for q in (q0, nearer)
+    )
+    (value,) = slerp_jet(*([q] for q in arc), [u])
+    return np.moveaxis(value, 0, -1)
 
 
 def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
@@ -328,7 +330,3 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
 
 def _norm(q: Array) -> Array:
     return np.linalg.norm(q, axis=-1, keepdims=True)
-
-
-def _split(q: Array) -> tuple[Array, Array]:
-    return q[..., :1], q[..., 1:]

@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_single
+from rbcourse._checks import as_single
+from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.draw.animate import Animation, animate
 from rbcourse.draw.arm import arm_table, describe_arm, moving_arm
 from rbcourse.draw.plane import describe_route, extent_of, moving_route, route_table
-from rbcourse.planar import interpolate_planar, propagate_planar
-from rbcourse.plans import Plan, as_path
+from rbcourse.planar import Plan, as_states, interpolate_planar, propagate_planar
 
 
 def interpolate_rigid_body(
@@ -263,7 +263,7 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     (2, 1.5) m; its way is drawn in red.
     >>> plt.close(figure)
     """
-    states = as_path(path)
+    states = as_states(path)
     data = arm_table(states, lengths)
     return _show("arm_path", describe_arm(data), len(states), moving_arm, data)
 

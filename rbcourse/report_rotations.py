@@ -12,7 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import Array, Rng, as_count, as_generator, as_single, as_tolerance, as_unit
+from rbcourse._checks import Rng, as_count, as_generator, as_single, as_tolerance, as_unit
+from rbcourse._numerics import Array
 from rbcourse.conversions import rotation_vector_from_quaternion
 from rbcourse.draw.animate import Animation, animate
 from rbcourse.draw.save import Table

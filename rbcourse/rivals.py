@@ -1,19 +1,36 @@
-"""Other closed forms with the ends of the projected cubic: the roads that BK 1 names, and kin."""
+"""Five other closed forms with the boundary conditions of the projected cubic (BK section 1).
+
+Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import first_index
-from rbcourse.quaternion_curves import (
-    Bezier,
-    CayleyCubic,
-    CumulativeBezier,
-    ExponentialCubic,
-    QuaternionCubic,
-    bezier_legs,
-    to_given,
+from rbcourse._checks import check_order, first_index
+from rbcourse._jets import Jet, angular_velocity, exp, multiply, product, rotation, slerp
+from rbcourse._numerics import EPS, Array
+from rbcourse.conversions import quaternion_from_matrix
+from rbcourse.curves import (
+    Chosen,
+    Curve,
+    Ends,
+    check_ends,
+    events_of,
+    least_over_time,
+    which_curve,
 )
-from rbcourse.so3 import log_so3
+from rbcourse.projected_cubic import projected_cubic_so3
+from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
+from rbcourse.so3 import exp_so3, log_so3, right_jacobian_inverse_so3
+
+Legs = tuple[Array, Array, Array]
 
 
 def exponential_cubic_so3(
@@ -24,7 +41,7 @@ def exponential_cubic_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -64,8 +81,8 @@ def exponential_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    given = to_given(R0, R1, w0, w1)
-    return ExponentialCubic(given, log_so3(given.turn))
+    ends = check_ends(R0, R1, w0, w1)
+    return ExponentialCubic(ends, log_so3(ends.turn))
 
 
 def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Bezier:
@@ -74,7 +91,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
 
@@ -115,15 +132,15 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    given = to_given(R0, R1, w0, w1)
-    for name, w in (("w0", w0), ("w1", w1)):
+    ends = check_ends(R0, R1, w0, w1)
+    for name, w in (("w0", ends.w0), ("w1", ends.w1)):
         speed = np.linalg.norm(w, axis=-1)
         fast = speed >= 3 * np.pi
         if fast.any():
             raise ValueError(
                 f"{first_index(name, fast)}: a norm below 3π is wanted, got {speed[fast][0]:.4g}"
             )
-    return Bezier(given, bezier_legs(given))
+    return Bezier(ends, bezier_legs(ends))
 
 
 def cumulative_bezier_so3(
@@ -134,7 +151,7 @@ def cumulative_bezier_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -174,8 +191,8 @@ def cumulative_bezier_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    given = to_given(R0, R1, w0, w1)
-    return CumulativeBezier(given, bezier_legs(given))
+    ends = check_ends(R0, R1, w0, w1)
+    return CumulativeBezier(ends, bezier_legs(ends))
 
 
 def quaternion_cubic_so3(
@@ -186,7 +203,7 @@ def quaternion_cubic_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1; what is none is not repaired (see `project_so`).
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -231,7 +248,7 @@ def quaternion_cubic_so3(
     >>> float(c.margin.round(3))
     0.933
     """
-    return QuaternionCubic(to_given(R0, R1, w0, w1))
+    return QuaternionCubic(check_ends(R0, R1, w0, w1))
 
 
 def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> CayleyCubic:
@@ -240,8 +257,8 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1, no half-turn apart; what is none is not repaired (see
-        `project_so`).
+        Rotation matrices at t = 0 and 1, no half-turn apart. Validity is not checked; see
+        `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -282,4 +299,265 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return CayleyCubic(to_given(R0, R1, w0, w1))
+    return CayleyCubic(check_ends(R0, R1, w0, w1))
+
+
+CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
+    "projection": projected_cubic_so3,
+    "exponential": exponential_cubic_so3,
+    "Bézier": bezier_so3,
+    "cumulative": cumulative_bezier_so3,
+    "quaternion": quaternion_cubic_so3,
+    "Cayley": cayley_cubic_so3,
+}
+"""The closed forms for two rotations and two angular velocities, with their names in figures."""
+
+
+def bezier_legs(ends: Ends) -> Legs:
+    """Return the turns from each of Bézier's control points to the next, the shortest."""
+    first, last = ends.w0 / 3, ends.w1 / 3
+    return first, log_so3(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
+
+
+def other_way(turn: Array) -> Array:
+    """Return the turns to the same rotations the other way round, by 2π − angle; of 0, itself."""
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
+
+
+class QuaternionCurve(Curve):
+    """A `Curve` that is R0 times the rotation of Q(t), unless a subclass starts elsewhere.
+
+    References
+    ----------
+    BK 1.
+    """
+
+    per_curve: ClassVar[dict[str, int]] = {"_start": 2, "_controls": 3}
+    _controls: Array
+    """What Q is made of, shape (n, components, 1, ...)."""
+
+    def __init__(self, ends: Ends) -> None:
+        self.batch_shape = ends.w0.shape[:-1]
+        self._start = _components(quaternion_from_matrix(ends.R0))
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return the jet of Q at the times t, from the controls of the curves."""
+        raise NotImplementedError
+
+    def _check(self, Q: Array, controls: Array, t: Array, which: Chosen) -> None:
+        """Raise a SingularTime where Q has no direction."""
+
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        controls = np.take(self._flat(self._controls, 3), which, axis=-1)
+        Q = self._quaternion(controls, t, order)
+        self._check(Q[0], controls, t, which)
+        if order == 0:
+            start = np.take(self._flat(self._start, 2), which, axis=-1)
+            out[...] = rotation(multiply(start, Q[0]))
+        else:
+            out[...] = np.moveaxis(angular_velocity(Q), 0, -1)
+
+
+class ExponentialCubic(QuaternionCurve):
+    """The `Curve` R0 exp(σ̂(t)), σ a cubic; σ(1) is any logarithm of the turn."""
+
+    def __init__(self, ends: Ends, turn: Array) -> None:
+        super().__init__(ends)
+        end_rate = (right_jacobian_inverse_so3(turn) @ ends.w1[..., None])[..., 0]
+        vectors = np.zeros_like(turn), turn, ends.w0, end_rate
+        self._controls = np.stack([_components(x / 2) for x in vectors])
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        return exp(_cubic(controls, t, order))
+
+
+class CumulativeBezier(QuaternionCurve):
+    """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), β the cumulative Bernstein polynomials."""
+
+    def __init__(self, ends: Ends, legs: Legs) -> None:
+        super().__init__(ends)
+        self._controls = np.stack([_components(leg / 2) for leg in legs])
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        s = 1 - t
+        shares: list[Jet] = [
+            [t * (1 + s + s * s), 3 * s * s, -6 * s],
+            [t * t * (1 + 2 * s), 6 * t * s, 6 * (s - t)],
+            [t * t * t, 3 * t * t, 6 * t],
+        ]
+        first, second, third = (
+            exp([beta * half for beta in share[: order + 1]])
+            for share, half in zip(shares, controls, strict=True)
+        )
+        return product(product(first, second), third)
+
+
+class Bezier(QuaternionCurve):
+    """The `Curve` of de Casteljau's construction, geodesics in the place of straight lines."""
+
+    def __init__(self, ends: Ends, legs: Legs) -> None:
+        super().__init__(ends)
+        start, first, second, third = (
+            exp([_components(leg / 2)])[0] for leg in (np.zeros_like(ends.w0), *legs)
+        )
+        last = multiply(multiply(first, second), third)
+        self._controls = np.stack([start, first, multiply(first, second), last])
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        share = [t, np.ones_like(t), np.zeros_like(t)][: order + 1]
+        points = [[point, *[np.zeros_like(point)] * order] for point in controls]
+        while len(points) > 1:
+            points = [slerp(a, b, share) for a, b in pairwise(points)]
+        return points[0]
+
+
+class NormalizedCubic(QuaternionCurve):
+    """The `Curve` of a cubic of quaternions, of norm 1 at its start and of another at its end.
+
+    Its components are those seen from the goal: there Q(1) is real, and does not round w1 away,
+    however large it is.
+    """
+
+    def __init__(self, ends: Ends, norm: Array, growth: Array) -> None:
+        super().__init__(ends)
+        turn = quaternion_from_matrix(ends.turn)
+        self._start = multiply(self._start, _components(turn))
+        start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
+        end_rate = growth[..., None] * one + _rate(one, ends.w1)
+        cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
+        self._controls = np.stack([_components(x) for x in cubic])
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        return _cubic(controls, t, order)
+
+
+class QuaternionCubic(NormalizedCubic):
+    """The `Curve` of the unit quaternions nearest to a cubic between unit quaternions.
+
+    Attributes
+    ----------
+    margin : ndarray, shape (...)
+        The least norm of the cubic. At 0 the nearest unit quaternion is not unique.
+    margin_time : ndarray, shape (...)
+        When that is.
+    """
+
+    def __init__(self, ends: Ends) -> None:
+        norm = np.ones(ends.w0.shape[:-1])
+        super().__init__(ends, norm, 0 * norm)
+
+    def _check(self, Q: Array, controls: Array, t: Array, which: Chosen) -> None:
+        lost = np.abs(Q).max(axis=0) < 8 * EPS * np.abs(controls).max(axis=(0, 1))
+        self._check_defined(t, which, lost, "the cubic of quaternions is zero")
+
+    @property
+    def margin(self) -> Array:
+        """The least norm of the cubic."""
+        return self._least[1]
+
+    @property
+    def margin_time(self) -> Array:
+        """When the margin is reached."""
+        return self._least[0]
+
+    @cached_property
+    def _least(self) -> tuple[Array, Array]:
+        def norm(t: Array) -> Array:
+            return np.linalg.norm(_cubic(self._controls, t, 0)[0], axis=0)
+
+        return least_over_time(norm, self.batch_shape)
+
+    def _events(self) -> list[tuple[float, float]]:
+        return events_of(self.margin_time, self.margin)
+
+
+class CayleyCubic(NormalizedCubic):
+    """The `Curve` of a cubic in Cayley's parameters.
+
+    Attributes
+    ----------
+    quickest : tuple of ndarray, shape (...)
+        When it turns most quickly, and about how long it takes for a radian then.
+    """
+
+    def __init__(self, ends: Ends) -> None:
+        turn = quaternion_from_matrix(ends.turn)
+        infinite = np.flatnonzero(turn[..., 0] == 0)
+        if len(infinite):
+            which = which_curve(infinite[0], turn.shape[:-1])
+            raise ValueError(f"R0 and R1{which} are a half-turn apart: no Cayley parameters")
+        growth = np.sum(turn[..., 1:] * ends.w1, axis=-1) / (2 * turn[..., 0])
+        super().__init__(ends, 1 / turn[..., 0], growth)
+
+    @cached_property
+    def quickest(self) -> tuple[Array, Array]:
+        """When it turns most quickly, and about how long it takes for a radian then."""
+
+        def time_for_a_radian(t: Array) -> Array:
+            Q, rate = (np.linalg.norm(x, axis=0) for x in _cubic(self._controls, t, 1))
+            return Q / (1 + rate)
+
+        return least_over_time(time_for_a_radian, self.batch_shape)
+
+    def _events(self) -> list[tuple[float, float]]:
+        return list(zip(*map(np.ravel, self.quickest), strict=True))
+
+
+def _components(x: Array) -> Array:
+    """Return vectors of shape (..., n) as (n, 1, ...): the components first, then the times."""
+    return np.ascontiguousarray(np.moveaxis(x, -1, 0))[:, None]
+
+
+def _cubic(ends: Array, t: Array, order: int) -> Jet:
+    return [hermite(ends, t, k) for k in range(order + 1)]
+
+
+def _rate(q: Array, w: Array) -> Array:
+    """Return q' = q (0, w)/2."""
+    return quaternion_multiply(q, np.concatenate([np.zeros_like(w[..., :1]), w], axis=-1)) / 2
+
+
+def hermite(ends: Sequence[ArrayLike], t: Array, order: int = 0) -> Array:
+    """Return that cubic, or one of its first two derivatives, at the times t.
+
+    Written by its ends, it meets them exactly, however they differ in size.
+
+    Parameters
+    ----------
+    ends : sequence of array_like
+        x0, x1, v0, v1, as for `cubic_coefficients`.
+    t : ndarray
+        The times; they broadcast with the ends.
+    order : {0, 1, 2}, optional
+        Which derivative.
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    ValueError
+        If `order` is another.
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
+    array([0. , 0.5, 1. ])
+    """
+    check_order(order)
+    weights: list[Array]
+    s = 1 - t
+    if order == 0:
+        weights = [s * s * (1 + 2 * t), t * t * (1 + 2 * s), t * s * s, -t * t * s]
+    elif order == 1:
+        weights = [-6 * t * s, 6 * t * s, s * (1 - 3 * t), t * (1 - 3 * s)]
+    else:
+        weights = [6 * (t - s), 6 * (s - t), 2 - 6 * s, 6 * t - 2]
+    first, *others = (w * x for w, x in zip(weights, map(np.asarray, ends), strict=True))
+    return sum(others, first)

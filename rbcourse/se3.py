@@ -6,7 +6,9 @@ A twist is (ω, v): the angular velocity and the velocity of the origin, both in
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, check_broadcast
+from rbcourse._checks import as_finite, as_single, check_broadcast
+from rbcourse._numerics import Array
+from rbcourse.projection import is_se, is_so
 from rbcourse.so3 import (
     exp_so3,
     hat_so3,
@@ -23,7 +25,7 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices; what is none is not repaired (see `project_se`).
+        Rotation matrices. Validity is not checked; see `project_so`.
     d : array_like, shape (..., 3)
         Positions, in m, fixed frame.
 
@@ -38,6 +40,7 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
 
     See Also
     --------
+    components_from_pose : The inverse.
     pose_from_coordinates : The same from exponential coordinates.
 
     References
@@ -53,7 +56,55 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
            [0., 0., 0., 1.]])
     """
     R, d = as_finite("R", R, 3, 3), as_finite("d", d, 3)
-    A = np.zeros((*check_broadcast(R=(R, 2), d=(d, 1)), 4, 4))
+    check_broadcast(R=(R, 2), d=(d, 1))
+    return join(R, d)
+
+
+def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
+    """Return the rotation R and the position d of a pose [[R, d], [0, 1]].
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
+
+    Returns
+    -------
+    R : ndarray, shape (..., 3, 3)
+        Rotation matrices.
+    d : ndarray, shape (..., 3)
+        Positions, in m, fixed frame.
+
+    Raises
+    ------
+    ValueError
+        If `A` is not finite or not of that shape.
+
+    See Also
+    --------
+    pose_from_components : The inverse.
+
+    References
+    ----------
+    BK 2.1.
+
+    Examples
+    --------
+    >>> R, d = components_from_pose([[0, -1, 0, 5], [1, 0, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1]])
+    >>> d
+    array([5., 6., 7.])
+    """
+    return split(as_finite("A", A, 4, 4))
+
+
+def split(A: Array) -> tuple[Array, Array]:
+    """Return views of the blocks R and d of poses, unchecked."""
+    return A[..., :3, :3], A[..., :3, 3]
+
+
+def join(R: Array, d: Array) -> Array:
+    """Return `pose_from_components`, unchecked."""
+    A = np.zeros((*np.broadcast_shapes(R.shape[:-2], d.shape[:-1]), 4, 4))
     A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
     return A
 
@@ -64,7 +115,7 @@ def inverse_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
@@ -133,7 +184,7 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
@@ -288,7 +339,7 @@ def log_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
@@ -329,7 +380,7 @@ def adjoint_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses; what is none is not repaired (see `project_se`), and the last row is not read.
+        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
@@ -365,3 +416,37 @@ def _components(name: str, A: ArrayLike) -> tuple[Array, Array]:
 
 def _apply(matrix: Array, vector: Array) -> Array:
     return (matrix @ vector[..., None])[..., 0]
+
+
+def check_path(
+    times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
+) -> tuple[Array, Array, Array | None]:
+    """Return times, poses or rotations, and velocities if there are any, as arrays.
+
+    Raises
+    ------
+    ValueError
+        If a shape is wrong, times do not increase, or a matrix is no pose or no rotation; the
+        message names the first.
+    """
+    if np.size(times) == 0:
+        raise ValueError("times, poses: one or more wanted, got none")
+    times, poses = as_single("times", times, "N"), as_finite("poses", poses, "n", "n")
+    size = poses.shape[-1]
+    if poses.ndim != 3 or size not in (3, 4):
+        raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) wanted, got {poses.shape}")
+    if len(times) != len(poses):
+        raise ValueError(f"times, poses: as many of each wanted, got {len(times)} and {len(poses)}")
+    late = np.flatnonzero(times[1:] <= times[:-1])
+    if len(late):
+        before, after = times[late[0] :][:2]
+        raise ValueError(f"times[{late[0] + 1}] is {after}, a time after {before} is wanted")
+    passes = is_so(poses) if size == 3 else is_se(poses)
+    if not passes.all():
+        what, cure = ("rotation", "project_so") if size == 3 else ("pose", "project_se")
+        raise ValueError(f"poses[{np.argmin(passes)}] is no {what} ({cure} gives the nearest)")
+    if velocities is not None:
+        velocities = as_single("velocities", velocities, "N", 3 if size == 3 else 6)
+        if len(velocities) != len(times):
+            raise ValueError(f"velocities: {len(times)} wanted, one a pose, got {len(velocities)}")
+    return times, poses, velocities

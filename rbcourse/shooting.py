@@ -1,11 +1,13 @@
 """The optimum by shooting: the initial values for which the motion hits its end."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
+from rbcourse.curves import Ends, check_ends
 from rbcourse.optimum import (
-    Ends,
     Failure,
     Guess,
     MinimumAcceleration,
@@ -15,7 +17,7 @@ from rbcourse.optimum import (
     grid,
     solve,
 )
-from rbcourse.so3 import hat_so3, log_so3
+from rbcourse.so3 import hat, log_so3
 
 NODES = 96
 STEPS = 20
@@ -33,7 +35,7 @@ def shoot_minimum_acceleration_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1; of what is none, the nearest rotation (`project_so`).
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
 
@@ -75,7 +77,7 @@ def shoot_minimum_acceleration_so3(
     >>> c(0.5, 1).round(9) + 0.0  # 1.5 times the average, as for any cubic from rest to rest
     array([0.  , 0.  , 2.25])
     """
-    return solve(shoot, R0, R1, w0, w1)
+    return solve(shoot, check_ends(R0, R1, w0, w1))
 
 
 def shoot(ends: Ends, guess: Guess) -> list[Solution | Failure]:
@@ -133,7 +135,7 @@ def _flow(_: float, state: Array, b: Array) -> Array:
     """Return R' = R ŵ, w', w'' = b − w × w', and the linearisation of the three."""
     R, w, acceleration = state[:9].reshape(3, 3), state[9:12], state[12:15]
     turn, dw, da = state[15:].reshape(3, 3, 6)
-    W = hat_so3(w)
-    dda = np.eye(3, 6, 3) + hat_so3(acceleration) @ dw - W @ da
+    W = hat(w)
+    dda = np.eye(3, 6, 3) + hat(acceleration) @ dw - W @ da
     rates = R @ W, acceleration, b - W @ acceleration, dw - W @ turn, da, dda
     return np.concatenate([rate.ravel() for rate in rates])

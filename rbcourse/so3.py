@@ -3,15 +3,29 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import (
-    Array,
-    as_finite,
-    cotangent_gap_ratio,
-    sinc,
-    sine_gap_ratio,
-    versine_ratio,
-)
+from rbcourse._checks import as_finite, check_broadcast
+from rbcourse._numerics import Array, cotangent_gap_ratio, sinc, sine_gap_ratio, versine_ratio
 from rbcourse.conversions import quaternion_from_matrix, rotation_vector_from_quaternion
+
+BASIS_SO3 = np.array(
+    [
+        [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    ]
+)
+"""The standard basis of so(3), shape (3, 3, 3): turns about x, y and z (BK (2))."""
+BASIS_SO3.flags.writeable = False
+
+
+def hat(w: Array) -> Array:
+    """Return `hat_so3` of vectors, unchecked: their combinations of the basis."""
+    return (w @ BASIS_SO3.reshape(3, 9)).reshape(*w.shape, 3) + 0.0
+
+
+def vee(W: Array) -> Array:
+    """Return `vee_so3` of matrices, unchecked."""
+    return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
 
 
 def hat_so3(w: ArrayLike) -> Array:
@@ -45,10 +59,7 @@ def hat_so3(w: ArrayLike) -> Array:
            [ 3.,  0., -1.],
            [-2.,  1.,  0.]])
     """
-    w = as_finite("w", w, 3)
-    W = np.zeros((*w.shape, 3))
-    W[..., 2, 1], W[..., 0, 2], W[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
-    return W - np.swapaxes(W, -1, -2)
+    return hat(as_finite("w", w, 3))
 
 
 def vee_so3(W: ArrayLike) -> Array:
@@ -76,14 +87,7 @@ def vee_so3(W: ArrayLike) -> Array:
     >>> vee_so3(hat_so3([1, 2, 3]))
     array([1., 2., 3.])
     """
-    W = as_finite("W", W, 3, 3)
-    half = (W - np.swapaxes(W, -1, -2)) / 2
-    return np.stack([half[..., 2, 1], half[..., 0, 2], half[..., 1, 0]], axis=-1)
-
-
-BASIS_SO3 = hat_so3(np.eye(3))
-"""The standard basis of so(3), shape (3, 3, 3): turns about x, y and z (BK (2))."""
-BASIS_SO3.flags.writeable = False
+    return vee(as_finite("W", W, 3, 3))
 
 
 def exp_so3(w: ArrayLike) -> Array:
@@ -134,7 +138,7 @@ def log_so3(R: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices; what is none is not repaired (see `project_so`).
+        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
@@ -163,6 +167,42 @@ def log_so3(R: ArrayLike) -> Array:
     array([0.        , 0.        , 1.57079633])
     """
     return rotation_vector_from_quaternion(quaternion_from_matrix(R))
+
+
+def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
+    """Return the angle of the rotation from R to S: the geodesic distance ‖log_so3(Rᵀ S)‖.
+
+    Parameters
+    ----------
+    R, S : array_like, shape (..., 3, 3)
+        Rotation matrices. Validity is not checked; see `project_so`.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Angles in [0, π], in rad; accurate to a few eps.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+
+    See Also
+    --------
+    geodesic_so3 : The curve of that length.
+
+    References
+    ----------
+    BK 6.1.
+
+    Examples
+    --------
+    >>> float(angle_between(np.eye(3), exp_so3([0, 0.3, 0.4])).round(12))
+    0.5
+    """
+    R, S = as_finite("R", R, 3, 3), as_finite("S", S, 3, 3)
+    check_broadcast(R=(R, 2), S=(S, 2))
+    return np.linalg.norm(log_so3(np.swapaxes(R, -1, -2) @ S), axis=-1)
 
 
 def right_jacobian_so3(w: ArrayLike) -> Array:
@@ -243,4 +283,4 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
 
 
 def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    return hat_so3(w), np.linalg.norm(w, axis=-1)[..., None, None]
+    return hat(w), np.linalg.norm(w, axis=-1)[..., None, None]

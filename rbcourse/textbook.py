@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
-from rbcourse.polynomials import cubic_coefficients, polynomial
+from rbcourse.projected_cubic import cubic_coefficients, polynomial
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
 

@@ -102,7 +102,9 @@ def test_geodesic_and_projected_line_follow_the_same_path():
 @pytest.mark.source("BK Cor. 2")
 def test_the_line_run_through_as_f_projects_to_the_geodesic():
     angle = np.linalg.norm(GEODESICS.rotation_vector, axis=-1)
-    lines = rb.projected_line_so3(STARTS, GOALS, lambda t, order: rb.f(t, angle, order))
+    lines = rb.projected_line_so3(
+        STARTS, GOALS, lambda t, order: rb.projected_line.f(t, angle, order)
+    )
     growth = 1 + 2 * np.tan(angle / 2) / np.maximum(angle, 1)
     for order in (0, 1, 2):
         core = (-2, -1) if order == 0 else -1
@@ -303,13 +305,13 @@ def test_f_may_be_a_constant_rate_and_must_have_the_right_ends():
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: t / 2)
     with pytest.raises(ValueError, match=r"f\(t, 0\): shape \(2,\) wanted, got \(3,\)"):
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.zeros(3))
-    with pytest.raises(ValueError, match=r"f\(t, 0\) is nan"):
+    with pytest.raises(ValueError, match=r"f\(0\.0, 0\) is nan"):
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.nan)
 
 
 def test_f_without_its_angle_is_refused():
-    with pytest.raises(ValueError, match=r"f: rbcourse\.f wants its angle"):
-        rb.projected_line_so3(STARTS[0], GOALS[0], rb.f)
+    with pytest.raises(ValueError, match=r"f: it wants its angle"):
+        rb.projected_line_so3(STARTS[0], GOALS[0], rb.projected_line.f)
     for no_function in (0, 1, [], "f"):
         with pytest.raises(ValueError, match=r"f: a callable f\(t, order\) is wanted"):
             rb.projected_line_so3(STARTS[0], GOALS[0], no_function)
@@ -494,8 +496,12 @@ def test_each_curve_of_a_list_at_its_own_time(stack_of_six):
     which, when = np.array([0, 0, 1, 2, 2, 2]), np.array([3, 1, 4, 0, 2, 2])
     for order, value in enumerate(values):
         want = value[when, 1, which]
-        out = np.empty_like(want)
-        stack[1]._write_each(times[when], which, order, out)
+        for count in (1, 20):  # runs that are short, and long
+            out = np.empty((1, count * len(which), *want.shape[1:]))
+            stack[1]._at(np.repeat(times[when], count)[None], np.repeat(which, count), order, out)
+            assert np.abs(out[0] - np.repeat(want, count, axis=0)).max() < 1e-12
+        out = np.empty((2, len(which), *want.shape[1:]))
+        stack[1]._at(np.tile(times[when], (2, 1)), which, order, out)
         assert np.abs(out - want).max() < 1e-12
 
 
@@ -517,7 +523,6 @@ def test_what_failed_in_a_stack_stays_failed():
     assert stack[0].converged
     assert not stack[1].converged
     assert np.isnan(stack[1](0.5)).all()
-    out = np.empty((2, 3, 3))
-    stack._write_each(np.array([0.5, 0.5]), np.array([0, 1]), 0, out)
+    out = stack.at_own_times([0.5, 0.5])
     assert np.abs(out[0] - stack(0.5)[0]).max() < 1e-14
     assert np.isnan(out[1]).all()

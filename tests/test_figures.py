@@ -13,7 +13,7 @@ import rbcourse as rb
 from rbcourse.study import atlas
 
 FIGURES = Path(__file__).parents[1] / "figures"
-NAIVE = rb.sample_rotation_naive, rb.sample_quaternion_naive
+NAIVE = rb.sampling.sample_rotation_naive, rb.sampling.sample_quaternion_naive
 HAAR = rb.sample_rotation, rb.sample_quaternion
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import rbcourse as rb
 from rbcourse import textbook
-from rbcourse.foam import nearest_rotation, nearest_rotations
+from rbcourse._foam import nearest_rotation, nearest_rotations
 
 EPS = np.finfo(float).eps
 BLOCK = 5128

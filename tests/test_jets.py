@@ -8,7 +8,8 @@ import oracles
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse import jets, vee_so3
+from rbcourse import _jets as jets
+from rbcourse import vee_so3
 
 EPS = np.finfo(float).eps
 STEP = mp.mpf(10) ** -15

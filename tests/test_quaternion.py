@@ -45,7 +45,7 @@ def test_multiplication_is_associative_bilinear_and_keeps_the_norm():
 
 
 def test_the_conjugate_turns_back():
-    identity = rb.quaternion_multiply(RANDOM, rb.quaternion_conjugate(RANDOM))
+    identity = rb.quaternion_multiply(RANDOM, rb.quaternion.quaternion_conjugate(RANDOM))
     assert np.abs(identity - [1, 0, 0, 0]).max() < 4 * EPS
 
 
@@ -140,9 +140,9 @@ def test_zero_has_no_nearest_unit_quaternion():
 
 def test_one_of_q_and_minus_q_is_canonical():
     for q in (RANDOM, awkward.quaternions(), np.insert(awkward.half_turns()[1], 0, 0, axis=1)):
-        one = rb.canonical_quaternion(q)
-        assert np.array_equal(rb.canonical_quaternion(-q), one)
-        assert np.array_equal(rb.canonical_quaternion(one), one)
+        one = rb.quaternion.canonical_quaternion(q)
+        assert np.array_equal(rb.quaternion.canonical_quaternion(-q), one)
+        assert np.array_equal(rb.quaternion.canonical_quaternion(one), one)
         assert np.abs(np.abs(one) - np.abs(q)).max() < 4 * EPS
         assert np.all(one[:, 0] >= 0)
 
@@ -150,23 +150,28 @@ def test_one_of_q_and_minus_q_is_canonical():
 def test_of_two_largest_components_the_first_decides():
     for off, first in [(0, True), (1e-9, True), (-1e-9, True), (1e-7, False)]:
         q = rb.project_quaternion([0, -1, 1 + off, 0.3])
-        assert (rb.canonical_quaternion(q)[1] > 0) is np.bool_(first)
+        assert (rb.quaternion.canonical_quaternion(q)[1] > 0) is np.bool_(first)
 
 
 def test_only_rounding_counts_as_a_half_turn():
     for off in (1e-9, 1e-12, 1e-14):
         q = np.array([-off, 0.8, 0.6, 0])
-        assert np.array_equal(rb.canonical_quaternion(q), -q)
-    assert np.array_equal(rb.canonical_quaternion([-2e-16, 0.8, 0.6, 0]), [0, 0.8, 0.6, 0])
+        assert np.array_equal(rb.quaternion.canonical_quaternion(q), -q)
+    assert np.array_equal(
+        rb.quaternion.canonical_quaternion([-2e-16, 0.8, 0.6, 0]), [0, 0.8, 0.6, 0]
+    )
     for goal in ([-1e-14, 1, 0, 0], [1e-14, 1, 0, 0]):  # nearly as far both ways
         sign = np.sign(goal[0])
         assert np.abs(rb.slerp([1, 0, 0, 0], goal, 1) - sign * np.array(goal)).max() < 4 * EPS
-        assert np.abs(rb.slerp_long([1, 0, 0, 0], goal, 1) + sign * np.array(goal)).max() < 4 * EPS
+        assert (
+            np.abs(rb.quaternion.slerp_long([1, 0, 0, 0], goal, 1) + sign * np.array(goal)).max()
+            < 4 * EPS
+        )
     rounded = [-2e-16, 1, 0, 0]
     assert rb.slerp([1, 0, 0, 0], rounded, 1)[1] > 0
-    assert rb.slerp_long([1, 0, 0, 0], rounded, 1)[1] < 0
+    assert rb.quaternion.slerp_long([1, 0, 0, 0], rounded, 1)[1] < 0
     near = [np.cos(1e-14), np.sin(1e-14), 0, 0]
-    assert np.abs(rb.slerp_long([1, 0, 0, 0], near, 0.5) - [0, -1, 0, 0]).max() < 0.1
+    assert np.abs(rb.quaternion.slerp_long([1, 0, 0, 0], near, 0.5) - [0, -1, 0, 0]).max() < 0.1
 
 
 @pytest.mark.source("BK Remark 7")
@@ -191,9 +196,9 @@ def test_the_long_way_is_the_rest_of_the_great_circle():
     for t in (0.0, 0.2, 0.5, 1.0):
         exact = np.array([oracles.arc(p, -q, t) for p, q in zip(q0, q1, strict=True)])
         for goal in (q1, -q1):
-            assert np.abs(rb.slerp_long(q0, goal, t) - exact).max() < 20 * EPS
+            assert np.abs(rb.quaternion.slerp_long(q0, goal, t) - exact).max() < 20 * EPS
     t = np.linspace(0, 1, 9)
-    steps = np.diff(rb.slerp_long(q0, q1, t), axis=0)
+    steps = np.diff(rb.quaternion.slerp_long(q0, q1, t), axis=0)
     size = np.linalg.norm(steps, axis=-1)
     assert np.abs(size - size[0]).max() < 20 * EPS  # at constant speed
 
@@ -202,13 +207,15 @@ def test_the_long_way_near_its_singular_sets():
     one = np.array([1.0, 0, 0, 0])
     for goal in (one, -one, [1, 1e-17, 0, 0]):
         with pytest.raises(ValueError, match=r"^q1 is the same rotation as q0"):
-            rb.slerp_long(one, goal, 0.5)
+            rb.quaternion.slerp_long(one, goal, 0.5)
     with pytest.raises(ValueError, match=r"^q1\[1\] is the same"):
-        rb.slerp_long(one, [[0, 1, 0, 0], [-1, 0, 0, 0]], 0.5)
+        rb.quaternion.slerp_long(one, [[0, 1, 0, 0], [-1, 0, 0, 0]], 0.5)
     for angle in (1e-3, 1e-6, 1e-9):
         near = np.array([np.cos(angle), 0, np.sin(angle), 0])
-        middle = rb.slerp_long(one, near, np.pi / 2 / (np.pi - angle))  # a quarter of the circle
+        middle = rb.quaternion.slerp_long(
+            one, near, np.pi / 2 / (np.pi - angle)
+        )  # a quarter of the circle
         assert np.abs(middle - [0, 0, -1, 0]).max() < 4 * EPS / angle
     half_turn = np.array([0, 0, 0, 1.0])  # both ways are as long, and they differ
-    assert np.abs(rb.slerp_long(one, half_turn, 1) + half_turn).max() < 4 * EPS
-    assert np.abs(rb.slerp_long(one, -half_turn, 1) - half_turn).max() < 4 * EPS
+    assert np.abs(rb.quaternion.slerp_long(one, half_turn, 1) + half_turn).max() < 4 * EPS
+    assert np.abs(rb.quaternion.slerp_long(one, -half_turn, 1) - half_turn).max() < 4 * EPS

@@ -30,7 +30,7 @@ def test_a_body_obeys_in_the_frame_of_the_world_unless_told_otherwise():
     path = rr.forward_propagate_rigid_body([0, 0, 0.5], PLAN)
     assert np.array_equal(path, [[0, 0, 0.5], [2, 1, -1.5], [2, 1, 0]])
     in_body = rr.forward_propagate_rigid_body([0, 0, 0.5], PLAN, frame="body")
-    assert np.array_equal(in_body, rb.propagate_planar([0, 0, 0.5], PLAN, frame="body"))
+    assert np.array_equal(in_body, rb.planar.propagate_planar([0, 0, 0.5], PLAN, frame="body"))
 
 
 @pytest.mark.source("RR 4.1", "RR (20)", "RR (21)", "RR 4.2", "RR (22)", "RR (23)")
@@ -66,7 +66,7 @@ def test_an_arm_path_is_shown(states, tmp_path):
     assert len(animation.pictures) == states
     assert animation.alt.startswith("An arm with links of 2 and 1.5 m turns its joints from")
     links, way = figure.axes[0].lines[-2:]
-    tip = rb.arm_forward_kinematics(ARM_PATH[:states]).joints
+    tip = rb.arm.arm_forward_kinematics(ARM_PATH[:states]).joints
     assert np.array_equal(np.transpose(way.get_data()), tip[:, -1])
     assert np.array_equal(np.transpose(links.get_data()), tip[-1])
     blue, red = (plt.matplotlib.colors.to_rgb(line.get_color()) for line in (links, way))
@@ -107,7 +107,7 @@ def test_six_states_are_pale_and_the_last_is_on_top():
     plt.close(figure)
     figure, _ = rr.visualize_arm_path(ARM_PATH)
     for line, i in zip(figure.axes[0].lines[:-2], shown, strict=True):
-        wanted = rb.arm_forward_kinematics(ARM_PATH[i]).joints
+        wanted = rb.arm.arm_forward_kinematics(ARM_PATH[i]).joints
         assert np.abs(np.transpose(line.get_data()) - wanted).max() < 1e-14
     plt.close(figure)
 

@@ -149,9 +149,11 @@ def test_random_members_are_those_of_the_samplers():
         assert rr.check_quaternion(q, 1e-14)
     assert np.array_equal(R, rb.sample_rotation(rng=3))
     assert np.array_equal(q, rb.sample_quaternion(rng=3))
-    assert np.array_equal(rr.random_quaternion(True, rng=3), rb.sample_quaternion_naive(rng=3))
+    assert np.array_equal(
+        rr.random_quaternion(True, rng=3), rb.sampling.sample_quaternion_naive(rng=3)
+    )
     R = rr.random_rotation_matrix(True, rng=3)
-    assert np.array_equal(R, rb.sample_rotation_naive(rng=3))
+    assert np.array_equal(R, rb.sampling.sample_rotation_naive(rng=3))
 
 
 @pytest.mark.parametrize("value", [0, 42, "no", None])
@@ -185,12 +187,12 @@ def strokes_of(figure):
 @pytest.mark.parametrize("naive", [True, False])
 def test_what_is_shown_is_what_the_samplers_draw(naive):
     v0, v1 = np.array([0.0, 0, 1]), np.array([0, 0.2, 1])
-    R = (rb.sample_rotation_naive if naive else rb.sample_rotation)(5, rng=4)
+    R = (rb.sampling.sample_rotation_naive if naive else rb.sample_rotation)(5, rng=4)
     figure, animation = rr.visualize(False, naive=naive, rng=4, steps=5)
     assert np.abs(strokes_of(figure) - np.stack([R @ v0, R @ v1], axis=1)).max() < 8 * EPS
     assert "random matrices" in animation.alt
     plt.close(figure)
-    q = (rb.sample_quaternion_naive if naive else rb.sample_quaternion)(5, rng=4)
+    q = (rb.sampling.sample_quaternion_naive if naive else rb.sample_quaternion)(5, rng=4)
     R = rb.matrix_from_quaternion(q)
     figure, animation = rr.visualize(True, naive=naive, rng=4, steps=5)
     assert np.abs(strokes_of(figure) - np.stack([R @ v0, R @ v1], axis=1)).max() < 8 * EPS

@@ -13,8 +13,8 @@ from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.polynomials import hermite
-from rbcourse.quaternion_curves import ExponentialCubic, other_way, to_given
+from rbcourse.curves import check_ends
+from rbcourse.rivals import ExponentialCubic, hermite, other_way
 
 pytestmark = pytest.mark.source("BK 1")
 EPS = np.finfo(float).eps
@@ -232,7 +232,7 @@ def test_near_half_turns_cayleys_end_velocity_is_met_too():
 
 def test_the_cubic_in_exponential_coordinates_may_go_the_other_way_round():
     R0, R1, w0, w1 = ends(50, 2.5)
-    given = to_given(R0, R1, w0, w1)
+    given = check_ends(R0, R1, w0, w1)
     short = rb.log_so3(given.turn)
     other = other_way(short)
     assert np.abs(np.linalg.norm(other, axis=-1) - (2 * np.pi - 2.5)).max() < 20 * EPS

@@ -13,9 +13,9 @@ from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 EPS = np.finfo(float).eps
 SAMPLERS = [
     rb.sample_rotation,
-    rb.sample_rotation_naive,
+    rb.sampling.sample_rotation_naive,
     rb.sample_quaternion,
-    rb.sample_quaternion_naive,
+    rb.sampling.sample_quaternion_naive,
 ]
 HAAR = [(rb.sample_rotation, arvo_rotation), (rb.sample_quaternion, shoemake_quaternion)]
 _SHARES = [0, 6e-7, 0.25, 0.5, 0.75, 1 - 6e-7, 1 - 2.0**-53]
@@ -128,9 +128,9 @@ def test_the_naive_ones_turn_by_their_angles_in_the_printed_order():
     x, y, z = np.eye(3)
     first, second, third = angles.T[..., None]
     R = rb.exp_so3(first * z) @ rb.exp_so3(second * y) @ rb.exp_so3(third * x)
-    assert np.abs(rb.sample_rotation_naive(50, rng=4) - R).max() < 4 * EPS
+    assert np.abs(rb.sampling.sample_rotation_naive(50, rng=4) - R).max() < 4 * EPS
     R = rb.exp_so3(third * z) @ rb.exp_so3(second * y) @ rb.exp_so3(first * x)
-    q = rb.sample_quaternion_naive(50, rng=4)
+    q = rb.sampling.sample_quaternion_naive(50, rng=4)
     assert np.abs(rb.matrix_from_quaternion(q) - R).max() < 8 * EPS
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array, Rng
+from rbcourse._checks import Rng
+from rbcourse._numerics import Array
 from rbcourse.assignments.marking import Mistake, as_numbers, show
 from rbcourse.assignments.student_code import NotYet, call_student
 

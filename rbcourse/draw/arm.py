@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics
 from rbcourse.draw.save import COLOURS, Table, in_words
-from rbcourse.plans import as_path
+from rbcourse.planar import as_states
 
 _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
 
@@ -31,7 +31,7 @@ def arm_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> dict[str, Array]:
     dict of str to ndarray
         The joint angles; then, for each link, where it ends: the last end is the tip.
     """
-    path = as_path(path)
+    path = as_states(path)
     ends = arm_forward_kinematics(path, lengths).joints[:, 1:]
     table = {f"theta{i} [rad]": angle for i, angle in enumerate(path.T)}
     for i, end in enumerate(np.moveaxis(ends, 1, 0), start=1):

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.draw.save import COLOURS, Table, in_words
-from rbcourse.planar import compose_planar
-from rbcourse.plans import STATES, as_path
+from rbcourse.planar import as_states, compose_planar
 
 _OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
 _NOSE = np.array([[0.8, -1, 0], [2, 0, 0], [0.8, 1, 0]]) / 4
 """A body of length 1, half as wide, and the mark on its front; it heads along its x axis."""
 _FILL = "#D6E6F2"
+STATES = {"planar": ["x [m]", "y [m]", "theta [rad]"]}
 
 
 def route_table(path: ArrayLike) -> dict[str, Array]:
@@ -30,7 +30,7 @@ def route_table(path: ArrayLike) -> dict[str, Array]:
     -------
     dict of str to ndarray
     """
-    return dict(zip(STATES["planar"], as_path(path).T, strict=True))
+    return dict(zip(STATES["planar"], as_states(path).T, strict=True))
 
 
 def draw_route(ax: Axes, data: Table, length: float, shown: Iterable[int]) -> list[Any]:

@@ -9,7 +9,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from rbcourse._numerics import Array
 from rbcourse.draw.save import COLOURS, Table
-from rbcourse.uniformity import angle_law
+from rbcourse.sampling import angle_law
 
 ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
 EYE = np.array(

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
-from rbcourse.connection import geodesic_flow
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.explore.explorer import (
@@ -19,9 +18,9 @@ from rbcourse.explore.explorer import (
     numbers,
     slider,
 )
-from rbcourse.line import f, line_singular_value, theta
-from rbcourse.motions import geodesic_se3
-from rbcourse.screws import screw_from_pose, screw_se3
+from rbcourse.metrics import geodesic_flow
+from rbcourse.motions import geodesic_se3, screw_from_pose, screw_se3
+from rbcourse.projected_line import f, line_singular_value, theta
 from rbcourse.se3 import pose_from_components, pose_from_coordinates
 from rbcourse.so3 import exp_so3, log_so3
 

@@ -11,11 +11,11 @@ from rbcourse.curves import Curve
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.explore.explorer import Explorer, look, menu, new_figure, new_line, numbers, slider
-from rbcourse.motions import projected_cubic_se3
-from rbcourse.relaxation import minimum_acceleration_se3, minimum_acceleration_so3
+from rbcourse.motions import minimum_acceleration_se3, projected_cubic_se3
+from rbcourse.optimum import minimum_acceleration_so3
+from rbcourse.rivals import CLOSED_FORMS
 from rbcourse.se3 import pose_from_coordinates
 from rbcourse.so3 import exp_so3, log_so3
-from rbcourse.study.atlas import WAYS
 
 Solved = tuple[dict[str, Curve], dict[str, float]]
 
@@ -50,7 +50,7 @@ def minimum_acceleration_explorer() -> Explorer:
             artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
-        "rival": menu("closed form", list(WAYS)),
+        "rival": menu("closed form", list(CLOSED_FORMS)),
         "size": slider("size s", 1.0, 0.05, 1.5, 0.05),
         "k": slider("k (rad)", 1.0, -6.0, 6.0, 0.25),
     }
@@ -118,7 +118,9 @@ def _solved_rotations(rival: str, size: float, k: float) -> Solved:
     """Solve BK (21) with these two changed."""
     sigma = size * _SIGMA
     ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
-    return _with_costs({"optimum": minimum_acceleration_so3(*ends), rival: WAYS[rival](*ends)})
+    return _with_costs(
+        {"optimum": minimum_acceleration_so3(*ends), rival: CLOSED_FORMS[rival](*ends)}
+    )
 
 
 @lru_cache(maxsize=64)

@@ -21,10 +21,9 @@ from rbcourse.explore.explorer import (
     slider,
 )
 from rbcourse.projection import orthonormalize_gram_schmidt, project_so
-from rbcourse.sampling import sample_rotation, sample_rotation_naive
+from rbcourse.sampling import sample_rotation, sample_rotation_naive, uniformity_tests
 from rbcourse.se3 import pose_from_components
 from rbcourse.so3 import log_so3
-from rbcourse.uniformity import uniformity_tests
 
 _BOX = np.array([1.3, 0.8, 0.25])
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}

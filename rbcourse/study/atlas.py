@@ -1,36 +1,32 @@
 """What near-optimal curves cost above the optimum, for thousands of boundary conditions."""
 
+from __future__ import annotations
+
 import os
 import warnings
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rbcourse._numerics import Array, Rng, as_count, as_generator, as_single, blocks
-from rbcourse.curves import BlockwiseCurve, Curve
-from rbcourse.optimum import Ends, MinimumAcceleration, from_curve, grid
-from rbcourse.polynomials import cubic_coefficients
-from rbcourse.projected import ProjectedPolynomial
-from rbcourse.quaternion_curves import (
+from rbcourse._checks import Rng, as_count, as_generator, as_single
+from rbcourse._numerics import Array, blocks
+from rbcourse.cost import integral
+from rbcourse.curves import Curve, Ends
+from rbcourse.optimum import MinimumAcceleration, from_curve, minimum_acceleration_so3, relax
+from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic
+from rbcourse.rivals import (
+    CLOSED_FORMS,
     Bezier,
     ExponentialCubic,
     bezier_legs,
     other_way,
-    to_given,
-)
-from rbcourse.relaxation import minimum_acceleration_so3, relax
-from rbcourse.rivals import (
-    bezier_so3,
-    cayley_cubic_so3,
-    cumulative_bezier_so3,
-    exponential_cubic_so3,
-    quaternion_cubic_so3,
 )
 from rbcourse.sampling import sample_rotation
-from rbcourse.so3 import exp_so3, hat_so3, log_so3
+from rbcourse.so3 import angle_between, exp_so3, log_so3
 
-Maker = Callable[[Array, Array, Array, Array], BlockwiseCurve]
+Maker = Callable[[Array, Array, Array, Array], Curve]
 Report = Callable[[int, int], object]
 
 CELLS = 10
@@ -40,24 +36,18 @@ FASTEST = 9.0
 FAMILIES = "along", "across"
 """Where the end velocities of the atlas point: along the axis of the displacement, or across."""
 
+NEAR_ZERO = 1e-4
+"""What costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖² is not divided by."""
+
 _PART = 1000  # problems between two reports
-_PANELS = 2000  # panels that are worked out together
 
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomial:
     """Return the stack of `projected_cubic_so3`, without a warning of any of its margins."""
-    V0, V1 = R0 @ hat_so3(w0), R1 @ hat_so3(w1)
-    return ProjectedPolynomial(cubic_coefficients(R0, R1, V0, V1))
+    return projected_cubic(Ends(R0, R1, w0, w1))
 
 
-WAYS: dict[str, Maker] = {
-    "projection": projection,
-    "exponential": exponential_cubic_so3,
-    "Bézier": bezier_so3,
-    "cumulative": cumulative_bezier_so3,
-    "quaternion": quaternion_cubic_so3,
-    "Cayley": cayley_cubic_so3,
-}
+WAYS: dict[str, Maker] = {**CLOSED_FORMS, "projection": projection}
 """The closed forms that are compared, with the names that figures and tables have for them."""
 
 
@@ -173,6 +163,8 @@ def survey(
     ------
     ValueError
         If a curve is not defined for some ends, or at a time at which it is evaluated.
+    RuntimeError
+        If an integral does not settle.
 
     References
     ----------
@@ -192,8 +184,7 @@ def survey(
 def costs(make: Maker, ends: Ends) -> Array:
     """Return ∫ 2 ‖w'‖² dt of many curves, each to about 1e-7 relative.
 
-    Each has panels of its own: one on which the rules of Clenshaw and Curtis with 9 and 17 nodes
-    differ by 1e-6 of the cost is halved.
+    Each has panels of its own; one on which two rules differ by 1e-6 of the cost is halved.
 
     Parameters
     ----------
@@ -226,23 +217,7 @@ def costs(make: Maker, ends: Ends) -> Array:
     >>> bool(np.allclose(costs(projection, ends), acceleration_cost(projection(*ends)), rtol=1e-6))
     True
     """
-    count, nodes, few = len(ends.w0), grid(17), grid(9)
-    cost, which = np.zeros(count), np.repeat(np.arange(count), 2)
-    start, width = np.tile([0.0, 0.5], count), np.full(2 * count, 0.5)
-    while len(which):
-        squares = np.empty((len(nodes.t), len(which)))
-        for part in blocks(len(which), _PANELS):
-            curves = make(*ends.of(which[part]))
-            times = start[part] + nodes.t[:, None] * width[part]
-            squares[:, part] = np.sum(curves.at_own_times(times, 2) ** 2, axis=-1)
-        value = 2 * width * (nodes.integral[-1] @ squares)
-        rough = 2 * width * (few.integral[-1] @ squares[::2])
-        expected = cost + np.bincount(which, value, count)
-        halved = (np.abs(value - rough) > 1e-6 * expected[which]) & (width > 1e-9)
-        cost += np.bincount(which[~halved], value[~halved], count)
-        which, start, width = (np.repeat(x[halved], 2) for x in (which, start, width / 2))
-        start[1::2] += width[1::2]
-    return cost
+    return integral(make(*ends), np.array([0.0, 0.5, 1.0]), 1e-6)[0]
 
 
 def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
@@ -282,15 +257,15 @@ def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]
 
 def long_way_round(R0: Array, R1: Array, w0: Array, w1: Array) -> ExponentialCubic:
     """Return the exponential cubics that turn the other way round, by 2π − ‖σ‖."""
-    given = to_given(R0, R1, w0, w1)
-    return ExponentialCubic(given, other_way(log_so3(given.turn)))
+    ends = Ends(R0, R1, w0, w1)
+    return ExponentialCubic(ends, other_way(log_so3(ends.turn)))
 
 
 def bezier_other_way(R0: Array, R1: Array, w0: Array, w1: Array) -> Bezier:
     """Return the Bézier curves whose middle legs turn the other way round; they must not be 0."""
-    given = to_given(R0, R1, w0, w1)
-    first, middle, last = bezier_legs(given)
-    return Bezier(given, (first, other_way(middle), last))
+    ends = Ends(R0, R1, w0, w1)
+    first, middle, last = bezier_legs(ends)
+    return Bezier(ends, (first, other_way(middle), last))
 
 
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
@@ -325,11 +300,120 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
         "right": (R @ Q, make(R0 @ Q, R1 @ Q, w0 @ Q, w1 @ Q)),
         "reversed": (R[::-1], make(R1, R0, -w1, -w0)),
     }
-    return {name: _largest_angle(A, curve(t)) for name, (A, curve) in pairs.items()}
+    return {name: float(angle_between(A, curve(t)).max()) for name, (A, curve) in pairs.items()}
 
 
-def _largest_angle(A: Array, B: Array) -> float:
-    return float(np.linalg.norm(log_so3(A.mT @ B), axis=-1).max())
+def near_zero(ends: Ends, optimum: Array) -> NDArray[np.bool_]:
+    """Tell which optima cost so little, in view of their ends, that no ratio says anything.
+
+    Parameters
+    ----------
+    ends : Ends
+        N problems.
+    optimum : ndarray, shape (N,)
+        What they cost.
+
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+    """
+    sigma = log_so3(ends.R0.mT @ ends.R1)
+    return optimum < NEAR_ZERO * sum(np.sum(x**2, axis=-1) for x in (sigma, ends.w0, ends.w1))
+
+
+def excesses(ends: Ends, found: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the costs over the optimum, minus 1; NaN where it is near zero, or not found.
+
+    Parameters
+    ----------
+    ends : Ends
+        N problems.
+    found : mapping of str to ndarray, shape (N,)
+        See `survey`.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (N,)
+    """
+    optimum = np.where(near_zero(ends, found["optimum"]), np.nan, found["optimum"])
+    return {way: cost / optimum - 1 for way, cost in found.items() if way != "optimum"}
+
+
+def cell_table(excess: Mapping[str, Array], draws: int, share: float) -> dict[str, Array]:
+    """Return a quantile of the excess in each cell of the atlas, as a table.
+
+    Parameters
+    ----------
+    excess : mapping of str to ndarray, shape (2 * 10 * 10 * draws,)
+        See `excesses`, of `atlas_problems`.
+    draws : int
+        How many there are in each cell.
+    share : float
+        Which quantile: 0.5 for the median.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (2 * 10 * 10,)
+        Family, the middle of the cell, how many problems count, and a `quantile` for each way.
+    """
+    family, turn, speed = np.indices((2, CELLS, CELLS)).reshape(3, -1)
+    cells = {way: x.reshape(-1, draws) for way, x in excess.items()}
+    return {
+        "family": np.array(FAMILIES)[family],
+        "displacement [rad]": (turn + 0.5) * np.pi / CELLS,
+        "end velocity [rad]": (speed + 0.5) * FASTEST / CELLS,
+        "problems [1]": np.sum(~np.isnan(next(iter(cells.values()))), axis=-1),
+        **{f"{way} excess [1]": quantile(x, share) for way, x in cells.items()},
+    }
+
+
+def quantile(x: Array, share: float) -> Array:
+    """Return the smallest of the numbers that `share` of them do not pass.
+
+    Parameters
+    ----------
+    x : ndarray, shape (..., N)
+        Numbers; NaN does not count.
+    share : float
+        From 0 to 1.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        With four digits, and eight decimals at most.
+
+    Examples
+    --------
+    >>> float(quantile(np.array([3.0, 1.23456, np.nan, 0.1]), 0.5))
+    1.235
+    """
+    ordered, count = np.sort(x, axis=-1), np.sum(~np.isnan(x), axis=-1, keepdims=True)  # NaN last
+    place = np.maximum(np.ceil(share * count).astype(int) - 1, 0)
+    return rounded(np.take_along_axis(ordered, place, axis=-1)[..., 0])
+
+
+def rounded(x: Array) -> Array:
+    """Return numbers with four digits, and eight decimals at most."""
+    return np.vectorize(lambda y: round(float(f"{y:.4g}"), 8) + 0.0, otypes=[float])(x)
+
+
+def in_words(excess: float) -> str:
+    """Return an excess as text: in percent, or how many times the optimum.
+
+    Examples
+    --------
+    >>> [in_words(x) for x in (-1e-12, 3.141e-3, 0.5, 46.2, 1e9, -0.3, np.nan)]
+    ['< 0.01 %', '0.31 %', '50 %', '47 ×', '> 10⁴ ×', '−30 %', '–']
+    """
+    if np.isnan(excess):
+        return "–"
+    if excess < -1e-4:
+        return f"−{-100 * excess:.2g} %"
+    if excess < 1e-4:
+        return "< 0.01 %"
+    if excess < 10:
+        return f"{100 * excess:.2g} %" if excess < 0.1 else f"{100 * excess:.0f} %"
+    return f"{1 + excess:.0f} ×" if excess < 1e4 else "> 10⁴ ×"
 
 
 def _cost_from(ends: Ends, guess: Curve) -> Array:

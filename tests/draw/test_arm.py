@@ -80,7 +80,7 @@ def test_the_arrows_at_the_tip_are_the_columns_of_the_jacobian(axes, q):
     lengths = [2, 1.5, 1][: len(q)]
     links, *arrows = arm.draw_tip_velocities(axes[0], arm.arm_table([q], lengths))
     assert np.abs(drawn(links) - ends(q, lengths)).max() < 1e-14
-    J = rb.arm_tip_jacobian(q, lengths)
+    J = rb.arm.arm_tip_jacobian(q, lengths)
     for arrow, column in zip(arrows, J.T, strict=True):
         assert abs(arrow.XY[0] @ [1, 1j] - ends(q, lengths)[-1]) < 1e-14
         assert np.abs([arrow.U[0], arrow.V[0]] - column / 2).max() < 1e-14

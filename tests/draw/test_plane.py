@@ -108,5 +108,5 @@ def test_a_rectangle_of_a_drawing_is_that_of_its_matrix(ax):
     """The nose is half a length ahead, as the lesson says."""
     pose = [4, 2, 0.5]
     _, nose = plane.draw_body(ax, np.array(pose), 1.2, "k")
-    ahead = rb.matrix_from_planar(pose) @ [0.6, 0, 1]
+    ahead = rb.planar.matrix_from_planar(pose) @ [0.6, 0, 1]
     assert np.abs(nose.get_xydata()[1] - ahead[:2]).max() < 1e-14

@@ -25,7 +25,7 @@ def ax3d():
 @pytest.fixture
 def family():
     angle, t = np.meshgrid(np.arange(1, 23) * np.pi / 24, np.linspace(0, 1, 5), indexing="ij")
-    return {"angle [rad]": angle, "t [1]": t, "theta [1]": rb.theta(t, angle)}
+    return {"angle [rad]": angle, "t [1]": t, "theta [1]": rb.projected_line.theta(t, angle)}
 
 
 @pytest.fixture
@@ -83,8 +83,14 @@ def test_the_chord_shows_its_cuts_and_their_projections(ax):
 def test_motions_are_carried_points_and_speeds(motions):
     t = motions["t [1]"]
     assert np.abs(motions["geodesic x [1]"] - np.cos(2 * t)).max() < 1e-15
-    assert np.abs(motions["projected line y [1]"] - np.sin(2 * rb.theta(t, 2))).max() < 1e-15
-    assert np.abs(motions["projected line speed [rad]"] - 2 * rb.theta(t, 2, 1)).max() < 1e-14
+    assert (
+        np.abs(motions["projected line y [1]"] - np.sin(2 * rb.projected_line.theta(t, 2))).max()
+        < 1e-15
+    )
+    assert (
+        np.abs(motions["projected line speed [rad]"] - 2 * rb.projected_line.theta(t, 2, 1)).max()
+        < 1e-14
+    )
 
 
 def test_paths_and_speeds_show_both_motions(ax, ax3d, motions):

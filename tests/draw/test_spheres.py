@@ -75,7 +75,9 @@ def test_the_description_counts():
 
 @pytest.mark.source("RR 2")
 def test_histograms_are_densities():
-    rounded = rb.matrix_from_quaternion(rb.quaternion_from_zyx([[k, 0, 0] for k in range(10)]))
+    rounded = rb.matrix_from_quaternion(
+        rb.conversions.quaternion_from_zyx([[k, 0, 0] for k in range(10)])
+    )
     rounded[:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)  # heights beyond 1, by rounding
     rounded[0] = np.eye(3)
     many = {"uniform": rb.sample_rotation(5000, rng=2), "e3 up": rounded}
@@ -93,7 +95,10 @@ def test_histograms_are_densities():
 
 
 def test_histograms_show_the_table_and_the_law():
-    many = {"a": rb.sample_rotation(5000, rng=2), "b": rb.sample_rotation_naive(5000, rng=2)}
+    many = {
+        "a": rb.sample_rotation(5000, rng=2),
+        "b": rb.sampling.sample_rotation_naive(5000, rng=2),
+    }
     data = spheres.histogram_table(many)
     fig, axes = plt.subplots(1, 3)
     artists = spheres.draw_histograms(axes, data)

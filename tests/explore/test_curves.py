@@ -33,7 +33,7 @@ def test_curves_dots_and_chord(line):
     t = np.linspace(0, 1, 101)
     for v in sweep(line, angle=100.0, t=0.3):
         a = np.radians(v["angle"])
-        for name, curve in (("theta", rb.theta), ("f", rb.f)):
+        for name, curve in (("theta", rb.projected_line.theta), ("f", rb.projected_line.f)):
             drawn = points(line.artists[name])
             assert np.abs(drawn - np.stack([t, curve(t, a)], axis=-1)).max() < 1e-14
             assert (
@@ -48,7 +48,12 @@ def test_curves_dots_and_chord(line):
         assert turned(first, last) == pytest.approx(a)
         assert turned(first, even) == pytest.approx(v["t"] * a, abs=1e-12)
         said = [float(text) for text in read_off(line).values()]
-        known = [rb.theta(v["t"], a), rb.theta(v["t"], a, 1), rb.f(v["t"], a), np.linalg.norm(on)]
+        known = [
+            rb.projected_line.theta(v["t"], a),
+            rb.projected_line.theta(v["t"], a, 1),
+            rb.projected_line.f(v["t"], a),
+            np.linalg.norm(on),
+        ]
         assert np.abs(np.array(said) - known).max() < 5.1e-4
         arc = points(line.artists["arc"])
         assert np.abs(np.linalg.norm(arc, axis=1) - 1).max() < 1e-14

@@ -31,10 +31,10 @@ def commands(v):
 def test_both_bodies_are_where_the_plan_leads_them(plan):
     for v in sweep(plan, omega1=45.0, t=4.0):
         for frame in ("world", "body"):
-            end = rb.propagate_planar([0, 0, 0], commands(v), frame=frame)[-1]
+            end = rb.planar.propagate_planar([0, 0, 0], commands(v), frame=frame)[-1]
             way = points(plan.artists[f"{frame} way"])
             assert len(way) == round(v["t"] * 20) + 1
-            whole = rb.propagate_planar([0, 0, 0], commands(v | {"t": 4.0}), frame=frame)[-1]
+            whole = rb.planar.propagate_planar([0, 0, 0], commands(v | {"t": 4.0}), frame=frame)[-1]
             assert np.abs(points(plan.artists[f"{frame} plan"])[-1] - whole[:2]).max() < 1e-12
             assert np.abs(way[-1] - end[:2]).max() < 1e-12
             corners = plan.artists[f"{frame} outline"].get_xy()[:4]
@@ -60,7 +60,7 @@ def test_the_way_of_the_body_is_the_one_of_all_times_before(plan):
     plan.put(**v)
     for frame in ("world", "body"):
         for k, place in enumerate(points(plan.artists[f"{frame} way"])):
-            states = rb.propagate_planar([0, 0, 0], commands(v | {"t": k / 20}), frame=frame)
+            states = rb.planar.propagate_planar([0, 0, 0], commands(v | {"t": k / 20}), frame=frame)
             assert np.abs(place - states[-1, :2]).max() < 1e-12
 
 
@@ -88,7 +88,7 @@ def test_the_arm_and_the_way_of_its_hand(arm):
     for v in sweep(arm, theta0=77.0, theta1=-40.0):
         goal = np.radians([v["theta0"], v["theta1"]])
         q = (1 - v["t"]) * START + v["t"] * goal
-        joints = rb.arm_forward_kinematics(q).joints
+        joints = rb.arm.arm_forward_kinematics(q).joints
         assert np.abs(points(arm.artists["links"]) - joints).max() < 1e-14
         assert np.abs(points(arm.artists["goal"])[0] - hand(goal)).max() < 1e-14
         way = points(arm.artists["way"])
@@ -101,7 +101,7 @@ def test_the_arm_and_the_way_of_its_hand(arm):
 
 
 def hand(q):
-    return rb.arm_forward_kinematics(q).joints[-1]
+    return rb.arm.arm_forward_kinematics(q).joints[-1]
 
 
 def test_the_arm_starts_where_its_pale_twin_stays(arm):

@@ -131,7 +131,7 @@ def test_the_poll_is_not_answered_before_it_is_touched(repairs):
 
 @pytest.mark.source("RR 2.1", "RR 2.2")
 def test_dots_and_histogram_are_of_the_first_rotations(sample):
-    samplers = {"three angles": rb.sample_rotation_naive, "uniform": rb.sample_rotation}
+    samplers = {"three angles": rb.sampling.sample_rotation_naive, "uniform": rb.sample_rotation}
     for v in sweep(sample):
         R = samplers[v["sampler"]](2000, rng=int(v["seed"]))[: int(v["number"])]
         e1 = R[:, :, 0]
@@ -144,7 +144,7 @@ def test_dots_and_histogram_are_of_the_first_rotations(sample):
         assert numbers_in(said["|height| > ½"])[0] == pytest.approx(100 * caps, abs=0.051)
         assert density.max() < sample.artists["histogram"].axes.get_xlim()[1]
         for name in ("image of e₁", "angle") if len(R) >= 100 else ():
-            p = rb.uniformity_tests(R)[name].p_value
+            p = rb.sampling.uniformity_tests(R)[name].p_value
             if p < 1e-6:
                 assert said[f"p, {name}"] == "< 1e-6: not uniform"
             else:

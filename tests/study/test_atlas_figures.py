@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from matplotlib.colors import LogNorm
 
-from rbcourse.study import atlas, atlas_figures, atlas_tables
+from rbcourse.study import atlas, atlas_figures
 
 RNG = np.random.default_rng(11)
-CELLS = atlas_tables.cell_table(
+CELLS = atlas.cell_table(
     {way: 10.0 ** RNG.uniform(-6, 3, 200) for way in atlas.WAYS} | {"Bézier": np.zeros(200)}, 1, 0.5
 )
 SIZES = np.array([0.25, 1, 3])

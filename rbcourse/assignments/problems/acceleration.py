@@ -4,7 +4,7 @@ import numpy as np
 
 from rbcourse._numerics import Array
 from rbcourse.assignments.marking import Drawing, Mistake, Problem
-from rbcourse.projected import projected_cubic_so3
+from rbcourse.projected_cubic import projected_cubic_so3
 from rbcourse.projection import project_so
 from rbcourse.so3 import exp_so3, hat_so3
 

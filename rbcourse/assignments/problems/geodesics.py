@@ -6,7 +6,7 @@ import numpy as np
 
 from rbcourse._numerics import Array
 from rbcourse.assignments.marking import Drawing, Mistake, Problem
-from rbcourse.line import f, theta
+from rbcourse.projected_line import f, theta
 from rbcourse.se3 import exp_se3, log_se3
 from rbcourse.so3 import exp_so3, log_so3
 

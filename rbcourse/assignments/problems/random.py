@@ -12,13 +12,8 @@ from rbcourse.conversions import (
     quaternion_from_matrix,
     quaternion_from_rotation_vector,
 )
-from rbcourse.sampling import (
-    arvo_rotation,
-    sample_quaternion_naive,
-    shoemake_quaternion,
-)
+from rbcourse.sampling import angle_law, arvo_rotation, sample_quaternion_naive, shoemake_quaternion
 from rbcourse.so3 import exp_so3
-from rbcourse.uniformity import angle_law
 
 Generator = np.random.Generator
 FULL = 2 * np.pi

@@ -1,4 +1,4 @@
-"""Plans and paths as files: the same numbers back, or the line and the reason."""
+"""Plans as files: the same numbers back, or the line and the reason."""
 
 import re
 
@@ -13,7 +13,6 @@ PLANS = {
     "body": [([1, 0, -0.5], 2), ([0.1, 1 / 3, np.pi], 0)],
     "joints": [(RNG.normal(size=5), 0.1), ([0, -0.0, 1e-300, 1e300, 7], 3)],
 }
-PATHS = {"planar": RNG.normal(size=(9, 3)), "joints": RNG.normal(size=(1, 4))}
 PLAN = "vx world [m/s],vy world [m/s],vtheta [rad/s],duration [s]\n"
 
 
@@ -27,28 +26,18 @@ def same(plan, other):
 @pytest.mark.parametrize("kind", PLANS)
 def test_a_plan_comes_back_to_the_last_digit(tmp_path, kind):
     file = tmp_path / "plan.csv"
-    rb.save_plan(file, PLANS[kind], kind)
-    assert same(rb.load_plan(file, kind), PLANS[kind])
-    rb.save_plan(str(file), [], kind)
-    assert rb.load_plan(str(file), kind) == []
-
-
-@pytest.mark.source("RR 3.3", "RR 4.3")
-@pytest.mark.parametrize("kind", PATHS)
-def test_a_path_comes_back_to_the_last_digit(tmp_path, kind):
-    file = tmp_path / "path.csv"
-    rb.save_path(file, PATHS[kind], kind)
-    assert np.array_equal(rb.load_path(file, kind), PATHS[kind])
+    rb.files.save_plan(file, PLANS[kind], kind)
+    assert same(rb.files.load_plan(file, kind), PLANS[kind])
+    rb.files.save_plan(str(file), [], kind)
+    assert rb.files.load_plan(str(file), kind) == []
 
 
 def test_files_are_plain(tmp_path):
-    rb.save_plan(tmp_path / "plan.csv", [([1, 0, 0.25], 2)], "world")
+    rb.files.save_plan(tmp_path / "plan.csv", [([1, 0, 0.25], 2)], "world")
     assert (tmp_path / "plan.csv").read_bytes() == (PLAN + "1.0,0.0,0.25,2.0\n").encode()
-    rb.save_plan(tmp_path / "plan.csv", [([1, 0], 2)], "joints")
+    rb.files.save_plan(tmp_path / "plan.csv", [([1, 0], 2)], "joints")
     text = "v0 [rad/s],v1 [rad/s],duration [s]\n1.0,0.0,2.0\n"
     assert (tmp_path / "plan.csv").read_text("utf-8") == text
-    rb.save_path(tmp_path / "path.csv", [[0, 1, 2]], "planar")
-    assert (tmp_path / "path.csv").read_text("utf-8") == "x [m],y [m],theta [rad]\n0.0,1.0,2.0\n"
 
 
 def test_what_a_spreadsheet_writes_is_read(tmp_path):
@@ -58,7 +47,7 @@ def test_what_a_spreadsheet_writes_is_read(tmp_path):
         + '"1", 2 ,3e0,+.5\r\n-1,0,0,0\r\n\r\n'
     )
     (tmp_path / "plan.csv").write_bytes(text.encode())
-    plan = rb.load_plan(tmp_path / "plan.csv", "world")
+    plan = rb.files.load_plan(tmp_path / "plan.csv", "world")
     assert same(plan, [([1, 2, 3], 0.5), ([-1, 0, 0], 0)])
 
 
@@ -100,38 +89,27 @@ def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, text, reason):
     file = tmp_path / "plan.csv"
     file.write_bytes(text.encode(errors="surrogateescape"))
     with pytest.raises(ValueError, match=f"^{re.escape(f'{file}, {reason}')}"):
-        rb.load_plan(file, "world")
-
-
-def test_a_path_needs_a_state_and_its_own_columns(tmp_path):
-    file = tmp_path / "path.csv"
-    for kind, header in {"planar": "x [m],y [m],theta [rad]", "joints": "theta0 [rad]"}.items():
-        file.write_text(header + "\n", "utf-8")
-        with pytest.raises(ValueError, match="line 2: a state wanted, the file ends"):
-            rb.load_path(file, kind)
-    file.write_text("theta0 [rad],theta2 [rad]\n1,2\n", "utf-8")
-    with pytest.raises(ValueError, match=r"line 1: theta0 \[rad\], theta1 \[rad\] wanted, got"):
-        rb.load_path(file, "joints")
-    with pytest.raises(ValueError, match=r"line 1: x \[m\]"):
-        rb.load_path(file, "planar")
-    with pytest.raises(FileNotFoundError):
-        rb.load_path(tmp_path / "none.csv", "planar")
+        rb.files.load_plan(file, "world")
 
 
 def test_what_is_none_is_not_written(tmp_path):
     file = tmp_path / "file.csv"
     for call, message in (
-        (lambda: rb.save_plan(file, [([1, 0], 2)], "world"), r"^plan\[0\] velocity: shape"),
-        (lambda: rb.save_plan(file, [([1, 0], 2), ([1], 2)], "joints"), r"^plan\[1\] velocity: "),
-        (lambda: rb.save_plan(file, [([1, 0, 0], -2)], "body"), r"^plan\[0\] duration is -2"),
-        (lambda: rb.save_plan(file, 3, "joints"), r"^plan: a list of"),
-        (lambda: rb.save_plan(file, [], "planar"), r"^kind: one of 'world', 'body', 'joints'"),
-        (lambda: rb.save_path(file, [[1, 2]], "planar"), r"^path: shape"),
-        (lambda: rb.save_path(file, [1, 2, 3], "planar"), r"^path: shape"),
-        (lambda: rb.save_path(file, np.zeros((0, 3)), "planar"), r"^path: shape"),
-        (lambda: rb.save_path(file, [[1, np.nan, 3]], "planar"), r"^path\[0, 1\] is nan"),
-        (lambda: rb.save_path(file, [[1, 2, 3]], "world"), r"^kind: one of 'planar', 'joints'"),
-        (lambda: rb.save_plan(file, [], ["world"]), r"^kind: one of .* wanted, got \['world'\]"),
+        (lambda: rb.files.save_plan(file, [([1, 0], 2)], "world"), r"^plan\[0\] velocity: shape"),
+        (
+            lambda: rb.files.save_plan(file, [([1, 0], 2), ([1], 2)], "joints"),
+            r"^plan\[1\] velocity: ",
+        ),
+        (lambda: rb.files.save_plan(file, [([1, 0, 0], -2)], "body"), r"^plan\[0\] duration is -2"),
+        (lambda: rb.files.save_plan(file, 3, "joints"), r"^plan: a list of"),
+        (
+            lambda: rb.files.save_plan(file, [], "planar"),
+            r"^kind: one of 'world', 'body', 'joints'",
+        ),
+        (
+            lambda: rb.files.save_plan(file, [], ["world"]),
+            r"^kind: one of .* wanted, got \['world'\]",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             call()
@@ -142,23 +120,22 @@ def test_joints_need_columns(tmp_path):
     file = tmp_path / "file.csv"
     file.write_text("duration [s]\n1\n", "utf-8")
     with pytest.raises(ValueError, match="line 2: a velocity wanted, there is no column for it"):
-        rb.load_plan(file, "joints")
+        rb.files.load_plan(file, "joints")
     file.write_text("", "utf-8")
-    for load, first in ((rb.load_plan, "duration"), (rb.load_path, "theta0")):
-        with pytest.raises(ValueError, match=rf"line 1: {first} \[\w+\] wanted, got ''$"):
-            load(file, "joints")
+    with pytest.raises(ValueError, match=r"line 1: duration \[s\] wanted, got ''$"):
+        rb.files.load_plan(file, "joints")
 
 
 def test_an_unknown_kind_is_refused_by_readers_too(tmp_path):
-    rb.save_path(tmp_path / "path.csv", [[1, 2, 3]], "planar")
-    with pytest.raises(ValueError, match=r"^kind: one of 'planar', 'joints' wanted, got 'arm'"):
-        rb.load_path(tmp_path / "path.csv", "arm")
+    rb.files.save_plan(tmp_path / "plan.csv", PLANS["world"], "world")
+    with pytest.raises(ValueError, match=r"^kind: one of 'world', .* wanted, got 'arm'"):
+        rb.files.load_plan(tmp_path / "plan.csv", "arm")
 
 
 def test_a_file_that_is_there_survives_a_bad_plan(tmp_path):
     file = tmp_path / "plan.csv"
-    rb.save_plan(file, PLANS["body"], "body")
+    rb.files.save_plan(file, PLANS["body"], "body")
     before = file.read_bytes()
     with pytest.raises(ValueError, match=r"^plan\[1\]"):
-        rb.save_plan(file, [([1, 2, 3], 1), ([1, 2, 3], np.nan)], "body")
+        rb.files.save_plan(file, [([1, 2, 3], 1), ([1, 2, 3], np.nan)], "body")
     assert file.read_bytes() == before

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse.polynomials import cubic_coefficients, hermite, polynomial, quintic_coefficients
+from rbcourse.projected_cubic import cubic_coefficients, polynomial, quintic_coefficients
+from rbcourse.rivals import hermite
 
 RNG = np.random.default_rng(62)
 EPS = np.finfo(float).eps

@@ -1,22 +1,24 @@
-"""Times, poses and velocities, as curves give them: as arrays, and as files for other programs."""
+"""Paths and plans as files: CSV with names and units, and TUM trajectories."""
 
+from __future__ import annotations
+
+import csv
+import io
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, as_finite, as_single
+from rbcourse._numerics import Array
 from rbcourse.conversions import matrix_from_quaternion, quaternion_from_matrix
-from rbcourse.plans import csv_lines, text_lines, to_number, write_csv, write_text
-from rbcourse.projection import is_se, is_so
+from rbcourse.planar import Commands, Plan, as_command, as_plan
 from rbcourse.quaternion import project_quaternion
-from rbcourse.se3 import pose_from_components
+from rbcourse.se3 import check_path, join
 
-Samples = tuple[Array, Array, Array | None]
 Rows = Iterator[tuple[str, list[float]]]
-
 TIME = ["time [s]"]
 POSITION = ["x [m]", "y [m]", "z [m]"]
 QUATERNION = ["qw [1]", "qx [1]", "qy [1]", "qz [1]"]
@@ -30,8 +32,14 @@ HEADERS = {
 """The columns of a CSV file of poses, or of rotations, with velocities or without."""
 TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
 """The columns of a TUM trajectory: its quaternions end with the scalar, ours begin with it."""
-
+VELOCITIES = {
+    "world": ["vx world [m/s]", "vy world [m/s]", "vtheta [rad/s]"],
+    "body": ["vx body [m/s]", "vy body [m/s]", "vtheta [rad/s]"],
+}
+"""The columns of a plan before the duration, for each frame of the plane, and for joints."""
+DURATION = "duration [s]"
 _TOLERANCE = 1e-3  # of the norm of a quaternion in a file: others write four decimals
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def write_path(
@@ -54,12 +62,12 @@ def write_path(
     Raises
     ------
     ValueError
-        If the path is none, or the format has no place for it; nothing is written.
+        If an argument is malformed, or the format cannot hold it; nothing is written.
 
     See Also
     --------
     read_path : The way back.
-    save_path : For the plane and for joints.
+    save_plan : For commands.
 
     Notes
     -----
@@ -80,7 +88,7 @@ def write_path(
     >>> bool(np.abs(poses - c(t)).max() < 2e-15)
     True
     """
-    times, poses, velocities = as_samples(times, poses, velocities)
+    times, poses, velocities = check_path(times, poses, velocities)
     q = _continuous(quaternion_from_matrix(poses[:, :3, :3]))
     d = poses[:, :3, 3:].reshape(len(poses), -1)
     if _is_tum(file):
@@ -97,7 +105,7 @@ def write_path(
         write_csv(file, HEADERS[d.size > 0, velocities is not None], table.tolist())
 
 
-def read_path(file: str | Path) -> Samples:
+def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
     """Read a path that `write_path` wrote, or a TUM trajectory; all of it, or nothing.
 
     Parameters
@@ -118,7 +126,7 @@ def read_path(file: str | Path) -> Samples:
     Raises
     ------
     ValueError
-        If there is anything else in the file, or no pose; if times do not increase; if the norm of
+        If the file has anything else in it, or no pose; if times do not increase; if the norm of
         a quaternion differs from 1 by more than 1e-3. The message gives the line and the reason.
     OSError
         If it cannot be read.
@@ -129,7 +137,7 @@ def read_path(file: str | Path) -> Samples:
 
     Notes
     -----
-    Files of others give quaternions with few digits: they count as the nearest unit quaternions.
+    Quaternions in files of other programs have few digits: the nearest unit quaternion is used.
     """
     moves, rows = _tum_rows(file) if _is_tum(file) else _csv_rows(file)
     at, table, last = (4 if moves else 1), [], -math.inf
@@ -145,40 +153,77 @@ def read_path(file: str | Path) -> Samples:
         raise ValueError(f"{file}: a pose wanted, the file ends")
     times, d, q, velocities = np.split(np.array(table), [1, at, at + 4], axis=1)
     R = matrix_from_quaternion(project_quaternion(q))
-    poses = pose_from_components(R, d) if moves else R
+    poses = join(R, d) if moves else R
     return times[:, 0], poses, velocities if velocities.size else None
 
 
-def as_samples(times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None) -> Samples:
-    """Return times, poses or rotations, and velocities if there are any, as arrays.
+def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
+    """Write a plan as CSV: a line of names with their units, then a line for each command.
+
+    Parameters
+    ----------
+    file : str or Path
+        Where to write; a file that is there is replaced.
+    plan : iterable of (velocity, duration)
+        Velocities of three numbers in the plane, and of any number for joints; durations from
+        0 up, in s. There may be none.
+    kind : {"world", "body", "joints"}
+        What the velocities are: of the plane, in the frame of the world or of the body, or of
+        joints. The names of the columns tell it.
 
     Raises
     ------
     ValueError
-        If a shape is another, a time is not after the one before, or a matrix is no pose or no
-        rotation; the message names the first.
+        If the plan, or one of its commands, is none, or the kind is unknown; nothing is written.
+
+    See Also
+    --------
+    load_plan : The way back, to the same numbers.
+    propagate_planar, propagate_joints : What comes of a plan.
+
+    References
+    ----------
+    RR 3.2, RR 4.2.
     """
-    if np.size(times) == 0:
-        raise ValueError("times, poses: one or more wanted, got none")
-    times, poses = as_single("times", times, "N"), as_finite("poses", poses, "n", "n")
-    size = poses.shape[-1]
-    if poses.ndim != 3 or size not in (3, 4):
-        raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) wanted, got {poses.shape}")
-    if len(times) != len(poses):
-        raise ValueError(f"times, poses: as many of each wanted, got {len(times)} and {len(poses)}")
-    late = np.flatnonzero(times[1:] <= times[:-1])
-    if len(late):
-        before, after = times[late[0] :][:2]
-        raise ValueError(f"times[{late[0] + 1}] is {after}, a time after {before} is wanted")
-    passes = is_so(poses) if size == 3 else is_se(poses)
-    if not passes.all():
-        what, cure = ("rotation", "project_so") if size == 3 else ("pose", "project_se")
-        raise ValueError(f"poses[{np.argmin(passes)}] is no {what} ({cure} gives the nearest)")
-    if velocities is not None:
-        velocities = as_single("velocities", velocities, "N", 3 if size == 3 else 6)
-        if len(velocities) != len(times):
-            raise ValueError(f"velocities: {len(times)} wanted, one a pose, got {len(velocities)}")
-    return times, poses, velocities
+    commands = as_plan(plan, "n")  # how many joints there are, the first of them tells
+    names = _velocities(kind, commands[0][0].size if commands else 0)
+    rows = [[*velocity, duration] for velocity, duration in as_plan(commands, len(names))]
+    write_csv(file, [*names, DURATION], rows)
+
+
+def load_plan(file: str | Path, kind: str) -> Commands:
+    """Read a plan that `save_plan` or a spreadsheet wrote; all of it, or nothing.
+
+    Parameters
+    ----------
+    file : str or Path
+        Comma-separated values, UTF-8; the first line has the names of the columns.
+    kind : {"world", "body", "joints"}
+        As for `save_plan`. A file of another kind is refused: what is meant in one frame is not
+        obeyed in the other.
+
+    Returns
+    -------
+    list of (ndarray, float)
+
+    Raises
+    ------
+    ValueError
+        If there is anything else in the file; the message gives the line and the reason.
+    OSError
+        If it cannot be read.
+
+    References
+    ----------
+    RR 3.2, RR 4.2.
+    """
+    lines = csv_lines(file)
+    place, header = next(lines, (f"{file}, line 1", []))
+    names = [*_velocities(kind, max(0, len(header) - 1)), DURATION]
+    if header != names:
+        raise ValueError(f"{place}: {', '.join(names)} wanted, got {', '.join(header)[:200]!r}")
+    rows = (_row(place, names, cells) for place, cells in lines)
+    return [_command(place, row) for place, row in rows]
 
 
 def _is_tum(file: str | Path) -> bool:
@@ -219,8 +264,68 @@ def _tum_rows(file: str | Path) -> tuple[bool, Rows]:
     return True, ((place, [*row[:4], row[7], *row[4:7]]) for place, row in rows)
 
 
+def _velocities(kind: str, joints: int) -> list[str]:
+    """Return the columns of the velocities of a plan; those of joints are numbered from 0."""
+    if kind == "joints":
+        return [f"v{i} [rad/s]" for i in range(joints)]
+    if kind in list(VELOCITIES):
+        return VELOCITIES[kind]
+    wanted = ", ".join(map(repr, [*VELOCITIES, "joints"]))
+    raise ValueError(f"kind: one of {wanted} wanted, got {kind!r}")
+
+
+def _command(place: str, row: list[float]) -> tuple[Array, float]:
+    if len(row) == 1:
+        raise ValueError(f"{place}: a velocity wanted, there is no column for it")
+    return as_command(f"{place}:", (row[:-1], row[-1]), "n")
+
+
 def _row(place: str, names: list[str], cells: list[str]) -> tuple[str, list[float]]:
     if len(cells) != len(names):
         raise ValueError(f"{place}: numbers wanted: {len(names)}, got: {len(cells)}")
     numbers = zip(names, cells, strict=True)
     return place, [to_number(f"{place}, {name}", cell) for name, cell in numbers]
+
+
+def csv_lines(file: str | Path) -> Iterator[tuple[str, list[str]]]:
+    """Yield the place and the cells of each line of a CSV file."""
+    for place, line in text_lines(file):
+        try:
+            row = next(csv.reader([line], strict=True), [])
+        except csv.Error as error:
+            raise ValueError(f"{place}: {error}") from error
+        yield place, [cell.strip(" \t") for cell in row]
+
+
+def text_lines(file: str | Path) -> Iterator[tuple[str, str]]:
+    """Yield the place and the text of each line of a file; blank lines at its end are left out."""
+    content = Path(file).read_bytes()
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = len(re.split(rb"\r\n|\n|\r", content[: error.start]))
+        raise ValueError(f"{file}, line {line}: no text in UTF-8") from error
+    lines = re.split("\r\n|\n|\r", text.rstrip(" \t\r\n"))
+    yield from ((f"{file}, line {number}", line) for number, line in enumerate(lines, start=1))
+
+
+def write_csv(file: str | Path, names: list[str], rows: Iterable[Iterable[float]]) -> None:
+    """Write a line of names, then a line for each row, with all digits that numbers need."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([float(x) for x in row] for row in rows)
+    write_text(file, text.getvalue())
+
+
+def write_text(file: str | Path, text: str) -> None:
+    """Write a text file, the same on every system."""
+    Path(file).write_text(text, encoding="utf-8", newline="\n")
+
+
+def to_number(place: str, cell: str) -> float:
+    """Return a finite number, or raise a ValueError that says where there is none."""
+    number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
+    if not np.isfinite(number):
+        raise ValueError(f"{place}: a finite number wanted, got {cell[:40]!r}")
+    return number

@@ -1,7 +1,7 @@
-"""Quaternions that change in time, with their derivatives: what exact velocities are made of.
+"""Quaternions as functions of time: products, exp and slerp with their derivatives.
 
-A jet is the list [x, x', x''] of a function of time and its derivatives, or its beginning, as far
-as they are wanted. Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
+A jet is the list [x, x', x''] of a function of time and its first derivatives, or the first one or
+two of these. Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
 Quaternions are (w, x, y, z).
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, sine_and_versine
 
 Jet = list[Array]
 
@@ -46,10 +46,10 @@ def multiply(p: Array, q: Array) -> Array:
     (a, b, c, d), (w, x, y, z) = p, q
     return np.stack(
         [
-            a * w - b * x - c * y - d * z,
-            a * x + b * w + c * z - d * y,
-            a * y - b * z + c * w + d * x,
-            a * z + b * y - c * x + d * w,
+            a * w - (b * x + c * y + d * z),
+            a * x + w * b + (c * z - d * y),
+            a * y + w * c + (d * x - b * z),
+            a * z + w * d + (b * y - c * x),
         ]
     )
 
@@ -125,16 +125,25 @@ def dot(x: Jet, y: Jet) -> Jet:
     return _leibniz(_dot, x, y)
 
 
-def rotation(q: Array) -> Array:
-    """Return the rotation of a quaternion of any norm but 0, shape (..., 3, 3)."""
+def matrix(q: Array) -> Array:
+    """Return the rotation matrix of a unit quaternion, shape (..., 3, 3)."""
     w, x, y, z = q
-    share = 2 / (w * w + x * x + y * y + z * z)
-    sx, sy, sz = share * x, share * y, share * z
     R = np.empty((*w.shape, 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = 1 - sy * y - sz * z, sx * y - sz * w, sx * z + sy * w
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sx * y + sz * w, 1 - sx * x - sz * z, sy * z - sx * w
-    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = sx * z - sy * w, sy * z + sx * w, 1 - sx * x - sy * y
+    R[..., 0, 0] = w * w + x * x - y * y - z * z
+    R[..., 0, 1] = 2 * (x * y - w * z)
+    R[..., 0, 2] = 2 * (x * z + w * y)
+    R[..., 1, 0] = 2 * (x * y + w * z)
+    R[..., 1, 1] = w * w - x * x + y * y - z * z
+    R[..., 1, 2] = 2 * (y * z - w * x)
+    R[..., 2, 0] = 2 * (x * z - w * y)
+    R[..., 2, 1] = 2 * (y * z + w * x)
+    R[..., 2, 2] = w * w - x * x - y * y + z * z
     return R
+
+
+def rotation(q: Array) -> Array:
+    """Return the rotation matrix of a quaternion of any norm except 0, shape (..., 3, 3)."""
+    return matrix(q / np.sqrt(_dot(q, q)))
 
 
 def angular_velocity(q: Jet) -> Array:
@@ -215,9 +224,8 @@ def _over(x: Jet, y: Jet) -> Jet:
 def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
     """Return cos √s, sin(√s)/√s, and their derivatives by s; where s is small by a power series."""
     root = np.sqrt(s)
-    tangent = np.tan(root / 2)  # NumPy's fastest way
-    sine = 2 * tangent / (1 + tangent * tangent)
-    c, k = 1 - tangent * sine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
+    sine, versine = sine_and_versine(root / 2)
+    c, k = 1 - versine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
     if order == 0:
         return [c], [k]
     small = s < 0.25

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import rbcourse as rb
-from rbcourse.trajectories import HEADERS
+from rbcourse.files import HEADERS
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(111)

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, norm
 
 import rbcourse as rb
-from rbcourse.sampling import arvo_rotation, shoemake_quaternion
-from rbcourse.uniformity import angle_law
+from rbcourse.sampling import angle_law, arvo_rotation, shoemake_quaternion
 
 MILLION = 1_000_000
 ALL = {"E tr", "E tr²", "angle", "image of e₁", "image of e₃", "angle to next", "angle to half"}
@@ -20,7 +19,7 @@ ALL = {"E tr", "E tr²", "angle", "image of e₁", "image of e₃", "angle to ne
 
 def failed(R, level=1e-8):
     """The statistics that say no."""
-    return {name for name, test in rb.uniformity_tests(R).items() if test.p_value < level}
+    return {name for name, test in rb.sampling.uniformity_tests(R).items() if test.p_value < level}
 
 
 def random_matrices(q):
@@ -69,11 +68,11 @@ def test_a_negated_column_is_uniform_too():
 def test_a_million_naive_draws_fail():
     """Matrices and quaternions alike, though they take their angles the other way round."""
     for R in (
-        rb.sample_rotation_naive(MILLION, rng=1),
-        random_matrices(rb.sample_quaternion_naive(MILLION, rng=1)),
+        rb.sampling.sample_rotation_naive(MILLION, rng=1),
+        random_matrices(rb.sampling.sample_quaternion_naive(MILLION, rng=1)),
     ):
         assert failed(R, 1e-6) >= {"E tr²", "angle", "image of e₁", "image of e₃"}
-        assert abs(rb.uniformity_tests(R)["E tr²"].statistic - 7 / 8) < 0.01
+        assert abs(rb.sampling.uniformity_tests(R)["E tr²"].statistic - 7 / 8) < 0.01
 
 
 @pytest.mark.parametrize(
@@ -129,7 +128,7 @@ def test_one_angle_of_shoemake_over_half_the_circle_is_no_fault_of_the_rotations
 def test_p_values_are_uniform_for_uniform_rotations():
     """2000 samples of 500: the share below a level is the level, to five standard deviations."""
     rng = np.random.default_rng(11)
-    tests = [rb.uniformity_tests(rb.sample_rotation(500, rng=rng)) for _ in range(2000)]
+    tests = [rb.sampling.uniformity_tests(rb.sample_rotation(500, rng=rng)) for _ in range(2000)]
     assert set(tests[0]) == ALL
     for name in ALL:
         p = np.array([test[name].p_value for test in tests])
@@ -151,7 +150,7 @@ def test_the_law_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions(
 
 def test_what_each_statistic_is():
     R = rb.sample_rotation(1000, rng=9)
-    tests = rb.uniformity_tests(R)
+    tests = rb.sampling.uniformity_tests(R)
     trace = np.einsum("nii", R)
     assert tests["E tr"].statistic == pytest.approx(trace.mean(), abs=1e-15)
     assert tests["E tr²"].statistic == pytest.approx((trace**2).mean(), rel=1e-14)
@@ -191,7 +190,7 @@ def test_poles_and_the_date_line_belong_to_a_cell():
         R = np.array([up, down, date_line] * 40)
         expected = 6
         want = (3 * (40 - expected) ** 2 + 17 * expected**2) / expected
-        found = rb.uniformity_tests(R)["image of e₁"]
+        found = rb.sampling.uniformity_tests(R)["image of e₁"]
         assert found.statistic == pytest.approx(want, rel=1e-12)
         assert found.null == "χ², 19 degrees of freedom"
 
@@ -199,8 +198,8 @@ def test_poles_and_the_date_line_belong_to_a_cell():
 def test_bad_arguments_are_named():
     for shape in [(99, 3, 3), (3, 3), (2, 100, 3, 3)]:
         with pytest.raises(ValueError, match=r"R: shape \(n, 3, 3\) with n >= 100 wanted, got"):
-            rb.uniformity_tests(np.zeros(shape))
+            rb.sampling.uniformity_tests(np.zeros(shape))
     with pytest.raises(ValueError, match=r"R: shape \(\.\.\., 3, 3\) wanted, got \(100, 4\)"):
-        rb.uniformity_tests(np.zeros((100, 4)))
+        rb.sampling.uniformity_tests(np.zeros((100, 4)))
     with pytest.raises(ValueError, match=r"R\[0, 0, 0\] is nan"):
-        rb.uniformity_tests(np.full((100, 3, 3), np.nan))
+        rb.sampling.uniformity_tests(np.full((100, 3, 3), np.nan))

@@ -4,6 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from rbcourse import _checks as checks
 from rbcourse import _numerics as numerics
 
 EPS = np.finfo(float).eps
@@ -27,52 +28,52 @@ EPS = np.finfo(float).eps
 )
 def test_bad_arguments_are_named(value, core, message):
     with pytest.raises(ValueError, match=re.escape(message)):
-        numerics.as_finite("x", value, *core)
+        checks.as_finite("x", value, *core)
 
 
 def test_good_arguments_become_floats_and_are_copied():
     given = np.arange(6.0).reshape(2, 3)
-    array = numerics.as_finite("x", given, 3)
+    array = checks.as_finite("x", given, 3)
     array[0, 0] = 9
     assert given[0, 0] == 0
-    assert numerics.as_finite("x", [1, 2], 2).dtype == np.float64
-    assert numerics.as_finite("x", np.zeros((0, 3, 3)), "n", "n").shape == (0, 3, 3)
+    assert checks.as_finite("x", [1, 2], 2).dtype == np.float64
+    assert checks.as_finite("x", np.zeros((0, 3, 3)), "n", "n").shape == (0, 3, 3)
 
 
 def test_symmetric_but_for_rounding():
     given = np.array([[1, 2 + 1e-15], [2, 3]])
-    assert np.array_equal(numerics.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
-    nearly = numerics.as_symmetric("G", [[1, 1], [1 + 5e-13, 1]], 2)
+    assert np.array_equal(checks.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
+    nearly = checks.as_symmetric("G", [[1, 1], [1 + 5e-13, 1]], 2)
     assert np.array_equal(nearly, nearly.T)
     with pytest.raises(ValueError, match="G is not symmetric"):
-        numerics.as_symmetric("G", 1.5e308 * np.array([[1, 1], [-1, 1]]), 2)
+        checks.as_symmetric("G", 1.5e308 * np.array([[1, 1], [-1, 1]]), 2)
     for scale in (1e-200, 1, 1e200):
         bad = scale * np.array([np.eye(2), [[1, 1e-9], [0, 1]]])
         with pytest.raises(ValueError, match=r"G\[1\] is not symmetric"):
-            numerics.as_symmetric("G", bad, "n")
-    assert not numerics.as_symmetric("G", np.zeros((2, 2)), 2).any()
+            checks.as_symmetric("G", bad, "n")
+    assert not checks.as_symmetric("G", np.zeros((2, 2)), 2).any()
 
 
 def test_times_outside_the_unit_interval_are_named():
-    assert numerics.as_time([0, 1], 2).shape == (2, 1, 1)
+    assert checks.as_time([0, 1], 2).shape == (2, 1, 1)
     for bad in (-1e-16, 1.0000000000000002):
         with pytest.raises(ValueError, match=re.escape(f"t[1] is {bad}, a time in [0, 1]")):
-            numerics.as_time([0, bad], 0)
+            checks.as_time([0, bad], 0)
 
 
 def test_angles_outside_0_to_pi_are_named():
-    assert np.array_equal(numerics.as_angle([0, np.pi]), [0, np.pi])
-    assert numerics.as_angle(np.nextafter(np.pi, 4)) == np.pi
+    assert np.array_equal(checks.as_angle([0, np.pi]), [0, np.pi])
+    assert checks.as_angle(np.nextafter(np.pi, 4)) == np.pi
     for bad in (-1e-300, 3.2):
         with pytest.raises(ValueError, match=re.escape(f"angle is {bad}, an angle in [0, π]")):
-            numerics.as_angle(bad)
+            checks.as_angle(bad)
 
 
 def test_batches_that_do_not_broadcast_are_listed():
     a, b = np.zeros((2, 3, 3)), np.zeros((4, 3, 3))
     with pytest.raises(ValueError, match=r"batch shapes do not broadcast: a \(2,\), b \(4,\)"):
-        numerics.check_broadcast(a=(a, 2), b=(b, 2))
-    assert numerics.check_broadcast(a=(a, 2), b=(np.zeros((5, 2, 3)), 1)) == (5, 2)
+        checks.check_broadcast(a=(a, 2), b=(b, 2))
+    assert checks.check_broadcast(a=(a, 2), b=(np.zeros((5, 2, 3)), 1)) == (5, 2)
 
 
 @pytest.mark.parametrize(

@@ -16,34 +16,38 @@ def exact(name, order):
 
 @pytest.mark.source("BK (16)", "BK Prop. 6")
 def test_theta_is_the_angle_of_the_printed_point():
-    assert np.abs(rb.theta(*GRID) - exact("theta", 0)).max() < 2 * EPS
+    assert np.abs(rb.projected_line.theta(*GRID) - exact("theta", 0)).max() < 2 * EPS
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.source("BK Cor. 1")
 def test_the_derivatives_of_theta(order):
     want = exact("theta", order)
-    assert np.all(np.abs(rb.theta(*GRID, order) - want) <= 8 * EPS * np.abs(want) + 1e-60)
+    assert np.all(
+        np.abs(rb.projected_line.theta(*GRID, order) - want) <= 8 * EPS * np.abs(want) + 1e-60
+    )
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.source("BK Cor. 2")
 def test_f_and_its_derivatives(order):
     want = exact("f", order)
-    assert np.all(np.abs(rb.f(*GRID, order) - want) <= 8 * EPS * np.abs(want) + 1e-60)
+    assert np.all(
+        np.abs(rb.projected_line.f(*GRID, order) - want) <= 8 * EPS * np.abs(want) + 1e-60
+    )
 
 
 @pytest.mark.source("BK Cor. 2")
 def test_theta_undoes_f():
     t, angle = GRID
-    error = np.abs(rb.theta(rb.f(t, angle), angle) - t)
+    error = np.abs(rb.projected_line.theta(rb.projected_line.f(t, angle), angle) - t)
     assert np.all(error <= 4 * EPS * np.maximum(1, 2 * np.tan(angle / 2) / angle))
 
 
 @pytest.mark.source("BK Cor. 2", "errata 10")
 def test_the_equation_for_f_holds_with_the_angle_on_its_right_and_not_as_printed():
     angle, t = 2.0, 0.3
-    x = rb.f(t, angle)
+    x = rb.projected_line.f(t, angle)
     left = np.arctan2(x * np.sin(angle), 1 - x + x * np.cos(angle))
     assert abs(left - angle * t) < 4 * EPS
     assert abs(left - t) > 0.1
@@ -52,7 +56,7 @@ def test_the_equation_for_f_holds_with_the_angle_on_its_right_and_not_as_printed
 @pytest.mark.source("BK Cor. 1", "errata 9")
 def test_the_printed_derivative_of_theta_lacks_a_square():
     t, angle = 0.5, 2.0
-    s, slope = rb.line_singular_value(t, angle), np.sin(angle) / angle
+    s, slope = rb.projected_line.line_singular_value(t, angle), np.sin(angle) / angle
     difference = (oracles.theta(t + 1e-6, angle) - oracles.theta(t - 1e-6, angle)) / 2e-6
     assert abs(slope / s**2 - difference) < 1e-9
     assert abs(slope / s - difference) > 0.5
@@ -62,35 +66,46 @@ def test_the_printed_derivative_of_theta_lacks_a_square():
 def test_the_printed_order_of_atan2_is_cosine_first():
     x, angle = 0.3, 1.0
     cosine, sine = 1 - x + x * np.cos(angle), x * np.sin(angle)
-    assert abs(np.arctan2(sine, cosine) / angle - rb.theta(x, angle)) < 2 * EPS
-    assert abs(np.arctan2(cosine, sine) / angle - rb.theta(x, angle)) > 0.5
+    assert abs(np.arctan2(sine, cosine) / angle - rb.projected_line.theta(x, angle)) < 2 * EPS
+    assert abs(np.arctan2(cosine, sine) / angle - rb.projected_line.theta(x, angle)) > 0.5
 
 
 @pytest.mark.source("BK (17)")
 def test_the_singular_values_of_the_line():
-    got, want = rb.line_singular_value(*GRID), np.vectorize(oracles.line_singular_value)(*GRID)
+    got, want = (
+        rb.projected_line.line_singular_value(*GRID),
+        np.vectorize(oracles.line_singular_value)(*GRID),
+    )
     assert np.all(np.abs(got - want) <= 4 * EPS * want)
     for angle in (1e-6, 1.0, 3.0):
         M = np.eye(3) + 0.3 * (oracles.exp_so3(np.array([2, -1, 2]) / 3 * angle) - np.eye(3))
-        s = rb.line_singular_value(0.3, angle)
+        s = rb.projected_line.line_singular_value(0.3, angle)
         assert np.abs(np.linalg.svd(M)[1] - [1, s, s]).max() < 8 * EPS
 
 
 @pytest.mark.source("BK Cor. 1", "BK Cor. 2")
 def test_the_symmetry_that_puts_the_middle_in_the_middle():
     angle = awkward.LINE_ANGLES
-    assert np.all(rb.theta(0.5, angle) == 0.5)
-    assert np.abs(rb.f(0.5, angle) - 0.5).max() < EPS
+    assert np.all(rb.projected_line.theta(0.5, angle) == 0.5)
+    assert np.abs(rb.projected_line.f(0.5, angle) - 0.5).max() < EPS
     for t in np.arange(9) / 16:  # whose distance from 1 is exact
-        assert np.abs(rb.theta(t, angle) + rb.theta(1 - t, angle) - 1).max() < 4 * EPS
-        assert np.abs(rb.f(t, angle) + rb.f(1 - t, angle) - 1).max() < 4 * EPS
+        assert (
+            np.abs(
+                rb.projected_line.theta(t, angle) + rb.projected_line.theta(1 - t, angle) - 1
+            ).max()
+            < 4 * EPS
+        )
+        assert (
+            np.abs(rb.projected_line.f(t, angle) + rb.projected_line.f(1 - t, angle) - 1).max()
+            < 4 * EPS
+        )
 
 
 @pytest.mark.source("BK Prop. 6", "errata 7")
 def test_theta_leaves_the_unit_interval_where_f_does():
     outside = np.array([-0.5, 1.5])
     want = [oracles.theta(t, 1.0) for t in outside]
-    assert np.abs(rb.theta(outside, 1.0) - want).max() < 2 * EPS
+    assert np.abs(rb.projected_line.theta(outside, 1.0) - want).max() < 2 * EPS
     assert want[0] < 0 < 1 < want[1]
 
 
@@ -146,34 +161,38 @@ def test_the_printed_product_in_the_proof_has_a_plus_too_many():
 def test_theta_far_from_the_line():
     for t, angle in ((1e6, 9.99e-10), (1e10, 9.99e-10), (-1e3, 1e-6), (1e12, 3.0)):
         want = oracles.theta(t, angle)
-        assert abs(rb.theta(t, angle) - want) < 4 * EPS * abs(want)
+        assert abs(rb.projected_line.theta(t, angle) - want) < 4 * EPS * abs(want)
 
 
 def test_what_is_larger_than_pi_by_rounding_only_is_pi():
     above = np.nextafter(np.pi, 4)
-    for function in (rb.theta, rb.f, rb.line_singular_value):
+    for function in (
+        rb.projected_line.theta,
+        rb.projected_line.f,
+        rb.projected_line.line_singular_value,
+    ):
         assert function(0.25, above) == function(0.25, np.pi)
 
 
 def test_angle_0_is_the_limit():
     t = awkward.LINE_TIMES
-    for function in (rb.theta, rb.f):
+    for function in (rb.projected_line.theta, rb.projected_line.f):
         assert np.abs(function(t, 0) - t).max() < EPS
         assert np.abs(function(t, 0, 1) - 1).max() < 2 * EPS
         assert np.all(function(t, 0, 2) == 0)
         assert np.abs(function(t, 1e-310) - t).max() < EPS
-    assert np.all(rb.line_singular_value(t, 0) == 1)
+    assert np.all(rb.projected_line.line_singular_value(t, 0) == 1)
 
 
 def test_angle_pi_is_the_step():
     t = np.array([0, 0.1, 0.49, 0.5, 0.51, 1])
-    assert np.abs(rb.theta(t, np.pi) - [0, 0, 0, 0.5, 1, 1]).max() < 2 * EPS / 0.02
-    assert np.abs(rb.f(t, np.pi) - [0, 0.5, 0.5, 0.5, 0.5, 1]).max() < 2 * EPS
-    assert 1e15 < rb.theta(0.5, np.pi, 1) < 1e17
-    assert 1e15 < rb.f(0, np.pi, 1) < 1e17
+    assert np.abs(rb.projected_line.theta(t, np.pi) - [0, 0, 0, 0.5, 1, 1]).max() < 2 * EPS / 0.02
+    assert np.abs(rb.projected_line.f(t, np.pi) - [0, 0.5, 0.5, 0.5, 0.5, 1]).max() < 2 * EPS
+    assert 1e15 < rb.projected_line.theta(0.5, np.pi, 1) < 1e17
+    assert 1e15 < rb.projected_line.f(0, np.pi, 1) < 1e17
 
 
-@pytest.mark.parametrize("function", [rb.theta, rb.f])
+@pytest.mark.parametrize("function", [rb.projected_line.theta, rb.projected_line.f])
 def test_shapes_and_bad_arguments(function):
     assert function(np.zeros((5, 1)), np.ones(4)).shape == (5, 4)
     assert isinstance(function(0.5, 1.0), float)
@@ -191,4 +210,4 @@ def test_shapes_and_bad_arguments(function):
 
 def test_f_is_for_times_in_the_unit_interval():
     with pytest.raises(ValueError, match=r"t is 1.5, a time in \[0, 1\] is wanted"):
-        rb.f(1.5, 1.0)
+        rb.projected_line.f(1.5, 1.0)

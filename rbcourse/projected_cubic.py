@@ -1,0 +1,410 @@
+"""Cubic and quintic polynomials through given ends, and their projections on SO(3)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._checks import as_finite, check_broadcast
+from rbcourse._numerics import Array
+from rbcourse.curves import (
+    Chosen,
+    Curve,
+    Ends,
+    check_ends,
+    events_of,
+    has_long_runs,
+    least_over_time,
+    runs,
+)
+from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
+from rbcourse.so3 import hat
+
+
+class ProjectedPolynomial(Curve):
+    """The `Curve` of the nearest rotations to a polynomial M(t) in the space of matrices.
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (degree + 1, ..., 3, 3)
+        Of 1, t, t², … in M(t).
+    margin : ndarray, shape (...)
+        The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M. At 0
+        the nearest rotation is not unique.
+    margin_time : ndarray, shape (...)
+        When that is.
+
+    References
+    ----------
+    BK 6, BK 6.2.
+    """
+
+    per_curve: ClassVar[dict[str, int]] = {"coefficients": 1}
+
+    def __init__(self, coefficients: Array) -> None:
+        self.coefficients = coefficients
+        self.batch_shape = coefficients.shape[1:-2]
+
+    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        """Write R, w or w' of the projection of M; its arrays have their components first."""
+        M = [polynomials(self._entries, t, which, k) for k in range(order + 1)]
+        R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
+        self._check_defined(t, which, ~unique, NOT_UNIQUE)
+        if order == 0:
+            out[...] = R
+        else:
+            R = np.ascontiguousarray(np.moveaxis(R, (-2, -1), (0, 1)))
+            out[...] = np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
+
+    @cached_property
+    def _entries(self) -> Array:
+        """The coefficients, shape (degree + 1, 3, 3, count)."""
+        return np.ascontiguousarray(np.moveaxis(self._flat(self.coefficients, 1), 1, -1))
+
+    @property
+    def margin(self) -> Array:
+        """The least sum of the two smallest eigenvalues of RᵀM."""
+        return self._least_gap[1]
+
+    @property
+    def margin_time(self) -> Array:
+        """When the margin is reached."""
+        return self._least_gap[0]
+
+    @cached_property
+    def _least_gap(self) -> tuple[Array, Array]:
+        def gap_at(t: Array) -> Array:
+            return gap(polynomial(self.coefficients, t[..., None, None]))
+
+        return least_over_time(gap_at, self.batch_shape)
+
+    def may_jump(self) -> bool:
+        """Tell whether the gap at 65 times, if not at 9, leaves room for a zero in between."""
+        may = np.ones(self.count, bool)
+        coefficients = self._flat(self.coefficients, 1)
+        for count in (9, 65):
+            times = np.linspace(0, 1, count)[:, None, None, None]
+            M = polynomial(coefficients[:, may], times)
+            change = np.linalg.norm(np.diff(M, axis=0), axis=(-2, -1)).max(axis=0)
+            may[may] = (gap(M) < change).any(axis=0)
+        return bool(may.any())
+
+    def _events(self) -> list[tuple[float, float]]:
+        return events_of(self.margin_time, self.margin)
+
+
+def projected_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> ProjectedPolynomial:
+    """Return the projection of the cubic with these ends: near-optimal minimum acceleration.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+
+    Returns
+    -------
+    ProjectedPolynomial
+        A `Curve`: the nearest rotations to the cubic M(t) with M(0) = R0, M'(0) = R0 hat_so3(w0),
+        M(1) = R1, M'(1) = R1 hat_so3(w1). It meets all four ends exactly; with ``margin``.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast. The
+        curve, when called at a time whose nearest rotation is not unique, to rounding.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6; the message names the time.
+
+    See Also
+    --------
+    rbcourse.textbook.projected_cubic_so3 : The same, matrix by matrix.
+    minimum_acceleration_so3 : The optimum with the same ends.
+    acceleration_cost : What both cost.
+
+    Notes
+    -----
+    Singular set: where the two smallest eigenvalues of RᵀM sum to 0, at some time; det M may
+    change its sign before, which does no harm. A curve past such a time is returned, and is right
+    on both sides; in between it jumps. Near it, where ``margin`` is small, the curve turns by up to
+    π in a time of about ``margin`` over the speed of M, and is accurate to a few eps ‖M‖ over the
+    sum at that time, its derivatives to that over its square and its cube.
+
+    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1.
+
+    References
+    ----------
+    BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = projected_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])  # from rest
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    >>> float(c.margin.round(3))
+    1.464
+    """
+    return watched(projected_cubic(check_ends(R0, R1, w0, w1)))
+
+
+def projected_quintic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+) -> ProjectedPolynomial:
+    """Return the projection of the quintic with these ends: a curve with given accelerations.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+    a0, a1 : array_like, shape (..., 3)
+        Angular accelerations w' there, body frame, in rad per unit time squared.
+
+    Returns
+    -------
+    ProjectedPolynomial
+        A `Curve`: the nearest rotations to the quintic M(t) with the values R, first derivatives
+        R ŵ and second derivatives R (ŵ² + â) at both ends. It meets all six exactly; with
+        ``margin``.
+
+    Raises
+    ------
+    ValueError
+        As `projected_cubic_so3`.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6; the message names the time.
+
+    See Also
+    --------
+    projected_cubic_so3 : The projection of a cubic, for given velocities only.
+
+    Notes
+    -----
+    Singular set and invariance: as for `projected_cubic_so3`.
+
+    References
+    ----------
+    BK 6, BK Prop. 3.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> rest = [0, 0, 0]
+    >>> c = projected_quintic_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, [0, 0, 2])
+    >>> c([0, 1], 2).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 0., 2.]])
+    """
+    a0, a1 = as_finite("a0", a0, 3), as_finite("a1", a1, 3)
+    ends = check_ends(R0, R1, w0, w1)
+    check_broadcast(R0=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
+    (R0, R1, w0, w1), W0, W1 = ends, hat(ends.w0), hat(ends.w1)
+    curvatures = R0 @ (W0 @ W0 + hat(a0)), R1 @ (W1 @ W1 + hat(a1))
+    return watched(ProjectedPolynomial(quintic_coefficients(R0, R1, R0 @ W0, R1 @ W1, *curvatures)))
+
+
+def projected_cubic(ends: Ends) -> ProjectedPolynomial:
+    """Return `projected_cubic_so3` of checked ends, without a warning of its margin."""
+    R0, R1, w0, w1 = ends
+    return ProjectedPolynomial(cubic_coefficients(R0, R1, R0 @ hat(w0), R1 @ hat(w1)))
+
+
+def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
+    """Return the curve, with a warning if its margin is below 1e-6."""
+    if curve.may_jump():
+        warn_if_nearly_singular(curve.margin)
+    return curve
+
+
+def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
+    """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
+
+    It is the minimum-acceleration curve: of all curves with these ends it has the least
+    ∫ ‖x''‖² dt.
+
+    Parameters
+    ----------
+    x0, x1, v0, v1 : ndarray
+        They broadcast.
+
+    Returns
+    -------
+    ndarray, shape (4, ...)
+        The coefficients of 1, t, t², t³.
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> cubic_coefficients(0.0, 1.0, 0.0, 0.0)
+    array([ 0.,  0.,  3., -2.])
+    """
+    gap = x1 - x0
+    return _stack(x0, v0, 3 * gap - 2 * v0 - v1, v0 + v1 - 2 * gap)
+
+
+def quintic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array, a0: Array, a1: Array) -> Array:
+    """Return the quintic on [0, 1] with given values, first and second derivatives at its ends.
+
+    It is the minimum-jerk curve: of all curves with these ends it has the least ∫ ‖x'''‖² dt.
+
+    Parameters
+    ----------
+    x0, x1, v0, v1, a0, a1 : ndarray
+        They broadcast.
+
+    Returns
+    -------
+    ndarray, shape (6, ...)
+        The coefficients of 1, t, …, t⁵.
+
+    References
+    ----------
+    BK 6.
+
+    Examples
+    --------
+    >>> quintic_coefficients(0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    array([  0.,   0.,   0.,  10., -15.,   6.])
+    """
+    gap = x1 - x0 - v0 - a0 / 2
+    speed = v1 - v0 - a0
+    bend = a1 - a0
+    return _stack(
+        x0,
+        v0,
+        a0 / 2,
+        10 * gap - 4 * speed + bend / 2,
+        -15 * gap + 7 * speed - bend,
+        6 * gap - 3 * speed + bend / 2,
+    )
+
+
+def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
+    """Return a polynomial, or one of its derivatives, at the times t.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (degree + 1, ...)
+        Of 1, t, t², ….
+    t : ndarray
+        The times; they broadcast with one coefficient.
+    order : int, optional
+        Which derivative.
+
+    Returns
+    -------
+    ndarray
+
+    Examples
+    --------
+    >>> polynomial(np.array([1.0, 2.0, 3.0]), np.array([0.0, 1.0]), 1)
+    array([2., 8.])
+    """
+    for _ in range(order):
+        powers = np.arange(len(coefficients)).reshape(-1, *(1,) * (coefficients.ndim - 1))
+        coefficients = (powers * coefficients)[min(1, len(coefficients) - 1) :]
+    value: Array = np.array(coefficients[-1] + 0.0 * t)
+    for coefficient in coefficients[-2::-1]:  # Horner's scheme
+        value *= t
+        value += coefficient
+    return value[()]
+
+
+def polynomials(coefficients: Array, t: Array, which: Chosen, order: int) -> Array:
+    """Return polynomials of a stack, or a derivative, components first.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (degree + 1, ..., count)
+    t : ndarray, shape (T, K) or (T, 1)
+    which : ndarray of int, shape (K,)
+    order : int
+
+    Returns
+    -------
+    ndarray, shape (..., T, K)
+    """
+    if len(t) > 1 or len(which) == 1 or not has_long_runs(which):
+        return polynomial(np.take(coefficients, which, axis=-1)[..., None, :], t, order)
+    core = coefficients.shape[1:-1]
+    powers = polynomial(np.eye(len(coefficients))[:, :, None], t[0], order)
+    flat = coefficients.reshape(len(coefficients), -1, coefficients.shape[-1])
+    values = np.empty((flat.shape[1], len(which)))
+    for curve, run in runs(which):
+        np.matmul(flat[:, :, curve].T, powers[:, run], out=values[:, run])
+    return values.reshape(*core, 1, len(which))
+
+
+def _stack(*coefficients: Array) -> Array:
+    return np.stack(np.broadcast_arrays(*coefficients))
+
+
+def _rates(R: Array, M: Array, M_rate: Array, M_bend: Array | None = None) -> list[Array]:
+    """Return w and, if M'' is given, w' of the nearest rotations R to M; components first.
+
+    S = RᵀM is symmetric. With A = RᵀM', differentiated, that says (tr(S) I − S) w = vee(A − Aᵀ),
+    and once more (tr(S) I − S) w' = vee(A' − A'ᵀ) − (tr(S') I − S') w.
+    """
+    S, A = _transposed_times(R, M), _transposed_times(R, M_rate)
+    w = _solve(S, _skew(A))
+    if M_bend is None:
+        return [w]
+    S_rate = A - _cross(w, S)
+    A_rate = _transposed_times(R, M_bend) - _cross(w, A)
+    trace = S_rate[0, 0] + S_rate[1, 1] + S_rate[2, 2]
+    spin = trace * w - (S_rate[:, 0] * w[0] + S_rate[:, 1] * w[1] + S_rate[:, 2] * w[2])
+    return [w, _solve(S, _skew(A_rate) - spin)]
+
+
+def _transposed_times(R: Array, M: Array) -> Array:
+    """Return RᵀM; row by row, several times faster than NumPy's einsum."""
+    product = np.empty_like(M)
+    for i in range(3):
+        np.multiply(R[0, i], M[0], out=product[i])
+        product[i] += R[1, i] * M[1]
+        product[i] += R[2, i] * M[2]
+    return product
+
+
+def _cross(w: Array, A: Array) -> Array:
+    """Return ŵ A: w × each column."""
+    (x, y, z), (a, b, c) = w, A
+    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a])
+
+
+def _skew(A: Array) -> Array:
+    """Return vee(A − Aᵀ)."""
+    return np.stack([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])
+
+
+def _solve(S: Array, b: Array) -> Array:
+    """Return x with (tr(S) I − S) x = b; that matrix, L D Lᵀ, is positive definite."""
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = S
+    d1 = yy + zz
+    l21, l31 = -xy / d1, -xz / d1
+    d2, below = xx + zz + l21 * xy, -yz + l21 * xz
+    l32 = below / d2
+    d3 = xx + yy + l31 * xz - l32 * below
+    y2 = b[1] - l21 * b[0]
+    x3 = (b[2] - l31 * b[0] - l32 * y2) / d3
+    x2 = y2 / d2 - l32 * x3
+    return np.stack([b[0] / d1 - l21 * x2 - l31 * x3, x2, x3])

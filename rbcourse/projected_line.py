@@ -1,0 +1,319 @@
+"""The straight line between two rotations, its projection on SO(3), and θ and f, which time it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._checks import as_angle, as_array, as_finite, as_time, check_broadcast, check_order
+from rbcourse._numerics import EPS, Array, sinc
+from rbcourse.curves import (
+    AlongGeodesic,
+    Chosen,
+    events_of,
+    identity,
+    runs,
+    start_and_rotation_vector,
+)
+from rbcourse.projection import NOT_UNIQUE, warn_if_nearly_singular
+
+Progress = Callable[[Array, int], ArrayLike]
+
+_PI_REST = 1.2246467991473532e-16  # π − np.pi
+
+
+class ProjectedLine(AlongGeodesic):
+    """The projection of a straight line between two rotations: p(t) = θ(f(t)).
+
+    Attributes
+    ----------
+    margin : ndarray, shape (...)
+        The least sum, over the line, of the two smallest eigenvalues of RᵀM, M on the line and R
+        its projection: 2 cos(‖σ‖/2). At 0 the projection of the middle is not unique.
+
+    References
+    ----------
+    BK Prop. 6, BK (15), BK (17).
+    """
+
+    per_curve: ClassVar[dict[str, int]] = {**AlongGeodesic.per_curve, "margin": 0, "_number": 0}
+
+    def __init__(self, R0: Array, rotation_vector: Array, timing: Progress) -> None:
+        if timing is f:
+            raise ValueError("f: it wants its angle, lambda t, order: f(t, angle, order)")
+        super().__init__(R0, rotation_vector)
+        self._angle = as_angle(self._angle)
+        self.margin = 2 * np.cos(self._angle / 2)
+        warn_if_nearly_singular(self.margin)
+        self._f, self._f_batch = timing, self.batch_shape
+        self._number = np.arange(self.count).reshape(self.batch_shape)
+        ends = self._f_at(np.array([0.0, 1.0]), 0)
+        start, end = ends.reshape(2, *self.batch_shape)
+        if np.any(np.abs(start) > 1e-12) or np.any(np.abs(end - 1) > 1e-12):
+            raise ValueError(f"f: f(0) = 0 and f(1) = 1 are wanted, got {start} and {end}")
+
+    def _progress(self, t: Array, which: Chosen, order: int) -> Array:
+        """Return θ(f(t)) or a derivative, by the chain rule."""
+        on_line, angle = self._on_line(t, which, 0), self._flat(self._angle)[which]
+        lost = line_singular_value(on_line, angle) < 8 * EPS
+        self._check_defined(t, which, lost, NOT_UNIQUE)
+        if order == 0:
+            return theta(on_line, angle)
+        slope, speed = theta(on_line, angle, 1), self._on_line(t, which, 1)
+        if order == 1:
+            return slope * speed
+        return theta(on_line, angle, 2) * speed**2 + slope * self._on_line(t, which, 2)
+
+    def _on_line(self, t: Array, which: Chosen, order: int) -> Array:
+        """Return f or a derivative of the chosen curves, shape (T, K) or (T, 1)."""
+        if self._f is identity:
+            return identity(t, order)
+        numbers = self._flat(self._number)[which]
+        if t.shape[1] == 1:
+            return self._f_at(t[:, 0], order)[:, numbers]
+        values = np.empty(t.shape)
+        for number, run in runs(numbers):
+            values[:, run] = self._f_at(t[:, run].ravel(), order)[:, number].reshape(len(t), -1)
+        return values
+
+    def _f_at(self, t: Array, order: int) -> Array:
+        """Return f or a derivative at the times t, shape (T,), for all curves, shape (T, N)."""
+        name, shape = f"f(t, {order})", (len(t), *self._f_batch)
+        value = as_array(name, self._f(t.copy().reshape(-1, *[1] * len(self._f_batch)), order))
+        try:
+            values = np.broadcast_to(value, shape).reshape(len(t), -1)
+        except ValueError as error:
+            raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
+        lost = ~np.isfinite(values)
+        if lost.any():
+            where = np.argwhere(lost)[0]
+            raise ValueError(
+                f"f({t[where[0]]}, {order}) is {values[tuple(where)]}, a finite number is wanted"
+            )
+        return values
+
+    def _events(self) -> list[tuple[float, float]]:
+        return events_of(0.5, self.margin)
+
+
+def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) -> ProjectedLine:
+    """Return the projection on SO(3) of the line R0 + (R1 − R0) f(t), in closed form.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices. Validity is not checked; see `project_so`.
+    f : callable, optional
+        ``f(t, order)``, order 0, 1 or 2: how the line is run through, f(0) = 0 and f(1) = 1 to
+        1e-12, and the derivatives of that. The times come with an axis of length 1 for each batch
+        axis. By default f(t) = t.
+
+    Returns
+    -------
+    ProjectedLine
+        A `Curve`: R0 exp(σ̂ θ(f(t))), the nearest rotations to the line; with ``margin``.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, the batches do not broadcast, or `f` is
+        not callable or has other ends. The curve, when called: if `f` returns non-finite values or
+        another shape, or at a time whose nearest rotation is not unique.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6.
+
+    See Also
+    --------
+    geodesic_so3 : The same path at constant speed.
+    rbcourse.projected_line.f : The timing for constant speed (see the example).
+    project_so : The projection, for any matrix.
+
+    Notes
+    -----
+    Singular set: R0 and R1 a half-turn apart. The line then runs through a matrix of rank 1, at
+    f(t) = 1/2, and its projection jumps there from R0 to R1. ``margin`` is 0 to a few eps, and the
+    curve raises at that time. Near it the projection is accurate to eps over the sum of the two
+    smallest eigenvalues of RᵀM, which ``margin`` bounds from below.
+
+    References
+    ----------
+    BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, log_so3
+    >>> c = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]))
+    >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # slow, fast, slow
+    array([0.314, 0.75 , 1.186])
+    >>> from rbcourse.projected_line import f
+    >>> c = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]), lambda t, order: f(t, 1.5, order))
+    >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # uniform
+    array([0.375, 0.75 , 1.125])
+    """
+    if not (f is None or callable(f)):
+        raise ValueError(f"f: a callable f(t, order) is wanted, got {f!r}")
+    return ProjectedLine(*start_and_rotation_vector(R0, R1), identity if f is None else f)
+
+
+def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
+    """Return s(t): the line (1 − t) I + t R2 has the singular values 1, s(t), s(t).
+
+    Parameters
+    ----------
+    t : array_like
+        Where on the line, any real numbers; broadcasts with `angle`.
+    angle : array_like
+        The angle ‖ω₀‖ of the rotation R2, in [0, π] rad.
+
+    Returns
+    -------
+    ndarray
+        √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)), accurate to a few eps relative.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, `angle` is outside [0, π], or they do not broadcast.
+
+    Notes
+    -----
+    It vanishes at t = 1/2, angle π only: the middle of the line between rotations a half-turn
+    apart has no unique nearest rotation.
+
+    References
+    ----------
+    BK (17).
+
+    Examples
+    --------
+    >>> line_singular_value([0, 0.5, 1], np.pi / 2).round(3)
+    array([1.   , 0.707, 1.   ])
+    """
+    t, angle = _where_and_angle(as_finite("t", t), angle)
+    return np.hypot(np.cos(angle / 2), (2 * t - 1) * np.sin(angle / 2))
+
+
+def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
+    """Return how far along the geodesic the projection of the straight line is.
+
+    The nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)). For a line that is run
+    through as f(t), θ is ``theta(f(t), angle)``.
+
+    Parameters
+    ----------
+    t : array_like
+        Where on the line, any real numbers; broadcasts with `angle`.
+    angle : array_like
+        The angle ‖ω₀‖, in [0, π] rad.
+    order : {0, 1, 2}, optional
+        Which derivative with respect to t.
+
+    Returns
+    -------
+    ndarray
+        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, |θ|); or a
+        derivative, accurate to a few eps relative.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, `angle` is outside [0, π], they do not broadcast, or `order`
+        is another.
+
+    See Also
+    --------
+    f : The inverse function of t.
+
+    Notes
+    -----
+    Angle 0: the limit, θ(t) = t. Angle π is singular: θ is 0 before t = 1/2, 1/2 there and 1 after
+    it. `numpy.pi` is less than π by 1.2e-16, so there the jump has the finite slope 1e16.
+
+    References
+    ----------
+    BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², where the paper prints
+    s, with s from BK (17).
+
+    Examples
+    --------
+    >>> theta([0, 0.25, 0.5, 1], np.pi / 2).round(3)
+    array([0.   , 0.205, 0.5  , 1.   ])
+    """
+    t, angle = _where_and_angle(as_finite("t", t), angle)
+    if check_order(order) == 0:
+        tiny = angle < 1e-290
+        turn = np.where(tiny, 1.0, angle)
+        return np.where(tiny, t, 0.5 + np.arctan((2 * t - 1) * np.tan(turn / 2)) / turn)[()]
+    s = line_singular_value(t, angle)
+    if order == 1:
+        return sinc(angle) / s**2
+    return -4 * (2 * t - 1) * np.sin(angle / 2) ** 2 * sinc(angle) / s**4
+
+
+def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
+    """Return where on the straight line to be at time t, for a projection of constant speed.
+
+    It is the inverse of `theta`: theta(f(t)) = t. Rounding f disturbs that by up to
+    eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, the greatest slope of θ.
+
+    Parameters
+    ----------
+    t : array_like
+        Times in [0, 1]; broadcasts with `angle`.
+    angle : array_like
+        The angle ‖ω₀‖, in [0, π] rad.
+    order : {0, 1, 2}, optional
+        Which derivative with respect to t.
+
+    Returns
+    -------
+    ndarray
+        f = sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)), or a derivative; accurate to a few eps
+        relative.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, a time is outside [0, 1], `angle` is outside [0, π], they do
+        not broadcast, or `order` is another.
+
+    See Also
+    --------
+    theta : The inverse function of t.
+
+    Notes
+    -----
+    Angle 0: the limit, f(t) = t. Angle π is singular: f is 0 at t = 0, 1 at t = 1, and 1/2 at all
+    times between. `numpy.pi` is less than π by 1.2e-16, so there f' is about 1e16 at the ends.
+
+    References
+    ----------
+    BK Cor. 2.
+
+    Examples
+    --------
+    >>> f([0, 0.25, 0.5, 1], np.pi / 2).round(3)
+    array([0.   , 0.293, 0.5  , 1.   ])
+    """
+    t, angle = _where_and_angle(as_time(t, 0), angle)
+    before, near = t <= 0.5, np.minimum(t, 1 - t)
+    cosine = np.sin(((np.pi - angle) + _PI_REST) / 2 + angle * near)  # cos(angle (1/2 − t))
+    if check_order(order) == 0:
+        first_half = near * sinc(angle * near) / (sinc(angle / 2) * cosine)
+        return np.where(before, first_half, 1 - first_half)[()]
+    middle_speed = np.cos(angle / 2) / sinc(angle / 2)
+    if order == 1:
+        return middle_speed / cosine**2
+    return -2 * angle * middle_speed * np.sin(angle * (0.5 - t)) / cosine**3
+
+
+def _where_and_angle(t: Array, angle: ArrayLike) -> tuple[Array, Array]:
+    angle = as_angle(angle)
+    check_broadcast(t=(t, 0), angle=(angle, 0))
+    return t, angle
