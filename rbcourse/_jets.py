@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rbcourse._numerics import Array, sine_and_versine
+from rbcourse._numerics import Array
 
 Jet = list[Array]
 
@@ -125,25 +125,22 @@ def dot(x: Jet, y: Jet) -> Jet:
     return _leibniz(_dot, x, y)
 
 
-def matrix(q: Array) -> Array:
-    """Return the rotation matrix of a unit quaternion, shape (..., 3, 3)."""
+def matrix(q: Array, scale: float | Array = 1.0) -> Array:
+    """Return `scale` times the matrix that rotates by q and scales by ‖q‖²: shape (..., 3, 3)."""
     w, x, y, z = q
+    sw, sx, sy, sz = scale * w, scale * x, scale * y, scale * z
+    ww, xx, yy, zz = sw * w, sx * x, sy * y, sz * z
+    xy, xz, yz, wx, wy, wz = sx * y, sx * z, sy * z, sw * x, sw * y, sw * z
     R = np.empty((*w.shape, 3, 3))
-    R[..., 0, 0] = w * w + x * x - y * y - z * z
-    R[..., 0, 1] = 2 * (x * y - w * z)
-    R[..., 0, 2] = 2 * (x * z + w * y)
-    R[..., 1, 0] = 2 * (x * y + w * z)
-    R[..., 1, 1] = w * w - x * x + y * y - z * z
-    R[..., 1, 2] = 2 * (y * z - w * x)
-    R[..., 2, 0] = 2 * (x * z - w * y)
-    R[..., 2, 1] = 2 * (y * z + w * x)
-    R[..., 2, 2] = w * w - x * x - y * y + z * z
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = ww + xx - yy - zz, 2 * (xy - wz), 2 * (xz + wy)
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = 2 * (xy + wz), ww - xx + yy - zz, 2 * (yz - wx)
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = 2 * (xz - wy), 2 * (yz + wx), ww - xx - yy + zz
     return R
 
 
 def rotation(q: Array) -> Array:
     """Return the rotation matrix of a quaternion of any norm except 0, shape (..., 3, 3)."""
-    return matrix(q / np.sqrt(_dot(q, q)))
+    return matrix(q, 1 / _dot(q, q))
 
 
 def angular_velocity(q: Jet) -> Array:
@@ -224,8 +221,9 @@ def _over(x: Jet, y: Jet) -> Jet:
 def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
     """Return cos √s, sin(√s)/√s, and their derivatives by s; where s is small by a power series."""
     root = np.sqrt(s)
-    sine, versine = sine_and_versine(root / 2)
-    c, k = 1 - versine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
+    tangent = np.tan(root / 2)  # NumPy's fastest way
+    sine = 2 * tangent / (1 + tangent * tangent)
+    c, k = 1 - tangent * sine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
     if order == 0:
         return [c], [k]
     small = s < 0.25

@@ -1,4 +1,4 @@
-"""Numerical care: ratios near zero, sine and cosine from one tangent, blocks that fit the cache."""
+"""Numerical care: ratios near zero, scaling by powers of two, blocks that fit the cache."""
 
 import math
 from collections.abc import Iterator
@@ -35,13 +35,6 @@ def _over_square(gap: Array, x: Array, limit: float) -> Array:
     """Return gap/x². Its users multiply by x² again, so below 1e-4 the limit is exact enough."""
     tiny = np.abs(x) < 1e-4
     return np.where(tiny, limit, gap / np.where(tiny, 1.0, x) ** 2)
-
-
-def sine_and_versine(half: Array) -> tuple[Array, Array]:
-    """Return sin a and 1 − cos a of a = 2 `half`, from tan(a/2), which NumPy computes fastest."""
-    tangent = np.tan(half)
-    sine = 2 * tangent / (1 + tangent * tangent)
-    return sine, tangent * sine
 
 
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:

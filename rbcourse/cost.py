@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbcourse._numerics import EPS, Array, blocks
 from rbcourse.curves import Curve, which_curve
@@ -144,7 +145,8 @@ def integral(curve: Curve, ends: Array, tolerance: float) -> tuple[Array, Array]
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
         cost += _sums(which[~coarse], value[:, ~coarse], curve.count)
-        which, start, width = (np.repeat(x[coarse], 2) for x in (which, start, width / 2))
+        which = np.repeat(which[coarse], 2)
+        start, width = (np.repeat(x[coarse], 2) for x in (start, width / 2))
         start[1::2] += width[1::2]
         if not len(which):
             return cost[0], cost[1]
@@ -158,7 +160,7 @@ def _squares(a: Array) -> Array:
     return np.sum(a**2, axis=-1)
 
 
-def _sums(which: Array, values: Array, count: int) -> Array:
+def _sums(which: NDArray[np.intp], values: Array, count: int) -> Array:
     """Return the sums of the rows of values over the panels of each curve."""
     return np.stack([np.bincount(which, row, count) for row in values])
 

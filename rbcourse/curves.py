@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_finite, as_single, as_time, check_broadcast, check_order
-from rbcourse._numerics import Array, blocks, sine_and_versine
+from rbcourse._numerics import Array, blocks
 from rbcourse.so3 import hat, log_so3
 
 Chosen: TypeAlias = NDArray[np.intp]
@@ -222,9 +222,9 @@ class Curve:
 
     def _at_all(self, t: Array, order: int) -> Array:
         """Return all curves at the times t, shape (T, count) or (T, 1), in blocks."""
-        which = np.arange(self.count)
-        values = np.empty((len(t), self.count, *self._core(order)))
-        for rows in blocks(len(t), max(1, BLOCK // max(1, self.count))):
+        count = self.count
+        which, values = np.arange(count), np.empty((len(t), count, *self._core(order)))
+        for rows in blocks(len(t), max(1, BLOCK // max(1, count))):
             self._at(t[rows], which, order, values[rows])
         return values
 
@@ -247,7 +247,7 @@ class Curve:
                 setattr(picked, name, np.take(flat, chosen, axis=lead))
         return picked
 
-    def _flat(self, values: Array, lead: int = 0) -> Array:
+    def _flat(self, values: NDArray[Any], lead: int = 0) -> NDArray[Any]:
         """Return an array with one axis for the stack in place of the batch axes."""
         stacked = lead + len(self.batch_shape)
         return values.reshape(*values.shape[:lead], self.count, *values.shape[stacked:])
@@ -257,7 +257,8 @@ class Curve:
         if lost.any():
             row, k = np.argwhere(lost)[0]
             time = float(np.broadcast_to(t, lost.shape)[row, k])
-            raise SingularTime(time, int(which[k]), self.batch_shape, why)
+            curve = int(np.broadcast_to(which, lost.shape[1:])[k])
+            raise SingularTime(time, curve, self.batch_shape, why)
 
     def _events(self) -> list[tuple[float, float]]:
         """Return when a curve of the stack is quick, and about how long that takes."""
@@ -299,12 +300,16 @@ class AlongGeodesic(Curve):
         progress = self._progress(t, which, order)
         if order:
             sigma = self._flat(self.rotation_vector)[which]
-            np.multiply(progress[..., None], sigma, out=out)
+            for i in range(3):  # four times as fast as in one go
+                np.multiply(progress, sigma[:, i], out=out[..., i])
             return
         shares = np.ones((3, len(t), len(which)))
-        angle = self._flat(self._angle)[which]
-        shares[1], shares[2] = sine_and_versine(progress * (angle / 2))
+        _write_sine_and_versine(progress, self._half_angle[which], *shares[1:])
         combine(shares, self._terms, which, out.reshape(*out.shape[:2], 9))
+
+    @cached_property
+    def _half_angle(self) -> Array:
+        return self._flat(self._angle) / 2
 
     @cached_property
     def _terms(self) -> Array:
@@ -313,6 +318,16 @@ class AlongGeodesic(Curve):
         K = hat(axis)
         turn = self.R0 @ K
         return np.stack([self.R0, turn, turn @ K]).reshape(3, self.count, 9)
+
+
+def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
+    """Write sin a and 1 − cos a, a = 2 `half` times `progress`, by tan(a/2): the fastest way."""
+    tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
+    np.multiply(tangent, tangent, out=sine)
+    sine += 1
+    np.divide(tangent, sine, out=sine)
+    sine *= 2
+    versine *= sine
 
 
 def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
@@ -468,12 +483,13 @@ def combine(weights: Array, terms: Array, which: Chosen, out: Array) -> None:
     if len(which) == 1:
         np.matmul(weights[:, :, 0].T, terms[:, which[0]], out=out[:, 0])
     elif weights.shape[2] == 1:
-        out[...] = (weights[:, :, 0].T @ terms[:, which].reshape(len(terms), -1)).reshape(out.shape)
+        columns = np.take(terms, which, axis=1).reshape(len(terms), -1)
+        out[...] = (weights[:, :, 0].T @ columns).reshape(out.shape)
     elif len(out) == 1 and has_long_runs(which):
         for curve, run in runs(which):
             np.matmul(weights[:, 0, run].T, terms[:, curve], out=out[0, run])
     else:
-        np.einsum("ntk,nkm->tkm", weights, terms[:, which], out=out)
+        np.einsum("ntk,nkm->tkm", weights, np.take(terms, which, axis=1), out=out)
 
 
 def runs(which: Chosen) -> Iterator[tuple[int, slice]]:

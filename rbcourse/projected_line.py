@@ -58,14 +58,15 @@ class ProjectedLine(AlongGeodesic):
     def _progress(self, t: Array, which: Chosen, order: int) -> Array:
         """Return θ(f(t)) or a derivative, by the chain rule."""
         on_line, angle = self._on_line(t, which, 0), self._flat(self._angle)[which]
-        lost = line_singular_value(on_line, angle) < 8 * EPS
-        self._check_defined(t, which, lost, NOT_UNIQUE)
+        s = _singular_value(on_line, angle)
+        self._check_defined(t, which, s < 8 * EPS, NOT_UNIQUE)
         if order == 0:
-            return theta(on_line, angle)
-        slope, speed = theta(on_line, angle, 1), self._on_line(t, which, 1)
+            return _theta(on_line, angle)
+        slope, speed = _theta_rate(angle, s), self._on_line(t, which, 1)
         if order == 1:
             return slope * speed
-        return theta(on_line, angle, 2) * speed**2 + slope * self._on_line(t, which, 2)
+        bend = _theta_bend(on_line, angle, s)
+        return bend * speed**2 + slope * self._on_line(t, which, 2)
 
     def _on_line(self, t: Array, which: Chosen, order: int) -> Array:
         """Return f or a derivative of the chosen curves, shape (T, K) or (T, 1)."""
@@ -195,8 +196,7 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     >>> line_singular_value([0, 0.5, 1], np.pi / 2).round(3)
     array([1.   , 0.707, 1.   ])
     """
-    t, angle = _where_and_angle(as_finite("t", t), angle)
-    return np.hypot(np.cos(angle / 2), (2 * t - 1) * np.sin(angle / 2))
+    return _singular_value(*_where_and_angle(as_finite("t", t), angle))
 
 
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
@@ -247,13 +247,9 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """
     t, angle = _where_and_angle(as_finite("t", t), angle)
     if check_order(order) == 0:
-        tiny = angle < 1e-290
-        turn = np.where(tiny, 1.0, angle)
-        return np.where(tiny, t, 0.5 + np.arctan((2 * t - 1) * np.tan(turn / 2)) / turn)[()]
-    s = line_singular_value(t, angle)
-    if order == 1:
-        return sinc(angle) / s**2
-    return -4 * (2 * t - 1) * np.sin(angle / 2) ** 2 * sinc(angle) / s**4
+        return _theta(t, angle)
+    s = _singular_value(t, angle)
+    return _theta_rate(angle, s) if order == 1 else _theta_bend(t, angle, s)
 
 
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
@@ -317,3 +313,21 @@ def _where_and_angle(t: Array, angle: ArrayLike) -> tuple[Array, Array]:
     angle = as_angle(angle)
     check_broadcast(t=(t, 0), angle=(angle, 0))
     return t, angle
+
+
+def _singular_value(t: Array, angle: Array) -> Array:
+    return np.hypot(np.cos(angle / 2), (2 * t - 1) * np.sin(angle / 2))
+
+
+def _theta(t: Array, angle: Array) -> Array:
+    tiny = angle < 1e-290
+    turn = np.where(tiny, 1.0, angle)
+    return np.where(tiny, t, 0.5 + np.arctan((2 * t - 1) * np.tan(turn / 2)) / turn)[()]
+
+
+def _theta_rate(angle: Array, s: Array) -> Array:
+    return sinc(angle) / s**2
+
+
+def _theta_bend(t: Array, angle: Array, s: Array) -> Array:
+    return -4 * (2 * t - 1) * np.sin(angle / 2) ** 2 * sinc(angle) / s**4

@@ -273,11 +273,11 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     batch = check_broadcast(q0=(q0, 1), q1=(q1, 1))
     u = as_time(t, len(batch))
     nearer = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1)
-    arc = (
+    first, last = (
         np.moveaxis(np.broadcast_to(q, (*batch, 4)), -1, 0).reshape(4, *[1] * np.ndim(t), *batch)
         for q in (q0, nearer)
     )
-    (value,) = slerp_jet(*([q] for q in arc), [u])
+    (value,) = slerp_jet([first], [last], [u])
     return np.moveaxis(value, 0, -1)
 
 

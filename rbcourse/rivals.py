@@ -349,14 +349,16 @@ class QuaternionCurve(Curve):
         """Raise a SingularTime where Q has no direction."""
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
+        if len(which) == 1:
+            t = t.reshape(1, -1)  # as if each time had its own curve: long axes last
         controls = np.take(self._flat(self._controls, 3), which, axis=-1)
         Q = self._quaternion(controls, t, order)
         self._check(Q[0], controls, t, which)
         if order == 0:
             start = np.take(self._flat(self._start, 2), which, axis=-1)
-            out[...] = rotation(multiply(start, Q[0]))
+            out[...] = rotation(multiply(start, Q[0])).reshape(out.shape)
         else:
-            out[...] = np.moveaxis(angular_velocity(Q), 0, -1)
+            out[...] = np.moveaxis(angular_velocity(Q), 0, -1).reshape(out.shape)
 
 
 class ExponentialCubic(QuaternionCurve):
@@ -518,7 +520,7 @@ def _rate(q: Array, w: Array) -> Array:
     return quaternion_multiply(q, np.concatenate([np.zeros_like(w[..., :1]), w], axis=-1)) / 2
 
 
-def hermite(ends: Sequence[ArrayLike], t: Array, order: int = 0) -> Array:
+def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
     """Return that cubic, or one of its first two derivatives, at the times t.
 
     Written by its ends, it meets them exactly, however they differ in size.
