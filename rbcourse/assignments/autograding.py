@@ -34,13 +34,7 @@ class RefusedError(ValueError):
 
 
 def configure(config: Config) -> None:
-    """Set what nbgrader does with submissions and feedback, and where it finds its tools.
-
-    Parameters
-    ----------
-    config : traitlets.config.Config
-        It is changed in place.
-    """
+    """Set what nbgrader does with submissions and feedback, and where it finds its tools."""
     # to make a gradebook it calls alembic by name, which a shell finds in an activated environment
     if not shutil.which("alembic"):
         tools = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
@@ -84,25 +78,7 @@ class RestoreCells(nbgrader.NbGraderPreprocessor):
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any]
     ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Restore the notebook; what was missing is noted in its metadata.
-
-        Parameters
-        ----------
-        nb : NotebookNode
-            What a student submits.
-        resources : dict
-            As nbgrader gives them.
-
-        Returns
-        -------
-        nb : NotebookNode
-        resources : dict
-
-        Raises
-        ------
-        RefusedError
-            If no cell of the set is there, or code of the student replaces what tests rely on.
-        """
+        """Restore the notebook; what was missing is noted in its metadata."""
         about = resources["nbgrader"]
         with Gradebook(about["db_url"]) as gradebook:
             given = _given_cells(gradebook.find_notebook(about["notebook"], about["assignment"]))
@@ -188,18 +164,7 @@ def _refuse_tampering(cells: list[NotebookNode]) -> None:
 
 
 def describe(cell: NotebookNode, index: int) -> str:
-    """Return how a cell is called in a message.
-
-    Parameters
-    ----------
-    cell : NotebookNode
-    index : int
-        Its place, from 0.
-
-    Returns
-    -------
-    str
-    """
+    """Return how a cell is called in a message."""
     kind = "answer cell" if is_solution(cell) else "cell"
     return f"{kind} {_name(cell) or index + 1}"
 
@@ -212,26 +177,7 @@ class BoundedExecute(nbgrader.Execute):
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any], km: Any = None
     ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Run all cells; errors are among the outputs.
-
-        Parameters
-        ----------
-        nb : NotebookNode
-            It is changed in place.
-        resources : dict
-            As nbgrader gives them.
-        km : jupyter_client.KernelManager, optional
-
-        Returns
-        -------
-        nb : NotebookNode
-        resources : dict
-
-        Raises
-        ------
-        RefusedError
-            If the kernel ends, or a cell does not stop.
-        """
+        """Run all cells; errors are among the outputs."""
         remarks = nb.metadata.get("remarks", [])
         path = resources["metadata"]["path"]
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -277,25 +223,14 @@ class BoundedExecute(nbgrader.Execute):
             shutil.copy(file, target)
 
     def create_kernel_manager(self) -> Any:
-        """Return a manager of a kernel that listens at files of this run only.
-
-        Returns
-        -------
-        jupyter_client.KernelManager
-        """
+        """Return a manager of a kernel that listens at files of this run only."""
         manager = super().create_kernel_manager()
         for name, value in kernel_address(str(self._folder)).items():
             setattr(manager, name, value)
         return manager
 
     def start_new_kernel(self, **kwargs: Any) -> None:
-        """Start the kernel; what it keeps, it keeps in the folder of this run.
-
-        Parameters
-        ----------
-        **kwargs
-            As nbclient gives them.
-        """
+        """Start the kernel; what it keeps, it keeps in the folder of this run."""
         folder = str(self._folder)
         own = {"IPYTHONDIR": folder, "TMPDIR": folder, "TEMP": folder, "OMP_NUM_THREADS": "1"}
         super().start_new_kernel(env={**os.environ, **own, "OPENBLAS_NUM_THREADS": "1"}, **kwargs)
@@ -303,24 +238,7 @@ class BoundedExecute(nbgrader.Execute):
     def preprocess_cell(
         self, cell: NotebookNode, resources: dict[str, Any], index: int
     ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Run a cell.
-
-        Parameters
-        ----------
-        cell : NotebookNode
-        resources : dict
-        index : int
-
-        Returns
-        -------
-        cell : NotebookNode
-        resources : dict
-
-        Raises
-        ------
-        RefusedError
-            If the kernel ends, or the cell does not stop.
-        """
+        """Run a cell."""
         try:
             return super().preprocess_cell(cell, resources, index)
         except DeadKernelError as error:
@@ -330,13 +248,7 @@ class BoundedExecute(nbgrader.Execute):
             raise RefusedError(f"{describe(cell, index)} cannot be stopped") from error
 
     def on_cell_executed(self, **kwargs: Any) -> None:
-        """Keep what nbgrader reads as points out of a cell that fails.
-
-        Parameters
-        ----------
-        **kwargs
-            As nbclient gives them.
-        """
+        """Keep what nbgrader reads as points out of a cell that fails."""
         super().on_cell_executed(**kwargs)
         cell = kwargs["cell"]
         if any(output.output_type == "error" for output in cell.outputs):
@@ -349,19 +261,7 @@ class NoteUnseen(nbgrader.NbGraderPreprocessor):
     def preprocess_cell(
         self, cell: NotebookNode, resources: dict[str, Any], index: int
     ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Add a line to the outputs of a test cell without points whose visible part passes.
-
-        Parameters
-        ----------
-        cell : NotebookNode
-        resources : dict
-        index : int
-
-        Returns
-        -------
-        cell : NotebookNode
-        resources : dict
-        """
+        """Add a line to the outputs of a test cell without points whose visible part passes."""
         if cell.cell_type == "code" and is_grade(cell) and not is_solution(cell):
             failed = any(output.output_type == "error" for output in cell.outputs)
             if not failed and cell.metadata.nbgrader.points and not cell.metadata.nbgrader.score:

@@ -39,27 +39,6 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
 
     What is found is printed. The file of the student is only read; the file to submit has the
     locked cells as in the original.
-
-    Parameters
-    ----------
-    path : Path
-        The notebook that a student has worked on.
-    original : Path, optional
-        The notebook as it was handed out; else it is looked for in ``original/`` beside the file.
-    seconds : int
-        How long a cell may take.
-
-    Returns
-    -------
-    Path
-        The file to submit, ``to_submit/`` beside the file, under the name of the original.
-
-    Raises
-    ------
-    ValueError
-        If a file is no notebook, the original is missing, or the notebook is of another set.
-    OSError
-        If a file cannot be read or written.
     """
     notebook = _read(path)
     original = original or _find_original(path)

@@ -65,28 +65,6 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
     Of several files of a student for a set the newest is taken; what is in ``submitted/`` is
     replaced by a newer one only. ``submitted/collected.csv`` keeps who is who in Moodle and
     Canvas, ``submitted/report.csv`` what is returned.
-
-    Parameters
-    ----------
-    folder : Path
-        With the zips of Moodle and Canvas, or what was in them; it is only read.
-    assignments : Path
-        The course folder of nbgrader. ``students.csv`` in it, if there is one, is the roster.
-    due : datetime, optional
-        The local time after which what Canvas did not mark may be late.
-
-    Returns
-    -------
-    list of tuple of str
-        A list, one of `LISTS`; a file or student; what there is to say. A file is in one of the
-        lists collected, unchanged, duplicates, unmatched, refused and ignored.
-
-    Raises
-    ------
-    ValueError
-        If the folder is none, there are no sets, or the roster is of no use.
-    OSError
-        If a file cannot be read or written.
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: there is no such folder")

@@ -69,26 +69,7 @@ class Download:
 
 
 def find(folder: Path, work: Path, rows: list[tuple[str, str, str]]) -> Iterator[Download]:
-    """Find the notebooks in a folder, in the zips in it, and in the zips of students.
-
-    Parameters
-    ----------
-    folder : Path
-        It is only read.
-    work : Path
-        An empty folder, for the contents.
-    rows : list of tuple of str
-        What else there is, is added: ignored, unmatched or refused; the file; why.
-
-    Yields
-    ------
-    Download
-
-    Raises
-    ------
-    OSError
-        If a file cannot be read.
-    """
+    """Find the notebooks in a folder, in the zips in it, and in the zips of students."""
     search = _Search(work, rows)
     for path in sorted(folder.rglob("*")):
         name = _shown(path.relative_to(folder).as_posix())

@@ -23,17 +23,7 @@ MEMORY = 1_500_000_000  # bytes, for each process of a student
 
 
 def sets_submitted(assignments: Path) -> list[str]:
-    """Return the problem sets of which there are submissions.
-
-    Parameters
-    ----------
-    assignments : Path
-        The course folder of nbgrader.
-
-    Returns
-    -------
-    list of str
-    """
+    """Return the problem sets of which there are submissions."""
     return sorted({path.name for path in assignments.glob("submitted/*/*/")})
 
 
@@ -49,29 +39,6 @@ def grade(
 
     What a human has given points for is kept. A submission that is refused loses the points that
     a machine gave it before, and its feedback.
-
-    Parameters
-    ----------
-    name : str
-        The problem set.
-    assignments : Path
-        The course folder of nbgrader.
-    seconds : float
-        That a submission may take, all in all.
-    memory : int
-        Bytes that each process of a submission may take, where the system can tell.
-    workers : int
-        How many submissions are graded at once.
-
-    Returns
-    -------
-    Path
-        The table, ``NAME-grades.csv``.
-
-    Raises
-    ------
-    ValueError
-        If there is no such set, no submission of it, or nbgrader cannot take it.
     """
     config = course_config(name, assignments)
     students = sorted(path.parent.name for path in assignments.glob(f"submitted/*/{name}/"))
@@ -162,25 +129,7 @@ def _write_table(path: Path, rows: list[dict[str, Any]]) -> Path:
 
 
 def grade_all(names: Iterable[str], assignments: Path) -> list[Path]:
-    """Grade sets one after the other.
-
-    Parameters
-    ----------
-    names : iterable of str
-        The sets; if there are none, all that have submissions.
-    assignments : Path
-        The course folder of nbgrader.
-
-    Returns
-    -------
-    list of Path
-        The tables.
-
-    Raises
-    ------
-    ValueError
-        As `grade`.
-    """
+    """Grade sets one after the other."""
     chosen = list(names) or sets_submitted(assignments)
     if not chosen:
         raise ValueError("There are no submissions: submitted/STUDENT/ps1/ps1.ipynb")

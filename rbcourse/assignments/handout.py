@@ -66,24 +66,7 @@ When something fails
 
 
 def find_set(name: str, assignments: Path) -> Path:
-    """Return the folder of a problem set; a private one goes before that of the course.
-
-    Parameters
-    ----------
-    name : str
-        As ``"ps1"``.
-    assignments : Path
-        The course folder of nbgrader.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ValueError
-        If there is no such set; the message names those that there are.
-    """
+    """Return the folder of a problem set; a private one goes before that of the course."""
     folders = [p for step in ("source", "private") for p in sorted(assignments.glob(f"{step}/*/"))]
     sets = {p.name: p for p in folders if (p / f"{p.name}.ipynb").is_file()}
     if name not in sets:
@@ -93,17 +76,7 @@ def find_set(name: str, assignments: Path) -> Path:
 
 
 def read_config(assignments: Path) -> Config:
-    """Return what nbgrader_config.py says.
-
-    Parameters
-    ----------
-    assignments : Path
-        The folder in which it is, if there is one.
-
-    Returns
-    -------
-    traitlets.config.Config
-    """
+    """Return what nbgrader_config.py says."""
     if not (assignments / "nbgrader_config.py").is_file():
         return Config()
     return PyFileConfigLoader("nbgrader_config.py", path=str(assignments)).load_config()
@@ -113,24 +86,6 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
     """Return what ``nbgrader generate_assignment`` makes, checked to give nothing away.
 
     Neither the gradebook nor the folder of releases is touched.
-
-    Parameters
-    ----------
-    name : str
-        The problem set.
-    assignments : Path
-        The course folder of nbgrader.
-
-    Returns
-    -------
-    dict of str to bytes
-        Each file of the set, by its path in the folder of the set.
-
-    Raises
-    ------
-    ValueError
-        If there is no such set, nbgrader cannot release it, or the release would give away a
-        solution, a hidden test or a mark scheme.
     """
     source, config = find_set(name, assignments), read_config(assignments)
     with tempfile.TemporaryDirectory() as folder:
@@ -158,16 +113,7 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
 
 
 def quiet_log(name: str) -> logging.Logger:
-    """Return a log for nbgrader that is printed nowhere.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    logging.Logger
-    """
+    """Return a log for nbgrader that is printed nowhere."""
     log = logging.getLogger(f"{__name__}.{name}")
     log.propagate = False
     log.addHandler(logging.NullHandler())
@@ -175,18 +121,7 @@ def quiet_log(name: str) -> logging.Logger:
 
 
 def last_line(done: dict[str, str]) -> str:
-    """Return what went wrong in a run of nbgrader, as one line.
-
-    Parameters
-    ----------
-    done : dict
-        What `nbgrader.utils.capture_log` returns.
-
-    Returns
-    -------
-    str
-        The message of the refusal, if there is one, or of the first exception.
-    """
+    """Return what went wrong in a run of nbgrader, as one line."""
     raised = re.findall(r"^ *([\w.]+(?:Error|Exception|Entry)): (.*)$", done.get("log", ""), re.M)
     refused = [what for kind, what in raised if kind.endswith("RefusedError")]
     lines = refused or [what for _, what in raised] or done["error"].strip().splitlines()[-1:]
@@ -219,19 +154,7 @@ def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> N
 
 
 def secret_lines(notebook: NotebookNode, *, solutions: bool = True) -> list[str]:
-    """Return the lines inside the regions that nbgrader removes, but for short and common ones.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        As a teacher writes it.
-    solutions : bool
-        Whether the code of solutions is among them.
-
-    Returns
-    -------
-    list of str
-    """
+    """Return the lines inside the regions that nbgrader removes, but for short and common ones."""
     inside: set[str] = set()
     for cell in notebook.cells:
         for kind, region in REGION.findall(cell.source):
@@ -255,25 +178,7 @@ def _strings(value: object) -> list[str]:
 
 
 def student_requirements(environment: str, wheel: str) -> str:
-    """Return the requirements of the students.
-
-    Parameters
-    ----------
-    environment : str
-        The text of environment.txt.
-    wheel : str
-        The name of the file with the package.
-
-    Returns
-    -------
-    str
-        A pin for each library that a student needs, and the package.
-
-    Raises
-    ------
-    ValueError
-        If environment.txt lacks a pin.
-    """
+    """Return the requirements of the students."""
     pins = dict(
         re.findall(r"^(([\w-]+)==\S+)", line)[0][::-1]
         for line in environment.splitlines()
@@ -286,18 +191,7 @@ def student_requirements(environment: str, wheel: str) -> str:
 
 
 def build_wheel(course: Path) -> tuple[str, bytes]:
-    """Build the package, the same byte for byte each time; nothing is asked for outside.
-
-    Parameters
-    ----------
-    course : Path
-        The folder with pyproject.toml.
-
-    Returns
-    -------
-    name : str
-    content : bytes
-    """
+    """Build the package, the same byte for byte each time; nothing is asked for outside."""
     with tempfile.TemporaryDirectory() as folder:
         code = "import sys; from flit_core import buildapi; buildapi.build_wheel(sys.argv[1])"
         subprocess.run(
@@ -312,27 +206,7 @@ def build_wheel(course: Path) -> tuple[str, bytes]:
 
 
 def make_handout(name: str, assignments: Path, course: Path) -> Path:
-    """Write ``handouts/NAME.zip``, which is what the students get; the same bytes each time.
-
-    Parameters
-    ----------
-    name : str
-        The problem set.
-    assignments : Path
-        The course folder of nbgrader.
-    course : Path
-        The folder with environment.txt and the package.
-
-    Returns
-    -------
-    Path
-        The file; it is replaced as a whole or left as it was.
-
-    Raises
-    ------
-    ValueError
-        As `release`, and if a file of the set has a name that the handout needs.
-    """
+    """Write ``handouts/NAME.zip``, which is what the students get; the same bytes each time."""
     files = release(name, assignments)
     wheel, content = build_wheel(course)
     environment = (course / "environment.txt").read_text("utf-8")

@@ -27,17 +27,7 @@ LARGEST = 50_000_000  # bytes of a notebook
 
 
 def course_config(name: str, assignments: Path) -> Config:
-    """Return the settings of nbgrader for a set.
-
-    Parameters
-    ----------
-    name : str
-    assignments : Path
-
-    Returns
-    -------
-    traitlets.config.Config
-    """
+    """Return the settings of nbgrader for a set."""
     source = find_set(name, assignments)
     config = Config()
     configure(config)
@@ -49,19 +39,7 @@ def course_config(name: str, assignments: Path) -> Config:
 
 
 def run_step(converter: Any, config: Config) -> dict[str, Any]:
-    """Run a step of nbgrader, over what it made before.
-
-    Parameters
-    ----------
-    converter : type
-        As `nbgrader.converters.Autograde`.
-    config : traitlets.config.Config
-
-    Returns
-    -------
-    dict
-        As `nbgrader.utils.capture_log` returns; nothing is printed.
-    """
+    """Run a step of nbgrader, over what it made before."""
     course = CourseDirectory(config=config)
     step = converter(course, config=config, log=quiet_log("steps"))
     step.force = True
@@ -71,25 +49,7 @@ def run_step(converter: Any, config: Config) -> dict[str, Any]:
 def grade_apart(
     name: str, assignments: Path, student: str, seconds: float, memory: int
 ) -> dict[str, Any]:
-    """Grade a submission in a process of its own.
-
-    Parameters
-    ----------
-    name : str
-        The problem set.
-    assignments : Path
-        The course folder of nbgrader.
-    student : str
-    seconds : float
-        That all of it may take.
-    memory : int
-        Bytes that the process and each that it starts may take, where the system can tell.
-
-    Returns
-    -------
-    dict
-        As `grade_one` returns.
-    """
+    """Grade a submission in a process of its own."""
     # on Linux it is copied from one that has loaded nbgrader, which takes seconds
     context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
     context.set_forkserver_preload(["rbcourse.assignments.isolated"])
@@ -138,21 +98,7 @@ def _work(name: str, assignments: Path, student: str, memory: int, result: Path)
 
 
 def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
-    """Grade one submission in this process.
-
-    Parameters
-    ----------
-    name : str
-        The problem set.
-    folder : Path
-        The course folder of nbgrader.
-    student : str
-
-    Returns
-    -------
-    dict
-        The ``"remarks"``, or why it is ``"refused"``.
-    """
+    """Grade one submission in this process."""
     config = course_config(name, folder)
     config.CourseDirectory.student_id = glob.escape(student)
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
@@ -184,20 +130,7 @@ def _words(path: Path) -> dict[str, str]:
 
 
 def check_submission(folder: Path, name: str) -> None:
-    """Refuse what is no notebook of the right name.
-
-    Parameters
-    ----------
-    folder : Path
-        With the files of a student.
-    name : str
-        The problem set.
-
-    Raises
-    ------
-    RefusedError
-        If there is no such notebook.
-    """
+    """Refuse what is no notebook of the right name."""
     there = sorted(path.name for path in folder.iterdir())
     wanted = f"{name}.ipynb"
     if wanted not in there:

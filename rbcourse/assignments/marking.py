@@ -65,66 +65,21 @@ class Problem:
     accuracy: float = 1e-9
 
     def accepts(self, function: Callable[..., Any]) -> bool:
-        """Compare a function with the answer on all inputs.
-
-        Parameters
-        ----------
-        function : callable
-            The student's.
-
-        Returns
-        -------
-        bool
-            True, always: a notebook asserts it.
-
-        Raises
-        ------
-        NotYet
-            With one hint: of the mistake that the function makes, or what is wrong with the first
-            result that is.
-        """
+        """Compare a function with the answer on all inputs."""
         self._examine(function)
         print("As it should be, on these inputs. Others are tried when it is graded.")
         return True
 
     def on(self, *inputs: tuple[Any, ...]) -> Self:
-        """Return the problem with other inputs, for hidden tests.
-
-        Parameters
-        ----------
-        *inputs : tuple
-            The arguments of each trial.
-
-        Returns
-        -------
-        Problem
-        """
+        """Return the problem with other inputs, for hidden tests."""
         return replace(self, inputs=inputs)
 
     def results(self, answer: Callable[..., Any]) -> list[Any]:
-        """Return what an answer gives for each input.
-
-        Parameters
-        ----------
-        answer : callable
-
-        Returns
-        -------
-        list
-        """
+        """Return what an answer gives for each input."""
         return [answer(*copy.deepcopy(trial)) for trial in self.inputs]
 
     def same(self, got: Any, wanted: Any) -> bool:
-        """Return whether two results are the same, to the accuracy of the problem.
-
-        Parameters
-        ----------
-        got, wanted : array_like
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether two results are the same, to the accuracy of the problem."""
         one, other = as_numbers(got), as_numbers(wanted)
         if one is None or other is None or one.shape != other.shape:
             return False
@@ -194,16 +149,7 @@ class Drawing(Problem):
                 )
 
     def same(self, got: Any, wanted: Any) -> bool:
-        """Return whether each wanted curve is among those that were drawn, from either end.
-
-        Parameters
-        ----------
-        got, wanted : list of ndarray, shape (n, 2)
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether each wanted curve is among those that were drawn, from either end."""
         drawn = [*got, *(curve[::-1] for curve in got)]
         return all(any(super(Drawing, self).same(d, w) for d in drawn) for w in wanted)
 
@@ -230,17 +176,7 @@ class Drawing(Problem):
 
 
 def curves_of(axes: Any) -> list[Array]:
-    """Return the points of all lines, dots, bars and steps on axes.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-
-    Returns
-    -------
-    list of ndarray, shape (n, 2)
-        Of bars and steps: middle and height of each.
-    """
+    """Return the points of all lines, dots, bars and steps on axes."""
     from matplotlib.cbook import STEP_LOOKUP_MAP
     from matplotlib.container import BarContainer
     from matplotlib.patches import Polygon, StepPatch
@@ -269,16 +205,7 @@ def _treads(outline: Any) -> Array:
 
 
 def as_numbers(value: Any) -> Array | None:
-    """Return a result as an array of floats, or None if it is no such thing.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    ndarray or None
-    """
+    """Return a result as an array of floats, or None if it is no such thing."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -287,16 +214,7 @@ def as_numbers(value: Any) -> Array | None:
 
 
 def show(value: Any) -> str:
-    """Return a value as one reads it: arrays as lists, rounded, or by their shape.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    str
-    """
+    """Return a value as one reads it: arrays as lists, rounded, or by their shape."""
     if isinstance(value, np.ndarray) and value.size > 16:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]

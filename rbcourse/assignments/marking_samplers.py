@@ -48,25 +48,7 @@ class Sampler:
     draws: int = 20_000
 
     def accepts(self, function: Callable[..., Any], rng: Rng = None) -> bool:
-        """Draw many times, one at a time, and compare their distributions with the right ones.
-
-        Parameters
-        ----------
-        function : callable
-            The student's.
-        rng : Generator, int or None
-            What is handed to it.
-
-        Returns
-        -------
-        bool
-            True, always: a notebook asserts it.
-
-        Raises
-        ------
-        NotYet
-            With one hint.
-        """
+        """Draw many times, one at a time, and compare their distributions with the right ones."""
         rng = np.random.default_rng(rng)
         drawn = self._as_draws(call_student(function, (rng,), self.allowed, self.draws))
         if (drawn[:10] == drawn[0]).all():

@@ -20,18 +20,6 @@ class TooMuchOutputError(RuntimeError):
 def clipped(value: Any, room: int, limit: int | None = None) -> Any:
     r"""Return a value made of dicts, lists and strings with no string longer than the room.
 
-    Parameters
-    ----------
-    value : object
-    room : int
-        In characters; what is cut off is replaced by a note.
-    limit : int, optional
-        What the note tells, where the room is what is left of more.
-
-    Returns
-    -------
-    object
-
     Examples
     --------
     >>> clipped({"text": "abcdef"}, 3)
@@ -49,14 +37,6 @@ def clipped(value: Any, room: int, limit: int | None = None) -> Any:
 def length(value: Any) -> int:
     """Return how many characters there are in a value made of dicts, lists and strings.
 
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    int
-
     Examples
     --------
     >>> length({"text/plain": ["ab", "c"]})
@@ -70,19 +50,7 @@ def length(value: Any) -> int:
 
 
 def limited(send: Callable[..., Any], shown: int = SHOWN) -> Callable[..., Any]:
-    """Return a way to send messages that cuts the outputs of each cell.
-
-    Parameters
-    ----------
-    send : callable
-        As `jupyter_client.session.Session.send`.
-    shown : int
-        Characters that a cell may print; its pictures and pages may have twenty times as many.
-
-    Returns
-    -------
-    callable
-    """
+    """Return a way to send messages that cuts the outputs of each cell."""
     used: dict[str, int] = {}
 
     def bounded(stream: Any, kind: Any, content: Any = None, *args: Any, **kwargs: Any) -> Any:
@@ -120,10 +88,6 @@ def load_ipython_extension(shell: Any) -> None:
     """Limit the outputs of a kernel: ``--IPKernelApp.extensions=rbcourse.assignments.quota``.
 
     A cell that has printed too much to be an oversight is ended by an exception.
-
-    Parameters
-    ----------
-    shell : ipykernel.zmqshell.ZMQInteractiveShell
     """
     session = shell.kernel.session
     session.send = limited(session.send)

@@ -13,65 +13,24 @@ from nbformat import NotebookNode
 
 
 def marks_of(cell: NotebookNode) -> dict[str, Any]:
-    """Return what nbgrader has written into a cell.
-
-    Parameters
-    ----------
-    cell : NotebookNode
-
-    Returns
-    -------
-    dict of str to object
-    """
+    """Return what nbgrader has written into a cell."""
     marks = cell.metadata.get("nbgrader")
     return marks if isinstance(marks, dict) else {}
 
 
 def grade_id(cell: NotebookNode) -> str:
-    """Return the name by which nbgrader knows a cell.
-
-    Parameters
-    ----------
-    cell : NotebookNode
-
-    Returns
-    -------
-    str
-        Empty where it has none.
-    """
+    """Return the name by which nbgrader knows a cell."""
     return str(marks_of(cell).get("grade_id") or "")
 
 
 def is_test(cell: NotebookNode) -> bool:
-    """Tell whether a cell holds tests.
-
-    Parameters
-    ----------
-    cell : NotebookNode
-
-    Returns
-    -------
-    bool
-    """
+    """Tell whether a cell holds tests."""
     marks = marks_of(cell)
     return bool(cell.cell_type == "code" and marks.get("grade") and not marks.get("solution"))
 
 
 def name_cell(cells: list[NotebookNode], at: int, number: bool = True) -> str:
-    """Return words by which a person finds a cell.
-
-    Parameters
-    ----------
-    cells : list of NotebookNode
-    at : int
-        Its index.
-    number : bool
-        Whether to tell its number, counted from 1.
-
-    Returns
-    -------
-    str
-    """
+    """Return words by which a person finds a cell."""
     cell = cells[at]
     kind = "answer" if marks_of(cell).get("solution") else "test" if is_test(cell) else "locked"
     headings = [
@@ -86,25 +45,7 @@ def name_cell(cells: list[NotebookNode], at: int, number: bool = True) -> str:
 
 
 def mend(notebook: NotebookNode, original: NotebookNode) -> list[str]:
-    """Put the locked cells of a notebook back as they were, and say what was done.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        It is changed in place.
-    original : NotebookNode
-        As it was handed out.
-
-    Returns
-    -------
-    list of str
-        What was found and done, in words for a student.
-
-    Raises
-    ------
-    ValueError
-        If the notebook is not of this set.
-    """
+    """Put the locked cells of a notebook back as they were, and say what was done."""
     cells, wanted = notebook.cells, {grade_id(c): c for c in original.cells if grade_id(c)}
     ids = {grade_id(cell) for cell in cells} - {""}
     if len(ids & set(wanted)) <= len(ids - set(wanted)):

@@ -26,29 +26,7 @@ class NotYet(AssertionError):
 def call_student(
     function: Any, arguments: tuple[Any, ...], allowed: Sequence[str], times: int = 1
 ) -> list[Any]:
-    """Return what a student's function returns, each time.
-
-    Parameters
-    ----------
-    function : callable
-        Defined in a notebook.
-    arguments : tuple
-    allowed : sequence of str
-        Functions of the package that it may call. Python and NumPy it may use as it likes, and
-        Matplotlib to draw.
-    times : int
-        How often it is called; ten times at most it is watched.
-
-    Returns
-    -------
-    list of object
-
-    Raises
-    ------
-    NotYet
-        If it stops with an error, or if it refers to, imports or calls anything else. (What is
-        built for not being seen is not: this tells an honest student what is not meant.)
-    """
+    """Return what a student's function returns, each time."""
     _refuse(_foreign_names(function, allowed))
     watch, before, collecting = _Watch(allowed), sys.getprofile(), gc.isenabled()
     gc.disable()  # what it cleans up is not the student's

@@ -25,16 +25,6 @@ CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp
 def names_relied_on(locked: Iterable[str]) -> set[str]:
     """Return the names that students may not give a new meaning.
 
-    Parameters
-    ----------
-    locked : iterable of str
-        The code of the cells that students may not change.
-
-    Returns
-    -------
-    set of str
-        What these import and define, and the built-in functions that they use.
-
     Examples
     --------
     >>> sorted(names_relied_on(["import numpy as np", "assert all(np.isclose(x, 1))"]))
@@ -59,20 +49,6 @@ def find_tampering(
     This reads the code and does not run it: it finds what students write in earnest or in jest,
     not what an expert takes pains to hide.
 
-    Parameters
-    ----------
-    source : str
-        The code of a cell.
-    relied : set of str
-        As `names_relied_on` returns.
-    imported : set of str, optional
-        Names that stand for modules and what they hold; those of this cell are added.
-
-    Returns
-    -------
-    list of (int, str)
-        The line and what is done there, as ``(3, "replaces np.allclose")``.
-
     Examples
     --------
     >>> find_tampering("import numpy as np\nnp.allclose = print", {"np"})
@@ -93,18 +69,7 @@ def find_tampering(
 
 
 def find_in_cells(cells: Iterable[tuple[str, bool]]) -> list[tuple[int, int, str]]:
-    """Find where a notebook replaces what its tests rely on.
-
-    Parameters
-    ----------
-    cells : iterable of (str, bool)
-        The code of each cell, and whether it is the student's own.
-
-    Returns
-    -------
-    list of (int, int, str)
-        The number of the cell among these, from 0; the line; what is done there.
-    """
+    """Find where a notebook replaces what its tests rely on."""
     cells = list(cells)
     relied = names_relied_on(source for source, own in cells if not own)
     imported: set[str] = set()

@@ -34,24 +34,7 @@ WIDGETS = [
 
 
 def find_lesson(number: str, folder: Path) -> Path:
-    """Return the lesson of a number.
-
-    Parameters
-    ----------
-    number : str
-        With or without a leading zero.
-    folder : Path
-        Where the lessons are.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    ValueError
-        If there is no such lesson; the message names those that there are.
-    """
+    """Return the lesson of a number."""
     paths = {path.name[:2]: path for path in lesson_paths(folder)}
     if number.zfill(2) not in paths:
         there = ", ".join(paths) or "none; this is run in the folder of the course"
@@ -64,11 +47,6 @@ def mark_sections(notebook: NotebookNode) -> None:
 
     A section that is stored collapsed reaches to the next heading of its level or a higher one.
     The run sheet is folded too: it has the answers, and is not for the class.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        It is changed in place: a heading that opens a section becomes a cell of its own.
     """
     cells: list[NotebookNode] = []
     levels: list[int] = []
@@ -118,13 +96,6 @@ def serve(path: Path, begin: Callable[[str], None]) -> None:
     """Serve a lesson until Ctrl-C, or until the event loop is stopped; then end its kernels.
 
     Nothing of the user's settings is read, and nothing is written but to a temporary folder.
-
-    Parameters
-    ----------
-    path : Path
-        The notebook; it is only read.
-    begin : callable
-        Called with the address, which contains a token, as soon as the server listens.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         _set_environment(Path(folder))
@@ -189,14 +160,7 @@ def _free_port() -> int:
 
 
 def present(path: Path, browser: bool) -> None:
-    """Show a lesson in the browser until Ctrl-C.
-
-    Parameters
-    ----------
-    path : Path
-    browser : bool
-        Whether to open it; the address is printed anyway.
-    """
+    """Show a lesson in the browser until Ctrl-C."""
 
     def begin(address: str) -> None:
         print(f"{path.name} is shown at {address}", flush=True)

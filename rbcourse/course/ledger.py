@@ -51,21 +51,6 @@ def collect(root: Path) -> dict[str, Entry]:
 
     Functions come from the References of their docstrings, constants from what stands below them,
     tests from their marks ``source``, lessons from the keys in their headings.
-
-    Parameters
-    ----------
-    root : Path
-        The folder of the course.
-
-    Returns
-    -------
-    dict of str to Entry
-        With the keys of sources.toml, in that order, then ``errata 1`` and so on.
-
-    Raises
-    ------
-    ValueError
-        If a key is used that sources.toml does not have; it names the place.
     """
     found = {key: Entry() for key in [*SOURCES["entries"], *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
@@ -84,12 +69,18 @@ def _functions(root: Path) -> Iterator[tuple[str, str]]:
         module = ".".join(path.relative_to(package).with_suffix("").parts)
         body = ast.parse(path.read_text(encoding="utf-8")).body
         for node, below in zip(body, [*body[1:], None], strict=True):
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                docstring = ast.get_docstring(node) or ""
-                _, _, references = docstring.partition("References\n----------\n")
-                yield f"{module}.{node.name}", references.partition("\n\n")[0]
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_":
+                yield f"{module}.{node.name}", _references(ast.get_docstring(node) or "")
             elif isinstance(node, ast.Assign) and isinstance(below, ast.Expr):
                 yield f"{module}.{ast.unparse(node.targets[0])}", ast.unparse(below)
+
+
+def _references(docstring: str) -> str:
+    """Return the References section; of a docstring without sections, the text."""
+    text, _, references = docstring.partition("References\n----------\n")
+    if not references:
+        return " ".join(re.split(r"\n\n\w+( \w+)?\n-+\n", text)[0].split())
+    return references.partition("\n\n")[0]
 
 
 def _tests(root: Path) -> Iterator[tuple[str, str]]:
@@ -111,18 +102,7 @@ def _headings(root: Path) -> Iterator[tuple[str, str]]:
 
 
 def render(found: dict[str, Entry]) -> str:
-    """Return the ledger as a page.
-
-    Parameters
-    ----------
-    found : dict of str to Entry
-        As `collect` returns it.
-
-    Returns
-    -------
-    str
-        Markdown, with links into the repository.
-    """
+    """Return the ledger as a page."""
     lines = [
         "# Ledger",
         "",

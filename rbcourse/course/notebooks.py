@@ -23,39 +23,12 @@ KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
 def lesson_paths(folder: Path) -> list[Path]:
-    """Return the lessons of a folder in the order of the course; assignments are none.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Returns
-    -------
-    list of Path
-    """
+    """Return the lessons of a folder in the order of the course; assignments are none."""
     return sorted(folder.glob("[0-9][0-9]_*.ipynb"))
 
 
 def execute(path: Path, figures: Path) -> str:
-    """Run a lesson from top to bottom in a new kernel and return what is to be stored.
-
-    Parameters
-    ----------
-    path : Path
-        The notebook; it is only read.
-    figures : Path
-        The folder that its figures go to.
-
-    Returns
-    -------
-    str
-        The notebook with its outputs, normalised.
-
-    Raises
-    ------
-    nbclient.exceptions.CellExecutionError
-        If a cell fails.
-    """
+    """Run a lesson from top to bottom in a new kernel and return what is to be stored."""
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(
         notebook,
@@ -81,15 +54,6 @@ def kernel_address(folder: str) -> dict[str, str]:
 
     At files, except on Windows: a port that is found free may be taken by another program before
     the kernel takes it.
-
-    Parameters
-    ----------
-    folder : str
-        For the files; its name must be short, 80 characters at most.
-
-    Returns
-    -------
-    dict of str to str
     """
     if os.name == "nt":
         return {}
@@ -102,15 +66,6 @@ def normalised(notebook: NotebookNode) -> str:
     Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
     random ids of 32 hexadecimal digits are numbered in the order of appearance. Of a widget, which
     lives with its kernel, the still is stored that it gives beside itself.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        It is changed in place.
-
-    Returns
-    -------
-    str
     """
     notebook.metadata.kernelspec = dict(KERNEL)
     notebook.metadata.language_info = {"name": "python"}
@@ -140,16 +95,6 @@ def regenerate(lessons: Path, figures: Path) -> None:
     """Execute every lesson, then rewrite the stored outputs and the figures.
 
     Nothing is rewritten unless every lesson ran; figures that no lesson draws are removed.
-
-    Parameters
-    ----------
-    lessons, figures : Path
-        The two folders.
-
-    Raises
-    ------
-    ValueError
-        If there are no lessons.
     """
     if not lesson_paths(lessons):
         raise ValueError(f"{lessons}: no lessons here; this is run in the folder of the course")
@@ -177,16 +122,6 @@ def copy_lessons(lessons: Path, work: Path) -> None:
     A lesson that is new to the folder is copied. One that has changed since it was copied takes
     the place of its copy if the cells of that are as they were, run or not, and is laid beside it
     otherwise.
-
-    Parameters
-    ----------
-    lessons, work : Path
-        From where and to where.
-
-    Raises
-    ------
-    ValueError
-        If a lesson is no notebook; nothing of it is written.
     """
     work.mkdir(exist_ok=True)
     record, notary = work / ".copied.json", NotebookNotary()

@@ -103,17 +103,7 @@ class _Page(HTMLParser):
 
 
 def check(path: Path) -> list[str]:
-    """Try a lesson before class; what is looked at is printed.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    list of str
-        What is missing and how to cure it; nothing if all is ready.
-    """
+    """Try a lesson before class; what is looked at is printed."""
     missing: list[str] = []
     print(f"lesson: {path.name}", flush=True)
 

@@ -51,11 +51,7 @@ def chain_explorer() -> Explorer:
 
     Controls: the ``leg``, a curve with its name; ``share``, the velocities at the two poses between
     as a share of Bessel's, for which geodesics do not ask; the ``duration`` of the whole in s; and
-    the time ``t`` in [0, 1], as a share of it, which plays.
-
-    References
-    ----------
-    BK 6.3.
+    the time ``t`` in [0, 1], as a share of it, which plays (BK 6.3).
     """
     with look():
         fig = new_figure()

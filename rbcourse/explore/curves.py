@@ -37,11 +37,8 @@ def theta_explorer() -> Explorer:
     """Return an explorer of the straight line and its shadow: θ(t), and its inverse f(t).
 
     On the left the circle of the rotations between the two ends, with the chord; on the right θ and
-    f over time. Controls: the ``angle`` ‖ω₀‖ in degrees, and the time ``t``, which plays.
-
-    References
-    ----------
-    BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Cor. 2, BK Fig. 2, BK Fig. 3.
+    f over time. Controls: the ``angle`` ‖ω₀‖ in degrees, and the time ``t``, which plays (BK Prop.
+    6, BK (15), BK (16), BK Cor. 1, BK Cor. 2, BK Fig. 2, BK Fig. 3).
     """
     with look():
         fig = new_figure()
@@ -108,11 +105,8 @@ def screw_explorer() -> Explorer:
     """Return an explorer of two ways from the room's frame to a pose: geodesic and screw.
 
     Controls: the ``angle`` of the turn in degrees, how far its axis is ``tilt``ed from z towards x,
-    in degrees, where the body goes, ``x`` and ``z`` in m, and the time ``t``, which plays.
-
-    References
-    ----------
-    BK 2.6, BK (10), BK (14).
+    in degrees, where the body goes, ``x`` and ``z`` in m, and the time ``t``, which plays (BK 2.6,
+    BK (10), BK (14)).
     """
     with look():
         fig = new_figure()
@@ -168,11 +162,7 @@ def flip_explorer() -> Explorer:
 
     Its angular momentum is upright and stays. Controls: the ``axis`` that it spins about; how far
     it is ``off`` that axis, in degrees; the time ``t`` in s, which plays, and starts again when
-    another axis is chosen.
-
-    References
-    ----------
-    BK (8), BK 2.4.
+    another axis is chosen (BK (8), BK 2.4).
     """
     with look():
         fig = new_figure()

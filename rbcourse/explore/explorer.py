@@ -161,13 +161,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return {name: control.value for name, control in self.controls.items()}
 
     def put(self, **values: Any) -> None:
-        """Set some of the controls, in their order, and draw once.
-
-        Parameters
-        ----------
-        **values
-            By the names of the controls.
-        """
+        """Set some of the controls, in their order, and draw once."""
         self._resting = True
         try:
             for name in [name for name in self.controls if name in values]:

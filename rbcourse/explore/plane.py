@@ -23,11 +23,8 @@ def planar_explorer() -> Explorer:
     """Return an explorer of plans: two commands, meant in the world's frame or in the body's.
 
     Controls: ``vx1 vy1 omega1`` and ``vx2 vy2 omega2``, the velocities of the two commands of two
-    seconds each, in m/s and degrees/s, and the time ``t`` in s, which plays.
-
-    References
-    ----------
-    RR 3.2, RR (17), RR (18), RR (19).
+    seconds each, in m/s and degrees/s, and the time ``t`` in s, which plays (RR 3.2, RR (17), RR
+    (18), RR (19)).
     """
     with look():
         fig = new_figure()
@@ -87,11 +84,7 @@ def arm_explorer() -> Explorer:
 
     A pale arm shows where it starts; both motors run evenly from there. Controls: the goal
     ``theta0`` and ``theta1``, in degrees, and the time ``t`` in [0, 1], which plays. Who sets a
-    goal sees the arm there.
-
-    References
-    ----------
-    RR 4, RR 4.1, RR (20), RR (21).
+    goal sees the arm there (RR 4, RR 4.1, RR (20), RR (21)).
     """
     start = np.radians(_START)
     with look():

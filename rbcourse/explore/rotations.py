@@ -37,11 +37,7 @@ def rotation_explorer() -> Explorer:
     A box with its axes. Dashed: the axes of the three turns, of the first one z of the room, of the
     second the y that the first has turned, of the third the body's own x. Dotted: the axis of the
     one turn that does it all. Controls: ``alpha beta gamma``, the ZYX angles in degrees; ``beta``
-    plays.
-
-    References
-    ----------
-    RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5.
+    plays (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
     with look():
         fig = new_figure()
@@ -96,11 +92,8 @@ def projection_explorer() -> Explorer:
     """Return an explorer of repairs: a matrix pulled away from SO(3), and what two make of it.
 
     Grey: the columns of I + pull · E. Full: the nearest rotation. Dashed: Gram–Schmidt. Controls:
-    the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it ``pull``s, which plays.
-
-    References
-    ----------
-    BK 4, BK Prop. 2, RR 1.4.
+    the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it ``pull``s, which plays (BK 4,
+    BK Prop. 2, RR 1.4).
     """
     with look():
         fig = new_figure()
@@ -156,11 +149,7 @@ def random_explorer() -> Explorer:
     """Return an explorer of random rotations: where they carry e₁, and how sure one can be.
 
     Controls: the ``sampler``, "three angles" or "uniform"; the ``number`` of rotations, which
-    plays: always the first of the same 2000; and the ``seed`` of these.
-
-    References
-    ----------
-    RR 2, RR 2.1, RR 2.2.
+    plays: always the first of the same 2000; and the ``seed`` of these (RR 2, RR 2.1, RR 2.2).
     """
     with look():
         fig = new_figure()

@@ -52,29 +52,13 @@ WAYS: dict[str, Maker] = {**CLOSED_FORMS, "projection": projection}
 
 
 def atlas_problems(draws: int, *, rng: Rng = None) -> Ends:
-    """Return random problems in every cell of the atlas.
+    """Return `draws` random problems in every cell of the atlas.
 
     A cell is a family, a step of the displacement ‖σ‖ from 0 to π, and a step of the end velocity
-    v = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`; within it both are uniform. v is shared out between
-    w0 and w1 by a random angle. "along": both point along the axis of σ or against it; "across":
-    each in a random direction across it.
-
-    Parameters
-    ----------
-    draws : int
-        How many in each cell.
-    rng : Generator, int or None, optional
-        Where the numbers come from; a seed gives the same ones each time.
-
-    Returns
-    -------
-    Ends
-        2 × 10 × 10 × draws problems: family, displacement, end velocity, draw.
-
-    Raises
-    ------
-    ValueError
-        If `draws` is no integer from 1 up, or `rng` makes no numbers.
+    v = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`; within it both are uniform. v is divided between w0
+    and w1 by a random angle. "along": both point along the axis of σ or against it; "across": each
+    in a random direction across it. The problems are in the order family, displacement, end
+    velocity, draw.
 
     Examples
     --------
@@ -104,24 +88,6 @@ def atlas_problems(draws: int, *, rng: Rng = None) -> Ends:
 def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     """Return random problems: σ in a ball of the radius `size`, w0 and w1 in one of twice that.
 
-    Parameters
-    ----------
-    count : int
-        How many.
-    size : float
-        The radius in rad, above 0 and at most π.
-    rng : Generator, int or None, optional
-        Where the numbers come from.
-
-    Returns
-    -------
-    Ends
-
-    Raises
-    ------
-    ValueError
-        If `count` is no integer from 1 up, `size` is another, or `rng` makes no numbers.
-
     Examples
     --------
     >>> ends = random_problems(1000, 0.5, rng=1)
@@ -142,33 +108,11 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
 def survey(
     ends: Ends, report: Report | None = None, ways: Mapping[str, Maker] = WAYS
 ) -> dict[str, Array]:
-    """Return what the optimum costs, and what each of the closed forms does.
+    """Return the costs ∫ 2 ‖w'‖² dt of N problems, shape (N,), by the names of the curves.
 
-    Parameters
-    ----------
-    ends : Ends
-        N problems.
-    report : callable, optional
-        ``report(done, total)`` is told now and then how many problems are done.
-    ways : mapping of str to callable, optional
-        What is compared: makers of stacks of curves, with names.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (N,)
-        ∫ 2 ‖w'‖² dt of the "optimum", NaN where it is not found, and under their names of the
-        others, to about 1e-7 relative.
-
-    Raises
-    ------
-    ValueError
-        If a curve is not defined for some ends, or at a time at which it is evaluated.
-    RuntimeError
-        If an integral does not settle.
-
-    References
-    ----------
-    BK 1, BK (18), BK 7.
+    They are those of the "optimum", NaN where it is not found, and of the closed forms, to about
+    1e-7 relative. ``report(done, total)`` is called now and then with numbers of problems
+    (BK 1, BK (18), BK 7).
     """
     parts = list(blocks(len(ends.w0), _PART)) or [slice(0, 0)]
 
@@ -182,33 +126,9 @@ def survey(
 
 
 def costs(make: Maker, ends: Ends) -> Array:
-    """Return ∫ 2 ‖w'‖² dt of many curves, each to about 1e-7 relative.
+    """Return ∫ 2 ‖w'‖² dt of the curves that ``make`` gives for N problems, to about 1e-7 relative.
 
-    Each has panels of its own; one on which two rules differ by 1e-6 of the cost is halved.
-
-    Parameters
-    ----------
-    make : callable
-        ``make(R0, R1, w0, w1)`` returns a stack of curves.
-    ends : Ends
-        N problems.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-
-    Raises
-    ------
-    ValueError
-        As `survey`.
-
-    See Also
-    --------
-    acceleration_cost : To 1e-10, for any curve.
-
-    References
-    ----------
-    BK (18).
+    See `acceleration_cost` for 1e-10, and for any curve (BK (18)).
 
     Examples
     --------
@@ -221,27 +141,11 @@ def costs(make: Maker, ends: Ends) -> Array:
 
 
 def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
-    """Return what the curves cost that Newton's method finds from several guesses.
+    """Return the costs of the curves that Newton's method finds from several guesses, by guess.
 
-    The guesses are the closed forms but Cayley's, which seldom leads anywhere when it is far off,
-    and the exponential cubic the long way round. What is found is stationary; none is proven to be
-    the best.
-
-    Parameters
-    ----------
-    ends : Ends
-        N problems.
-    report : callable, optional
-        See `survey`.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (N,)
-        The costs, NaN where nothing is found; by the name of the guess.
-
-    References
-    ----------
-    BK (19).
+    The guesses are the closed forms except Cayley's, which seldom leads anywhere when it is far
+    off, and the exponential cubic the long way round. The curves are stationary; none is proven to
+    be the best. NaN where none is found (BK (19)).
     """
     starts = {way: make for way, make in WAYS.items() if way != "Cayley"}
     starts["long way round"] = long_way_round
@@ -271,25 +175,9 @@ def bezier_other_way(R0: Array, R1: Array, w0: Array, w1: Array) -> Bezier:
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
     """Return by how much curves differ when their ends are moved, or exchanged.
 
-    Parameters
-    ----------
-    make : callable
-        As for `costs`.
-    ends : Ends
-        N problems.
-    rng : Generator, int or None, optional
-        Where the rotations L and Q come from.
-
-    Returns
-    -------
-    dict of str to float
-        The largest angle in rad, over all problems and 33 times, between L R(t) and the curve of
-        the "left"-moved ends, R(t) Q and that of the "right"-moved ones, and R(1 − t) and that of
-        the "reversed" ones.
-
-    References
-    ----------
-    BK Prop. 3.
+    The values are the largest angles in rad, over all problems and 33 times, between L R(t) and the
+    curve of the "left"-moved ends, R(t) Q and that of the "right"-moved ones, and R(1 − t) and that
+    of the "reversed" ones, for random rotations L and Q (BK Prop. 3).
     """
     R0, R1, w0, w1 = ends
     L, Q = sample_rotation(2, rng=rng)
@@ -304,57 +192,25 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
 
 
 def near_zero(ends: Ends, optimum: Array) -> NDArray[np.bool_]:
-    """Tell which optima cost so little, in view of their ends, that no ratio says anything.
-
-    Parameters
-    ----------
-    ends : Ends
-        N problems.
-    optimum : ndarray, shape (N,)
-        What they cost.
-
-    Returns
-    -------
-    ndarray of bool, shape (N,)
-    """
+    """Tell which optima cost so little, compared with their ends, that a ratio is meaningless."""
     sigma = log_so3(ends.R0.mT @ ends.R1)
     return optimum < NEAR_ZERO * sum(np.sum(x**2, axis=-1) for x in (sigma, ends.w0, ends.w1))
 
 
 def excesses(ends: Ends, found: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the costs over the optimum, minus 1; NaN where it is near zero, or not found.
+    """Return the costs of a `survey` over the optimum, minus 1.
 
-    Parameters
-    ----------
-    ends : Ends
-        N problems.
-    found : mapping of str to ndarray, shape (N,)
-        See `survey`.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (N,)
+    NaN where the optimum is near zero or not found.
     """
     optimum = np.where(near_zero(ends, found["optimum"]), np.nan, found["optimum"])
     return {way: cost / optimum - 1 for way, cost in found.items() if way != "optimum"}
 
 
 def cell_table(excess: Mapping[str, Array], draws: int, share: float) -> dict[str, Array]:
-    """Return a quantile of the excess in each cell of the atlas, as a table.
+    """Return the quantile `share` of `excesses` in each cell of `atlas_problems`, as a table.
 
-    Parameters
-    ----------
-    excess : mapping of str to ndarray, shape (2 * 10 * 10 * draws,)
-        See `excesses`, of `atlas_problems`.
-    draws : int
-        How many there are in each cell.
-    share : float
-        Which quantile: 0.5 for the median.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (2 * 10 * 10,)
-        Family, the middle of the cell, how many problems count, and a `quantile` for each way.
+    Its columns are the family, the middle of the cell, how many problems count, and a `quantile`
+    for each closed form; a row for each of the 2 × 10 × 10 cells.
     """
     family, turn, speed = np.indices((2, CELLS, CELLS)).reshape(3, -1)
     cells = {way: x.reshape(-1, draws) for way, x in excess.items()}
@@ -368,19 +224,9 @@ def cell_table(excess: Mapping[str, Array], draws: int, share: float) -> dict[st
 
 
 def quantile(x: Array, share: float) -> Array:
-    """Return the smallest of the numbers that `share` of them do not pass.
+    """Return the smallest number that is not below `share` of the numbers in the last axis.
 
-    Parameters
-    ----------
-    x : ndarray, shape (..., N)
-        Numbers; NaN does not count.
-    share : float
-        From 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        With four digits, and eight decimals at most.
+    NaN does not count. The result is rounded to four digits, and to eight decimals at most.
 
     Examples
     --------

@@ -27,22 +27,6 @@ _LOOKS: dict[str, tuple[str, str]] = {
 def draw_atlas(fig: Figure, data: Table, quantile: str) -> list[Any]:
     """Draw a heat map for each closed form and each family, with contours at 1, 10 and 100 %.
 
-    Parameters
-    ----------
-    fig : Figure
-        Where to draw, on axes of its own.
-    data : mapping of str to array_like, shape (200,)
-        A `cell_table`.
-    quantile : str
-        What it is called.
-
-    Returns
-    -------
-    list of artists
-        The heat maps.
-
-    References
-    ----------
     BK 1, BK 7.
     """
     fig.set_layout_engine("none")
@@ -89,17 +73,7 @@ def _draw_contours(ax: Axes, turns: Array, speeds: Array, excess: Array) -> None
 
 
 def describe_atlas(data: Table, quantile: str) -> str:
-    """Return in words what `draw_atlas` shows.
-
-    Parameters
-    ----------
-    data, quantile
-        As for `draw_atlas`.
-
-    Returns
-    -------
-    str
-    """
+    """Return in words what `draw_atlas` shows."""
     said = "; ".join(f"{way} {_shares(data, way)}" for way in WAYS)
     return (
         f"Heat maps of the cost over the optimum minus 1, {quantile}, for six closed forms, over "
@@ -116,20 +90,6 @@ def _shares(data: Table, way: str) -> str:
 def draw_growth(ax: Axes, data: Table) -> list[Any]:
     """Draw, on logarithmic axes, the median excess of each closed form over the excursion.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (sizes,)
-        The size of the excursion, and for each closed form the median excess, and the 90 %
-        quantile: the upper end of a bar. The curves stand side by side, up to 8 % off their size.
-
-    Returns
-    -------
-    list of Line2D
-
-    References
-    ----------
     BK 1, BK 7.
     """
     size = np.asarray(data["size [rad]"])
@@ -151,17 +111,7 @@ def draw_growth(ax: Axes, data: Table) -> list[Any]:
 
 
 def describe_growth(data: Table) -> str:
-    """Return in words what `draw_growth` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (sizes,)
-        As for `draw_growth`.
-
-    Returns
-    -------
-    str
-    """
+    """Return in words what `draw_growth` shows."""
     size = np.asarray(data["size [rad]"])
     said = "; ".join(
         f"{way} from {values[0]:.1e} to {values[-1]:.1e}"
@@ -175,20 +125,7 @@ def describe_growth(data: Table) -> str:
 
 
 def draw_margins(ax: Axes, data: Table) -> list[Any]:
-    """Draw the excess of the projections, of matrices and of quaternions, over their margins.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (problems,)
-        For each of the two the margin and the excess.
-
-    Returns
-    -------
-    list of Line2D
-        A dot for each problem; then a line of slope −3.
-    """
+    """Draw the excess of the projections, of matrices and of quaternions, over their margins."""
     dots = []
     for way, mark in {"projection": ".", "quaternion": "+"}.items():
         style: Any = {"color": COLOURS[_LOOKS[way][0]], "alpha": 0.5, "ms": 4, "label": way}
@@ -201,17 +138,7 @@ def draw_margins(ax: Axes, data: Table) -> list[Any]:
 
 
 def describe_margins(data: Table) -> str:
-    """Return in words what `draw_margins` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (problems,)
-        As for `draw_margins`.
-
-    Returns
-    -------
-    str
-    """
+    """Return in words what `draw_margins` shows."""
     margin, excess = _margins(data, "projection")
     low, high = (np.nanmedian(excess[x]) for x in (margin < 0.2, margin > 1))
     least = _margins(data, "quaternion")[0].min()

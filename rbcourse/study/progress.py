@@ -33,16 +33,6 @@ class Stage:
 def bar(what: str) -> Callable[[int, int], None]:
     """Return a function that shows how much is done: a bar; outside of notebooks, lines.
 
-    Parameters
-    ----------
-    what : str
-        What is computed.
-
-    Returns
-    -------
-    callable
-        ``report(done, total)``.
-
     Examples
     --------
     >>> report = bar("Problems")
