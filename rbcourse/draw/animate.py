@@ -93,13 +93,7 @@ class Animation:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the animation to a file, as a GIF that starts again when it ends.
-
-        Parameters
-        ----------
-        path : str or Path
-            Where to write; a file that is there is replaced.
-        """
+        """Write the animation to a file, as a GIF that starts again when it ends."""
         Path(path).write_bytes(gif(self.pictures, self.seconds))
 
 
@@ -112,34 +106,7 @@ def animate(
     seconds: float = 4.0,
     still: int = -1,
 ) -> Animation:
-    """Return a figure as an animation, and leave it as it is in its still frame.
-
-    Parameters
-    ----------
-    fig : Figure
-        The figure, with everything on it that does not move. The axes must not change.
-    name : str
-        What the animation is called: a word.
-    alt : str
-        A sentence or two that say what is to be seen.
-    update : callable
-        ``update(i)`` moves the artists to frame i and returns those that move.
-    frames : int
-        How many frames.
-    seconds : float, optional
-        How long the animation takes.
-    still : int, optional
-        Which frame is shown before it plays: by default the last.
-
-    Returns
-    -------
-    Animation
-
-    Raises
-    ------
-    ValueError
-        If the name is no word, or more than 50 frames a second are asked for, or none.
-    """
+    """Return a figure as an animation, and leave it as it is in its still frame."""
     if not name.isidentifier():
         raise ValueError(f"name: a word of letters, digits and _ wanted, got {name!r}")
     if not 0 < frames <= 50 * seconds:
@@ -163,22 +130,6 @@ def save_animation(
     """Save an animation as GIF, its still frame as PNG and PDF, its numbers as CSV; close it.
 
     The files go where `save_figure` puts its own. The same input gives the same bytes.
-
-    Parameters
-    ----------
-    fig, name, alt, update, frames, seconds, still
-        As for `animate`; the name is that of the files, without ending.
-    data : mapping of str to array_like
-        The plotted numbers: columns of one shape, with units in their names.
-
-    Returns
-    -------
-    Animation
-
-    Raises
-    ------
-    ValueError
-        If the columns differ in shape, and as for `animate`.
     """
     csv_text(data)  # before anything is written
     animation = animate(fig, name, alt, update, frames, seconds, still)
@@ -193,20 +144,6 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
     """Return the frames as pictures.
 
     What does not move is drawn once, and restored before each frame. The axes must not change.
-
-    Parameters
-    ----------
-    fig : Figure
-        The figure.
-    update : callable
-        ``update(i)`` moves the artists to frame i and returns those that move.
-    frames : int
-        How many.
-
-    Returns
-    -------
-    list of Image
-        In RGB.
     """
     before: Any = fig.canvas
     paint = painter(fig, update(0))
@@ -216,20 +153,7 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
 
 
 def painter(fig: Figure, moving: Sequence[Any]) -> Callable[[Sequence[Any]], Image.Image]:
-    """Draw what does not move, once; return what draws moving artists over it.
-
-    Parameters
-    ----------
-    fig : Figure
-        The figure. Its canvas is replaced, its axes must not change.
-    moving : sequence of artists
-        All that will move.
-
-    Returns
-    -------
-    callable
-        ``paint(artists)`` returns the picture with these of them, in RGB.
-    """
+    """Draw what does not move, once; return what draws moving artists over it."""
     canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
     for artist in moving:
         artist.set_animated(True)

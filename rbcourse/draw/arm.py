@@ -1,4 +1,7 @@
-"""An arm on its way: artists on axes that the caller owns."""
+"""An arm on its way: artists on axes that the caller owns.
+
+Paths are arrays of joint angles in rad, shape (states, n); `lengths` are those of the links, in m.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -11,55 +14,25 @@ from numpy.typing import ArrayLike
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics
 from rbcourse.draw.save import COLOURS, Table, in_words
-from rbcourse.planar import as_states
 
 _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
 
 
-def arm_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> dict[str, Array]:
-    """Return a path of an arm as a table: one row for each state.
-
-    Parameters
-    ----------
-    path : array_like, shape (states, n)
-        Joint angles, in rad.
-    lengths : array_like, shape (n,), optional
-        Lengths of the links, in m.
-
-    Returns
-    -------
-    dict of str to ndarray
-        The joint angles; then, for each link, where it ends: the last end is the tip.
-    """
-    path = as_states(path)
-    ends = arm_forward_kinematics(path, lengths).joints[:, 1:]
+def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
+    """Return a path as a table: the joint angles; then where each link ends, the tip last."""
+    path = np.asarray(path)
     table = {f"theta{i} [rad]": angle for i, angle in enumerate(path.T)}
-    for i, end in enumerate(np.moveaxis(ends, 1, 0), start=1):
+    for i, end in enumerate(np.moveaxis(_joints(path, lengths)[:, 1:], 1, 0), start=1):
         table |= {f"x{i} [m]": end[:, 0], f"y{i} [m]": end[:, 1]}
     return table
 
 
-def draw_posture(ax: Axes, data: Table) -> list[Any]:
-    """Draw an arm with its joint angles and the frames at the centres of its links.
+def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
+    """Draw an arm with its joint angles q, shape (n,), and the frames at the centres of its links.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (1,)
-        An `arm_table`.
-
-    Returns
-    -------
-    list of artists
-        The links; then for each link its two axes.
-
-    References
-    ----------
-    RR 4.
+    Return the links; then for each link its two axes (RR 4).
     """
-    (q,), (joints,) = _angles(data), _joints(data)
-    headings = np.append(0, np.cumsum(q))
+    joints, headings = _joints(q, lengths), np.append(0, np.cumsum(q))
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.6)
     for i, (joint, before, after) in enumerate(
         zip(joints[:-1], headings[:-1], headings[1:], strict=True)
@@ -78,27 +51,14 @@ def draw_posture(ax: Axes, data: Table) -> list[Any]:
     return artists
 
 
-def draw_tip_velocities(ax: Axes, data: Table) -> list[Any]:
+def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     """Draw an arm, and at its tip the columns of the Jacobian as arrows.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; it is made to show all that the arm can reach.
-    data : mapping of str to array_like, shape (1,)
-        An `arm_table`.
-
-    Returns
-    -------
-    list of artists
-        The links; then an arrow for each joint, half as long as the tip goes for each radian.
-
-    References
-    ----------
-    RR 4.
+    Return the links; then an arrow for each joint, half as long as the tip goes for each radian
+    (RR 4).
     """
-    show_reach(ax, data)
-    (joints,) = _joints(data)
+    show_reach(ax, lengths)
+    joints = _joints(q, lengths)
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.6)
     for i, column in enumerate(_columns(joints).T):
         colour = _LOOKS[i % len(_LOOKS)][0]
@@ -106,32 +66,16 @@ def draw_tip_velocities(ax: Axes, data: Table) -> list[Any]:
     return artists
 
 
-def moving_arm(ax: Axes, data: Table, shown: Iterable[int]) -> Callable[[int], list[Any]]:
+def moving_arm(
+    ax: Axes, path: Array, shown: Iterable[int], lengths: ArrayLike = LINKS
+) -> Callable[[int], list[Any]]:
     """Draw an arm, pale, in some of its states; return what moves it along its way.
 
-    Dotted circles bound what the tip can reach.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; it is made to show all that the arm can reach, lengths equal on both axes.
-    data : mapping of str to array_like, shape (states,)
-        An `arm_table`.
-    shown : iterable of int
-        In which states it is drawn pale.
-
-    Returns
-    -------
-    callable
-        ``update(i)`` moves the arm to state i, draws the way of the tip up to there, and returns
-        the artists that move.
-
-    References
-    ----------
-    RR 4.3, RR Fig. 8, RR Fig. 9.
+    The axes show all that the arm can reach. ``update(i)`` moves the arm to state i, draws the way
+    of the tip up to there, and returns the artists that move (RR 4.3, RR Fig. 8, RR Fig. 9).
     """
-    joints = _joints(data)
-    show_reach(ax, data)
+    joints = _joints(path, lengths)
+    show_reach(ax, lengths)
     for i in shown:
         ax.plot(*joints[i].T, "o-", color="0.82", lw=3, ms=6, zorder=1.5)
     (links,) = ax.plot([], [], "o-", color=COLOURS["z"], lw=4, ms=8, zorder=3)
@@ -145,90 +89,48 @@ def moving_arm(ax: Axes, data: Table, shown: Iterable[int]) -> Callable[[int], l
     return update
 
 
-def draw_arm_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
-    """Draw the ways of the tip of an arm; pale, the arm at their ends, and half-way of the last.
+def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> list[Any]:
+    """Draw the ways of the tip of an arm, at most three; pale, the arm on the last of them.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; it is made to show all that the arm can reach.
-    ways : mapping of str to mapping of str to array_like
-        An `arm_table` for each name, at most three.
-
-    Returns
-    -------
-    list of Line2D
-        The ways.
-
-    References
-    ----------
-    RR 4.3.
+    Return the ways (RR 4.3).
     """
-    *_, last = ways.values()
-    show_reach(ax, last)
-    joints = _joints(last)
+    *_, last = paths.values()
+    show_reach(ax, lengths)
+    joints = _joints(last, lengths)
     for i in (0, len(joints) // 2, -1):
         ax.plot(*joints[i].T, "o-", color="0.75", lw=4, ms=8, zorder=1.5)
     for i, word in ((0, "start"), (-1, "goal")):
         ax.annotate(word, joints[i, -1], (0, -18), textcoords="offset points", ha="center")
     return [
-        ax.plot(*_joints(data)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
-        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
+        ax.plot(*_joints(path, lengths)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
+        for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)
     ]
 
 
-def draw_joint_ways(ax: Axes, ways: Mapping[str, Table]) -> list[Any]:
-    """Draw the same ways in the plane of the two joint angles.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    ways : mapping of str to mapping of str to array_like
-        An `arm_table` of a two-link arm for each name, at most three.
-
-    Returns
-    -------
-    list of Line2D
-
-    References
-    ----------
-    RR 4.1.
-    """
+def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
+    """Draw ways of a two-link arm, at most three, in the plane of the joint angles (RR 4.1)."""
     lines = [
-        ax.plot(*np.degrees(_angles(data)).T, color=colour, ls=ls, label=name)[0]
-        for (name, data), (colour, ls) in zip(ways.items(), _LOOKS[: len(ways)], strict=True)
+        ax.plot(*np.degrees(path).T, color=colour, ls=ls, label=name)[0]
+        for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)
     ]
     ax.set(xlabel="$θ_0$ (degrees)", ylabel="$θ_1$ (degrees)")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
     return lines
 
 
-def show_reach(ax: Axes, data: Table) -> None:
+def show_reach(ax: Axes, lengths: ArrayLike = LINKS) -> None:
     """Make axes show all that an arm can reach; dotted circles bound it."""
-    lengths = _lengths(_joints(data))
-    outer, inner = lengths.sum(), max(0.0, 2 * lengths.max() - lengths.sum())
-    for radius in (outer, inner):
+    total, longest = np.sum(lengths), np.max(lengths)
+    for radius in (total, max(0.0, 2 * longest - total)):
         ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))
-    edge = 1.08 * outer
+    edge = 1.08 * total
     ax.set(xlim=(-edge, edge), ylim=(-edge, edge), xlabel="x (m)", ylabel="y (m)")
     ax.set_aspect("equal")
 
 
-def describe_posture(data: Table) -> str:
-    """Return in words what `draw_posture` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (1,)
-        An `arm_table`.
-
-    Returns
-    -------
-    str
-    """
-    (q,), (joints,) = _angles(data), _joints(data)
-    places = ", ".join(_said(place, _lengths(joints[None]).sum()) for place in joints)
+def describe_posture(q: Array, lengths: ArrayLike = LINKS) -> str:
+    """Return in words what `draw_posture` shows."""
+    places = ", ".join(_said(place, np.sum(lengths)) for place in _joints(q, lengths))
     return (
         "An arm, each link with the x and y axes of its frame at its centre. Its joint angles are "
         f"{_degrees(q)} degrees, each measured from the link before; its joints, and "
@@ -236,70 +138,38 @@ def describe_posture(data: Table) -> str:
     )
 
 
-def describe_ways(ways: Mapping[str, Table]) -> str:
-    """Return in words what `draw_arm_ways` and `draw_joint_ways` show.
-
-    Parameters
-    ----------
-    ways : mapping of str to mapping of str to array_like
-        As for these.
-
-    Returns
-    -------
-    str
-    """
+def describe_ways(paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> str:
+    """Return in words what `draw_arm_ways` and `draw_joint_ways` show."""
     said = [
-        f"{name}: {_length(_joints(data)[:, -1]):.1f} m and "
-        f"{np.degrees(_length(_angles(data))):.0f} degrees"
-        for name, data in ways.items()
+        f"{name}: {_length(_joints(path, lengths)[:, -1]):.1f} m and "
+        f"{np.degrees(_length(path)):.0f} degrees"
+        for name, path in paths.items()
     ]
-    start, goal = map(_degrees, _angles(next(iter(ways.values())))[[0, -1]])
+    start, goal = map(_degrees, next(iter(paths.values()))[[0, -1]])
     return (
         f"Ways of an arm from joint angles of {start} to {goal} degrees: of its tip in the room, "
         f"and in the plane of the angles. How long they are: {'; '.join(said)}."
     )
 
 
-def describe_arm(data: Table) -> str:
-    """Return in words how an arm goes.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (states,)
-        An `arm_table`.
-
-    Returns
-    -------
-    str
-    """
-    angles, joints = _angles(data), _joints(data)
-    lengths, tip = _lengths(joints), joints[:, -1]
-    reach = lengths.sum()
-    turned = np.abs(np.diff(angles, axis=0)).sum(axis=0)
+def describe_arm(path: Array, lengths: ArrayLike = LINKS) -> str:
+    """Return in words how an arm goes."""
+    tip, reach = _joints(path, lengths)[:, -1], np.sum(lengths)
+    turned = np.abs(np.diff(path, axis=0)).sum(axis=0)
     start, end = (_said(place, reach) for place in tip[[0, -1]])
     return (
-        f"An arm with links of {_listed(in_words(x, x) for x in lengths)} m turns its joints "
-        f"from {_degrees(angles[0])} to {_degrees(angles[-1])} degrees, by {_degrees(turned)} "
+        f"An arm with links of {_listed(in_words(x, x) for x in np.asarray(lengths))} m turns its "
+        f"joints from {_degrees(path[0])} to {_degrees(path[-1])} degrees, by {_degrees(turned)} "
         f"degrees in all. From state to state its tip covers {in_words(_length(tip), reach)} m, "
         f"from {start} to {end} m; its way is drawn in red."
     )
 
 
-def describe_tip_velocities(postures: Mapping[str, Table]) -> str:
-    """Return in words what `draw_tip_velocities` shows on several axes.
-
-    Parameters
-    ----------
-    postures : mapping of str to mapping of str to array_like
-        An `arm_table` of one row for each name.
-
-    Returns
-    -------
-    str
-    """
+def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = LINKS) -> str:
+    """Return in words what `draw_tip_velocities` shows on several axes, for joint angles each."""
     said = []
-    for name, data in postures.items():
-        x, y = _columns(_joints(data)[0])
+    for name, q in postures.items():
+        x, y = _columns(_joints(q, lengths))
         said.append(f"{name}: they point to {_degrees(np.arctan2(y, x))} degrees")
     return (
         "An arm, with an arrow at its tip for each joint: how fast the tip goes when only the "
@@ -307,15 +177,9 @@ def describe_tip_velocities(postures: Mapping[str, Table]) -> str:
     )
 
 
-def _angles(data: Table) -> Array:
-    return np.stack([np.asarray(x) for key, x in data.items() if key.startswith("theta")], axis=-1)
-
-
-def _joints(data: Table) -> Array:
-    """Return the joints and the tip, shape (states, n + 1, 2)."""
-    x, y = ([np.asarray(v) for key, v in data.items() if key[0] == letter] for letter in "xy")
-    ends = np.stack([np.stack(x, axis=-1), np.stack(y, axis=-1)], axis=-1)
-    return np.concatenate([np.zeros_like(ends[:, :1]), ends], axis=1)
+def _joints(q: ArrayLike, lengths: ArrayLike) -> Array:
+    """Return the joints and the tip, shape (..., n + 1, 2)."""
+    return arm_forward_kinematics(q, lengths).joints
 
 
 def _columns(joints: Array) -> Array:
@@ -344,10 +208,6 @@ def _towards(heading: float) -> Array:
 
 def _length(places: Array) -> float:
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-
-
-def _lengths(joints: Array) -> Array:
-    return np.linalg.norm(np.diff(joints[0], axis=0), axis=1)
 
 
 def _listed(said: Iterable[str]) -> str:

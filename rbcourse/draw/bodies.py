@@ -1,56 +1,37 @@
-"""Bodies on their way: artists on axes that the caller owns, still or moving."""
+"""Bodies and frames in space, still or moving: artists on axes that the caller owns.
+
+Motions are arrays of poses, shape (times, 4, 4); `pose_table` turns them into columns for a file.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MultipleLocator
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from numpy.typing import ArrayLike
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from rbcourse._numerics import Array
-from rbcourse.draw.frames import draw_triad, pose_columns
 from rbcourse.draw.save import COLOURS, Table
-from rbcourse.so3 import log_so3
+from rbcourse.so3 import angle_between
 
 
-def motion_table(t: ArrayLike, poses: Array) -> Table:
-    """Return poses over time as a table: time, position and rotation matrix.
+def pose_table(first: Table, poses: Array) -> Table:
+    """Return a first column, such as the times, and the positions and rotation matrices of poses.
 
-    Parameters
-    ----------
-    t : array_like, shape (times,)
-        The times.
-    poses : ndarray, shape (times, 4, 4)
-        Poses [[R, d], [0, 1]].
-
-    Returns
-    -------
-    dict of str to ndarray
+    Examples
+    --------
+    >>> list(pose_table({"t [1]": [0]}, np.eye(4)[None]))[:5]
+    ['t [1]', 'x [m]', 'y [m]', 'z [m]', 'R11 [1]']
     """
-    return {"t [1]": np.asarray(t), **pose_columns(poses)}
+    position = dict(zip(["x [m]", "y [m]", "z [m]"], poses[:, :3, 3].T, strict=True))
+    entries = {f"R{i + 1}{j + 1} [1]": poses[:, i, j] for i in range(3) for j in range(3)}
+    return {**first, **position, **entries}
 
 
 def draw_box(ax: Any, pose: Array, edges: float | Array) -> Poly3DCollection:
-    """Draw a box with a rectangle on one of its faces, centred at the origin of its frame.
+    """Draw a box with a rectangle on the face of +z, centred at the origin of its frame.
 
-    Parameters
-    ----------
-    ax : Axes3D
-        Where to draw.
-    pose : ndarray, shape (4, 4)
-        Where the box is.
-    edges : float or ndarray of shape (3,)
-        Its three edges, or the one of a cube, in m.
-
-    Returns
-    -------
-    Poly3DCollection
-        Six faces and the rectangle; `move_box` moves it.
-
-    References
-    ----------
-    BK Fig. 5.
+    `edges` are its three edges, or the one of a cube, in m. `move_box` moves it (BK Fig. 5).
     """
     fill = ["0.86", "0.93", "0.98"] * 2 + [COLOURS["x"]]  # a shade for each direction
     box = Poly3DCollection(_box_faces(pose, edges), facecolors=fill, edgecolors="0.3", lw=0.8)
@@ -62,28 +43,11 @@ def move_box(box: Poly3DCollection, pose: Array, edges: float | Array) -> None:
     box.set_verts(_box_faces(pose, edges))
 
 
-def draw_cube_motion(ax: Any, data: Table, side: float) -> list[Any]:
-    """Draw a cube at several times, and stars along the path of its centre.
+def draw_cube_motion(ax: Any, poses: Array, side: float) -> list[Any]:
+    """Draw a cube of edge `side` in m at each pose, and stars along the path of its centre.
 
-    Parameters
-    ----------
-    ax : Axes3D
-        Where to draw.
-    data : mapping of str to array_like, shape (times,)
-        A `motion_table`; a cube is drawn at each time.
-    side : float
-        Its edge, in m.
-
-    Returns
-    -------
-    list of artists
-        The cubes, then the stars.
-
-    References
-    ----------
-    BK Fig. 5.
+    Return the cubes, then the stars (BK Fig. 5).
     """
-    poses = poses_from_table(data)
     cubes = [draw_box(ax, pose, side) for pose in poses]
     set_space(ax, poses[:, :3, 3], side)
     return [*cubes, draw_centre_path(ax, poses[:, :3, 3])]
@@ -108,40 +72,36 @@ def set_space(ax: Any, places: Array, side: float) -> None:
     ax.view_init(elev=18, azim=-22)  # never behind the square of BK Fig. 5
 
 
-def draw_ways(ax: Any, tables: Mapping[str, Table]) -> list[Any]:
-    """Draw the paths of the origin in several motions, and its frame at the start and the ends.
+def describe_cube_motion(poses: Array) -> str:
+    """Return in words what `draw_cube_motion` shows."""
+    steps = np.degrees(angle_between(poses[:-1, :3, :3], poses[1:, :3, :3]))
+    ends = " to ".join("(" + ", ".join(f"{x:g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
+    return (
+        f"A cube with a square on one face, at {len(poses)} times on its way from {ends} m, its "
+        f"centre starred. From one to the next it turns by "
+        f"{', '.join(f'{step:.0f}' for step in steps)} degrees."
+    )
 
-    Parameters
-    ----------
-    ax : Axes3D
-        Where to draw.
-    tables : mapping of str to table
-        A `motion_table` for up to three motions from one pose at the same times, with their names.
 
-    Returns
-    -------
-    list of Line3D
-        A path for each motion.
+def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
+    """Draw the paths of the origin in up to three motions, and its frame at the start and the ends.
 
-    References
-    ----------
-    BK 2.6.
+    The motions begin at one pose. Return a line for each (BK 2.6).
     """
     looks = [(COLOURS["optimum"], "-"), (COLOURS["screw"], "--"), (COLOURS["reference"], ":")]
     lines = [
-        ax.plot(*poses_from_table(table)[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
-        for (name, table), (colour, dash) in zip(tables.items(), looks, strict=False)
+        ax.plot(*poses[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
+        for (name, poses), (colour, dash) in zip(ways.items(), looks, strict=False)
     ]
-    ways = [poses_from_table(table) for table in tables.values()]
-    poses = [ways[0][0]]
-    for A in ways:
-        if all(np.abs(A[-1] - other).max() > 1e-9 for other in poses[1:]):
-            poses.append(A[-1])
-    for pose, name in zip(poses, "0111", strict=False):
+    frames = [next(iter(ways.values()))[0]]
+    for poses in ways.values():
+        if all(np.abs(poses[-1] - other).max() > 1e-9 for other in frames[1:]):
+            frames.append(poses[-1])
+    for pose, name in zip(frames, "0111", strict=False):
         draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
-    paths = np.array([line.get_data_3d() for line in lines])
+    paths = np.array([poses[:, :3, 3].T for poses in ways.values()])
     places = np.concatenate(paths, axis=1).T
-    set_space(ax, np.concatenate([places, *(A[:3, 3] + 0.5 * A[:3, :3].T for A in poses)]), 1.0)
+    set_space(ax, np.concatenate([places, *(A[:3, 3] + 0.5 * A[:3, :3].T for A in frames)]), 1.0)
     _look_across(ax, paths)
     ax.legend(loc="upper left", bbox_to_anchor=(0, 1.1))
     return lines
@@ -159,21 +119,11 @@ def _look_across(ax: Any, paths: Array) -> None:
     )
 
 
-def describe_ways(tables: Mapping[str, Table]) -> str:
-    """Return in words what `draw_ways` shows.
-
-    Parameters
-    ----------
-    tables : mapping of str to table
-        As for `draw_ways`.
-
-    Returns
-    -------
-    str
-    """
+def describe_ways(ways: Mapping[str, Array]) -> str:
+    """Return in words what `draw_ways` shows."""
     lengths = []
-    for name, table in tables.items():
-        steps = np.linalg.norm(np.diff(poses_from_table(table)[:, :3, 3], axis=0), axis=-1)
+    for name, poses in ways.items():
+        steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1)
         lengths.append(f"{name} {steps.sum():.2f} m")
     return (
         "The paths of the origin of a frame in several motions from one pose, and the frame at the "
@@ -182,27 +132,15 @@ def describe_ways(tables: Mapping[str, Table]) -> str:
 
 
 def moving_cubes(
-    axes: Sequence[Any], tables: Mapping[str, Table], side: float
+    axes: Sequence[Any], motions: Mapping[str, Array], side: float
 ) -> Callable[[int], list[Any]]:
-    """Draw cubes at the start of their motions, each on its axes; return what moves them.
+    """Draw cubes of edge `side` in m at the start of motions of equal length, each on its axes.
 
-    Parameters
-    ----------
-    axes : sequence of Axes3D
-        Where to draw.
-    tables : mapping of str to table
-        A `motion_table` for each at the same times, with its name.
-    side : float
-        The edge of the cubes, in m.
-
-    Returns
-    -------
-    callable
-        ``update(i)`` moves all cubes to row i of their tables and returns them.
+    Return ``update(i)``, which moves all cubes to pose i of their motions and returns them.
     """
-    motions = [poses_from_table(table) for table in tables.values()]
-    cubes = [draw_box(ax, poses[0], side) for ax, poses in zip(axes, motions, strict=True)]
-    for ax, name, poses in zip(axes, tables, motions, strict=True):
+    ways = list(motions.values())
+    cubes = [draw_box(ax, poses[0], side) for ax, poses in zip(axes, ways, strict=True)]
+    for ax, name, poses in zip(axes, motions, ways, strict=True):
         set_space(ax, poses[:, :3, 3], side)
         if np.ptp(poses[:, :3, 3], axis=0).any():
             draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
@@ -210,30 +148,19 @@ def moving_cubes(
         ax.set_title(name)
 
     def update(i: int) -> list[Any]:
-        for cube, poses in zip(cubes, motions, strict=True):
+        for cube, poses in zip(cubes, ways, strict=True):
             move_box(cube, poses[i], side)
         return cubes
 
     return update
 
 
-def describe_moving_cubes(tables: Mapping[str, Table]) -> str:
-    """Return in words what `moving_cubes` shows.
-
-    Parameters
-    ----------
-    tables : mapping of str to table
-        As for `moving_cubes`.
-
-    Returns
-    -------
-    str
-    """
-    (first, table), *others = tables.items()
-    t, R = np.asarray(table["t [1]"]), np.swapaxes(poses_from_table(table)[:, :3, :3], -1, -2)
-    said = f"Cubes with a square on one face move side by side: {', '.join(tables)}."
+def describe_moving_cubes(t: Array, motions: Mapping[str, Array]) -> str:
+    """Return in words what `moving_cubes` shows; the poses are those of the times t."""
+    (first, poses), *others = motions.items()
+    said = f"Cubes with a square on one face move side by side: {', '.join(motions)}."
     for name, other in others:
-        apart = np.degrees(np.linalg.norm(log_so3(R @ poses_from_table(other)[:, :3, :3]), axis=-1))
+        apart = np.degrees(angle_between(poses[:, :3, :3], other[:, :3, :3]))
         said += (
             f" The orientations of {first} and {name} differ most at t = {t[apart.argmax()]:.2f}, "
             f"by {apart.max():.0f} degrees."
@@ -243,27 +170,94 @@ def describe_moving_cubes(tables: Mapping[str, Table]) -> str:
     return said
 
 
-def describe_cube_motion(data: Table) -> str:
-    """Return in words what `draw_cube_motion` shows.
+def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> list[Any]:
+    """Draw a fixed frame, a moving frame on its body, and the position vector between them.
 
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (times,)
-        As for `draw_cube_motion`.
-
-    Returns
-    -------
-    str
+    `names` and `poses`, shape (2, 4, 4), are those of the fixed frame and the moving one
+    (BK Fig. 1).
     """
-    poses = poses_from_table(data)
-    R = poses[:, :3, :3]
-    steps = np.degrees(np.linalg.norm(log_so3(np.swapaxes(R[:-1], -1, -2) @ R[1:]), axis=-1))
-    ends = " to ".join("(" + ", ".join(f"{x:g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
+    d, R = poses[:, :3, 3], poses[:, :3, :3]
+    artists = [_draw_wire_box(ax, d[1], R[1], np.array([0.7, 0.5, 0.35]))]
+    for name, origin, axes in zip(names, d, R, strict=True):
+        artists += draw_triad(ax, origin, axes, name)
+        ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center")
+    vector = ax.quiver(*d[0], *(d[1] - d[0]), color=COLOURS["reference"], arrow_length_ratio=0.06)
+    ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
+    ax.set_box_aspect(np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1), zoom=1.3)
+    ax.set_axis_off()
+    ax.view_init(elev=20, azim=-60)
+    return [*artists, vector]
+
+
+def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
+    """Return in words what `draw_moving_frame` shows."""
+    fixed, moving = names
+    place = ", ".join(f"{x:g}" for x in poses[1, :3, 3])
+    turn = np.degrees(angle_between(np.eye(3), poses[1, :3, :3]))
     return (
-        f"A cube with a square on one face, at {len(poses)} times on its way from {ends} m, its "
-        f"centre starred. From one to the next it turns by "
-        f"{', '.join(f'{step:.0f}' for step in steps)} degrees."
+        f"The fixed frame {{{fixed}}} with its axes x, y, z, and a box that carries the moving "
+        f"frame {{{moving}}}. Its origin is at ({place}) m, the tip of the vector d, and it is "
+        f"turned by {turn:.0f} degrees against the fixed one."
     )
+
+
+def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> list[Any]:
+    """Draw a box with its frame in orientations R, shape (n, 3, 3), each on its own axes.
+
+    The names become titles; pale are the axes of the room (RR 2.1).
+    """
+    artists: list[Any] = []
+    for ax, name, turned in zip(axes, names, R, strict=True):
+        artists.append(_draw_wire_box(ax, np.zeros(3), turned, np.array([0.8, 0.5, 0.15])))
+        for room in 1.3 * np.eye(3):
+            artists += ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
+        for axis, direction in zip("xyz", turned.T, strict=True):
+            arrow = {"color": COLOURS[axis], "lw": 2.5, "arrow_length_ratio": 0.15}
+            artists.append(ax.quiver(0, 0, 0, *(1.2 * direction), **arrow))
+            ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
+        ax.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), zlim=(-1.3, 1.3))
+        ax.set_box_aspect((1, 1, 1), zoom=1.4)
+        ax.set_axis_off()
+        ax.view_init(elev=20, azim=-55)
+        ax.set_title(name)
+    return artists
+
+
+def describe_turns(names: Sequence[str], R: Array) -> str:
+    """Return in words what `draw_turns` shows."""
+    said = [
+        f"{name}: x {_heading(x)}, y {_heading(y)}, z {_heading(z)}"
+        for name, (x, y, z) in zip(names, np.swapaxes(R, -1, -2), strict=True)
+    ]
+    return f"A box with its axes in several orientations. Where they point: {'; '.join(said)}."
+
+
+def _heading(direction: Array) -> str:
+    """Return a direction as the fixed axis that it is nearest to, with its sign."""
+    k = int(np.abs(direction).argmax())
+    return f"along {'−' if direction[k] < 0 else '+'}{'xyz'[k]}"
+
+
+def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
+    """Draw the columns of R as arrows x, y, z from the origin, labelled with the name."""
+    artists = []
+    for axis, direction in zip("xyz", R.T, strict=True):
+        artists.append(ax.quiver(*origin, *direction, color=COLOURS[axis], lw=2.5))
+        ax.text(*(origin + 1.15 * direction), f"${axis}_{name}$", color=COLOURS[axis])
+    return artists
+
+
+def _draw_wire_box(ax: Any, centre: Array, R: Array, half: Array) -> Any:
+    """Draw the edges of a box with the half sides `half`, turned by R about its centre."""
+    corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij")).reshape(3, 8).T
+    placed = centre + (corners * half) @ R.T
+    edges = [
+        (placed[i], placed[j])
+        for i in range(8)
+        for j in range(i)
+        if np.abs(corners[i] - corners[j]).sum() == 2
+    ]
+    return ax.add_collection3d(Line3DCollection(edges, colors=COLOURS["reference"], lw=1))
 
 
 def _box_faces(pose: Array, edges: float | Array) -> Array:
@@ -277,13 +271,3 @@ def _box_faces(pose: Array, edges: float | Array) -> Array:
     faces[6] = faces[2] * [0.5, 0.5, 1.02]
     placed: Array = pose[:3, 3] + edges / 2 * faces @ pose[:3, :3].T
     return placed
-
-
-def poses_from_table(data: Table) -> Array:
-    """Return the poses, shape (times, 4, 4), of a `motion_table`."""
-    columns = [np.asarray(column) for name, column in data.items() if name[0] in "xyzR"]
-    poses = np.zeros((len(columns[0]), 4, 4))
-    poses[:, :3, 3] = np.stack(columns[:3], axis=-1)
-    poses[:, :3, :3] = np.stack(columns[3:], axis=-1).reshape(-1, 3, 3)
-    poses[:, 3, 3] = 1
-    return poses

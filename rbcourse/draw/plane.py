@@ -1,4 +1,7 @@
-"""A rectangle on its way through the plane: artists on axes that the caller owns."""
+"""A rectangle on its way through the plane: artists on axes that the caller owns.
+
+Paths are arrays of poses (x, y, theta) in m, m and rad, shape (states, 3).
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -9,135 +12,74 @@ from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.draw.save import COLOURS, Table, in_words
-from rbcourse.planar import as_states, compose_planar
+from rbcourse.planar import compose_planar
 
 _OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
 _NOSE = np.array([[0.8, -1, 0], [2, 0, 0], [0.8, 1, 0]]) / 4
 """A body of length 1, half as wide, and the mark on its front; it heads along its x axis."""
 _FILL = "#D6E6F2"
-STATES = {"planar": ["x [m]", "y [m]", "theta [rad]"]}
 
 
-def route_table(path: ArrayLike) -> dict[str, Array]:
-    """Return a path of planar poses as a table: one row for each.
-
-    Parameters
-    ----------
-    path : array_like, shape (states, 3)
-        Poses (x, y, theta): m, m, rad.
-
-    Returns
-    -------
-    dict of str to ndarray
-    """
-    return dict(zip(STATES["planar"], as_states(path).T, strict=True))
+def path_table(path: Array) -> Table:
+    """Return a path as a table: one row for each pose."""
+    return dict(zip(["x [m]", "y [m]", "theta [rad]"], path.T, strict=True))
 
 
-def draw_route(ax: Axes, data: Table, length: float, shown: Iterable[int]) -> list[Any]:
+def draw_route(ax: Axes, path: Array, length: float, shown: Iterable[int]) -> list[Any]:
     """Draw the way of a rectangle's centre, and the rectangle at some of its poses.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; it is made to show all of it, lengths equal on both axes.
-    data : mapping of str to array_like, shape (states,)
-        A `route_table`.
-    length : float
-        How long the rectangle is, in m. It is half as wide, and a mark shows its front.
-    shown : iterable of int
-        At which states it is drawn.
-
-    Returns
-    -------
-    list of artists
-        The way; then outline and mark for each.
-
-    References
-    ----------
-    RR 3.3.
+    The rectangle has a `length` in m, is half as wide, and has a mark on its front. The axes are
+    fitted, with equal units. Return the way; then outline and mark for each (RR 3.3).
     """
-    path = _path(data)
     artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["path"], zorder=2)
     for i in shown:
         artists += draw_body(ax, path[i], length, COLOURS["z"])
     for word, (x, y, _) in {"start": path[0], "goal": path[-1]}.items():
         ax.annotate(word, (x, y), (0, 3), textcoords="offset points", ha="center")
-    show_plane(ax, [data], length)
+    show_plane(ax, [path], length)
     return artists
 
 
 def draw_compared(
     ax: Axes,
-    routes: Mapping[str, Table],
+    paths: Mapping[str, Array],
     length: float,
     shown: Iterable[int],
     points: Sequence[ArrayLike] = ((0, 0), (0, 0)),
 ) -> list[Any]:
     """Draw two rectangles on their ways, the second dashed, at the same states.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; it is made to show both, lengths equal on both axes.
-    routes : mapping of str to mapping of str to array_like
-        Two names, and a `route_table` for each.
-    length : float
-        How long the rectangles are, in m.
-    shown : iterable of int
-        At which states they are drawn.
-    points : two array_like, shape (2,), optional
-        Of each the point, in the frame of the body, whose way is drawn; by default the centre.
-
-    Returns
-    -------
-    list of artists
-        For each: the way of its point, with dots at the states; then outline and mark at each.
-
-    References
-    ----------
-    RR 3.3.
+    `points` are the points in the frame of each body whose ways are drawn, by default the centres.
+    Return for each the way, with dots at the states; then outline and mark at each (RR 3.3).
     """
     artists: list[Any] = []
     looks = (COLOURS["z"], _FILL, "-"), (COLOURS["x"], "none", "--")
     states = list(shown)
-    for (name, data), point, look in zip(routes.items(), points, looks, strict=True):
-        path, (colour, fill, ls) = _path(data), look
+    for (name, path), point, look in zip(paths.items(), points, looks, strict=True):
+        colour, fill, ls = look
         way = compose_planar(path, np.append(point, 0))[:, :2]
         artists += ax.plot(*way.T, "o", ls=ls, color=colour, label=name, markevery=states)
         for i in states:
             artists += draw_body(ax, path[i], length, colour, fill=fill, ls=ls)
-    show_plane(ax, routes.values(), length)
+    show_plane(ax, paths.values(), length)
     return artists
 
 
 def moving_route(
-    ax: Axes, data: Table, length: float, shown: Iterable[int]
+    ax: Axes, path: Array, length: float, shown: Iterable[int]
 ) -> Callable[[int], list[Any]]:
     """Draw a rectangle, pale, at some of its poses; return what moves it along its way.
 
-    Parameters
-    ----------
-    ax, data, length, shown
-        As for `draw_route`.
-
-    Returns
-    -------
-    callable
-        ``update(i)`` moves the rectangle to state i, draws the way of its centre up to there, and
-        returns the artists that move.
-
-    References
-    ----------
-    RR 3.3, RR Fig. 6, RR Fig. 7.
+    ``update(i)`` moves the rectangle to state i, draws the way of its centre up to there, and
+    returns the artists that move (RR 3.3, RR Fig. 6, RR Fig. 7).
     """
-    path = _path(data)
     for i in shown:
         draw_body(ax, path[i], length, "0.75", fill="none")
     (way,) = ax.plot([], [], color=COLOURS["path"], zorder=2)
     body = draw_body(ax, path[0], length, COLOURS["z"])
     for artist in body:
         artist.set_zorder(3)
-    show_plane(ax, [data], length)
+    show_plane(ax, [path], length)
 
     def update(i: int) -> list[Any]:
         way.set_data(*path[: i + 1, :2].T)
@@ -163,9 +105,9 @@ def move_body(body: Sequence[Any], pose: Array, length: float) -> None:
     body[1].set_data(*nose.T)
 
 
-def show_plane(ax: Axes, routes: Iterable[Table], length: float) -> None:
+def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
     """Make axes show all places that a rectangle passes, with equal lengths on both."""
-    places = np.concatenate([_path(data)[:, :2] for data in routes])
+    places = np.concatenate([path[:, :2] for path in paths])
     margin = 0.75 * length
     (left, low), (right, high) = places.min(axis=0) - margin, places.max(axis=0) + margin
     ax.set(xlim=(left, right), ylim=(low, high), xlabel="x (m)", ylabel="y (m)")
@@ -175,26 +117,15 @@ def show_plane(ax: Axes, routes: Iterable[Table], length: float) -> None:
 def extent_of(path: Array) -> float:
     """Return the larger extent of a path; 0 for less than 1e-12 of its distance, or of a metre.
 
-    Less is rounding: of a body that stays on the spot, or comes back to it.
+    A smaller extent is rounding, of a body that stays on the spot or comes back to it.
     """
     places = path[:, :2]
     extent = float(np.ptp(places, axis=0).max())
     return extent if extent > 1e-12 * max(1.0, np.abs(places).max()) else 0.0
 
 
-def describe_route(data: Table) -> str:
-    """Return in words how a rectangle goes.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (states,)
-        A `route_table`.
-
-    Returns
-    -------
-    str
-    """
-    path = _path(data)
+def describe_route(path: Array) -> str:
+    """Return in words how a rectangle goes."""
     steps = np.diff(path, axis=0)
     turns = np.degrees(steps[:, 2])
     sides = {"left": turns[turns > 0].sum(), "right": -turns[turns < 0].sum()}
@@ -208,33 +139,19 @@ def describe_route(data: Table) -> str:
     )
 
 
-def describe_compared(panels: Mapping[str, Mapping[str, Table]]) -> str:
-    """Return in words what `draw_compared` shows on several axes.
-
-    Parameters
-    ----------
-    panels : mapping of str to mapping of str to mapping of str to array_like
-        For each of the axes its name, and its two routes.
-
-    Returns
-    -------
-    str
-    """
+def describe_compared(panels: Mapping[str, Mapping[str, Array]]) -> str:
+    """Return in words what `draw_compared` shows on several axes, two paths on each."""
     said = []
-    for title, routes in panels.items():
-        one, other = (_path(data)[:, :2] for data in routes.values())
+    for title, paths in panels.items():
+        one, other = (path[:, :2] for path in paths.values())
         apart = in_words(np.linalg.norm(one - other, axis=1).max(), extent_of(one))
-        said.append(f"{title}: {' and '.join(routes)}, the centres apart by {apart} m at most")
+        said.append(f"{title}: {' and '.join(paths)}, the centres apart by {apart} m at most")
     return f"Rectangles on two ways each. {'; '.join(said)}."
 
 
-def describe_routes(routes: Mapping[str, Table]) -> str:
+def describe_routes(paths: Mapping[str, Array]) -> str:
     """Return in words how rectangles go, with the names of their ways."""
-    return " ".join(f"{name}: {describe_route(data)}" for name, data in routes.items())
-
-
-def _path(data: Table) -> Array:
-    return np.stack([np.asarray(data[key], dtype=float) for key in STATES["planar"]], axis=-1)
+    return " ".join(f"{name}: {describe_route(path)}" for name, path in paths.items())
 
 
 def _placed(pose: Array, length: float) -> tuple[Array, Array]:

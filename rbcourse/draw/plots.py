@@ -1,22 +1,25 @@
-"""Still figures of curves: artists on axes that the caller owns.
+"""Line plots of curves over time and over parameters, from tables: artists on given axes.
 
-Each ``draw_*(ax, data)`` draws a table (see `rbcourse.draw.save`) and returns its artists; the
-``describe_*(data)`` beside it says in words what is to be seen.
+A table is a dict of columns whose names carry the units (see `rbcourse.draw.save`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.curves import Curve
-from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.so3 import log_so3
 
 LABELS = {
     "t": "time t",
@@ -47,24 +50,20 @@ _MOTIONS: dict[str, dict[str, Any]] = {
     },
 }
 _DASHES: list[Any] = ["-", "--", "-.", ":", (0, (6, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1))]
+_STYLES: dict[str, dict[str, Any]] = {
+    "optimum": {"ls": "-", "marker": "o", "ms": 8, "mfc": "white"},
+    "projection": {"ls": "--", "marker": "o", "ms": 4},
+}
+RATES = {
+    1: ("angular speed [rad/s]", "speed [m/s]"),
+    2: ("angular acceleration [rad/s²]", "acceleration [m/s²]"),
+}
+_TIME = "t [s]"
 
 
 def draw_family(ax: Axes, data: Table) -> list[Any]:
     """Draw up to six curves of a table (parameter, abscissa, value), each for one parameter.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (parameters, abscissas)
-        Three columns, in that order; the parameter an angle in rad, constant along a row.
-
-    Returns
-    -------
-    list of Line2D
-
-    References
-    ----------
     BK Fig. 2, BK Fig. 3.
     """
     (_, parameter), (x_name, x), (y_name, y) = _columns(data)
@@ -82,19 +81,6 @@ def draw_family(ax: Axes, data: Table) -> list[Any]:
 def draw_surface(ax: Any, data: Table) -> list[Any]:
     """Draw a table (parameter, abscissa, value) as a surface over abscissa and parameter.
 
-    Parameters
-    ----------
-    ax : Axes3D
-        Where to draw.
-    data : mapping of str to array_like, shape (parameters, abscissas)
-        Three columns, in that order.
-
-    Returns
-    -------
-    list of Poly3DCollection
-
-    References
-    ----------
     BK Fig. 2, BK Fig. 3.
     """
     (p_name, parameter), (x_name, x), (y_name, y) = _columns(data)
@@ -111,17 +97,7 @@ def draw_surface(ax: Any, data: Table) -> list[Any]:
 
 
 def describe_family(data: Table) -> str:
-    """Return in words what `draw_family` and `draw_surface` show.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (parameters, abscissas)
-        As for `draw_family`.
-
-    Returns
-    -------
-    str
-    """
+    """Return in words what `draw_family` and `draw_surface` show."""
     (_, parameter), (_, x), (y_name, y) = _columns(data)
     at = np.linspace(0, x.shape[1] - 1, 5).round().astype(int)
     ends = [
@@ -137,19 +113,7 @@ def describe_family(data: Table) -> str:
 
 
 def draw_chord(ax: Axes, data: Table) -> list[Any]:
-    """Draw equal steps along a chord of the unit circle, and the rays that project them.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (steps,)
-        The times; x and y of the points of the chord; x and y of their projections.
-
-    Returns
-    -------
-    list of artists
-    """
+    """Draw equal steps along a chord of the unit circle, and the rays that project them."""
     t, x, y, arc_x, arc_y = (np.asarray(column) for column in data.values())
     circle = Circle((0, 0), 1, fill=False, color=COLOURS["reference"], lw=1)
     ax.add_patch(circle)
@@ -174,17 +138,7 @@ def draw_chord(ax: Axes, data: Table) -> list[Any]:
 
 
 def describe_chord(data: Table) -> str:
-    """Return in words what `draw_chord` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (steps,)
-        As for `draw_chord`.
-
-    Returns
-    -------
-    str
-    """
+    """Return in words what `draw_chord` shows."""
     _, _, _, x, y = (np.asarray(column) for column in data.values())
     steps = np.degrees(np.diff(np.unwrap(np.arctan2(y, x))))
     return (
@@ -194,56 +148,32 @@ def describe_chord(data: Table) -> str:
     )
 
 
-def motion_table(curves: Mapping[str, Curve], point: ArrayLike, t: ArrayLike) -> Table:
-    """Return where rotations carry a point, and how fast they turn, as a table.
+def point_path(curve: Curve, point: ArrayLike, t: Array) -> Array:
+    """Return where rotations over time carry a point of the body, shape (times, 3)."""
+    return curve(t) @ np.asarray(point)
 
-    Parameters
-    ----------
-    curves : mapping of str to Curve
-        Rotations over time, with their names.
-    point : array_like, shape (3,)
-        A point of the unit sphere, body frame.
-    t : array_like, shape (times,)
-        Times in [0, 1].
 
-    Returns
-    -------
-    dict of str to ndarray
-        The times; for each curve x, y, z of the point in the fixed frame, and the angular speed.
-    """
-    table = {"t [1]": np.asarray(t)}
-    for name, curve in curves.items():
-        x, y, z = (curve(t) @ np.asarray(point)).T
-        speed = np.linalg.norm(curve(t, 1), axis=-1)
-        table |= {f"{name} x [1]": x, f"{name} y [1]": y, f"{name} z [1]": z}
-        table |= {f"{name} speed [rad]": speed}
+def path_table(t: Array, paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> Table:
+    """Return paths of a point and angular speeds as a table."""
+    table = {"t [1]": t}
+    for name, path in paths.items():
+        table |= {f"{name} {axis} [1]": x for axis, x in zip("xyz", path.T, strict=True)}
+        table |= {f"{name} speed [rad]": speeds[name]}
     return table
 
 
-def draw_paths(ax: Any, data: Table) -> list[Any]:
-    """Draw on the unit sphere where two motions carry one point, every tenth time marked.
+def draw_paths(ax: Any, paths: Mapping[str, Array]) -> list[Any]:
+    """Draw on the unit sphere the paths of one point, shape (times, 3), every tenth time marked.
 
-    Parameters
-    ----------
-    ax : Axes3D
-        Where to draw.
-    data : mapping of str to array_like, shape (times,)
-        A `motion_table` of a "geodesic" and a "projected line".
-
-    Returns
-    -------
-    list of Line3D
+    They are those of a "geodesic" and a "projected line".
     """
-    paths = {
-        name: np.array([data[f"{name} {axis} [1]"] for axis in "xyz"])
-        for name in ("geodesic", "projected line")
-    }
     longitude, latitude = np.mgrid[0 : 2 * np.pi : 25j, 0 : np.pi : 13j]
     across = np.sin(latitude)
     sphere = [np.cos(longitude) * across, np.sin(longitude) * across, np.cos(latitude)]
     ax.plot_wireframe(*sphere, color="0.85", lw=0.5)
-    lines = [ax.plot(*path, **_MOTIONS[name])[0] for name, path in paths.items()]
-    start, middle, end = paths["geodesic"][:, [0, paths["geodesic"].shape[1] // 2, -1]].T
+    lines = [ax.plot(*path.T, **_MOTIONS[name])[0] for name, path in paths.items()]
+    way = paths["geodesic"]
+    start, middle, end = way[[0, len(way) // 2, -1]]
     for when, place in (("t = 0", start), ("t = 1", end)):
         ax.text(*(0.82 * place), when, ha="center", va="center")
     x, y, z = np.cross(start, end) / np.linalg.norm(np.cross(start, end)) + middle / 2
@@ -255,45 +185,19 @@ def draw_paths(ax: Any, data: Table) -> list[Any]:
     return lines
 
 
-def draw_speeds(ax: Axes, data: Table) -> list[Any]:
-    """Draw the angular speed of two motions over time, every tenth time marked.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (times,)
-        As for `draw_paths`.
-
-    Returns
-    -------
-    list of Line2D
-    """
-    lines = [
-        ax.plot(data["t [1]"], data[f"{name} speed [rad]"], label=name, **style)[0]
-        for name, style in _MOTIONS.items()
-    ]
+def draw_speeds(ax: Axes, t: Array, speeds: Mapping[str, Array]) -> list[Any]:
+    """Draw the angular speeds of these two motions over time, every tenth time marked."""
+    lines = [ax.plot(t, speeds[name], label=name, **style)[0] for name, style in _MOTIONS.items()]
     ax.set(xlabel=LABELS["t"], ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
     ax.legend()
     return lines
 
 
-def describe_paths(data: Table) -> str:
-    """Return in words what `draw_paths` and `draw_speeds` show.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (times,)
-        As for `draw_paths`.
-
-    Returns
-    -------
-    str
-    """
+def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> str:
+    """Return in words what `draw_paths` and `draw_speeds` show."""
     said = []
     for name in _MOTIONS:
-        speed = np.asarray(data[f"{name} speed [rad]"])
-        marks = np.array([data[f"{name} {axis} [1]"] for axis in "xyz"]).T[::10]
+        speed, marks = speeds[name], paths[name][::10]
         sine = np.linalg.norm(np.cross(marks[:-1], marks[1:]), axis=1)
         steps = np.degrees(np.arctan2(sine, np.sum(marks[:-1] * marks[1:], axis=1)))
         said.append(
@@ -305,6 +209,243 @@ def describe_paths(data: Table) -> str:
         "Left, a sphere with the paths of one point under two motions, marked at equal times; "
         f"right, the angular speeds in rad per unit time. Between the marks {'; '.join(said)}."
     )
+
+
+def coordinate_table(curves: Mapping[str, Curve], t: ArrayLike) -> Table:
+    """Return the exponential coordinates σ of rotations over time, as a table (BK 6.2, BK (21))."""
+    table = {"t [1]": np.asarray(t)}
+    for name, curve in curves.items():
+        for i, sigma in enumerate(log_so3(curve(t)).T, start=1):
+            table[f"{name} sigma{i} [rad]"] = sigma
+    return table
+
+
+def draw_comparison(fig: Figure, data: Table) -> list[Any]:
+    """Draw the paths in the space of σ, the coordinates over time, and their difference.
+
+    BK Fig. 4.
+    """
+    space: Any = {"a": {"projection": "3d"}}
+    axes = fig.subplot_mosaic("ab;ac", per_subplot_kw=space, height_ratios=[2, 1])
+    return [
+        *draw_coordinate_paths(axes["a"], data),
+        *draw_coordinates(axes["b"], data),
+        *draw_difference(axes["c"], data),
+    ]
+
+
+def draw_coordinate_paths(ax: Any, data: Table) -> list[Any]:
+    """Draw the paths of an optimum and a projection in the space of σ, every tenth time marked.
+
+    BK Fig. 4.
+    """
+    lines = [
+        ax.plot(*_coordinates(data, name), color=COLOURS[name], label=name, markevery=10, **style)[
+            0
+        ]
+        for name, style in _STYLES.items()
+    ]
+    start, end = _coordinates(data, "optimum")[:, [0, -1]].T
+    ax.text(*start, "   t = 0", va="top")
+    ax.text(*end, "t = 1   ", va="bottom", ha="right")
+    ax.set_xlabel("σ₁ (rad)", labelpad=8)
+    ax.set_ylabel("σ₂ (rad)", labelpad=8)
+    ax.zaxis.set_rotate_label(False)
+    ax.set_zlabel("σ₃ (rad)", rotation=90)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    ax.view_init(elev=22, azim=-62)
+    ax.set_box_aspect((1, 1, 0.9), zoom=0.9)
+    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.06))
+    return lines
+
+
+def draw_coordinates(ax: Axes, data: Table) -> list[Any]:
+    """Draw σ₁, σ₂, σ₃ over time, of the optimum as full lines and of the projection dashed.
+
+    BK Fig. 4.
+    """
+    t = np.asarray(data["t [1]"])
+    lines = []
+    for name, style in _STYLES.items():
+        for axis, sigma in zip("xyz", _coordinates(data, name), strict=True):
+            lines += ax.plot(t, sigma, color=COLOURS[axis], markevery=10, clip_on=False, **style)
+    for axis, number, sigma in zip("xyz", "₁₂₃", _coordinates(data, "optimum"), strict=True):
+        ax.text(1.04, sigma[-1], f"σ{number}", color=COLOURS[axis], va="center")
+    ax.set(xlabel="time t", ylabel="σ (rad)", xlim=(0, 1))
+    ax.legend(handles=[Line2D([], [], color="0.3", label=name, **s) for name, s in _STYLES.items()])
+    return lines
+
+
+def draw_difference(ax: Axes, data: Table) -> list[Any]:
+    """Draw by how much σ₁, σ₂, σ₃ of the projection differ from those of the optimum."""
+    t, difference = (
+        np.asarray(data["t [1]"]),
+        _coordinates(data, "projection") - _coordinates(data, "optimum"),
+    )
+    lines = [
+        ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"σ{number}")[0]
+        for axis, number, part, dash in zip("xyz", "₁₂₃", difference, ["-", "--", ":"], strict=True)
+    ]
+    ax.set(xlabel="time t", ylabel="Δσ (rad)", xlim=(0, 1))
+    ax.legend(
+        title="projection\n− optimum", loc="center left", bbox_to_anchor=(1, 0.5), handlelength=1.5
+    )
+    return lines
+
+
+def describe_coordinates(data: Table) -> str:
+    """Return in words what `draw_comparison` shows."""
+    best, near = _coordinates(data, "optimum"), _coordinates(data, "projection")
+    apart = np.linalg.norm(best - near, axis=0)
+    start, end = (", ".join(f"{x:.3g}" for x in best[:, k].round(9) + 0.0) for k in (0, -1))
+    said = (
+        "Two paths in the space of exponential coordinates, the optimum and the projection, "
+        f"marked at equal times; the coordinates over time; and by how much they differ. "
+        f"Both run from ({start}) to ({end}) rad. "
+    )
+    if apart.max() < 1e-9:
+        return said + "They coincide at all times."
+    when = np.asarray(data["t [1]"])[np.argmax(apart > (1 - 1e-9) * apart.max())]
+    return said + f"σ differs most at t = {when:g}, by {apart.max():.2g} rad in length."
+
+
+def draw_excess(ax: Axes, data: Table) -> list[Any]:
+    """Draw, on logarithmic axes, what near-optimal curves cost too much over their excursion."""
+    (_, scale), *families = data.items()
+    scale = np.asarray(scale)
+    looks = [("x", "o-"), ("y", "s--"), ("z", "^-."), ("projection", "d:")]
+    lines = [
+        ax.plot(scale, excess, mark, color=COLOURS[look], label=name.removesuffix(" excess [1]"))[0]
+        for (name, excess), (look, mark) in zip(families, looks, strict=False)
+    ]
+    slope = ax.plot(scale, 1e-2 * scale**4, color=COLOURS["reference"], lw=1, label="slope 4")
+    ax.set(xscale="log", yscale="log", xlabel="size s of the excursion (1: as given)")
+    ax.set_ylabel("cost / optimum − 1")
+    ax.axhline(0.01, color=COLOURS["reference"], lw=1, ls=":")
+    ax.text(scale.min(), 0.012, "1 %", color=COLOURS["reference"])
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return [*lines, *slope]
+
+
+def describe_excess(data: Table) -> str:
+    """Return in words what `draw_excess` shows."""
+    (_, scale), *families = data.items()
+    ends = "; ".join(
+        f"{name.removesuffix(' excess [1]')} from {np.asarray(excess)[0]:.1e} to "
+        f"{np.asarray(excess)[-1]:.2g}"
+        for name, excess in families
+    )
+    return (
+        "What the projection costs above the optimum, as a share, over the size of the excursion "
+        f"from {np.min(scale):g} to {np.max(scale):g}, on logarithmic axes: {ends}. All follow a "
+        "line of slope four where they are small."
+    )
+
+
+def _coordinates(data: Table, name: str) -> Array:
+    return np.array([data[f"{name} sigma{i} [rad]"] for i in (1, 2, 3)])
+
+
+def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
+    """Return how fast a motion turns and moves over time, or how strongly it is accelerated.
+
+    They are the norms of the two halves of ``motion(t, order)``, order 1 or 2, at even times in s.
+
+    Raises
+    ------
+    ValueError
+        If it is no single motion on SE(3).
+
+    Examples
+    --------
+    >>> from rbcourse import geodesic_se3, pose_from_coordinates
+    >>> c = geodesic_se3(np.eye(4), pose_from_coordinates([0, 0, 1, 3, 4, 0]))
+    >>> {name: x.round(9).tolist() for name, x in profile_table(c, 1, 2).items()}
+    {'t [s]': [0.0, 1.0], 'angular speed [rad/s]': [1.0, 1.0], 'speed [m/s]': [5.0, 5.0]}
+    """
+    t = np.linspace(*motion.domain, samples)
+    rates = motion(t, order)
+    if rates.shape != (samples, 6):
+        raise ValueError("motion: a single curve on SE(3) wanted")
+    halves = np.split(rates, 2, axis=-1)
+    norms = (np.linalg.norm(half, axis=-1) for half in halves)
+    return {_TIME: t, **dict(zip(RATES[order], norms, strict=True))}
+
+
+def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> list[Any]:
+    """Draw each column over time, on axes of its own, and a thin line at each of some times."""
+    t, lines = np.asarray(data[_TIME]), []
+    for ax, (name, values) in zip(axes, _profiles(data), strict=True):
+        for knot in np.asarray(knots):
+            ax.axvline(knot, color=COLOURS["reference"], lw=0.8, ls=":")
+        lines += ax.plot(t, values, color=COLOURS["path"])
+        label, unit = name.removesuffix("]").split(" [")
+        ax.set(ylabel=f"{label}\n({unit})", xlim=(t[0], t[-1]))
+        low, high = 1.08 * min(np.min(values), 0), 1.08 * max(np.max(values), 0)
+        ax.set_ylim(low, high if high > low else 1)
+    axes[-1].set_xlabel("time (s)")
+    axes[0].figure.align_ylabels(axes)
+    return lines
+
+
+def describe_profiles(data: Table, knots: ArrayLike) -> str:
+    """Say how large each column of such a drawing becomes, and when."""
+    t = np.asarray(data[_TIME])
+    parts = []
+    for name, values in _profiles(data):
+        label, unit = name.removesuffix("]").split(" [")
+        scale, largest = np.abs(values).max(), int(np.argmax(np.round(values, 9)))
+        low = f"from {in_words(values.min(), scale)} " if values.min() < -0.01 * scale else ""
+        parts.append(f"{label} {low}up to {in_words(values[largest], scale)} {unit}")
+        parts[-1] += f" at {in_words(t[largest], t[-1])} s"
+    when = ", ".join(in_words(knot, t[-1]) for knot in np.asarray(knots))
+    return f"Over time: {'; '.join(parts)}. The poses are reached at {when} s."
+
+
+def _profiles(data: Table) -> list[tuple[str, Any]]:
+    return [(name, np.asarray(values)) for name, values in data.items() if name != _TIME]
+
+
+def draw_angles(axes: Sequence[Axes], data: Table) -> list[Any]:
+    """Draw ZYX angles over time, each motion on its own axes (RR (8))."""
+    looks = {"α": (COLOURS["z"], "-"), "β": (COLOURS["y"], "-."), "γ": (COLOURS["x"], "--")}
+    lines = []
+    for ax, name in zip(axes, _motions(data), strict=True):
+        for angle, (colour, dash) in looks.items():
+            degrees = np.degrees(np.asarray(data[f"{name} {angle} [rad]"]))
+            lines += ax.plot(data["t [1]"], degrees, color=colour, ls=dash, label=angle)
+        ax.set(
+            xlabel="time t",
+            title=name,
+            xlim=(0, 1),
+            xticks=[0, 0.5, 1],
+            yticks=[-180, -90, 0, 90, 180],
+        )
+    axes[0].set_ylabel("angle (degrees)")
+    axes[0].legend()
+    return lines
+
+
+def describe_angles(data: Table) -> str:
+    """Return in words what `draw_angles` shows."""
+    t = np.asarray(data["t [1]"])
+    said = []
+    for name in _motions(data):
+        alpha = np.unwrap(np.asarray(data[f"{name} α [rad]"]))
+        share = (alpha - alpha[0]) / (alpha[-1] - alpha[0])
+        early, late = np.interp([0.25, 0.75], share, t)
+        beta = np.degrees(np.asarray(data[f"{name} β [rad]"]))
+        extreme = beta[np.abs(beta).argmax()]
+        said.append(
+            f"{name}: β goes to {extreme:.0f} degrees, and the middle half of α's change takes "
+            f"{100 * (late - early):.1f} % of the time"
+        )
+    return f"ZYX angles of steadily turning bodies over time. {'; '.join(said)}."
+
+
+def _motions(data: Table) -> list[str]:
+    return [key.removesuffix(" α [rad]") for key in data if key.endswith(" α [rad]")]
 
 
 def _columns(data: Table) -> list[tuple[str, Array]]:
@@ -325,15 +466,6 @@ def _shown_rows(parameter: Array) -> list[int]:
 
 def pi_fraction(angle: float) -> str:
     """Return an angle in rad as a fraction of π.
-
-    Parameters
-    ----------
-    angle : float
-        A multiple of π/24, to rounding.
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -1,16 +1,25 @@
-"""Matrices that should be rotations: how they drift, and what a repair makes of them."""
+"""Matrices that should be rotations: how they drift, and where repairs take them (lesson 04).
+
+A 2 × 2 matrix is a turn with a stretch plus a mirror with a stretch. As a map of complex numbers it
+takes ζ to z ζ + m ζ*, and the nearest rotation, z/|z|, depends on z alone: the `shadows` are these
+z, and the rotations are the unit circle.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.draw.save import COLOURS, Table
+from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 
 Repair = Callable[[Array], Array]
 
+_REPAIRS = {"nearest rotation": project_so, "Gram–Schmidt": orthonormalize_gram_schmidt}
+_COLOURS = {"nearest rotation": COLOURS["projection"], "Gram–Schmidt": COLOURS["z"]}
 _LETTER = np.array(
     [
         *([0, 0], [0.2, 0], [0.2, 0.4], [0.5, 0.4], [0.5, 0.6], [0.2, 0.6], [0.2, 0.8]),
@@ -23,22 +32,9 @@ _LETTER = np.array(
 def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> Table:
     """Multiply a matrix again and again in single precision, and return how it leaves SO(3).
 
-    Parameters
-    ----------
-    steps : int
-        How many products, at least 100.
-    ways : mapping of str to (ndarray of shape (3, 3), callable or None)
-        For each way the factor, and what repairs the matrix after every 100 products.
-
-    Returns
-    -------
-    dict of str to ndarray
-        At up to 60 numbers of steps, evenly spread over the powers of ten, beyond 100 multiples of
-        it, the defect ‖RᵀR − I‖ of each way, before the repair.
-
-    References
-    ----------
-    RR 1.4.
+    `ways` gives for each name the factor, shape (3, 3), and what repairs the matrix after every
+    100 products. The table has the defect ‖RᵀR − I‖ of each way, before the repair, at up to 60
+    numbers of steps, evenly spread over the powers of ten, beyond 100 multiples of it (RR 1.4).
     """
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))
@@ -63,19 +59,7 @@ def _defects(counts: Array, factor: Array, repair: Repair | None) -> Array:
 
 
 def draw_drift(ax: Axes, data: Table) -> list[Any]:
-    """Draw how matrices leave the rotations as they are multiplied.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    data : mapping of str to array_like
-        A `drift_table` of three ways.
-
-    Returns
-    -------
-    list of Line2D
-    """
+    """Draw how matrices leave the rotations as they are multiplied."""
     (_, steps), *ways = ((name, np.asarray(column)) for name, column in data.items())
     looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
     lines = [
@@ -88,17 +72,7 @@ def draw_drift(ax: Axes, data: Table) -> list[Any]:
 
 
 def describe_drift(data: Table) -> str:
-    """Return in words what `draw_drift` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like
-        As for `draw_drift`.
-
-    Returns
-    -------
-    str
-    """
+    """Return in words what `draw_drift` shows."""
     steps = np.asarray(data["steps [1]"])
     said = [
         f"{name.removesuffix(' [1]')}: {np.asarray(column)[-1]:.0e}"
@@ -111,48 +85,25 @@ def describe_drift(data: Table) -> str:
     )
 
 
-def letter_table(matrices: Mapping[str, Array]) -> Table:
-    """Return what matrices make of the outline of a letter F as a table.
+def letters(matrices: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the images of the outline of a letter F, shape (points, 2), under 2 × 2 matrices."""
+    return {name: (M @ _LETTER.T).T for name, M in matrices.items()}
 
-    Parameters
-    ----------
-    matrices : mapping of str to ndarray of shape (2, 2)
-        With their names.
 
-    Returns
-    -------
-    dict of str to ndarray
-        x and y of the letter, then of each image.
-    """
+def letter_table(images: Mapping[str, Array]) -> Table:
+    """Return x and y of the letter, then of each of its `letters`, as a table."""
     table = {"x [1]": _LETTER[:, 0], "y [1]": _LETTER[:, 1]}
-    for name, M in matrices.items():
-        x, y = M @ _LETTER.T
-        table |= {f"{name} x [1]": x, f"{name} y [1]": y}
+    for name, image in images.items():
+        table |= {f"{name} x [1]": image[:, 0], f"{name} y [1]": image[:, 1]}
     return table
 
 
-def draw_letters(axes: Sequence[Axes], data: Table) -> list[Any]:
-    """Draw a letter, and what matrices make of it, each on its own axes.
+def draw_letters(axes: Sequence[Axes], images: Mapping[str, Array]) -> list[Any]:
+    """Draw the images of a letter under matrices, each on its own axes.
 
     The first matrix is the given one; its image is repeated behind the others, whose titles say how
-    far their matrix is from it.
-
-    Parameters
-    ----------
-    axes : sequence of Axes
-        Where to draw.
-    data : mapping of str to array_like
-        A `letter_table` of as many matrices.
-
-    Returns
-    -------
-    list of artists
-
-    References
-    ----------
-    BK Prop. 2, RR 1.4.
+    far their matrix is from it (BK Prop. 2, RR 1.4).
     """
-    images = _images(data)
     artists: list[Any] = []
     for k, (ax, (name, image)) in enumerate(zip(axes, images.items(), strict=True)):
         behind = images[next(iter(images))] if k else _LETTER
@@ -165,19 +116,8 @@ def draw_letters(axes: Sequence[Axes], data: Table) -> list[Any]:
     return artists
 
 
-def describe_letters(data: Table) -> str:
-    """Return in words what `draw_letters` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like
-        As for `draw_letters`.
-
-    Returns
-    -------
-    str
-    """
-    images = _images(data)
+def describe_letters(images: Mapping[str, Array]) -> str:
+    """Return in words what `draw_letters` shows."""
     (first, given), *others = images.items()
     said = [
         f"{name}: a {'turned' if _turned(image) else 'mirrored'} letter, at the distance "
@@ -190,14 +130,7 @@ def describe_letters(data: Table) -> str:
     )
 
 
-def _images(data: Table) -> dict[str, Array]:
-    names = [key.removesuffix(" x [1]") for key in data if key.endswith(" x [1]")]
-    return {
-        name: np.stack([data[f"{name} x [1]"], data[f"{name} y [1]"]], axis=-1) for name in names
-    }
-
-
-def _distance(image: Array, images: dict[str, Array]) -> float:
+def _distance(image: Array, images: Mapping[str, Array]) -> float:
     """Return the Frobenius distance of the matrix of an image to that of the first image."""
     apart = np.linalg.lstsq(_LETTER, image - next(iter(images.values())))[0]
     return float(np.linalg.norm(apart))
@@ -209,3 +142,98 @@ def _turned(image: Array) -> bool:
     ox, oy = _LETTER.T
     area, before = (np.sum(a[:-1] * b[1:] - a[1:] * b[:-1]) for a, b in ((x, y), (ox, oy)))
     return bool(area * before > 0)
+
+
+def shadows(M: Array) -> dict[str, Array]:
+    """Return the shadows of matrices "M" and of what repairs make of them, each of shape (n, 2).
+
+    M are matrices [[a, b], [c, d]], shape (n, 2, 2), with a positive determinant; the shadow is
+    x = (a + d)/2, y = (c − b)/2.
+    """
+    matrices = {"M": M, **{name: fix(M) for name, fix in _REPAIRS.items()}}
+    return {
+        name: np.stack([A[:, 0, 0] + A[:, 1, 1], A[:, 1, 0] - A[:, 0, 1]], axis=-1) / 2
+        for name, A in matrices.items()
+    }
+
+
+def shadow_table(points: Mapping[str, Array]) -> Table:
+    """Return `shadows` as a table."""
+    return {
+        f"{name} {axis} [1]": column
+        for name, places in points.items()
+        for axis, column in zip("xy", places.T, strict=True)
+    }
+
+
+def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> list[Any]:
+    """Draw the `shadows` of matrices, and where each of the two repairs takes them, on its axes.
+
+    Return for each repair the dots, then the lines to the circle (BK 4, BK Prop. 2).
+    """
+    artists: list[Any] = []
+    circle = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
+    start = points["M"]
+    for ax, name in zip(axes, _REPAIRS, strict=True):
+        ax.plot(circle.real, circle.imag, color="0.6", lw=1)
+        artists += ax.plot(*start.T, "o", ms=5, color=_COLOURS[name])
+        ways = np.stack([start, points[name]])
+        artists += ax.plot(*ways.transpose(2, 0, 1), color=_COLOURS[name], lw=1.5)
+        ax.plot(*ways[1].T, "o", ms=4, mfc="white", mec=_COLOURS[name])
+        ax.plot(0, 0, "+", color="0.3", ms=9)
+        ax.set(aspect="equal", title=name, xlabel="(a + d)/2", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+    axes[0].set_ylabel("(c − b)/2")
+    return artists
+
+
+def describe_shadows(points: Mapping[str, Array]) -> str:
+    """Return in words what `draw_shadows` shows."""
+    start, found = (points[name] @ [1, 1j] for name in ("M", "Gram–Schmidt"))
+    off = np.degrees(np.abs(np.angle(found / start))).max()
+    return (
+        f"{len(start)} matrices as dots in a plane in which the rotations are the unit circle, "
+        "and lines from each to what a repair makes of it. To the nearest rotation the lines run "
+        "along the rays from the origin. With Gram–Schmidt they miss the ray by up to "
+        f"{off:.0f} degrees."
+    )
+
+
+def frame_table(M: Array, angles: ArrayLike) -> Table:
+    """Return which rotation repairs find when a 2 × 2 matrix is measured in a turned body frame.
+
+    For each angle of the frame in rad, and each repair, it is the angle of fix(M L) Lᵀ, L the turn
+    of the frame. M has a positive determinant.
+    """
+    angles = np.asarray(angles, dtype=np.float64)
+    cos, sin = np.cos(angles), np.sin(angles)
+    L = np.stack([cos, -sin, sin, cos], axis=-1).reshape(-1, 2, 2)
+    table = {"frame [rad]": angles}
+    for name, fix in _REPAIRS.items():
+        R = fix(M @ L) @ np.swapaxes(L, -1, -2)
+        table[f"{name} [rad]"] = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
+    return table
+
+
+def draw_frames(ax: Axes, data: Table) -> list[Any]:
+    """Draw which rotation two repairs find, over the angle of the frame (BK Prop. 3)."""
+    frame = np.degrees(data["frame [rad]"])
+    lines = [
+        ax.plot(frame, np.degrees(data[f"{name} [rad]"]), color=_COLOURS[name], ls=dash, label=name)
+        for name, dash in zip(_REPAIRS, ("-", "--"), strict=True)
+    ]
+    ax.set(xlabel="the body frame is turned by (°)", ylabel="rotation found (°)")
+    ax.set(xlim=(frame[0], frame[-1]), xticks=np.arange(frame[0], frame[-1] + 1, 45))
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return [line for (line,) in lines]
+
+
+def describe_frames(data: Table) -> str:
+    """Return in words what `draw_frames` shows."""
+    found = {name: np.degrees(np.asarray(data[f"{name} [rad]"])) for name in _REPAIRS}
+    ranges = [
+        f"{name} finds {angle.min():.1f} to {angle.max():.1f} degrees"
+        if np.ptp(angle) > 1e-6
+        else f"{name} finds {angle[0]:.1f} degrees in every frame"
+        for name, angle in found.items()
+    ]
+    return f"The rotation found, over the angle of the body frame: {'; '.join(ranges)}."

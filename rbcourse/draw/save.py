@@ -70,26 +70,6 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
 
     The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, or else
     to ``figures`` in the current folder. The same input gives the same bytes.
-
-    Parameters
-    ----------
-    fig : Figure
-        The figure.
-    name : str
-        The name of the files, without ending.
-    data : mapping of str to array_like
-        The plotted numbers: columns of one shape, with units in their names.
-    alt : str
-        A sentence or two that say what is to be seen.
-
-    Returns
-    -------
-    Picture
-
-    Raises
-    ------
-    ValueError
-        If the columns differ in shape.
     """
     text = csv_text(data)
     folder = figures_folder()
@@ -112,20 +92,6 @@ def figures_folder() -> Path:
 def csv_text(data: Table) -> str:
     """Return a table as CSV: a line of names, then numbers with twelve significant digits.
 
-    Parameters
-    ----------
-    data : mapping of str to array_like
-        Columns of one shape; more than one axis is written row by row.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ValueError
-        If the columns differ in shape; the message gives every shape.
-
     Examples
     --------
     >>> print(csv_text({"t [1]": [0, 0.5], "angle [rad]": [1 / 3, 2]}), end="")
@@ -146,15 +112,6 @@ def csv_text(data: Table) -> str:
 
 def named_tables(tables: Mapping[str, Table]) -> dict[str, ArrayLike]:
     """Return tables as one, each column with the name of its table before its own.
-
-    Parameters
-    ----------
-    tables : mapping of str to mapping of str to array_like
-        Tables whose columns have one shape.
-
-    Returns
-    -------
-    dict of str to array_like
 
     Examples
     --------

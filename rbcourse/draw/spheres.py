@@ -1,4 +1,4 @@
-"""Random rotations on the sphere: what they do to a vector, still and one by one."""
+"""On the unit sphere: random rotations and their laws, free bodies, and the flip of a book."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -6,10 +6,18 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
+from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.sampling import angle_law
+from rbcourse.se3 import join
+
+Images = Mapping[str, tuple[Array, Array]]
+"""For each sample of n rotations the images of v0 and of v1, both of shape (n, 3)."""
+Bins = Mapping[str, tuple[Array, Mapping[str, Array]]]
+"""For each column of a histogram the edges of its bins, and the densities of each sample."""
 
 ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
 EYE = np.array(
@@ -28,18 +36,29 @@ _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
 """The columns of a histogram: label, range, and their distribution for uniform rotations."""
 
 
-def image_table(images: Mapping[str, tuple[Array, Array]]) -> Table:
-    """Return where rotations carry two vectors as a table: one row for each rotation.
+def draw_sphere(ax: Any) -> None:
+    """Draw the unit sphere by its meridians and parallels, as `moving_images` looks at it."""
+    longitude, latitude = np.mgrid[0 : 2 * np.pi : 61j, 0 : np.pi : 31j]
+    across = np.sin(latitude)
+    ax.plot_wireframe(
+        np.cos(longitude) * across,
+        np.sin(longitude) * across,
+        np.cos(latitude),
+        rstride=5,
+        cstride=5,
+        color="0.85",
+        lw=0.5,
+    )
+    ax.computed_zorder = False
+    ax.view_init(elev=np.degrees(ELEVATION), azim=np.degrees(AZIMUTH))
+    ax.set_proj_type("ortho")
+    ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
+    ax.set_box_aspect((1, 1, 1), zoom=1.4)
+    ax.set_axis_off()
 
-    Parameters
-    ----------
-    images : mapping of str to (ndarray, ndarray), each of shape (n, 3)
-        For each sample of rotations the images of v0 and of v1.
 
-    Returns
-    -------
-    dict of str to ndarray
-    """
+def image_table(images: Images) -> Table:
+    """Return where rotations carry two vectors as a table: one row for each rotation."""
     return {
         f"{name} {vector} {axis} [1]": column
         for name, pair in images.items()
@@ -48,30 +67,16 @@ def image_table(images: Mapping[str, tuple[Array, Array]]) -> Table:
     }
 
 
-def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]]:
-    """Draw spheres; return what marks on them, one by one, where the rotations carry v0 and v1.
+def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[Any]]:
+    """Draw a sphere for each sample; return what marks on it where the rotations carry v0 and v1.
 
     A dot is the image of v0, and the stroke from it ends at the image of v1, so that a turn about
-    v0 shows too. What lies behind is pale.
-
-    Parameters
-    ----------
-    axes : sequence of Axes3D
-        Where to draw, one for each sample.
-    data : mapping of str to array_like, shape (n,)
-        An `image_table`.
-
-    Returns
-    -------
-    callable
-        ``update(i)`` shows the first i of the n rotations and returns the artists that change.
-
-    References
-    ----------
-    RR 2.2, RR Fig. 4, RR Fig. 5.
+    v0 shows too. What lies behind is pale. ``update(i)`` shows the first i rotations and returns
+    the artists that change (RR 2.2, RR Fig. 4, RR Fig. 5).
     """
     panels = []
-    for ax, (name, strokes) in zip(axes, _strokes(data).items(), strict=True):
+    for ax, (name, pair) in zip(axes, images.items(), strict=True):
+        strokes = np.stack(pair, axis=1)
         draw_sphere(ax)
         ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
         ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
@@ -99,43 +104,11 @@ def moving_images(axes: Sequence[Any], data: Table) -> Callable[[int], list[Any]
     return update
 
 
-def draw_sphere(ax: Any) -> None:
-    """Draw the unit sphere by its meridians and parallels, as `moving_images` looks at it."""
-    longitude, latitude = np.mgrid[0 : 2 * np.pi : 61j, 0 : np.pi : 31j]
-    across = np.sin(latitude)
-    ax.plot_wireframe(
-        np.cos(longitude) * across,
-        np.sin(longitude) * across,
-        np.cos(latitude),
-        rstride=5,
-        cstride=5,
-        color="0.85",
-        lw=0.5,
-    )
-    ax.computed_zorder = False
-    ax.view_init(elev=np.degrees(ELEVATION), azim=np.degrees(AZIMUTH))
-    ax.set_proj_type("ortho")
-    ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-    ax.set_box_aspect((1, 1, 1), zoom=1.4)
-    ax.set_axis_off()
-
-
-def describe_images(data: Table) -> str:
-    """Return in words what `moving_images` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (n,)
-        As for `moving_images`.
-
-    Returns
-    -------
-    str
-    """
-    strokes = _strokes(data)
-    count = len(next(iter(strokes.values())))
+def describe_images(images: Images) -> str:
+    """Return in words what `moving_images` shows."""
+    count = len(next(iter(images.values()))[0])
     said = ", ".join(
-        f"{name}: {(np.abs(points[:, 0, 2]) < 0.5).sum()}" for name, points in strokes.items()
+        f"{name}: {(np.abs(v0[:, 2]) < 0.5).sum()}" for name, (v0, _) in images.items()
     )
     return (
         f"The images of the pole of a sphere under {count} random rotations, a stroke at each "
@@ -144,56 +117,48 @@ def describe_images(data: Table) -> str:
     )
 
 
-def histogram_table(R: Mapping[str, Array]) -> Table:
-    """Return what the histograms of samples of rotations show as a table.
+def histograms(R: Mapping[str, Array]) -> Bins:
+    """Return the densities of samples of rotations, shape (n, 3, 3), in 20 bins for each column.
 
-    Parameters
-    ----------
-    R : mapping of str to ndarray, each of shape (n, 3, 3)
-        Samples of rotation matrices, with their names.
-
-    Returns
-    -------
-    dict of str to ndarray
-        For the angle and the heights of the images of e₁ and e₃ the edges of 20 bins, and for
-        each sample the density in the bin that starts there: numbers over bin width and n. The
-        last edge has no bin, and 0.
+    The columns are the angle and the heights of the images of e₁ and e₃; a density is the number
+    in a bin over its width and n.
     """
-    table: dict[str, Array] = {}
+    bins = {}
     for column, (_, (low, high), _) in _LAWS.items():
-        unit = "rad" if column == "angle" else "1"
-        table[f"{column} [{unit}]"] = edges = np.linspace(low, high, 21)
+        edges, densities = np.linspace(low, high, 21), {}
         for name, matrices in R.items():
             counts, _ = np.histogram(np.clip(_shown(column, matrices), low, high), edges)
-            density = counts / (len(matrices) * np.diff(edges))
-            table[f"{column}, {name} [1]"] = np.append(density, 0)
+            densities[name] = counts / (len(matrices) * np.diff(edges))
+        bins[column] = edges, densities
+    return bins
+
+
+def _shown(column: str, R: Array) -> Array:
+    if column == "angle":
+        return np.arccos(np.clip((np.trace(R, axis1=-2, axis2=-1) - 1) / 2, -1, 1))
+    return R[:, 2, 0 if column.endswith("₁") else 2]
+
+
+def histogram_table(bins: Bins) -> Table:
+    """Return `histograms` as a table: edges, and the densities in the bins that start there."""
+    table: dict[str, Array] = {}
+    for column, (edges, densities) in bins.items():
+        table[f"{column} [{'rad' if column == 'angle' else '1'}]"] = edges
+        table |= {f"{column}, {name} [1]": np.append(x, 0) for name, x in densities.items()}
     return table
 
 
-def draw_histograms(axes: Sequence[Axes], data: Table) -> list[Any]:
-    """Draw histograms of samples of rotations, and what uniform ones give.
+def draw_histograms(axes: Sequence[Axes], bins: Bins) -> list[Any]:
+    """Draw the histograms of two samples of rotations on three axes, and the law of uniform ones.
 
-    Parameters
-    ----------
-    axes : sequence of three Axes
-        Where to draw.
-    data : mapping of str to array_like, shape (bins + 1,)
-        A `histogram_table`, of two samples.
-
-    Returns
-    -------
-    list of artists
-
-    References
-    ----------
-    RR 2.
+    (RR 2)
     """
     artists: list[Any] = []
     colours = COLOURS["projection"], COLOURS["z"]
     for ax, (column, (label, limits, law)) in zip(axes, _LAWS.items(), strict=True):
-        edges, densities = _bins(data, column)
+        edges, densities = bins[column]
         for (name, density), colour in zip(densities.items(), colours, strict=True):
-            artists.append(ax.stairs(density[:-1], edges, color=colour, lw=2, label=name))
+            artists.append(ax.stairs(density, edges, color=colour, lw=2, label=name))
         fine = np.linspace(*limits, 201)
         density = np.diff(law(fine)) / np.diff(fine)
         middle = (fine[:-1] + fine[1:]) / 2
@@ -205,24 +170,13 @@ def draw_histograms(axes: Sequence[Axes], data: Table) -> list[Any]:
     return artists
 
 
-def describe_histograms(data: Table) -> str:
-    """Return in words what `draw_histograms` shows.
-
-    Parameters
-    ----------
-    data : mapping of str to array_like, shape (bins + 1,)
-        As for `draw_histograms`.
-
-    Returns
-    -------
-    str
-    """
+def describe_histograms(bins: Bins) -> str:
+    """Return in words what `draw_histograms` shows."""
     said = []
     for column, (label, _, law) in _LAWS.items():
-        edges, densities = _bins(data, column)
-        width = np.diff(edges)
+        edges, densities = bins[column]
         for name, density in densities.items():
-            off = np.abs(density[:-1] * width - np.diff(law(edges))).sum() / 2
+            off = np.abs(density * np.diff(edges) - np.diff(law(edges))).sum() / 2
             said.append(f"{label.split(' (')[0]}, {name}: {100 * off:.0f} %")
     return (
         "Histograms of random rotations beside the law of uniform ones. The share of the draws "
@@ -230,28 +184,135 @@ def describe_histograms(data: Table) -> str:
     )
 
 
-def _strokes(data: Table) -> dict[str, Array]:
-    """Return the images of v0 and v1, shape (n, 2, 3), for each sample of an `image_table`."""
-    names = [key.removesuffix(" v0 x [1]") for key in data if key.endswith(" v0 x [1]")]
-    return {
-        name: np.array([[data[f"{name} {v} {axis} [1]"] for axis in "xyz"] for v in ("v0", "v1")])
-        .transpose(2, 0, 1)
-        .astype(float)
-        for name in names
-    }
+def spin_table(t: Array, spins: Mapping[str, Array]) -> Table:
+    """Return angular velocities over time, shape (times, 3), body frame, as a table."""
+    table = {"t [1]": t}
+    for name, w in spins.items():
+        table |= {f"{name} w{i + 1} [rad]": w[:, i] for i in range(3)}
+    return table
 
 
-def _shown(column: str, R: Array) -> Array:
-    if column == "angle":
-        return np.arccos(np.clip((np.trace(R, axis1=-2, axis2=-1) - 1) / 2, -1, 1))
-    return R[:, 2, 0 if column.endswith("₁") else 2]
+def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> list[Any]:
+    """Draw the components of angular velocities, shape (times, 3), over time, each on its axes."""
+    lines: list[Any] = []
+    for ax, (name, w) in zip(axes, spins.items(), strict=True):
+        for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True)):
+            lines += ax.plot(t, w[:, i], color=COLOURS[axis], ls=dash, label=f"ω{'₁₂₃'[i]}")
+        ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]))
+        ax.set_xticks(np.linspace(t[0], t[-1], 5))
+    axes[0].set_ylabel("rad per unit time")
+    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return lines
 
 
-def _bins(data: Table, column: str) -> tuple[Array, dict[str, Array]]:
-    edges = next(np.asarray(data[key]) for key in data if key.startswith(f"{column} ["))
-    densities = {
-        key.removeprefix(f"{column}, ").removesuffix(" [1]"): np.asarray(data[key])
-        for key in data
-        if key.startswith(f"{column}, ")
-    }
-    return edges, densities
+def describe_spins(spins: Mapping[str, Array]) -> str:
+    """Return in words what `draw_spins` shows."""
+    said = []
+    for name, w in spins.items():
+        main = w[:, np.abs(w[0]).argmax()]
+        flips = np.count_nonzero(np.diff(main > 0))
+        said.append(f"{name}: it changes its sign {flips} times" if flips else f"{name}: it stays")
+    return (
+        "The three components of the angular velocity of a free body over time, for spins that "
+        f"start about one axis, nearly. What becomes of the largest component: {'; '.join(said)}."
+    )
+
+
+def momentum_directions(moments: ArrayLike, w: Array) -> Array:
+    """Return the directions of the angular momentum in the body frame, shape (paths, times, 3).
+
+    `moments` are the principal moments of inertia, the second one between the others, and w the
+    angular velocities in the body frame, shape (times, paths, 3).
+    """
+    momentum = np.swapaxes(w * np.asarray(moments), 0, 1)
+    return momentum / np.linalg.norm(momentum, axis=-1, keepdims=True)
+
+
+def momentum_table(directions: Array) -> Table:
+    """Return `momentum_directions` as a table, with the number of the path."""
+    numbers = np.broadcast_to(np.arange(len(directions))[:, None], directions.shape[:2])
+    columns = {f"{axis} [1]": directions[..., i] for i, axis in enumerate("xyz")}
+    return {"path [1]": numbers, **columns}
+
+
+def draw_momenta(ax: Any, directions: Array) -> list[Any]:
+    """Draw closed paths of the angular momentum through the body, on the unit sphere.
+
+    A path has the colour of the axis that it goes round; black are those that pass close to the
+    middle one. Return a line for the visible part of each.
+    """
+    draw_sphere(ax)
+    lines: list[Any] = []
+    for path in directions:
+        near_middle = _comes_near_axis_2(path)
+        colour = COLOURS["optimum"] if near_middle else COLOURS["xyz"[_goes_round(path)]]
+        seen = path @ EYE > 0
+        front = (seen | np.roll(seen, 1))[:, None]  # each piece begins where the last one ended
+        ax.plot(*np.where(front, np.nan, path).T, color=colour, lw=0.8, alpha=0.4, zorder=2)
+        lines += ax.plot(*np.where(front, path, np.nan).T, color=colour, lw=2, zorder=3)
+    for name, end in zip("123", np.diag(np.sign(EYE)), strict=True):
+        ax.text(*end, name, ha="center", va="center", zorder=4)
+        ax.text(*-end, name, ha="center", va="center", zorder=1, color="0.6")
+    return lines
+
+
+def describe_momenta(directions: Array) -> str:
+    """Return in words what `draw_momenta` shows."""
+    rounds = [_goes_round(path) for path in directions]
+    near = sum(_comes_near_axis_2(path) for path in directions)
+    return (
+        f"{len(rounds)} paths of the angular momentum on a sphere that is fixed in the body: "
+        f"{rounds.count(0)} go round axis 1, {rounds.count(2)} round axis 3, "
+        f"{rounds.count(1) or 'none'} round axis 2. Black: the {near} that pass close to axis 2."
+    )
+
+
+def _comes_near_axis_2(path: Array) -> bool:
+    return bool(np.abs(path[:, 1]).max() > 0.99)
+
+
+def _goes_round(path: Array) -> int:
+    """Return the axis along which the component of a path keeps its sign, the farthest from 0."""
+    low, high = path.min(axis=0), path.max(axis=0)
+    return int(np.where(low * high > 0, np.abs(path).min(axis=0), 0).argmax())
+
+
+def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
+    """Draw a book in its first orientation, with a pin in its middle axis; return what turns it.
+
+    R are its orientations at the times t, such that the angular momentum is vertical, as a line
+    says; `edges` are its edges along its axes, in m, the pin along the second. ``update(i)`` turns
+    the book to orientation i and returns the artists that move.
+    """
+    poses, edges = join(R, np.zeros(3)), np.asarray(edges)
+    reach = 0.5 * float(np.linalg.norm(edges))
+    ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
+    label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
+    ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
+    clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
+    book = draw_box(ax, poses[0], edges)
+    pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
+    ax.set_box_aspect((1, 1, 1), zoom=1.5)
+    ax.set_axis_off()
+    ax.set_proj_type("ortho")  # in perspective the square on the cover can sink into it
+    ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
+
+    def update(i: int) -> list[Any]:
+        move_box(book, poses[i], edges)
+        ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
+        pin.set_data_3d(*ends.T)
+        clock.set_text(f"t = {t[i]:.1f}")
+        away = R[i, :, 1] @ EYE < 0  # the pin leaves the book on its far side
+        return [clock, pin, book] if away else [clock, book, pin]
+
+    return update
+
+
+def describe_book(t: Array, R: Array) -> str:
+    """Return in words what `moving_book` shows."""
+    height = R[:, 2, 1]
+    start = "up" if height[0] > 0 else "down"
+    over = ", ".join(f"{x:.1f}" for x in t[1:][np.diff(height > 0)])
+    fate = f"turns over at t = {over}" if over else "stays there"
+    return f"A book spins freely, with a pin in its middle axis. It starts {start}, and {fate}."

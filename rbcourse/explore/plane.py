@@ -6,7 +6,7 @@ import numpy as np
 
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics, interpolate_joints
-from rbcourse.draw.arm import arm_table, show_reach
+from rbcourse.draw.arm import show_reach
 from rbcourse.draw.plane import draw_body, move_body
 from rbcourse.draw.save import COLOURS
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, numbers, slider
@@ -90,7 +90,7 @@ def arm_explorer() -> Explorer:
     with look():
         fig = new_figure()
         ax = fig.add_axes((0.12, 0.15, 0.63, 0.84))
-        show_reach(ax, arm_table([start]))
+        show_reach(ax)
         ax.plot(*arm_forward_kinematics(start).joints.T, "o-", color="0.75", lw=4, ms=8)
         artists: dict[str, Any] = {
             "way": new_line(ax, color=COLOURS["path"], lw=2.5, label="its way"),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rbcourse._checks import Rng, as_count, as_generator, as_single
 from rbcourse._numerics import Array, blocks
 from rbcourse.cost import integral
-from rbcourse.curves import Curve, Ends
+from rbcourse.curves import Curve, Ends, check_ends
 from rbcourse.optimum import MinimumAcceleration, from_curve, minimum_acceleration_so3, relax
 from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic
 from rbcourse.rivals import (
@@ -44,7 +44,7 @@ _PART = 1000  # problems between two reports
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomial:
     """Return the stack of `projected_cubic_so3`, without a warning of any of its margins."""
-    return projected_cubic(Ends(R0, R1, w0, w1))
+    return projected_cubic(check_ends(R0, R1, w0, w1))
 
 
 WAYS: dict[str, Maker] = {**CLOSED_FORMS, "projection": projection}
@@ -161,13 +161,13 @@ def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]
 
 def long_way_round(R0: Array, R1: Array, w0: Array, w1: Array) -> ExponentialCubic:
     """Return the exponential cubics that turn the other way round, by 2π − ‖σ‖."""
-    ends = Ends(R0, R1, w0, w1)
+    ends = check_ends(R0, R1, w0, w1)
     return ExponentialCubic(ends, other_way(log_so3(ends.turn)))
 
 
 def bezier_other_way(R0: Array, R1: Array, w0: Array, w1: Array) -> Bezier:
     """Return the Bézier curves whose middle legs turn the other way round; they must not be 0."""
-    ends = Ends(R0, R1, w0, w1)
+    ends = check_ends(R0, R1, w0, w1)
     first, middle, last = bezier_legs(ends)
     return Bezier(ends, (first, other_way(middle), last))
 
