@@ -107,8 +107,8 @@ def moving_cubes(frames):
     ways = {"screw": rb.screw_se3(np.eye(4), A1), "geodesic": rb.geodesic_se3(np.eye(4), A1)}
     panes = {"layout": "none", "subplot_kw": {"projection": "3d"}}
     fig, axes = plt.subplots(1, 2, figsize=(8, 4), dpi=80, **panes)
-    tables = {name: bodies.motion_table(t, way(t)) for name, way in ways.items()}
-    return fig, bodies.moving_cubes(axes, tables, side=2)
+    motions = {name: way(t) for name, way in ways.items()}
+    return fig, bodies.moving_cubes(axes, motions, side=2)
 
 
 def film(fig, update, frames):

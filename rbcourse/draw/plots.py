@@ -148,11 +148,6 @@ def describe_chord(data: Table) -> str:
     )
 
 
-def point_path(curve: Curve, point: ArrayLike, t: Array) -> Array:
-    """Return where rotations over time carry a point of the body, shape (times, 3)."""
-    return curve(t) @ np.asarray(point)
-
-
 def path_table(t: Array, paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> Table:
     """Return paths of a point and angular speeds as a table."""
     table = {"t [1]": t}

@@ -14,12 +14,13 @@ from rbcourse.draw import animate, bodies
 
 A1 = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
 TIMES = np.linspace(0, 1, 12)
-TABLE = bodies.motion_table(TIMES, rb.screw_se3(np.eye(4), A1)(TIMES))
+POSES = rb.screw_se3(np.eye(4), A1)(TIMES)
+TABLE = bodies.pose_table({"t [1]": TIMES}, POSES)
 
 
 def cube():
     fig, ax = plt.subplots(figsize=(3, 3), dpi=60, subplot_kw={"projection": "3d"}, layout="none")
-    return fig, bodies.moving_cubes([ax], {"cube": TABLE}, side=1)
+    return fig, bodies.moving_cubes([ax], {"cube": POSES}, side=1)
 
 
 def save(folder, monkeypatch):

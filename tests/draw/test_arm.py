@@ -1,4 +1,4 @@
-"""Arms are drawn where the table says, and described by its numbers."""
+"""Arms are drawn where the path says, and described by its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,7 +9,6 @@ import rbcourse as rb
 from rbcourse.draw import arm
 
 PATH = np.array([[0.2, 0.5], [1.0, -0.5], [-2.0, 3.0], [4.0, 0.1]])
-TABLE = arm.arm_table(PATH)
 
 
 @pytest.fixture
@@ -28,26 +27,27 @@ def drawn(line):
     return np.transpose(line.get_data()) @ [1, 1j]
 
 
-def test_an_arm_table_holds_angles_and_ends():
-    assert list(TABLE) == [
+def test_a_table_holds_angles_and_ends():
+    table = arm.path_table(PATH)
+    assert list(table) == [
         "theta0 [rad]",
         "theta1 [rad]",
         *("x1 [m]", "y1 [m]"),
         *("x2 [m]", "y2 [m]"),
     ]
-    assert np.array_equal(np.transpose([TABLE["theta0 [rad]"], TABLE["theta1 [rad]"]]), PATH)
+    assert np.array_equal(np.transpose([table["theta0 [rad]"], table["theta1 [rad]"]]), PATH)
     for i, q in enumerate(PATH):
         for k in (1, 2):
-            place = TABLE[f"x{k} [m]"][i] + 1j * TABLE[f"y{k} [m]"][i]
+            place = table[f"x{k} [m]"][i] + 1j * table[f"y{k} [m]"][i]
             assert abs(place - ends(q)[k]) < 1e-14
-    longer = arm.arm_table([[0.1, 0.2, 0.3]], [1, 2, 3])
+    longer = arm.path_table([[0.1, 0.2, 0.3]], [1, 2, 3])
     assert abs(longer["x3 [m]"][0] - ends([0.1, 0.2, 0.3], [1, 2, 3])[3].real) < 1e-14
 
 
 @pytest.mark.source("RR 4")
 @pytest.mark.parametrize("q", [[0.5, 0.8], [-0.5, -2], [2, -1]])
 def test_a_posture_shows_links_angles_and_frames(axes, q):
-    links, *arrows = arm.draw_posture(axes[0], arm.arm_table([q]))
+    links, *arrows = arm.draw_posture(axes[0], np.array(q))
     joints = ends(q)
     assert np.abs(drawn(links) - joints).max() < 1e-14
     headings = np.cumsum(q)
@@ -78,14 +78,14 @@ def test_a_posture_shows_links_angles_and_frames(axes, q):
 @pytest.mark.parametrize("q", [[0.5, 1.5], [0.2, 0.1, 0.3]])
 def test_the_arrows_at_the_tip_are_the_columns_of_the_jacobian(axes, q):
     lengths = [2, 1.5, 1][: len(q)]
-    links, *arrows = arm.draw_tip_velocities(axes[0], arm.arm_table([q], lengths))
+    links, *arrows = arm.draw_tip_velocities(axes[0], np.array(q), lengths)
     assert np.abs(drawn(links) - ends(q, lengths)).max() < 1e-14
     J = rb.arm.arm_tip_jacobian(q, lengths)
     for arrow, column in zip(arrows, J.T, strict=True):
         assert abs(arrow.XY[0] @ [1, 1j] - ends(q, lengths)[-1]) < 1e-14
         assert np.abs([arrow.U[0], arrow.V[0]] - column / 2).max() < 1e-14
     assert [arrow.get_label() for arrow in arrows] == [f"motor {i} runs" for i in range(len(q))]
-    said = arm.describe_tip_velocities({"here": arm.arm_table([q], lengths)})
+    said = arm.describe_tip_velocities({"here": np.array(q)}, lengths)
     first = np.degrees(np.arctan2(J[1, 0], J[0, 0]))
     assert f"here: they point to {first:.0f}" in said
 
@@ -98,7 +98,7 @@ def assert_reach_is_seen(ax):
 
 @pytest.mark.source("RR 4.3", "RR Fig. 8", "RR Fig. 9")
 def test_the_arm_moves_and_its_tip_leaves_a_curve(axes):
-    update = arm.moving_arm(axes[0], TABLE, shown=[0, 2])
+    update = arm.moving_arm(axes[0], PATH, shown=[0, 2])
     for i in (0, 3, 1):
         links, way = update(i)
         assert np.abs(drawn(links) - ends(PATH[i])).max() < 1e-14
@@ -113,8 +113,7 @@ def test_the_arm_moves_and_its_tip_leaves_a_curve(axes):
     ("lengths", "radii"), [((2, 1.5), (3.5, 0.5)), ((1, 1, 1), (3, 0)), ((1, 5, 1), (7, 3))]
 )
 def test_the_reach_is_bounded_by_circles(axes, lengths, radii):
-    table = arm.arm_table([[0.1] * len(lengths)], lengths)
-    arm.show_reach(axes[0], table)
+    arm.show_reach(axes[0], lengths)
     circles = [patch for patch in axes[0].patches if isinstance(patch, Circle)]
     assert [circle.radius for circle in circles] == pytest.approx(radii, abs=1e-14)
     assert axes[0].get_xlim()[1] == axes[0].get_ylim()[1] > radii[0]
@@ -123,7 +122,7 @@ def test_the_reach_is_bounded_by_circles(axes, lengths, radii):
 
 @pytest.mark.source("RR 4.1", "RR 4.3")
 def test_ways_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
-    ways = {"one": TABLE, "other": arm.arm_table(PATH[::-1] + 0.3)}
+    ways = {"one": PATH, "other": PATH[::-1] + 0.3}
     for lines, place in (
         (arm.draw_arm_ways(axes[0], ways), lambda q: ends(q)[-1]),
         (arm.draw_joint_ways(axes[1], ways), lambda q: np.degrees(q) @ [1, 1j]),
@@ -140,13 +139,13 @@ def test_ways_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
         assert abs(complex(*text.xy) - ends(last[i])[-1]) < 1e-14
     for draw in (arm.draw_arm_ways, arm.draw_joint_ways):
         with pytest.raises(ValueError, match="shorter"):
-            draw(axes[0], dict.fromkeys("abcd", TABLE))
+            draw(axes[0], dict.fromkeys("abcd", PATH))
 
 
 def test_descriptions_give_numbers():
     tips = np.array([ends(q)[-1] for q in PATH])
     covered = np.abs(np.diff(tips)).sum()
-    said = arm.describe_arm(TABLE)
+    said = arm.describe_arm(PATH)
     assert "links of 2 and 1.5 m turns its joints from 11 and 29 to 229 and 6 degrees" in said
     turned = np.degrees(np.abs(np.diff(PATH, axis=0)).sum(axis=0))
     assert f"by {turned[0]:.0f} and {turned[1]:.0f} degrees in all" in said
@@ -154,12 +153,12 @@ def test_descriptions_give_numbers():
         f"its tip covers {covered:.2f} m, from ({tips[0].real:.2f}, {tips[0].imag:.2f}) to ("
         in said
     )
-    unequal = arm.arm_table([[0, 0]], [1e-3, 1000])
-    assert "links of 0.001 and 1000 m" in arm.describe_arm(unequal)
-    said = arm.describe_posture(arm.arm_table([[-0.5, np.pi / 2]]))
+    unequal = arm.describe_arm(np.zeros((1, 2)), [1e-3, 1000])
+    assert "links of 0.001 and 1000 m" in unequal
+    said = arm.describe_posture(np.array([-0.5, np.pi / 2]))
     assert "joint angles are -29 and 90 degrees" in said
     assert f"at (0, 0), ({2 * np.cos(0.5):.2f}, {-2 * np.sin(0.5):.2f}), (" in said
-    said = arm.describe_ways({"one": TABLE})
+    said = arm.describe_ways({"one": PATH})
     angles = np.degrees(np.linalg.norm(np.diff(PATH, axis=0), axis=1).sum())
     assert "from joint angles of 11 and 29 to 229 and 6 degrees" in said
     assert f"one: {covered:.1f} m and {angles:.0f} degrees." in said

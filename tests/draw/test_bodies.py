@@ -1,4 +1,4 @@
-"""Cubes and paths are drawn where the table says."""
+"""Bodies and frames are drawn where the poses are."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,10 +10,7 @@ from rbcourse.draw import bodies
 A1 = rb.pose_from_coordinates([0.3, -0.5, 1.0, 4, 5, 3])
 TIMES = np.linspace(0, 1, 6)
 SCREW, GEODESIC = rb.screw_se3(np.eye(4), A1), rb.geodesic_se3(np.eye(4), A1)
-MOTIONS = {
-    "geodesic": bodies.motion_table(TIMES, GEODESIC(TIMES)),
-    "screw": bodies.motion_table(TIMES, SCREW(TIMES)),
-}
+MOTIONS = {"geodesic": GEODESIC(TIMES), "screw": SCREW(TIMES)}
 
 
 @pytest.fixture
@@ -28,8 +25,8 @@ def corners(cube):
     return np.asarray(cube._faces)[:, :4]
 
 
-def test_a_motion_table_holds_the_poses():
-    table = MOTIONS["screw"]
+def test_a_pose_table_holds_the_poses():
+    table = bodies.pose_table({"t [1]": TIMES}, MOTIONS["screw"])
     assert list(table)[:4] == ["t [1]", "x [m]", "y [m]", "z [m]"]
     assert np.array_equal(table["t [1]"], TIMES)
     assert np.array_equal(table["R23 [1]"], SCREW(TIMES)[:, 1, 2])
@@ -74,7 +71,7 @@ def test_moving_cubes_move(axes):
 
 
 def test_short_motions_can_be_drawn(axes):
-    few = {name: {key: part[:3] for key, part in table.items()} for name, table in MOTIONS.items()}
+    few = {name: poses[:3] for name, poses in MOTIONS.items()}
     assert len(bodies.moving_cubes(axes, few, side=1)(2)) == 2
 
 
@@ -88,7 +85,7 @@ def test_ways_are_the_paths_and_differ_in_colour_and_dashes(axes):
 
 def test_the_frame_is_drawn_at_the_start_and_once_at_each_end(axes):
     bodies.draw_ways(axes[0], MOTIONS)
-    other = bodies.motion_table(TIMES, rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES))
+    other = rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES)
     bodies.draw_ways(axes[1], {**MOTIONS, "back": other})
     assert [len(ax.texts) for ax in axes] == [2 * 3, 3 * 3]
 
@@ -98,8 +95,7 @@ def test_the_square_is_seen_on_the_face_that_is_turned_to_the_eye():
     turns = rb.exp_so3(np.outer(np.linspace(0, 6, 20), [0, 0, 1]))
     for R in turns:
         fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "3d"})
-        motion = bodies.motion_table([0], rb.pose_from_components(R, [[0, 0, 0]]))
-        bodies.draw_cube_motion(ax, motion, 2.0)
+        bodies.draw_cube_motion(ax, rb.pose_from_components(R, [[0, 0, 0]]), 2.0)
         fig.canvas.draw()
         red, green, blue = np.moveaxis(np.asarray(fig.canvas.buffer_rgba())[..., :3], -1, 0)
         assert ((red > 180) & (green < 130) & (blue < 60)).any()
@@ -118,15 +114,57 @@ def test_descriptions_give_numbers():
     assert "at 6 times on its way from (0, 0, 0) to (4, 5, 3) m" in said
     assert ", ".join([f"{angle / 5:.0f}"] * 5) in said
     same = {"one": MOTIONS["screw"], "two": MOTIONS["screw"]}
-    assert "side by side: one, two." in bodies.describe_moving_cubes(same)
-    assert "one and two agree at all times." in bodies.describe_moving_cubes(same)
+    assert "side by side: one, two." in bodies.describe_moving_cubes(TIMES, same)
+    assert "one and two agree at all times." in bodies.describe_moving_cubes(TIMES, same)
     t = np.linspace(0, 1, 6)
     bump = 4 * t * (1 - t) ** 2  # most at 1/3, of the six times at 0.4
     turned = rb.exp_so3(np.radians(50) * bump[:, None] * [0, 0.6, 0.8])
     upright = np.broadcast_to(np.eye(3), turned.shape)
     both = {
-        name: bodies.motion_table(t, rb.pose_from_components(R, [0, 0, 0]))
+        name: rb.pose_from_components(R, [0, 0, 0])
         for name, R in {"upright": upright, "tilted": turned}.items()
     }
-    said = bodies.describe_moving_cubes(both)
+    said = bodies.describe_moving_cubes(t, both)
     assert f"upright and tilted differ most at t = 0.40, by {50 * bump.max():.0f} degrees." in said
+
+
+@pytest.fixture
+def ax3d():
+    fig, ax = plt.subplots(subplot_kw={"projection": "3d"})
+    yield ax
+    plt.close(fig)
+
+
+@pytest.mark.source("BK Fig. 1")
+def test_the_moving_frame_shows_both_frames(ax3d):
+    poses = np.stack([np.eye(4), np.eye(4)])
+    poses[1, :3, :3], poses[1, :3, 3] = rb.exp_so3([0, 0, np.pi / 2]), [1, 2, 3]
+    artists = bodies.draw_moving_frame(ax3d, ["F", "M"], poses)
+    assert len(artists) == 8  # box, six axes, vector
+    edges = np.array(artists[0]._segments3d)
+    assert edges.shape == (12, 2, 3)
+    assert np.abs(edges.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-15
+    assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-15  # turned by 90°
+    assert np.array_equal(artists[-1]._segments3d[0], [[1, 2, 3], [0, 0, 0]])
+    texts = [text.get_text() for text in ax3d.texts]
+    axes = [f"${axis}_{name}$" for name in "FM" for axis in "xyz"]
+    assert texts == [*axes[:3], "{F}", *axes[3:], "{M}", "d"]
+    said = bodies.describe_moving_frame(["F", "M"], poses)
+    assert "(1, 2, 3) m" in said
+    assert "90 degrees" in said
+
+
+@pytest.mark.source("RR 2.1")
+def test_turned_boxes_carry_their_frames(ax3d):
+    R = rb.exp_so3([[0, 0, np.pi / 2]])
+    box, *room, x, y, z = bodies.draw_turns([ax3d], ["turned"], R)
+    assert np.array_equal([np.ptp(line.get_data_3d(), axis=1) for line in room], 2.6 * np.eye(3))
+    edges = np.array(box._segments3d)
+    assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.6, 0.3]).max() < 1e-15
+    for arrow, direction in zip((x, y, z), R[0].T, strict=True):
+        shaft = np.array(arrow._segments3d[0])
+        assert np.abs(shaft[np.linalg.norm(shaft, axis=1).argmax()] - 1.2 * direction).max() < 1e-12
+    assert ax3d.get_title() == "turned"
+    assert [text.get_text() for text in ax3d.texts] == ["x", "y", "z"]
+    said = bodies.describe_turns(["turned"], R)
+    assert "turned: x along +y, y along −x, z along +z." in said

@@ -1,4 +1,4 @@
-"""Rectangles are drawn where the table says, and described by its numbers."""
+"""Rectangles are drawn where the path says, and described by its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -8,7 +8,6 @@ import rbcourse as rb
 from rbcourse.draw import plane
 
 PATH = np.array([[0, 0, 0], [3, 0, 0.5], [3, 2, -2.0], [1, 4, -2.0]])
-TABLE = plane.route_table(PATH)
 
 
 @pytest.fixture
@@ -41,14 +40,15 @@ def assert_all_is_seen(ax, length):
     assert ax.get_aspect() == 1
 
 
-def test_a_route_table_holds_the_path():
-    assert list(TABLE) == ["x [m]", "y [m]", "theta [rad]"]
-    assert np.array_equal(np.transpose(list(TABLE.values())), PATH)
+def test_a_table_holds_the_path():
+    table = plane.path_table(PATH)
+    assert list(table) == ["x [m]", "y [m]", "theta [rad]"]
+    assert np.array_equal(np.transpose(list(table.values())), PATH)
 
 
 @pytest.mark.source("RR 3.3")
 def test_rectangles_stand_at_the_poses_and_all_is_seen(ax):
-    way, *bodies = plane.draw_route(ax, TABLE, 1.5, shown=[0, 2, 3])
+    way, *bodies = plane.draw_route(ax, PATH, 1.5, shown=[0, 2, 3])
     assert {text.get_text(): text.xy[0] for text in ax.texts} == {"start": 0, "goal": 1}
     assert np.array_equal(np.transpose(way.get_data()), PATH[:, :2])
     for i, outline, nose in zip([0, 2, 3], bodies[::2], bodies[1::2], strict=True):
@@ -59,7 +59,7 @@ def test_rectangles_stand_at_the_poses_and_all_is_seen(ax):
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
 def test_the_rectangle_moves_and_leaves_its_way(ax):
-    update = plane.moving_route(ax, TABLE, 0.8, shown=[1, 3])
+    update = plane.moving_route(ax, PATH, 0.8, shown=[1, 3])
     assert_all_is_seen(ax, 0.8)
     for ghost, nose, i in zip(ax.patches[:2], ax.lines[:2], (1, 3), strict=True):
         assert_body(ghost, nose, PATH[i], 0.8)
@@ -71,7 +71,7 @@ def test_the_rectangle_moves_and_leaves_its_way(ax):
 
 def test_two_ways_are_compared(ax):
     raised = PATH + np.array([0, 1, 0]) * [[0], [1], [2], [0.5]]
-    pair = {"one": TABLE, "other": plane.route_table(raised)}
+    pair = {"one": PATH, "other": raised}
     point = [0.3, -0.2]
     artists = plane.draw_compared(ax, pair, 1, shown=[1], points=[[0, 0], point])
     for (way, outline, nose), path, c in zip(
@@ -94,14 +94,14 @@ def test_two_ways_are_compared(ax):
 
 
 def test_the_description_says_from_where_to_where_and_how_it_turns():
-    said = plane.describe_route(TABLE)
+    said = plane.describe_route(PATH)
     assert "from (0, 0) m, heading 0 degrees, to (1, 4) m, heading -115 degrees" in said
     assert f"its centre covers {3 + 2 + np.sqrt(8):.2f} m" in said
     assert "by 29 degrees to the left and 143 degrees to the right." in said
-    still = plane.describe_route(plane.route_table([[1, -0.001, -0.004], [1, -0.001, 0]]))
+    still = plane.describe_route(np.array([[1, -0.001, -0.004], [1, -0.001, 0]]))
     assert "from (1, 0) m, heading 0 degrees" in still
     assert "it turns by less than a degree." in still
-    assert plane.describe_routes({"one": TABLE}) == f"one: {said}"
+    assert plane.describe_routes({"one": PATH}) == f"one: {said}"
 
 
 def test_a_rectangle_of_a_drawing_is_that_of_its_matrix(ax):

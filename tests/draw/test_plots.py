@@ -7,6 +7,19 @@ import pytest
 import rbcourse as rb
 from rbcourse.draw import plots
 
+CURVE_TIMES = np.linspace(0, 1, 21)
+SIGMA = np.array([0.3, 0.6, 0.9])
+ENDS = np.eye(3), rb.exp_so3(SIGMA), SIGMA, SIGMA + np.array([1, 0, 0])
+CURVES = {
+    "optimum": rb.minimum_acceleration_so3(*ENDS),
+    "projection": rb.projected_cubic_so3(*ENDS),
+}
+COORDINATES = plots.coordinate_table(CURVES, CURVE_TIMES)
+POSES = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 3, 4, 0], [0, 0, 1, 3, 4, 5]])
+MOTION = rb.chain([0, 2, 4], POSES, leg=rb.geodesic_se3)
+SMOOTH = rb.chain([0, 2, 4], POSES)
+PROFILES = {"t [s]": [0, 1, 2], "speed [m/s]": [0, 2.5, 1], "turn [rad/s]": [1, 0, 0.25]}
+
 
 @pytest.fixture
 def ax():
@@ -35,7 +48,10 @@ def motions():
         "geodesic": rb.geodesic_so3(np.eye(3), R1),
         "projected line": rb.projected_line_so3(np.eye(3), R1),
     }
-    return plots.motion_table(curves, [1, 0, 0], np.linspace(0, 1, 21))
+    t = np.linspace(0, 1, 21)
+    paths = {name: curve(t) @ [1, 0, 0] for name, curve in curves.items()}
+    speeds = {name: np.linalg.norm(curve(t, 1), axis=-1) for name, curve in curves.items()}
+    return t, paths, speeds
 
 
 def test_a_family_shows_six_curves_that_differ_in_colour_and_dashes(ax, family):
@@ -81,30 +97,28 @@ def test_the_chord_shows_its_cuts_and_their_projections(ax):
 
 
 def test_motions_are_carried_points_and_speeds(motions):
-    t = motions["t [1]"]
-    assert np.abs(motions["geodesic x [1]"] - np.cos(2 * t)).max() < 1e-15
+    table = plots.path_table(*motions)
+    t = table["t [1]"]
+    assert np.abs(table["geodesic x [1]"] - np.cos(2 * t)).max() < 1e-15
     assert (
-        np.abs(motions["projected line y [1]"] - np.sin(2 * rb.projected_line.theta(t, 2))).max()
+        np.abs(table["projected line y [1]"] - np.sin(2 * rb.projected_line.theta(t, 2))).max()
         < 1e-15
     )
     assert (
-        np.abs(motions["projected line speed [rad]"] - 2 * rb.projected_line.theta(t, 2, 1)).max()
+        np.abs(table["projected line speed [rad]"] - 2 * rb.projected_line.theta(t, 2, 1)).max()
         < 1e-14
     )
 
 
 def test_paths_and_speeds_show_both_motions(ax, ax3d, motions):
+    t, paths, speeds = motions
     for name, path, speed in zip(
-        ["geodesic", "projected line"],
-        plots.draw_paths(ax3d, motions),
-        plots.draw_speeds(ax, motions),
-        strict=True,
+        paths, plots.draw_paths(ax3d, paths), plots.draw_speeds(ax, t, speeds), strict=True
     ):
-        shown = [motions[f"{name} {axis} [1]"] for axis in "xyz"]
-        assert np.array_equal(path.get_data_3d(), shown)
-        assert np.array_equal(speed.get_ydata(), motions[f"{name} speed [rad]"])
+        assert np.array_equal(path.get_data_3d(), paths[name].T)
+        assert np.array_equal(speed.get_xydata(), np.transpose([t, speeds[name]]))
         assert path.get_color() == speed.get_color()
-    said = plots.describe_paths(motions)
+    said = plots.describe_paths(paths, speeds)
     assert "the geodesic takes the steps 57, 57 degrees; its speed is 2.00 at the start" in said
     assert "0.91 at the start, 3.11 in the middle, 0.91 at the end" in said
 
@@ -112,3 +126,121 @@ def test_paths_and_speeds_show_both_motions(ax, ax3d, motions):
 def test_the_style_is_part_of_the_package():
     with plt.style.context("rbcourse.rbcourse"):
         assert plt.rcParams["pdf.fonttype"] == 42
+
+
+def test_the_table_holds_rotation_vectors():
+    assert np.array_equal(COORDINATES["t [1]"], CURVE_TIMES)
+    for name, curve in CURVES.items():
+        sigma = np.array([COORDINATES[f"{name} sigma{i} [rad]"] for i in (1, 2, 3)]).T
+        assert np.array_equal(sigma, rb.log_so3(curve(CURVE_TIMES)))
+
+
+@pytest.mark.source("BK Fig. 4")
+def test_paths_coordinates_and_differences_are_those_of_the_table(ax):
+    fig, ax3d = plt.subplots(subplot_kw={"projection": "3d"})
+    lines = plots.draw_coordinate_paths(ax3d, COORDINATES)
+    sigma = [rb.log_so3(curve(CURVE_TIMES)).T for curve in CURVES.values()]
+    for line, path in zip(lines, sigma, strict=True):
+        assert np.array_equal(line.get_data_3d(), path)
+    assert len({line.get_color() for line in lines}) == len(
+        {line.get_linestyle() for line in lines}
+    )
+    plt.close(fig)
+    for line, part in zip(
+        plots.draw_coordinates(ax, COORDINATES), np.concatenate(sigma), strict=True
+    ):
+        assert np.array_equal(line.get_ydata(), part)
+    apart = sigma[1] - sigma[0]
+    for line, part in zip(plots.draw_difference(ax, COORDINATES), apart, strict=True):
+        assert np.array_equal(line.get_ydata(), part)
+    distance = np.linalg.norm(apart, axis=0)
+    said = plots.describe_coordinates(COORDINATES)
+    assert (
+        f"most at t = {CURVE_TIMES[distance.argmax()]:g}, by {distance.max():.2g} rad in length"
+        in said
+    )
+
+
+def test_equal_curves_are_said_to_coincide():
+    same = plots.coordinate_table(dict.fromkeys(CURVES, CURVES["optimum"]), CURVE_TIMES)
+    assert plots.describe_coordinates(same).endswith("They coincide at all times.")
+
+
+def test_excess_is_drawn_on_logarithmic_axes(ax):
+    scale = np.array([0.25, 0.5, 1])
+    table = {"scale [1]": scale, "one excess [1]": scale**4, "two excess [1]": 2 * scale**4}
+    one, two, slope = plots.draw_excess(ax, table)
+    assert np.array_equal(one.get_ydata(), scale**4)
+    assert np.array_equal(two.get_ydata(), 2 * scale**4)
+    assert np.allclose(np.diff(np.log(slope.get_ydata())), 4 * np.log(2))
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert "one from 3.9e-03 to 1; two from 7.8e-03 to 2" in plots.describe_excess(table)
+
+
+def test_speeds_are_those_of_the_motion():
+    table = plots.profile_table(MOTION, 1, 5)
+    assert table["t [s]"].tolist() == [0, 1, 2, 3, 4]
+    assert np.allclose(table["angular speed [rad/s]"], [0.5, 0.5, 0, 0, 0], atol=1e-14)
+    assert np.allclose(table["speed [m/s]"], 2.5, atol=1e-14)
+
+
+def test_accelerations_are_those_of_the_body():
+    table = plots.profile_table(SMOOTH, 2, 9)
+    h = 1e-4
+    for t, w, d in zip(*table.values(), strict=True):
+        if t in (0, 2, 4):
+            continue
+        before, now, after = (SMOOTH(t + s)[:3, 3] for s in (-h, 0, h))
+        assert d == pytest.approx(np.linalg.norm(after - 2 * now + before) / h**2, abs=1e-5)
+        w_dot = (SMOOTH(t + h, 1) - SMOOTH(t - h, 1))[:3] / (2 * h)
+        assert w == pytest.approx(np.linalg.norm(w_dot), abs=1e-6)
+
+
+def test_each_column_has_its_axes_and_the_knots_their_lines():
+    fig, axes = plt.subplots(2)
+    lines = plots.draw_profiles(axes, PROFILES, [0, 1.5])
+    for ax, line, label in zip(axes, lines, ("speed\n(m/s)", "turn\n(rad/s)"), strict=True):
+        assert line.axes is ax
+        assert ax.get_ylabel() == label
+        assert line.get_xdata().tolist() == [0, 1, 2]
+        knots = [other.get_xdata()[0] for other in ax.lines if other is not line]
+        assert knots == [0, 1.5]
+        assert ax.get_ylim()[1] > line.get_ydata().max()
+    assert lines[0].get_ydata().tolist() == [0, 2.5, 1]
+    assert axes[1].get_xlabel() == "time (s)"
+    plt.close(fig)
+
+
+def test_what_is_said():
+    assert plots.describe_profiles(PROFILES, [0, 1.5]) == (
+        "Over time: speed up to 2.5 m/s at 1 s; turn up to 1 rad/s at 0 s. "
+        "The poses are reached at 0, 1.5 s."
+    )
+
+
+def test_what_never_changes_has_axes_too():
+    fig, axes = plt.subplots(2)
+    plots.draw_profiles(axes, PROFILES | {"speed [m/s]": [0, 0, 0], "turn [rad/s]": [-1, 0, 3]}, [])
+    assert [ax.get_ylim() for ax in axes] == [(0, 1), pytest.approx((-1.08, 3.24))]
+    plt.close(fig)
+
+
+def test_of_rotations_alone_there_is_no_profile():
+    with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) wanted"):
+        plots.profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)
+
+
+@pytest.mark.source("RR (8)")
+def test_angles_are_drawn_in_degrees_and_described():
+    t = np.linspace(0, 1, 11)
+    letters = {"α": -t, "β": -t, "γ": 2 * t}
+    table = {"t [1]": t} | {f"slow {name} [rad]": angle for name, angle in letters.items()}
+    fig, ax = plt.subplots()
+    lines = plots.draw_angles([ax], table)
+    for line, (name, angle) in zip(lines, letters.items(), strict=True):
+        assert line.get_label() == name
+        assert np.array_equal(line.get_ydata(), np.degrees(angle))
+    assert ax.get_title() == "slow"
+    plt.close(fig)
+    said = plots.describe_angles(table)
+    assert "slow: β goes to -57 degrees, and the middle half of α's change takes 50.0 %" in said

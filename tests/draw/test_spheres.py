@@ -1,4 +1,4 @@
-"""Random rotations on the sphere: what is drawn is what was computed."""
+"""On the sphere: what is drawn is what was computed."""
 
 import io
 
@@ -15,6 +15,11 @@ V0 = np.array([0.0, 0, 1])
 V1 = np.array([0.0, 0.2, 1])
 IMAGES = {"one": (R @ V0, R @ V1), "other": (-R @ V0, -R @ V1)}
 TABLE = spheres.image_table(IMAGES)
+MOMENTS = np.array([1.0, 2, 3])
+TIMES = np.linspace(0, 24, 481)
+STARTS = {"axis 1": [2, 0.01, 0.01], "axis 2": [0.01, 2, 0.01], "axis 3": [0.01, 0.01, 2]}
+TURNS, W = rb.geodesic_flow(np.diag(MOMENTS), np.eye(3), list(STARTS.values()), TIMES)
+SPINS = {name: W[:, k] for k, name in enumerate(STARTS)}
 
 
 @pytest.fixture
@@ -32,7 +37,7 @@ def test_the_table_has_a_row_for_each_rotation():
 @pytest.mark.source("RR 2.2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize("shown", [0, 1, 17, 50])
 def test_the_first_images_are_marked(panels, shown):
-    artists = spheres.moving_images(panels, TABLE)(shown)
+    artists = spheres.moving_images(panels, IMAGES)(shown)
     for k, (v0, v1) in enumerate(IMAGES.values()):
         far, strokes, near = artists[3 * k : 3 * k + 3]
         drawn = np.array(strokes._segments3d).reshape(-1, 2, 3)
@@ -43,7 +48,7 @@ def test_the_first_images_are_marked(panels, shown):
 
 
 def test_what_lies_behind_is_pale(panels):
-    far, strokes, near = spheres.moving_images(panels, TABLE)(50)[:3]
+    far, strokes, near = spheres.moving_images(panels, IMAGES)(50)[:3]
     e, a = np.radians([panels[0].elev, panels[0].azim])
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     assert (eye @ far.get_data_3d() < 0).all()
@@ -55,8 +60,8 @@ def test_what_lies_behind_is_pale(panels):
 def test_frames_are_what_a_full_drawing_gives():
     fig, ax = plt.subplots(figsize=(5, 5), dpi=80, subplot_kw={"projection": "3d"}, layout="none")
     many = rb.sample_rotation(300, rng=1)
-    table = spheres.image_table({"many": (many @ V0, many @ V1)})
-    pictures = animate.render(fig, spheres.moving_images([ax], table), 301)[-1:]
+    images = {"many": (many @ V0, many @ V1)}
+    pictures = animate.render(fig, spheres.moving_images([ax], images), 301)[-1:]
     for artist in ax.get_children():
         artist.set_animated(False)
     full = io.BytesIO()
@@ -67,7 +72,7 @@ def test_frames_are_what_a_full_drawing_gives():
 
 
 def test_the_description_counts():
-    said = spheres.describe_images(TABLE)
+    said = spheres.describe_images(IMAGES)
     inside = (np.abs((R @ V0)[:, 2]) < 0.5).sum()
     assert "under 50 random rotations" in said
     assert f"area: one: {inside}, other: {inside}." in said
@@ -81,7 +86,7 @@ def test_histograms_are_densities():
     rounded[:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)  # heights beyond 1, by rounding
     rounded[0] = np.eye(3)
     many = {"uniform": rb.sample_rotation(5000, rng=2), "e3 up": rounded}
-    data = spheres.histogram_table(many)
+    data = spheres.histogram_table(spheres.histograms(many))
     for column, unit in (("angle", "rad"), ("height of e₁", "1"), ("height of e₃", "1")):
         edges = data[f"{column} [{unit}]"]
         for name in many:
@@ -99,13 +104,14 @@ def test_histograms_show_the_table_and_the_law():
         "a": rb.sample_rotation(5000, rng=2),
         "b": rb.sampling.sample_rotation_naive(5000, rng=2),
     }
-    data = spheres.histogram_table(many)
+    bins = spheres.histograms(many)
     fig, axes = plt.subplots(1, 3)
-    artists = spheres.draw_histograms(axes, data)
+    artists = spheres.draw_histograms(axes, bins)
     for k, column in enumerate(("angle", "height of e₁", "height of e₃")):
         a, b, law = artists[3 * k : 3 * k + 3]
         for stairs, name in ((a, "a"), (b, "b")):
-            assert np.array_equal(stairs.get_data().values, data[f"{column}, {name} [1]"][:-1])
+            assert np.array_equal(stairs.get_data().values, bins[column][1][name])
+            assert np.array_equal(stairs.get_data().edges, bins[column][0])
         x, y = law.get_data()
         want = (1 - np.cos(x)) / np.pi if k == 0 else np.full_like(x, 0.5)
         assert np.abs(y - want).max() < 1e-4
@@ -114,6 +120,91 @@ def test_histograms_show_the_table_and_the_law():
 
 def test_histograms_are_described_by_what_is_in_the_wrong_bins():
     up = rb.exp_so3(np.zeros((10, 3)))
-    said = spheres.describe_histograms(spheres.histogram_table({"up": up}))
+    said = spheres.describe_histograms(spheres.histograms({"up": up}))
     assert "height of the image of e₃, up: 95 %" in said
     assert "angle, up: 100 %" in said
+
+
+@pytest.fixture
+def space():
+    fig, ax = plt.subplots(subplot_kw={"projection": "3d"})
+    yield ax
+    plt.close(fig)
+
+
+@pytest.mark.source("BK (8)")
+def test_spins_are_drawn_with_a_line_for_each_component():
+    fig, axes = plt.subplots(1, 3)
+    lines = spheres.draw_spins(axes, TIMES, SPINS)
+    assert len(lines) == 9
+    for k, name in enumerate(STARTS):
+        assert axes[k].get_title() == name
+        for i in range(3):
+            assert np.array_equal(lines[3 * k + i].get_ydata(), W[:, k, i])
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
+    plt.close(fig)
+
+
+def test_the_description_counts_flips():
+    said = spheres.describe_spins(SPINS)
+    flips = np.count_nonzero(np.diff(np.sign(W[:, 1, 1])))
+    assert flips >= 1
+    assert f"axis 1: it stays; axis 2: it changes its sign {flips} times; axis 3: it stays" in said
+
+
+@pytest.mark.source("BK (8)")
+def test_momenta_lie_on_the_sphere_on_paths_of_equal_energy(space):
+    L = spheres.momentum_directions(MOMENTS, W)
+    table = spheres.momentum_table(L)
+    assert np.array_equal(np.stack([table[f"{axis} [1]"] for axis in "xyz"], axis=-1), L)
+    assert L.shape == (3, 481, 3)
+    assert np.abs(np.linalg.norm(L, axis=-1) - 1).max() < 1e-14
+    energy = (L**2 / MOMENTS).sum(axis=-1)
+    assert np.abs(energy - energy[:, :1]).max() < 1e-9
+    assert np.array_equal(table["path [1]"][:, 0], [0, 1, 2])
+    lines = spheres.draw_momenta(space, L)
+    for line, path in zip(lines, L, strict=True):
+        drawn = np.transpose(line.get_data_3d())
+        shown = ~np.isnan(drawn[:, 0])
+        assert np.array_equal(drawn[shown], path[shown])
+        e, a = np.radians([space.elev, space.azim])
+        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        seen = path @ eye > 0
+        assert np.array_equal(shown, seen | np.roll(seen, 1))  # and the step across the edge
+    assert len({line.get_color() for line in lines}) == 3
+    said = spheres.describe_momenta(L)
+    assert "Black: the 1 that pass close to axis 2." in said
+    assert "none round axis 2" in said
+
+
+def test_the_book_turns_and_its_pin_with_it(space):
+    edges = np.array([2.0, 1, 0.5])
+    update = spheres.moving_book(space, TIMES, TURNS[:, 1], edges)
+    flat = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * edges / 2
+    for i in (0, 40, 100, 120, 130, 160):
+        artists = update(i)
+        (pin,) = [artist for artist in artists if hasattr(artist, "get_data_3d")]
+        e, a = np.radians([space.elev, space.azim])
+        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        assert (artists[-1] is pin) == (TURNS[i, 1, :, 1] @ eye > 0)  # in front, drawn last
+        (book,) = [artist for artist in artists if hasattr(artist, "_faces")]
+        (clock,) = [artist for artist in artists if hasattr(artist, "get_text")]
+        assert clock.get_text() == f"t = {TIMES[i]:.1f}"
+        corners = np.unique(np.asarray(book._faces)[:6, :4].reshape(-1, 3).round(12), axis=0)
+        assert np.abs(np.sort(corners, 0) - np.sort(flat @ TURNS[i, 1].T, 0)).max() < 1e-11
+        foot, tip = np.transpose(pin.get_data_3d())
+        assert np.abs(foot - edges[1] / 2 * TURNS[i, 1, :, 1]).max() < 1e-14
+        assert np.abs(np.cross(tip, foot)).max() < 1e-14
+        assert tip @ foot > foot @ foot
+
+
+def test_the_description_of_the_book_says_when_it_turns_over():
+    t = np.linspace(0, 4, 41)
+    over = rb.exp_so3(np.outer(np.where(t > 1.95, np.pi, 0), [1, 0, 0]))
+    upright = rb.exp_so3([np.pi / 2, 0, 0])
+    said = spheres.describe_book(t, over @ upright)
+    assert "It starts up, and turns over at t = 2.0." in said
+    still = np.broadcast_to(upright, over.shape)
+    assert "It starts up, and stays there." in spheres.describe_book(t, still)
+    level = np.broadcast_to(np.eye(3), over.shape)
+    assert "It starts down, and stays there." in spheres.describe_book(t, level)
