@@ -12,6 +12,7 @@ import pytest
 from freshness import changed_lines, stale_figures
 from nbformat import NotebookNode
 from nbval.plugin import IPyNbFile
+from shown import not_shown, start_recording
 
 from rbcourse.course.notebooks import kernel_address, lesson_paths, normalised
 
@@ -50,17 +51,21 @@ class Lesson(IPyNbFile):
         return [*self.cells, Remains.from_parent(self, name="Outputs and figures")]
 
     def setup(self):
-        """Start the kernel, with an empty folder for figures."""
-        self.figures = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        self.displays = {}
+        """Start the kernel, with empty folders for figures and for what their artists show."""
+        self.figures, self.shown, ipython = (
+            tempfile.TemporaryDirectory(ignore_cleanup_errors=True) for _ in range(3)
+        )
+        self.folders, self.displays = (self.figures, self.shown, ipython), {}
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv("RBCOURSE_FIGURES", self.figures.name)
+            patch.setenv("IPYTHONDIR", start_recording(self.shown.name, ipython.name))
             super().setup()
 
     def teardown(self):
-        """Stop the kernel, remove the folder."""
+        """Stop the kernel, remove the folders."""
         super().teardown()
-        self.figures.cleanup()
+        for folder in self.folders:
+            folder.cleanup()
 
     def get_kernel_message(self, timeout=None, stream="iopub"):
         """Let outputs that are updated, as progress bars are, end as they do in Jupyter."""
@@ -94,6 +99,7 @@ class Remains(pytest.Item):
         changes = [
             *changed_lines(lesson.path.read_text("utf-8"), normalised(lesson.nb)),
             *stale_figures(Path(lesson.figures.name), ROOT / "figures"),
+            *not_shown(Path(lesson.figures.name), Path(lesson.shown.name)),
         ]
         if changes:
             pytest.fail("\n".join(changes), pytrace=False)
