@@ -1,5 +1,7 @@
 """Checks of arguments: shapes, finiteness and ranges, with errors that name the argument."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from operator import index
 from typing import Any, TypeAlias
@@ -172,7 +174,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
     return shape
 
 
-def as_generator(rng: Rng) -> "np.random.Generator":
+def as_generator(rng: Rng) -> np.random.Generator:
     """Return a generator of random numbers, or raise a ValueError if `rng` makes none."""
     try:
         return np.random.default_rng(rng)

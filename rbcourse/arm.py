@@ -1,5 +1,7 @@
 """An arm in the plane: links in a row, each turned by its joint from the one before it."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

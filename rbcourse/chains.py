@@ -169,6 +169,9 @@ class Chain(Curve):
         self.durations = np.diff(times)
         self.size = legs.size
 
+    def _what(self) -> str:
+        return f"Chain of {len(self.durations)} legs, {self.legs._what()},"
+
     def jumps(self, order: int) -> Array:
         """Return what the inner poses change in the curve or a derivative: after, minus before.
 

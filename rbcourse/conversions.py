@@ -1,5 +1,7 @@
 """A rotation by other numbers: quaternions, matrices, rotation vectors, ZYX angles."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -20,6 +20,7 @@ Chosen: TypeAlias = NDArray[np.intp]
 BLOCK = 4096  # rotations that are evaluated together, in the cache
 LONG_RUN = 8  # times on one curve for which a matrix product of their own pays
 SHORTEST = 1e-100  # of a duration
+_GROUPS = {3: "SO(3)", 4: "SE(3)"}
 
 
 class Ends(NamedTuple):
@@ -194,10 +195,12 @@ class Curve:
 
     def __repr__(self) -> str:
         """Return what it is a curve of, how many there are, and when."""
-        group = {3: "SO(3)", 4: "SE(3)"}[self.size]
         stack = f", stack of shape {self.batch_shape}" if self.batch_shape else ""
         start, end = self.domain
-        return f"<{type(self).__name__} on {group}{stack}, t in [{start:g}, {end:g}]>"
+        return f"<{self._what()} on {_GROUPS[self.size]}{stack}, t in [{start:g}, {end:g}]>"
+
+    def _what(self) -> str:
+        return type(self).__name__
 
     @property
     def count(self) -> int:
@@ -401,6 +404,9 @@ class Retimed(Curve):
         self.curve._at(np.where(t == end, last, inner), which, order, out)
         if order:
             out *= self.rate**order
+
+    def _what(self) -> str:
+        return f"Retimed {self.curve._what()}"
 
     def _unit_legs(self) -> tuple[Curve, Any]:
         legs, durations = self.curve._unit_legs()

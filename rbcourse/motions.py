@@ -399,6 +399,14 @@ class Screw(NamedTuple):
     angle: Array
     slide: Array
 
+    def __repr__(self) -> str:
+        """Return the screw in words; of a stack, its shape."""
+        if np.ndim(self.angle):
+            return f"<Screw, stack of shape {self.angle.shape}>"
+        axis, point = (", ".join(f"{x:.4g}" for x in v + 0.0) for v in (self.axis, self.point))
+        turn = f"{np.degrees(self.angle):.4g}° about ({axis}) through ({point}) m"
+        return f"<Screw: {turn}, slide {self.slide:.4g} m>"
+
     @property
     def pitch(self) -> Array:
         """The slide for each rad of the turn, in m: inf for a slide alone, NaN for no motion."""

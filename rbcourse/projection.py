@@ -1,5 +1,7 @@
 """The nearest rotation, the nearest pose, and membership: in any dimension n."""
 
+from __future__ import annotations
+
 import warnings
 
 import numpy as np

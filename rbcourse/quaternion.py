@@ -1,5 +1,7 @@
 """Unit quaternions (w, x, y, z): the unit sphere in R⁴, where q and −q are the same rotation."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -3,6 +3,8 @@
 A twist is (ω, v): the angular velocity and the velocity of the origin, both in the body frame.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -136,7 +138,7 @@ def inverse_se3(A: ArrayLike) -> Array:
     >>> bool(np.allclose(inverse_se3(A) @ A, np.eye(4)))
     True
     """
-    R, d = _components("A", A)
+    R, d = split(as_finite("A", A, 4, 4))
     Rt = np.swapaxes(R, -1, -2)
     return pose_from_components(Rt, -_apply(Rt, d))
 
@@ -209,7 +211,7 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     >>> coordinates_from_pose(pose_from_coordinates([0.1, 0, 0.3, 1, 2, 3])).round(12)
     array([0.1, 0. , 0.3, 1. , 2. , 3. ])
     """
-    R, d = _components("A", A)
+    R, d = split(as_finite("A", A, 4, 4))
     return np.concatenate([log_so3(R), d], axis=-1)
 
 
@@ -278,7 +280,7 @@ def vee_se3(matrix: ArrayLike) -> Array:
     >>> vee_se3(hat_se3([1, 2, 3, 4, 5, 6]))
     array([1., 2., 3., 4., 5., 6.])
     """
-    W, v = _components("matrix", matrix)
+    W, v = split(as_finite("matrix", matrix, 4, 4))
     return np.concatenate([vee_so3(W), v], axis=-1)
 
 
@@ -368,7 +370,7 @@ def log_se3(A: ArrayLike) -> Array:
     >>> log_se3(exp_se3([0, 0, 1.5, 1, 2, 3])).round(12)
     array([0. , 0. , 1.5, 1. , 2. , 3. ])
     """
-    R, d = _components("A", A)
+    R, d = split(as_finite("A", A, 4, 4))
     w = log_so3(R)
     left_jacobian_inverse = np.swapaxes(right_jacobian_inverse_so3(w), -1, -2)
     return np.concatenate([w, _apply(left_jacobian_inverse, d)], axis=-1)
@@ -402,16 +404,11 @@ def adjoint_se3(A: ArrayLike) -> Array:
     >>> adjoint_se3(A) @ [0, 0, 1, 0, 0, 0]  # a turn about an axis 2 m away moves the origin
     array([0., 0., 1., 2., 0., 0.])
     """
-    R, d = _components("A", A)
+    R, d = split(as_finite("A", A, 4, 4))
     Ad = np.zeros((*R.shape[:-2], 6, 6))
     Ad[..., :3, :3] = Ad[..., 3:, 3:] = R
     Ad[..., 3:, :3] = hat_so3(d) @ R
     return Ad
-
-
-def _components(name: str, A: ArrayLike) -> tuple[Array, Array]:
-    A = as_finite(name, A, 4, 4)
-    return A[..., :3, :3], A[..., :3, 3]
 
 
 def _apply(matrix: Array, vector: Array) -> Array:

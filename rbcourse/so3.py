@@ -1,5 +1,7 @@
 """The rotation group SO(3) and its Lie algebra so(3): hat, vee, exp, log and their Jacobians."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

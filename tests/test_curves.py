@@ -1,3 +1,5 @@
+import re
+
 import awkward
 import numpy as np
 import oracles
@@ -481,6 +483,14 @@ def test_a_stack_is_indexed_as_an_array_is(stack_of_six, index):
         want = value.reshape(5, 6, *value.shape[3:])[:, numbers]
         assert picked(times, order).shape == want.shape
         assert np.abs(picked(times, order) - want).max(initial=0) < 1e-12
+
+
+def test_a_curve_says_what_it_is(stack_of_six):
+    stack, _, _ = stack_of_six
+    assert re.fullmatch(
+        r"<[\w ]+ on S[OE]\(3\), stack of shape \(2, 3\), t in \[0, \d\].*>", repr(stack)
+    )
+    assert "stack" not in repr(stack[0, 1])
 
 
 def test_what_a_stack_tells_of_its_curves_is_picked_too(stack_of_six):

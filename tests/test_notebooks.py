@@ -8,7 +8,6 @@ from pathlib import Path
 import nbformat
 import pytest
 from freshness import BASE64
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from rbcourse.course import notebooks
 
@@ -87,53 +86,6 @@ def faults(notebook):
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_stored_lessons_are_complete(path):
     assert list(faults(nbformat.read(path, as_version=4))) == []
-
-
-def lesson(source="x = 1", output=None, **changes):
-    """A notebook without faults, but for the changes."""
-    cell = new_code_cell(source, execution_count=1)
-    cell.outputs = [output or new_output("stream", name="stdout", text="1.5 and < 1e-14")]
-    cell.metadata.tags = changes.get("tags", ["solution"])
-    cell.execution_count = changes.get("count", 1)
-    text = new_markdown_cell(changes.get("text", "Text"))
-    text.metadata["jp-MarkdownHeadingCollapsed"] = "folded" in changes
-    kernel = {"kernelspec": {"name": changes.get("kernel", "python3"), "display_name": "Python"}}
-    title = new_markdown_cell(changes.get("title", "# Title"))
-    return new_notebook(cells=[title, text, cell], metadata=kernel)
-
-
-def plain(text):
-    return new_output("execute_result", data={"text/plain": text})
-
-
-@pytest.mark.parametrize(
-    ("notebook", "fault"),
-    [
-        (lesson(kernel="xpython"), "the kernel is not python3"),
-        (lesson(title="## Title"), "not one title"),
-        (lesson(text="Text\n## Next"), "a heading is not the first line of its cell"),
-        (lesson(text="## Answer\n42", folded=True), "a collapsed heading shows what follows it"),
-        (lesson(tags=["raises-exeption"]), "unknown tag raises-exeption"),
-        (lesson(tags=["nbval-skip"]), "a skipped cell gives no reason"),
-        (lesson(count=None), "a cell is not executed, or not in order"),
-        (lesson("x = 1\n" * 11), "a cell is longer than ten lines"),
-        (lesson(output=new_output("stream", name="stderr")), "an error or a warning is stored"),
-        (lesson("from time import perf_counter"), "a cell measures time"),
-        (lesson("import timeit as t"), "a cell measures time"),
-        (lesson("%timeit 1"), "a cell measures time"),
-        (lesson(output=plain("1.11e-16")), "rounding residue 1.11e-16"),
-        (lesson(output=plain("2e-16")), "rounding residue 2e-16"),
-        (lesson(output=plain("0.30000000000000004")), "rounding residue 0.30000000000000004"),
-        (lesson(output=plain("[-0.  1.]")), "rounding residue -0."),
-    ],
-)
-def test_each_fault_is_seen(notebook, fault):
-    assert list(faults(notebook)) == [fault]
-
-
-def test_what_is_no_fault():
-    assert list(faults(lesson("time = 0.5\nprint(time)"))) == []
-    assert list(faults(lesson(output=plain("difference < 1e-14, 1.0e-09, -0.5")))) == []
 
 
 START = (ROOT / "notebooks" / "00_start_here.ipynb").read_text("utf-8")

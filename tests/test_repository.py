@@ -1,6 +1,5 @@
 """The files round the package agree with each other, and the package works without them."""
 
-import ast
 import re
 import subprocess
 import sys
@@ -107,20 +106,6 @@ def test_an_old_python_is_told_so_in_one_line():
     assert done.returncode == 1
     assert done.stdout == ""
     assert re.fullmatch(r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\.\n", done.stderr)
-
-
-def test_even_python_2_can_read_the_script_that_tells_it_so():
-    """No syntax beyond Python 2: no f-string, annotation, walrus, match, star in a display."""
-    tree = ast.parse(read("course.py"))
-    for node in ast.walk(tree):
-        assert not isinstance(node, ast.JoinedStr | ast.AnnAssign | ast.NamedExpr | ast.Match)
-        if isinstance(node, ast.FunctionDef):
-            assert node.returns is None
-            assert not any(arg.annotation for arg in node.args.args)
-        if isinstance(node, ast.List | ast.Tuple | ast.Set):
-            assert not any(isinstance(item, ast.Starred) for item in node.elts)
-        if isinstance(node, ast.Call):
-            assert sum(isinstance(arg, ast.Starred) for arg in node.args) <= 1
 
 
 @pytest.mark.parametrize(

@@ -142,3 +142,12 @@ def test_the_basis_cannot_be_changed():
 def test_bad_arguments_are_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_the_components_of_a_pose_are_what_it_is_made_of():
+    R, d = rb.exp_so3(RNG.normal(size=(2, 5, 3))), RNG.normal(size=(5, 3))
+    again = rb.components_from_pose(rb.pose_from_components(R, d))
+    assert np.array_equal(again[0], R)
+    assert np.array_equal(again[1], np.broadcast_to(d, (2, 5, 3)))
+    with pytest.raises(ValueError, match=r"^A: shape \(\.\.\., 4, 4\) wanted"):
+        rb.components_from_pose(np.eye(3))

@@ -2,6 +2,7 @@ import awkward
 import numpy as np
 import oracles
 import pytest
+from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 
@@ -146,3 +147,18 @@ def test_functions_of_matrices(function, name):
         function([1, 2, 3])
     with pytest.raises(ValueError, match=rf"{name}\[0, 0\] is nan"):
         function(np.full((3, 3), np.nan))
+
+
+@pytest.mark.source("BK 6.1")
+def test_the_angle_between_rotations_is_that_of_the_turn_from_one_to_the_other():
+    """Moved from the left or the right it is the same; it is a distance."""
+    R, S, T = Rotation.random(60, rng=5).as_matrix().reshape(3, 20, 3, 3)
+    want = (Rotation.from_matrix(R).inv() * Rotation.from_matrix(S)).magnitude()
+    assert np.abs(rb.angle_between(R, S) - want).max() < 16 * EPS
+    for moved in (rb.angle_between(T @ R, T @ S), rb.angle_between(R @ T, S @ T)):
+        assert np.abs(moved - want).max() < 32 * EPS
+    assert rb.angle_between(R[0], S).shape == (20,)
+    assert rb.angle_between(np.eye(3), np.diag([1.0, -1, -1])) == np.pi
+    assert np.all(rb.angle_between(R, T) <= want + rb.angle_between(S, T) + 8 * EPS)
+    with pytest.raises(ValueError, match="batch shapes do not broadcast: R"):
+        rb.angle_between(R, S[:7])

@@ -22,7 +22,7 @@ from rbcourse.metrics import geodesic_flow
 from rbcourse.motions import geodesic_se3, screw_from_pose, screw_se3
 from rbcourse.projected_line import f, line_singular_value, theta
 from rbcourse.se3 import pose_from_components, pose_from_coordinates
-from rbcourse.so3 import exp_so3, log_so3
+from rbcourse.so3 import angle_between, exp_so3
 
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8
@@ -145,7 +145,7 @@ def screw_explorer() -> Explorer:
         bolt = screw_from_pose(goal)
         artists["axis"].set_data_3d(*(bolt.point + np.outer([-2.5, 2.5], bolt.axis)).T)
         far = ", not in sight" if np.linalg.norm(bolt.point) > 3 else ""
-        turned = {n: np.linalg.norm(log_so3(pose[:3, :3])) for n, pose in poses.items()}
+        turned = {n: angle_between(np.eye(3), pose[:3, :3]) for n, pose in poses.items()}
         apart = np.linalg.norm((poses["screw"] - poses["geodesic"])[:3, 3])
         return {
             **{f"turned, {n}": f"{numbers(np.degrees(a), 1)}°" for n, a in turned.items()},

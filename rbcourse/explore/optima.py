@@ -15,7 +15,7 @@ from rbcourse.motions import minimum_acceleration_se3, projected_cubic_se3
 from rbcourse.optimum import minimum_acceleration_so3
 from rbcourse.rivals import CLOSED_FORMS
 from rbcourse.se3 import pose_from_coordinates
-from rbcourse.so3 import exp_so3, log_so3
+from rbcourse.so3 import angle_between, exp_so3, log_so3
 
 Solved = tuple[dict[str, Curve], dict[str, float]]
 
@@ -142,5 +142,4 @@ def _compared(costs: dict[str, float]) -> dict[str, str]:
 def _apart(curves: dict[str, Curve], t: ArrayLike) -> str:
     """Return by how much two motions are turned against each other, at most, at these times."""
     best, near = (curve(t)[..., :3, :3] for curve in curves.values())
-    angles = np.linalg.norm(log_so3(np.swapaxes(best, -1, -2) @ near), axis=-1)
-    return f"{numbers(np.degrees(angles.max()), 1)}°"
+    return f"{numbers(np.degrees(angle_between(best, near).max()), 1)}°"

@@ -23,7 +23,7 @@ from rbcourse.explore.explorer import (
 from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 from rbcourse.sampling import sample_rotation, sample_rotation_naive, uniformity_tests
 from rbcourse.se3 import pose_from_components
-from rbcourse.so3 import log_so3
+from rbcourse.so3 import angle_between, log_so3
 
 _BOX = np.array([1.3, 0.8, 0.25])
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}
@@ -221,7 +221,7 @@ def _axes_of(ax: Any, name: str, ls: str, lw: float, colour: str | None = None) 
 
 
 def _angle(R: Array) -> str:
-    return f"{numbers(np.degrees(np.linalg.norm(log_so3(R))), 1)}°"
+    return f"{numbers(np.degrees(angle_between(np.eye(3), R)), 1)}°"
 
 
 def _move_axes(artists: dict[str, Any], name: str, M: Array) -> None:
