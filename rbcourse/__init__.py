@@ -7,7 +7,6 @@ samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f
 """
 
 from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling
-from rbcourse.chains import bessel_velocities, chain
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
@@ -28,6 +27,7 @@ from rbcourse.motions import (
     screw_se3,
 )
 from rbcourse.optimum import ConvergenceError, minimum_acceleration_so3
+from rbcourse.paths import bessel_velocities, chain
 from rbcourse.projected_cubic import projected_cubic_so3, projected_quintic_so3
 from rbcourse.projected_line import projected_line_so3
 from rbcourse.projection import (

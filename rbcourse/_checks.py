@@ -19,10 +19,9 @@ def as_array(
 ) -> Array:
     """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
 
-    A letter in `core` stands for any size from 1 up, the same at each of its places, and "n+1" for
-    any from 2 up: ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes
-    are batch axes; with ``stacked=False`` there may be none. With ``copy=False`` the array may be
-    the caller's own.
+    A letter in `core` matches any size ≥ 1, repeated letters the same size, and "n+1" any size ≥ 2:
+    ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are batch axes;
+    with ``stacked=False`` there may be none. With ``copy=False`` the result may be the input.
 
     Raises
     ------
@@ -195,7 +194,7 @@ def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
     Raises
     ------
     ValueError
-        If there is none; the message gives every argument with its batch shape.
+        If the batch shapes do not broadcast; the message gives every one of them.
     """
     batches = {name: array.shape[: array.ndim - core] for name, (array, core) in arguments.items()}
     try:

@@ -11,8 +11,8 @@ where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁) f
 An error in λ or ζ leaves R times another symmetric matrix, near λζ I; one step of Newton's method
 for the polar factor, X ← (X + X⁻ᵀ)/2, squares its relative distance.
 
-`nearest_rotation` says so for one matrix. `nearest_rotations` does the same for many, entry by
-entry: its arrays have the shape (3, 3, N).
+`nearest_rotation` implements this for one matrix. `nearest_rotations` does the same for many, entry
+by entry: its arrays have the shape (3, 3, N).
 """
 
 import math
@@ -101,7 +101,7 @@ _KEPT = _Workspace()
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
     """Write the nearest rotations to M into R, both of shape (3, 3, N); return which are right.
 
-    What is not is of no use, or not even written: near the singular set of `project_so` (see
+    Entries that fail are left undefined: near the singular set of `project_so` (see
     `nearest_rotation`), where an entry of M is not finite, and perhaps where ‖M‖ is extreme.
 
     References
@@ -136,7 +136,7 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
 def _project(M: Array, X: Array, C: Array, rows: Array) -> NDArray[np.bool_]:
     """Write the nearest rotations to M into C, and return which are right.
 
-    Nothing is allocated that does not have to be: X and rows are given for that.
+    X and rows are workspace.
     """
     norm2, cof2, det, s1, gap, t, u = rows
     m, x, c = ([list(row) for row in entries] for entries in (M, X, C))

@@ -228,7 +228,7 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     Raises
     ------
     ValueError
-        If the start is not finite, or a command is none; the message says which and why.
+        If the start is not finite, or a command is malformed; the message says which and why.
 
     See Also
     --------

@@ -1,4 +1,4 @@
-"""A rotation by other numbers: quaternions, matrices, rotation vectors, ZYX angles."""
+"""Conversions between rotation matrices, quaternions, rotation vectors and ZYX angles."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
 
     See Also
     --------
-    quaternion_from_matrix : The way back.
+    quaternion_from_matrix : The inverse.
 
     References
     ----------
@@ -190,7 +190,7 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
 
     See Also
     --------
-    zyx_from_matrix : The way back.
+    zyx_from_matrix : The inverse.
 
     References
     ----------

@@ -26,8 +26,8 @@ def acceleration_cost(curve: Curve) -> Array:
     -------
     ndarray, shape curve.batch_shape
         ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt; to 1e-10 relative, or 1e-20 absolute,
-        unless all of it arises in less than a hundredth of the time, by a sudden ``f`` of a
-        `projected_line_so3`.
+        unless all of the acceleration falls within a hundredth of the interval, as with an abrupt
+        ``f`` of a `projected_line_so3`.
 
     Raises
     ------

@@ -45,7 +45,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 def write_path(
     file: str | Path, times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> None:
-    """Write a path of poses or rotations, as CSV or as a TUM trajectory: the name's end tells.
+    """Write a path of poses or rotations as CSV or as a TUM trajectory, by the file extension.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def write_path(
 
     See Also
     --------
-    read_path : The way back.
+    read_path : The inverse.
     save_plan : For commands.
 
     Notes
@@ -174,11 +174,11 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     Raises
     ------
     ValueError
-        If the plan, or one of its commands, is none, or the kind is unknown; nothing is written.
+        If the plan or a command is malformed, or the kind is unknown; nothing is written.
 
     See Also
     --------
-    load_plan : The way back, to the same numbers.
+    load_plan : The inverse; it returns the same numbers.
     propagate_planar, propagate_joints : What comes of a plan.
 
     References
@@ -324,7 +324,7 @@ def write_text(file: str | Path, text: str) -> None:
 
 
 def to_number(place: str, cell: str) -> float:
-    """Return a finite number, or raise a ValueError that says where there is none."""
+    """Return a cell as a finite number, or raise a ValueError that gives its place."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
         raise ValueError(f"{place}: a finite number wanted, got {cell[:40]!r}")

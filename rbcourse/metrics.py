@@ -226,7 +226,7 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
 
     See Also
     --------
-    components_from_tangent : The way back.
+    components_from_tangent : The inverse.
 
     References
     ----------
@@ -266,7 +266,7 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
 
     See Also
     --------
-    tangent_from_components : The way back.
+    tangent_from_components : The inverse.
 
     References
     ----------
@@ -304,7 +304,7 @@ def inertia_from_weight(W: ArrayLike) -> Array:
 
     See Also
     --------
-    weight_from_inertia : The way back, and which metrics are reached.
+    weight_from_inertia : The inverse, and which metrics are reached.
     project_so_weighted : The nearest rotation in that metric.
 
     References
@@ -343,7 +343,7 @@ def weight_from_inertia(G: ArrayLike) -> Array:
 
     See Also
     --------
-    inertia_from_weight : The way back.
+    inertia_from_weight : The inverse.
 
     Notes
     -----

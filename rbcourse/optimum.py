@@ -16,7 +16,7 @@ from rbcourse.projection import nearest
 from rbcourse.rivals import other_way
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-CLOSE = 2.0  # with legs whose costs are within this factor both ways round are tried
+CLOSE = 2.0  # if the costs of the two guesses differ by less than this factor, both are tried
 COARSE = 17  # nodes, on which guesses are made and systems solved
 STEPS = 25
 EXACT = 3e-12  # what may be left of the equation, and of R in the last Chebyshev coefficients
@@ -25,7 +25,7 @@ ROUGH = 1e-2  # rad: with shorter steps the fewest nodes are left
 _BLOCK = 128  # problems whose linear systems fit into the cache together
 
 Guess = Callable[[int], Array]
-"""Rotations at the nodes, when told how many: shape (N, n, 3, 3)."""
+"""Takes the number n of nodes, returns rotations there: shape (N, n, 3, 3)."""
 
 
 def minimum_acceleration_so3(
@@ -52,8 +52,9 @@ def minimum_acceleration_so3(
     ValueError
         If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
-        For a single problem, if Newton's method does not converge from either of two guesses. None
-        in ten thousand for ‖w0‖, ‖w1‖ < 12; one draw in thirty up to 30.
+        For a single problem, if Newton's method does not converge from either of two guesses. This
+        happened in none of 10,000 random problems with ‖w0‖, ‖w1‖ < 12, and in about 1 of 30 up to
+        30.
 
     Warns
     -----
@@ -279,8 +280,8 @@ class MinimumAcceleration(Curve):
 
     def __repr__(self) -> str:
         """Return what it is, what it costs, and what is left of the equation."""
-        cost = np.array2string(np.asarray(self.cost), precision=6, threshold=6)
-        return f"{super().__repr__()[:-1]}, cost {cost}, residual < {np.max(self.residual):.0e}>"
+        cost = "" if self.batch_shape else f", cost {self.cost:.6g}"
+        return f"{super().__repr__()[:-1]}{cost}, residual < {np.max(self.residual):.0e}>"
 
 
 def velocity(ends: Ends, jerk: Array) -> Array:

@@ -40,7 +40,7 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
 
     See Also
     --------
-    planar_from_matrix : The way back, but for full turns.
+    planar_from_matrix : The inverse, up to multiples of 2π.
 
     References
     ----------
@@ -191,7 +191,7 @@ def exp_planar(S: ArrayLike) -> Array:
 
     See Also
     --------
-    log_planar : The way back.
+    log_planar : The inverse.
     exp_se3 : The same in space, where the angular part stands first.
 
     Notes
@@ -225,7 +225,7 @@ def log_planar(pose: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        (vx, vy, omega), −π ≤ omega ≤ π; `exp_planar` of it is the pose, but for full turns.
+        (vx, vy, omega), −π ≤ omega ≤ π; `exp_planar` of it is the pose, up to full turns.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def interpolate_planar(
     steps : int, optional
         How many equal steps, from 1 up.
     shortest : bool, optional
-        Whether to turn the short way, by π at most (but for rounding), whatever full turns the
+        Whether to turn the short way, by π at most (to rounding), whatever full turns the
         two angles differ by. By default theta goes from its start to its goal as given.
 
     Returns
@@ -334,7 +334,7 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     ------
     ValueError
         If the start is not finite or not of that shape, `frame` is neither of the two, or a
-        command is none; the message says which and why.
+        command is malformed; the message says which and why.
 
     See Also
     --------
@@ -412,7 +412,7 @@ def as_states(path: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        If it is none; the message names the first entry that is not finite.
+        If it has another shape, or an entry is not finite; the message names the first.
     """
     return as_single("path", path, "states", "k")
 

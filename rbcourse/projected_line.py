@@ -43,7 +43,7 @@ class ProjectedLine(AlongGeodesic):
 
     def __init__(self, R0: Array, rotation_vector: Array, timing: Progress) -> None:
         if timing is f:
-            raise ValueError("f: it wants its angle, lambda t, order: f(t, angle, order)")
+            raise ValueError("f: it must be bound to an angle: lambda t, order: f(t, angle, order)")
         super().__init__(R0, rotation_vector)
         self._angle = as_angle(self._angle)
         self.margin = 2 * np.cos(self._angle / 2)

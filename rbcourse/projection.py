@@ -27,7 +27,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Candidates. NaN and infinity are no errors here, they fail.
+        Candidates. Non-finite entries do not raise; the result is False.
     atol : float, optional
         The largest defect that passes, in any entry of MᵀM − I and in det M − 1.
 
@@ -66,7 +66,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     A : array_like, shape (..., n + 1, n + 1)
-        Candidates. NaN and infinity are no errors here, they fail.
+        Candidates. Non-finite entries do not raise; the result is False.
     atol : float, optional
         The largest defect of the rotation (see `is_so`) and of the last row that passes.
 
@@ -136,7 +136,7 @@ def project_so(M: ArrayLike) -> Array:
     References
     ----------
     BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. For n = 3 it is computed by
-    FOAM (see `rbcourse.foam`), and near the singular set, as for other n, by the SVD.
+    FOAM (see `rbcourse._foam`), and near the singular set, as for other n, by the SVD.
 
     Examples
     --------
@@ -216,9 +216,9 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     -------
     ndarray, shape (..., n, n)
         Q with QᵀQ = I, and QᵀM upper triangular with a positive diagonal: rotations where
-        det M > 0, reflections where it is negative. L M gives L Q for every rotation L; M L does
-        *not* give Q L. The first column keeps its direction; each of the others bears the
-        changes that those before it ask for.
+        det M > 0, reflections where it is negative. Q is not the rotation nearest to M: the first
+        column keeps its direction, and the others take all of the correction. L M gives L Q for
+        every rotation L; M L does *not* give Q L.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 
     References
     ----------
-    BK 4, BK Prop. 3.
+    BK 4, BK Remark 6, BK Prop. 3.
 
     Examples
     --------

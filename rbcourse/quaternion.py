@@ -27,7 +27,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Candidates. NaN and infinity are no errors here, they fail.
+        Candidates. Non-finite entries do not raise; the result is False.
     atol : float, optional
         The largest difference between norm and 1 that passes.
 

@@ -320,7 +320,7 @@ def bezier_legs(ends: Ends) -> Legs:
 
 
 def other_way(turn: Array) -> Array:
-    """Return the turns to the same rotations the other way round, by 2π − angle; of 0, itself."""
+    """Return the turns to the same rotations the other way round, by 2π − angle; 0 stays 0."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
 

@@ -162,7 +162,7 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
 
     See Also
     --------
-    coordinates_from_pose : The way back.
+    coordinates_from_pose : The inverse.
     exp_se3 : Other coordinates, whose straight lines are screw motions.
 
     References
@@ -234,7 +234,7 @@ def hat_se3(S: ArrayLike) -> Array:
 
     See Also
     --------
-    vee_se3 : The way back.
+    vee_se3 : The inverse.
 
     References
     ----------
@@ -310,7 +310,7 @@ def exp_se3(S: ArrayLike) -> Array:
 
     See Also
     --------
-    log_se3 : The way back.
+    log_se3 : The inverse.
     screw_se3 : The motion.
 
     Notes

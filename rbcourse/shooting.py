@@ -1,4 +1,4 @@
-"""The optimum by shooting: the initial values for which the motion hits its end."""
+"""The optimum by shooting: find the initial values for which the motion reaches its end."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def hat_so3(w: ArrayLike) -> Array:
 
     See Also
     --------
-    vee_so3 : The way back.
+    vee_so3 : The inverse.
 
     References
     ----------
@@ -112,7 +112,7 @@ def exp_so3(w: ArrayLike) -> Array:
 
     See Also
     --------
-    log_so3 : The way back.
+    log_so3 : The inverse.
 
     Notes
     -----

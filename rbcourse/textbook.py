@@ -1,4 +1,4 @@
-"""The fast functions again, as one writes them on the board: short, slow, and to be read first.
+"""Textbook versions of the fast functions, as on the board: short, slow, and to be read first.
 
 Each has the name of its fast twin and gives the same to rounding, the optimum to a tolerance. Units
 and frames are those of the twin, and so is the singular set. No argument is checked, and rotations

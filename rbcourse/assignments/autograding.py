@@ -1,4 +1,4 @@
-"""How nbgrader treats the notebooks of students: restored, run under limits, shown without tests.
+"""nbgrader preprocessors: restore locked cells, run under limits, hide the hidden tests.
 
 These are preprocessors of nbgrader; `configure` names them in its configuration, so that they
 also work in its own commands.
@@ -73,7 +73,7 @@ def configure(config: Config) -> None:
 
 
 class RestoreCells(nbgrader.NbGraderPreprocessor):
-    """Give the cells of the set back their form; refuse what replaces what tests rely on."""
+    """Restore locked cells; reject code that overrides names used by the tests."""
 
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any]
@@ -112,7 +112,7 @@ def _given_cells(notebook: Any) -> dict[str, NotebookNode]:
 def _restored(
     cells: list[NotebookNode], given: dict[str, NotebookNode]
 ) -> tuple[list[NotebookNode], list[str]]:
-    """Return the cells with those of the set as they were given, but for the answers."""
+    """Return the cells of the set as they were given, with the answers of the student."""
     names = [_name(cell) for cell in cells]
     marked = {name for name, cell in given.items() if is_grade(cell) or is_solution(cell)}
     if not marked & set(names):
@@ -141,7 +141,7 @@ def _name(cell: NotebookNode) -> str:
 
 
 def _as_given(cell: NotebookNode, given: NotebookNode | None) -> NotebookNode:
-    """Return a cell with the metadata that it was given; tags could keep it from being run."""
+    """Return a cell with its original metadata (student-added tags could skip execution)."""
     if given is not None and not is_solution(given):
         return given
     # what looks like a region of nbgrader would stop it

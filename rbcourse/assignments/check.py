@@ -1,4 +1,4 @@
-"""A problem set before it is handed in: what was changed, whether it runs, and the file to submit.
+"""Check a problem set before submission: what was changed, whether it runs, the file to submit.
 
 A student runs this, without nbgrader.
 """
@@ -262,7 +262,7 @@ def _note(notebook: NotebookNode, client: _Client, seconds: int) -> list[str]:
 
 
 def _error(cell: NotebookNode) -> str:
-    """Return the last line of the last error of a cell; nothing where there is none."""
+    """Return the last line of the last error of a cell, or an empty string."""
     errors = [o for o in cell.get("outputs", []) if o.output_type == "error"]
     if not errors:
         return ""
@@ -274,7 +274,7 @@ def _error(cell: NotebookNode) -> str:
 
 
 def _failures(notebook: NotebookNode, original: NotebookNode) -> list[str]:
-    """Name the cells that fail, but for tests and for what is not answered yet."""
+    """Name the cells that fail, except tests and unanswered questions."""
     empty = {grade_id(c): c.source.strip() for c in original.cells if marks_of(c).get("solution")}
     return [
         f"{name_cell(notebook.cells, at)} fails: {_error(cell)}"

@@ -1,4 +1,4 @@
-"""What students handed in through Moodle or Canvas, put where nbgrader looks for it.
+"""Collect submissions from Moodle or Canvas downloads into the folders that nbgrader reads.
 
 The date of a file in a download is often that of the download. So one that is not after the due
 date shows that the file was in time, and a later one shows nothing.
@@ -25,7 +25,7 @@ import nbformat
 from rbcourse.assignments.downloads import Download, find
 from rbcourse.assignments.restore import grade_id
 
-# of nobody, of anonymous students, and what Windows does not take as the name of a folder
+# of unknown and anonymous students, and names that Windows does not allow for a folder
 NOT_ALONE = ("", "participant", "aux", "con", "nul", "prn")
 LISTS = (
     *("collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"),
@@ -102,7 +102,7 @@ def _read_sets(assignments: Path) -> dict[str, set[str]]:
 
 
 def _ids(path: Path) -> set[str]:
-    """Return the names of the cells of a notebook; ValueError where it is none."""
+    """Return the names of the cells of a notebook; raise a ValueError for another file."""
     try:
         with warnings.catch_warnings():  # on cells without ids
             warnings.simplefilter("ignore")

@@ -1,4 +1,4 @@
-"""The notebooks in what a teacher downloaded from Moodle or Canvas.
+"""Find the notebooks in Moodle and Canvas downloads.
 
 The names are those that mod/assign/classes/downloader.php of Moodle and lib/content_zipper.rb of
 Canvas give. Both write the time of the download into a zip, not that of the upload; older

@@ -1,4 +1,4 @@
-"""Problem sets graded: each submission on its own, with feedback and a table of the points."""
+"""Grade problem sets: each submission on its own, with feedback and a table of the points."""
 
 import argparse
 import csv

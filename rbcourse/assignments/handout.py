@@ -1,4 +1,4 @@
-"""A problem set as one file for the students: the notebook, what it needs, and how to begin."""
+"""Pack a problem set for students: the notebook, the package, and a page on how to begin."""
 
 import argparse
 import io
@@ -129,7 +129,7 @@ def last_line(done: dict[str, str]) -> str:
 
 
 def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> None:
-    """Raise a ValueError if a file shows what the students shall not see."""
+    """Raise a ValueError if a file contains solutions, hidden tests or mark schemes."""
     released = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
     for cell in released.cells:
         where = f"cell {cell.metadata.get('nbgrader', {}).get('grade_id') or cell.get('id')}"
@@ -154,7 +154,7 @@ def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> N
 
 
 def secret_lines(notebook: NotebookNode, *, solutions: bool = True) -> list[str]:
-    """Return the lines inside the regions that nbgrader removes, but for short and common ones."""
+    """Return the lines inside the regions that nbgrader removes, except short and common ones."""
     inside: set[str] = set()
     for cell in notebook.cells:
         for kind, region in REGION.findall(cell.source):

@@ -1,4 +1,4 @@
-"""One submission graded in a process of its own, which may fail, hang or be ended."""
+"""Grade one submission in a process of its own, with limits of time and memory."""
 
 import glob
 import html

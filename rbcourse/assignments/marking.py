@@ -1,4 +1,4 @@
-"""Problems that say what is wrong: a student's function held against an answer and known mistakes.
+"""Problems that give hints: a student's function compared with an answer and known mistakes.
 
 What is right is accepted; else `NotYet` is raised, whose text is one hint. What people get wrong is
 listed with each problem, as functions that get it wrong in the same way: a student's function that

@@ -1,4 +1,4 @@
-"""Problems whose answer is random: a student's sampler, judged by the laws of its draws."""
+"""Problems with random answers: a student's sampler, tested against known distributions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a kernel that runs work of others may put out; a gigabyte stays with who made it."""
+"""Limit the output of a kernel that runs student code."""
 
 import sys
 from collections.abc import Callable

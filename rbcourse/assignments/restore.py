@@ -1,4 +1,4 @@
-"""A problem set compared with what was handed out, cell by cell.
+"""Compare a problem set with the original, cell by cell, and restore what must not change.
 
 Cells are told apart as nbgrader does, by their grade_id, but without it: students do not have it.
 """

@@ -1,4 +1,4 @@
-"""A student's function, called: the work has to be its author's own, and all trouble is told."""
+"""Call a student's function: report its errors, and calls of functions that it should replace."""
 
 import dis
 import functools

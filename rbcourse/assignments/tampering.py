@@ -1,4 +1,4 @@
-"""What a student's code may not do where tests decide: replace what the tests rely on."""
+"""Find code in a submission that overrides names used by the tests."""
 
 import ast
 import builtins
@@ -135,7 +135,7 @@ def _root(node: ast.AST) -> str:
 
 
 def _rebound(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    """Yield the names of the notebook that are bound, but for imports under customary names."""
+    """Yield the names that the notebook binds, except imports under customary names."""
     todo: list[ast.AST] = list(tree.body)
     while todo:
         node = todo.pop()

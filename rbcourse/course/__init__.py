@@ -1,1 +1,1 @@
-"""The lessons as files: run, stored, shown to a class, and indexed by equation."""
+"""Lessons: run and stored, shown to a class, and indexed by equation."""

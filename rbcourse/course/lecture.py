@@ -1,4 +1,4 @@
-"""A lesson in front of a class: large, without its code, run anew, and asking nobody outside."""
+"""Show a lesson to a class: in large letters, without code, run afresh, without a network."""
 
 import argparse
 import logging
@@ -121,7 +121,7 @@ def serve(path: Path, begin: Callable[[str], None]) -> None:
             port=_free_port(),
             token=secrets.token_hex(24),
             open_browser=False,
-            log_level=logging.ERROR,  # it warns of what is meant: that nobody has signed the lesson
+            log_level=logging.ERROR,  # it warns that the lesson is not signed
         )
         logging.getLogger("tornado.general").setLevel(logging.ERROR)
         app.initialize([])

@@ -1,4 +1,4 @@
-"""The lessons as files: executed so that what is stored is the same, byte for byte, each time."""
+"""Execute and store the lessons, byte for byte the same each time."""
 
 import argparse
 import hashlib
@@ -23,7 +23,7 @@ KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 
 
 def lesson_paths(folder: Path) -> list[Path]:
-    """Return the lessons of a folder in the order of the course; assignments are none."""
+    """Return the lessons of a folder in the order of the course, without assignments."""
     return sorted(folder.glob("[0-9][0-9]_*.ipynb"))
 
 
@@ -157,7 +157,7 @@ def _read_record(record: Path) -> dict[str, list[str]]:
 
 
 def _left_alone(target: Path, lesson: bytes, last: list[str] | None) -> bool:
-    """Tell whether a copy is absent, the lesson itself, or as it was copied but for its outputs."""
+    """Tell whether a copy is absent, the lesson itself, or unchanged apart from its outputs."""
     if not target.exists():
         return True
     content = target.read_bytes()

@@ -1,4 +1,4 @@
-"""A lesson tried before class: every cell run, nothing asked for outside, nobody else let in."""
+"""Try a lesson before class: cells run, no request leaves the machine, access needs a token."""
 
 import argparse
 import http.client

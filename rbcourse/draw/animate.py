@@ -1,4 +1,4 @@
-"""Artists over time: GIFs, and players that can be paused and work without a network."""
+"""Animations: GIFs, and players for notebooks that work without a network."""
 
 import base64
 import html
@@ -53,7 +53,7 @@ class Animation:
     name : str
         What it is called.
     alt : str
-        What is to be seen, for who cannot see it.
+        Alternative text: what the animation shows.
     pictures : tuple of Image
         Its frames. The player shows every second one.
     still : int

@@ -43,7 +43,7 @@ class Picture:
     name : str
         The name of its files, without ending.
     alt : str
-        What is to be seen, for who cannot see it.
+        Alternative text: what the figure shows.
     png : bytes
         The picture.
     """

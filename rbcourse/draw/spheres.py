@@ -1,4 +1,4 @@
-"""On the unit sphere: random rotations and their laws, free bodies, and the flip of a book."""
+"""Random rotations on the sphere, their distributions, and freely rotating bodies."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

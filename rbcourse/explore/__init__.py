@@ -1,8 +1,8 @@
 """The explorers: for each lesson a picture that follows its sliders."""
 
-from rbcourse.explore.chains import chain_explorer
 from rbcourse.explore.curves import flip_explorer, screw_explorer, theta_explorer
 from rbcourse.explore.optima import cube_explorer, minimum_acceleration_explorer
+from rbcourse.explore.paths import chain_explorer
 from rbcourse.explore.plane import arm_explorer, planar_explorer
 from rbcourse.explore.rotations import projection_explorer, random_explorer, rotation_explorer
 

@@ -1,4 +1,4 @@
-"""Explorers of motions that nobody steers: geodesics and their shadows, screws, a free body."""
+"""Explorers of geodesics and projected lines, screws, and a free rigid body."""
 
 from functools import lru_cache
 from typing import Any

@@ -1,4 +1,4 @@
-"""A picture that follows its sliders: what all explorers have in common."""
+"""The base of all explorers: a picture that follows its sliders."""
 
 import base64
 import html
@@ -49,7 +49,7 @@ export default {
       image.addEventListener("pointerdown", point);
       image.addEventListener("pointermove", point);
     }
-    // Buttons and sliders have no names of their own for who cannot see them.
+    // Give buttons and sliders names for screen readers.
     const name = () => {
       const panel = el.closest(".rbcourse-explorer");
       panel?.querySelectorAll(".widget-slider").forEach((slider) => {

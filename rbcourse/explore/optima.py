@@ -66,7 +66,7 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: two cubes on their ways, the optimum and the projection.
 
-    The ends are the paper's, but for three that can be changed; pale, the goal. Controls: the
+    The ends are the paper's, except three that can be changed; the goal is pale. Controls: the
     ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad; ``rise``, that
     of the velocity at the end in m; and the time ``t``, which plays (BK 6.3, BK (14), BK Fig. 5).
     """

@@ -1,4 +1,4 @@
-"""Explorers of the plane: a body that obeys a plan, and the two-link arm."""
+"""Explorers of the plane: a body that follows a plan, and the two-link arm."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Explorers of rotations: one orientation in many words, projections, and random rotations."""
+"""Explorers of rotations: representations of one orientation, projections, random rotations."""
 
 from functools import lru_cache
 from typing import Any
@@ -137,7 +137,7 @@ def projection_explorer() -> Explorer:
 
 
 def _gram_schmidt(M: Array) -> tuple[Array, str]:
-    """Return what Gram and Schmidt make of M, and why that is no rotation: "" where it is one."""
+    """Return the Gram–Schmidt result for M, and why it is no rotation, or "" if it is one."""
     try:
         G = orthonormalize_gram_schmidt(M)
     except ValueError:

@@ -1,4 +1,4 @@
-"""How far a long computation is: a bar in the notebook, which ends as a line."""
+"""A progress bar for notebooks, which ends as a line of text."""
 
 import html
 from collections.abc import Callable

@@ -6,7 +6,7 @@ from sweeps import corners, numbers_in, points, read_off, sweep
 
 import rbcourse as rb
 from rbcourse.explore import chain_explorer
-from rbcourse.explore.chains import POSES, SHARES
+from rbcourse.explore.paths import POSES, SHARES
 
 LEGS = {
     "projected cubics": rb.projected_cubic_se3,

@@ -51,11 +51,12 @@ def chain(
         has at each pose. By default it starts and ends at rest, rests where a pose equals its
         neighbour, to rounding, and has the `bessel_velocities` elsewhere.
     leg : callable, optional
-        What joins two poses: a function of this package that makes two-point curves, or one of your
-        own that makes a stack of them. It is called by name, with what it asks for of R0, R1, A0,
-        A1, w0, w1, d0_dot, d1_dot, a0, a1: all legs at once, in a leg's own time from 0 to 1 (h ω,
-        h² ω' for a leg that lasts h); d0_dot and d1_dot in the fixed frame. One for rotations also
-        joins poses: the origin then moves on the polynomial with as many ends. By default
+        What joins two poses: a function of this package that returns two-point curves, or one of
+        your own that returns a stack of them. It is called once for all legs, with keyword
+        arguments; its parameters must be among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1. They
+        are in a leg's own time from 0 to 1 (h ω, h² ω' for a leg of duration h), d0_dot and d1_dot
+        in the fixed frame. A function for rotations also joins poses: the origin then moves on the
+        polynomial with as many boundary conditions. By default
         `projected_cubic_so3`, or `projected_cubic_se3`.
 
     Returns
@@ -360,7 +361,7 @@ def _checked(
         i = np.argmax(far)
         raise ValueError(
             f"poses[{i}] and poses[{i + 1}] are a half-turn apart: put a pose between them, "
-            "to tell which way to turn"
+            "to specify which way to turn"
         )
     return times, poses, velocities
 

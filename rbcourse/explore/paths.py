@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
-from rbcourse.chains import Chain, bessel_velocities, chain
 from rbcourse.curves import Curve
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
@@ -20,6 +19,7 @@ from rbcourse.explore.explorer import (
     slider,
 )
 from rbcourse.motions import geodesic_se3, minimum_acceleration_se3, projected_cubic_se3
+from rbcourse.paths import Chain, bessel_velocities, chain
 from rbcourse.projected_cubic import projected_quintic_so3
 from rbcourse.se3 import pose_from_coordinates
 
