@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import Rng, as_count, as_generator, as_single, as_tolerance, as_unit
 from rbcourse._numerics import Array
-from rbcourse.arm import LINKS, arm_forward_kinematics, interpolate_joints, propagate_joints
+from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.conversions import rotation_vector_from_quaternion
 from rbcourse.draw.animate import Animation, Update, animate
 from rbcourse.draw.arm import describe_arm, moving_arm
@@ -455,7 +455,6 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     >>> plt.close(figure)
     """
     states = as_states(path)
-    arm_forward_kinematics(states, lengths)  # refuses other lengths
     alt = describe_arm(states, lengths)
     return _show_path("arm_path", alt, states, lambda ax, p: moving_arm(ax, states, p, lengths))
 
