@@ -361,7 +361,7 @@ def _checked(
         i = np.argmax(far)
         raise ValueError(
             f"poses[{i}] and poses[{i + 1}] are a half-turn apart: put a pose between them, "
-            "to specify which way to turn"
+            "to tell which way to turn"
         )
     return times, poses, velocities
 
