@@ -408,6 +408,11 @@ class Retimed(Curve):
     def _what(self) -> str:
         return f"Retimed {self.curve._what()}"
 
+    def _events(self) -> list[tuple[float, float]]:
+        start, first = self.domain[0], self.curve.domain[0]
+        events = self.curve._events()
+        return [(start + (t - first) / self.rate, width / self.rate) for t, width in events]
+
     def _unit_legs(self) -> tuple[Curve, Any]:
         legs, durations = self.curve._unit_legs()
         return legs, durations / self.rate
@@ -500,8 +505,8 @@ def combine(weights: Array, terms: Array, which: Chosen, out: Array) -> None:
 
 def runs(which: Chosen) -> Iterator[tuple[int, slice]]:
     """Yield each stretch of equal numbers, and where it is."""
-    cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist(), len(which)]
-    for start, end in pairwise(cuts):
+    cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist()] if len(which) else []
+    for start, end in pairwise([*cuts, len(which)]):
         yield int(which[start]), slice(start, end)
 
 

@@ -281,7 +281,9 @@ class MinimumAcceleration(Curve):
     def __repr__(self) -> str:
         """Return what it is, what it costs, and what is left of the equation."""
         cost = "" if self.batch_shape else f", cost {self.cost:.6g}"
-        return f"{super().__repr__()[:-1]}{cost}, residual < {np.max(self.residual):.0e}>"
+        return (
+            f"{super().__repr__()[:-1]}{cost}, residual < {np.max(self.residual, initial=0):.0e}>"
+        )
 
 
 def velocity(ends: Ends, jerk: Array) -> Array:

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 import rbcourse as rb
+from rbcourse.curves import Retimed
 
 REST = np.zeros(3)
 
@@ -155,3 +156,19 @@ def test_of_a_curve_that_was_not_found_there_is_no_cost():
         stack = rb.minimum_acceleration_so3(np.eye(3), R, w, -w)
     with pytest.raises(RuntimeError, match=r"^acceleration cost of curve \[1\]: the curve is NaN"):
         rb.acceleration_cost(stack)
+
+
+@pytest.mark.parametrize("margin", [1e-3, 3e-6])
+def test_a_sharp_turn_of_a_retimed_leg_is_not_missed(margin):
+    """A curve that is retimed twice, to the time that it took, alone and as a leg of a chain."""
+    turn = rb.exp_so3([0, 0, np.pi - margin])
+
+    def leg(R0, R1):
+        return rb.retime(rb.retime(rb.projected_line_so3(R0, R1), 3), 1)
+
+    want = rb.acceleration_cost(rb.projected_line_so3(np.eye(3), turn))
+    assert rb.acceleration_cost(leg(np.eye(3), turn)) == pytest.approx(want, rel=1e-9)
+    legs, _ = rb.chain([0, 1], [np.eye(3), turn], leg=leg)._unit_legs()
+    assert isinstance(legs, Retimed)
+    ((when, width),) = legs._events()
+    assert (when, width) == pytest.approx((0.5, margin / 4), rel=1e-6)

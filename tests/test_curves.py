@@ -536,3 +536,20 @@ def test_what_failed_in_a_stack_stays_failed():
     out = stack.at_own_times([0.5, 0.5])
     assert np.abs(out[0] - stack(0.5)[0]).max() < 1e-14
     assert np.isnan(out[1]).all()
+
+
+def test_stacks_of_no_curves_have_no_values():
+    none = np.empty((2, 0, 3))
+    turns = rb.exp_so3(none)
+    stacks = [
+        rb.geodesic_so3(np.eye(3), turns),
+        rb.projected_line_so3(np.eye(3), turns, lambda t, order: [t * t, 2 * t, 2 + 0 * t][order]),
+        rb.projected_cubic_so3(np.eye(3), turns, none, none),
+        rb.bezier_so3(np.eye(3), turns, none, none),
+        rb.minimum_acceleration_so3(np.eye(3), turns, none, none),
+    ]
+    for stack in stacks:
+        assert stack([0, 0.5]).shape == (2, 2, 0, 3, 3)
+        assert rb.retime(stack, 2)(1.5, 2).shape == (2, 0, 3)
+        assert stack.at_own_times(np.empty((4, 2, 0)), 1).shape == (4, 2, 0, 3)
+        assert "stack of shape (2, 0)" in repr(stack)
