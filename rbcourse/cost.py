@@ -96,12 +96,15 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
     (0.0, 12.0)
     """
     legs, durations = curve._unit_legs()
-    parts = integral(legs, _panels(legs), 1e-10)
-    rotation, translation = (
-        (part.reshape(legs.batch_shape) / durations**3).reshape(*curve.batch_shape, -1).sum(axis=-1)
-        for part in parts
+    cubes = (1 / np.asarray(durations, float)) ** 3
+    parts = (
+        part.reshape(legs.batch_shape) * cubes for part in integral(legs, _panels(legs), 1e-10)
     )
-    return rotation, translation
+    if legs.batch_shape == curve.batch_shape:
+        rotation, translation = parts
+    else:
+        rotation, translation = (np.sum(part, axis=-1) for part in parts)
+    return rotation[()], translation[()]
 
 
 def integral(curve: Curve, ends: Array, tolerance: float) -> tuple[Array, Array]:
@@ -137,10 +140,12 @@ def integral(curve: Curve, ends: Array, tolerance: float) -> tuple[Array, Array]
             curve._at(start[part] + fine.t[:, None] * width[part], which[part], 2, a)
             squares = np.stack([2 * _squares(a[..., :3]), _squares(a[..., 3:])])
             value[:, part] = width[part] * (fine.integral[-1] @ squares)
-            rest = value[:, part] - width[part] * (rough.integral[-1] @ squares[:, ::2])
-            error[:, part] = np.abs(rest)
+            rest = width[part] * (rough.integral[-1] @ squares[:, ::2])
+            with np.errstate(invalid="ignore"):  # inf − inf
+                error[:, part] = np.abs(value[:, part] - rest)
         expected = cost + _sums(which, value, curve.count)
-        coarse = (error > tolerance * expected[:, which] + 1e-20).any(axis=0)
+        settled = error <= tolerance * expected[:, which] + 1e-20  # NaN is not
+        coarse = ~settled.all(axis=0)
         lost = coarse & (width < 256 * EPS * (start + width))  # beyond the resolution of the times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break

@@ -64,20 +64,30 @@ def check_ends(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> En
     ValueError
         If an argument is not finite, not of its shape, or the batches do not broadcast.
     """
-    rotations = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
-    velocities = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
-    named = {"R0": (rotations[0], 2), "R1": (rotations[1], 2)}
-    batch = check_broadcast(**named, w0=(velocities[0], 1), w1=(velocities[1], 1))
-    matrices = (np.broadcast_to(R, (*batch, 3, 3)) for R in rotations)
-    return Ends(*matrices, *(np.broadcast_to(w, (*batch, 3)) for w in velocities))
+    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+    check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+    return broadcast_ends(R0, R1, w0, w1)
+
+
+def broadcast_ends(R0: Array, R1: Array, w0: Array, w1: Array) -> Ends:
+    """Return checked boundary conditions, all of one batch shape."""
+    batches = R0.shape[:-2], R1.shape[:-2], w0.shape[:-1], w1.shape[:-1]
+    batch = np.broadcast_shapes(*batches)
+    rotations = (np.broadcast_to(R, (*batch, 3, 3)) for R in (R0, R1))
+    return Ends(*rotations, *(np.broadcast_to(w, (*batch, 3)) for w in (w0, w1)))
 
 
 class SingularTime(ValueError):
     """A curve is not defined at a time; `curve` is its number in the stack."""
 
     def __init__(self, time: float, curve: int, batch_shape: tuple[int, ...], why: str) -> None:
-        super().__init__(f"t = {time}{which_curve(curve, batch_shape)}: {why}")
+        super().__init__(time, curve, batch_shape, why)
         self.curve, self.reason = curve, f"t = {time}: {why}"
+        self._said = f"t = {time}{which_curve(curve, batch_shape)}: {why}"
+
+    def __str__(self) -> str:
+        return self._said
 
 
 class Curve:
@@ -238,7 +248,7 @@ class Curve:
         """Return the stack of the curves with these numbers."""
         picked = copy(self)
         picked.batch_shape = np.shape(chosen)
-        for name in list(vars(self)):
+        for name in list(vars(picked)):
             if isinstance(getattr(type(self), name, None), cached_property):
                 del picked.__dict__[name]
         for name, lead in self.per_curve.items():

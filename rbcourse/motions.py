@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_unit, check_broadcast
 from rbcourse._numerics import EPS, Array
-from rbcourse.curves import Chosen, Curve, Ends, geodesic_so3
+from rbcourse.curves import Chosen, Curve, Ends, broadcast_ends, geodesic_so3
 from rbcourse.optimum import relax, solve
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
@@ -432,7 +432,7 @@ def _cubic_ends(
     poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
     v = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)
-    batch = check_broadcast(
+    check_broadcast(
         A0=(poses[0], 2),
         A1=(poses[1], 2),
         w0=(w[0], 1),
@@ -441,6 +441,4 @@ def _cubic_ends(
         d1_dot=(v[1], 1),
     )
     (R0, d0), (R1, d1) = map(split, poses)
-    rotations = (np.broadcast_to(R, (*batch, 3, 3)) for R in (R0, R1))
-    ends = Ends(*rotations, *(np.broadcast_to(x, (*batch, 3)) for x in w))
-    return ends, cubic_coefficients(d0, d1, *v)
+    return broadcast_ends(R0, R1, *w), cubic_coefficients(d0, d1, *v)

@@ -117,6 +117,10 @@ class ConvergenceError(RuntimeError):
         self.residual = residual
         self.iterations = iterations
 
+    def __reduce__(self) -> tuple[type, tuple[float, int]]:
+        """Return how to make it again; its only argument would be the message."""
+        return type(self), (self.residual, self.iterations)
+
 
 class Solution(NamedTuple):
     """One problem solved: R at the nodes, c = R w'', what was left, and after how many steps."""
@@ -281,9 +285,7 @@ class MinimumAcceleration(Curve):
     def __repr__(self) -> str:
         """Return what it is, what it costs, and what is left of the equation."""
         cost = "" if self.batch_shape else f", cost {self.cost:.6g}"
-        return (
-            f"{super().__repr__()[:-1]}{cost}, residual < {np.max(self.residual, initial=0):.0e}>"
-        )
+        return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 
 
 def velocity(ends: Ends, jerk: Array) -> Array:

@@ -17,6 +17,7 @@ from rbcourse.curves import (
     identity,
     runs,
     start_and_rotation_vector,
+    which_curve,
 )
 from rbcourse.projection import NOT_UNIQUE, warn_if_nearly_singular
 
@@ -50,10 +51,13 @@ class ProjectedLine(AlongGeodesic):
         warn_if_nearly_singular(self.margin)
         self._f, self._f_batch = timing, self.batch_shape
         self._number = np.arange(self.count).reshape(self.batch_shape)
-        ends = self._f_at(np.array([0.0, 1.0]), 0)
-        start, end = ends.reshape(2, *self.batch_shape)
-        if np.any(np.abs(start) > 1e-12) or np.any(np.abs(end - 1) > 1e-12):
-            raise ValueError(f"f: f(0) = 0 and f(1) = 1 are wanted, got {start} and {end}")
+        which = np.arange(self.count)
+        start, end = self._on_line(np.array([[0.0], [1.0]]), which, 0)
+        for curve in np.flatnonzero((np.abs(start) > 1e-12) | (np.abs(end - 1) > 1e-12)):
+            raise ValueError(
+                f"f{which_curve(int(curve), self.batch_shape)}: f(0) = 0 and f(1) = 1 are wanted, "
+                f"got {start[curve]} and {end[curve]}"
+            )
 
     def _progress(self, t: Array, which: Chosen, order: int) -> Array:
         """Return θ(f(t)) or a derivative, by the chain rule."""
@@ -74,27 +78,29 @@ class ProjectedLine(AlongGeodesic):
             return identity(t, order)
         numbers = self._flat(self._number)[which]
         if t.shape[1] == 1:
-            return self._f_at(t[:, 0], order)[:, numbers]
-        values = np.empty(t.shape)
-        for number, run in runs(numbers):
-            values[:, run] = self._f_at(t[:, run].ravel(), order)[:, number].reshape(len(t), -1)
+            values = np.take(self._f_at(t[:, 0], order), numbers, axis=1, mode="clip")
+        elif t.size and self._f_at(t[0, :1], order).shape[1] == 1:  # the same for all curves
+            values = self._f_at(t.ravel(), order).reshape(t.shape)
+        else:
+            values = np.empty(t.shape)
+            for number, run in runs(numbers):
+                at = self._f_at(t[:, run].ravel(), order)
+                values[:, run] = at[:, number].reshape(len(t), -1)
+        why = f"f(t, {order}) is not a finite number"
+        self._check_defined(t, which, ~np.isfinite(values), why)
         return values
 
     def _f_at(self, t: Array, order: int) -> Array:
-        """Return f or a derivative at the times t, shape (T,), for all curves, shape (T, N)."""
+        """Return f or a derivative at the times t: shape (T, 1), or (T, N) for a stack of N."""
         name, shape = f"f(t, {order})", (len(t), *self._f_batch)
         value = as_array(name, self._f(t.copy().reshape(-1, *[1] * len(self._f_batch)), order))
         try:
-            values = np.broadcast_to(value, shape).reshape(len(t), -1)
+            np.broadcast_to(value, shape)
         except ValueError as error:
             raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
-        lost = ~np.isfinite(values)
-        if lost.any():
-            where = np.argwhere(lost)[0]
-            raise ValueError(
-                f"f({t[where[0]]}, {order}) is {values[tuple(where)]}, a finite number is wanted"
-            )
-        return values
+        if value.size == 1 or value.shape[-len(shape) :] == (len(t), *[1] * len(self._f_batch)):
+            return np.broadcast_to(value.reshape(-1, 1), (len(t), 1))
+        return np.broadcast_to(value, shape).reshape(len(t), -1)
 
     def _events(self) -> list[tuple[float, float]]:
         return events_of(0.5, self.margin)

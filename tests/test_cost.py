@@ -172,3 +172,18 @@ def test_a_sharp_turn_of_a_retimed_leg_is_not_missed(margin):
     assert isinstance(legs, Retimed)
     ((when, width),) = legs._events()
     assert (when, width) == pytest.approx((0.5, margin / 4), rel=1e-6)
+
+
+def test_a_stack_of_no_curves_has_no_costs():
+    stack = rb.geodesic_so3(np.eye(3), rb.exp_so3(np.empty((2, 0, 3))))
+    assert rb.acceleration_cost(stack).shape == (2, 0)
+    assert rb.acceleration_cost(rb.retime(stack, 3)).shape == (2, 0)
+
+
+def test_a_very_long_time_costs_nothing_and_an_overflow_is_no_number():
+    line = rb.projected_line_so3(np.eye(3), rb.exp_so3([0, 0, 1.0]))
+    assert rb.acceleration_cost(rb.retime(line, 1e120)) == 0
+    far = np.eye(4)
+    far[:3, 3] = 1e160
+    with np.errstate(over="ignore"), pytest.raises(RuntimeError, match="an uncertainty of"):
+        rb.acceleration_cost(rb.projected_cubic_se3(np.eye(4), far, REST, REST, REST, REST))

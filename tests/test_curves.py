@@ -1,3 +1,4 @@
+import pickle
 import re
 
 import awkward
@@ -7,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 import rbcourse as rb
-from rbcourse.curves import least_over_time
+from rbcourse.curves import SingularTime, least_over_time
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(61)
@@ -307,7 +308,7 @@ def test_f_may_be_a_constant_rate_and_must_have_the_right_ends():
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: t / 2)
     with pytest.raises(ValueError, match=r"f\(t, 0\): shape \(2,\) wanted, got \(3,\)"):
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.zeros(3))
-    with pytest.raises(ValueError, match=r"f\(0\.0, 0\) is nan"):
+    with pytest.raises(ValueError, match=r"^t = 0\.0: f\(t, 0\) is not a finite number"):
         rb.projected_line_so3(STARTS[0], GOALS[0], lambda t, order: np.nan)
 
 
@@ -553,3 +554,26 @@ def test_stacks_of_no_curves_have_no_values():
         assert rb.retime(stack, 2)(1.5, 2).shape == (2, 0, 3)
         assert stack.at_own_times(np.empty((4, 2, 0)), 1).shape == (4, 2, 0, 3)
         assert "stack of shape (2, 0)" in repr(stack)
+
+
+def test_an_error_of_a_time_survives_a_pickle():
+    error = SingularTime(0.5, 3, (2, 2), "no rotation")
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error) == "t = 0.5 of curve [1, 1]: no rotation"
+    assert (again.curve, again.reason) == (3, "t = 0.5: no rotation")
+    lost = pickle.loads(pickle.dumps(rb.ConvergenceError(1e-3, 5)))
+    assert (lost.residual, lost.iterations) == (1e-3, 5)
+
+
+def test_a_time_at_which_f_fails_is_named_with_its_curve():
+    def timing(t, order):
+        rates = [t + np.array([0, 0.1, 0]) * (t * (1 - t)), np.array([1, np.nan, 1]) + 0 * t]
+        return rates[order]
+
+    stack = rb.projected_line_so3(np.eye(3), rb.exp_so3(np.eye(3)), timing)
+    with pytest.raises(ValueError, match=r"^t = 0\.6 of curve \[1\]: f\(t, 1\) is not a finite"):
+        stack(0.6, 1)
+    with pytest.raises(ValueError, match=r"^t = 0\.2 of curve \[1\]: f\(t, 1\) is not a finite"):
+        stack.at_own_times([0.1, 0.2, 0.3], 1)
+    each = [stack[k](t) for k, t in enumerate((0.1, 0.2, 0.3))]
+    assert np.abs(stack.at_own_times([0.1, 0.2, 0.3]) - each).max() < 1e-14
