@@ -17,7 +17,7 @@ from rbcourse.optimum import (
     grid,
     solve,
 )
-from rbcourse.so3 import hat, log_so3
+from rbcourse.so3 import hat_so3, log_so3
 
 NODES = 96
 STEPS = 20
@@ -135,7 +135,7 @@ def _flow(_: float, state: Array, b: Array) -> Array:
     """Return R' = R ŵ, w', w'' = b − w × w', and the linearisation of the three."""
     R, w, acceleration = state[:9].reshape(3, 3), state[9:12], state[12:15]
     turn, dw, da = state[15:].reshape(3, 3, 6)
-    W = hat(w)
-    dda = np.eye(3, 6, 3) + hat(acceleration) @ dw - W @ da
+    W = hat_so3(w)  # a ValueError where the motion overflows ends the attempt
+    dda = np.eye(3, 6, 3) + hat_so3(acceleration) @ dw - W @ da
     rates = R @ W, acceleration, b - W @ acceleration, dw - W @ turn, da, dda
     return np.concatenate([rate.ravel() for rate in rates])
