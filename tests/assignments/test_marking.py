@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_own_work import student
+from test_student_code import student
 
 from rbcourse.assignments.marking import Drawing, Mistake, Problem, curves_of
 from rbcourse.assignments.student_code import NotYet

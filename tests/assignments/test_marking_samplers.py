@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from test_own_work import student
+from test_student_code import student
 
 from rbcourse.assignments.marking import Mistake
 from rbcourse.assignments.marking_samplers import DELTA, Sampler
