@@ -26,10 +26,12 @@ def as_array(
     Raises
     ------
     ValueError
-        If `value` is ragged, not made of real numbers, or of another shape; the message names the
-        argument, the wanted and the given.
+        If `value` is ragged, masked, not made of real numbers, or of another shape; the message
+        names the argument, the wanted and the given.
     """
     given: Any
+    if isinstance(value, np.ma.MaskedArray):
+        raise ValueError(f"{name}: a masked array, whose mask would be lost; fill or compress it")
     try:
         given = np.asarray(value)
     except ValueError as error:
@@ -164,8 +166,11 @@ def as_count(name: str, value: int) -> int:
 def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
     """Return the shape of a batch: () for None, (n,) for n; a ValueError if it is no shape."""
     given: Any = () if size is None else size
+    lengths = given if isinstance(given, tuple | list) else [given]
+    if any(isinstance(length, bool) for length in lengths):
+        raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}")
     try:
-        shape = tuple(map(index, given if isinstance(given, tuple | list) else [given]))
+        shape = tuple(map(index, lengths))
     except TypeError as error:
         raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}") from error
     if any(length < 0 for length in shape):
@@ -183,7 +188,7 @@ def as_generator(rng: Rng) -> np.random.Generator:
 
 def check_order(order: int) -> int:
     """Return `order`, the order of a derivative, or raise a ValueError if it is not 0, 1 or 2."""
-    if not isinstance(order, int | np.integer) or order not in (0, 1, 2):
+    if not isinstance(order, int | np.integer) or isinstance(order, bool) or order not in (0, 1, 2):
         raise ValueError(f"order: 0, 1 or 2 wanted, got {order!r}")
     return order
 

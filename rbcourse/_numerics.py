@@ -16,25 +16,10 @@ def sinc(x: Array) -> Array:
     return np.where(x == 0, 1.0, np.sin(x) / np.where(x == 0, 1.0, x))[()]
 
 
-def versine_ratio(x: Array) -> Array:
-    """Return (1 − cos x)/x², and 1/2 at x = 0, without cancellation."""
-    return sinc(x / 2) ** 2 / 2
-
-
 def sine_gap_ratio(x: Array) -> Array:
     """Return (x − sin x)/x³, and 1/6 at x = 0, with an absolute error of eps/x²."""
-    return _over_square(1 - sinc(x), x, 1 / 6)
-
-
-def cotangent_gap_ratio(x: Array) -> Array:
-    """Return (1 − (x/2) cot(x/2))/x², and 1/12 at x = 0, with an absolute error of eps/x²."""
-    return _over_square(1 - np.cos(x / 2) / sinc(x / 2), x, 1 / 12)
-
-
-def _over_square(gap: Array, x: Array, limit: float) -> Array:
-    """Return gap/x². Its users multiply by x² again, so below 1e-4 the limit is exact enough."""
-    tiny = np.abs(x) < 1e-4
-    return np.where(tiny, limit, gap / np.where(tiny, 1.0, x) ** 2)
+    tiny = np.abs(x) < 1e-4  # its user multiplies by x³ again: there the limit is exact enough
+    return np.where(tiny, 1 / 6, (1 - sinc(x)) / np.where(tiny, 1.0, x) ** 2)
 
 
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:

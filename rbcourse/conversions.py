@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite
 from rbcourse._jets import matrix
-from rbcourse._numerics import EPS, Array, sinc
+from rbcourse._numerics import EPS, Array
 from rbcourse.quaternion import canonical_quaternion
 
 
@@ -93,8 +93,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
-        Rotation vectors, in rad, ‖w‖ < 1e154. One full turn gives (−1, 0, 0, 0), two give
-        (1, 0, 0, 0).
+        Rotation vectors, in rad. One full turn gives (−1, 0, 0, 0), two give (1, 0, 0, 0).
 
     Returns
     -------
@@ -120,9 +119,21 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     array([[ 0.,  0.,  0.,  1.],
            [-1.,  0.,  0.,  0.]])
     """
-    w = as_finite("w", w, 3)
-    half = np.linalg.norm(w, axis=-1, keepdims=True) / 2
-    return np.concatenate([np.cos(half), sinc(half) / 2 * w], axis=-1)
+    axis, angle = axis_and_angle(as_finite("w", w, 3))
+    return np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=-1)
+
+
+def axis_and_angle(w: Array) -> tuple[Array, Array]:
+    """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1); 0 where w is.
+
+    Raises
+    ------
+    ValueError
+        If a norm overflows.
+    """
+    with np.errstate(over="ignore"):
+        angle = as_finite("norm of w", np.hypot.reduce(w, axis=-1))[..., None]
+    return w / np.where(angle == 0, 1.0, angle), angle
 
 
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -13,19 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 from rbcourse._numerics import Array, blocks
 from rbcourse.curves import Chosen, Curve, Ends, check_ends, combine
 from rbcourse.projection import nearest
-from rbcourse.rivals import other_way
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-CLOSE = 2.0  # if the costs of the two guesses differ by less than this factor, both are tried
-COARSE = 17  # nodes, on which guesses are made and systems solved
+COARSE = 17  # nodes, on which curves are started and systems solved
+DESCENTS = 3  # steps that lower the cost of a start
+BUMPS = 8  # polynomials that each component of such a step is made of
+CLOSE = 2.0  # starts that cost more than this many times the cheapest are dropped,
+FAST = 12.0  # rad: but where ‖w0‖ + ‖w1‖ is larger, not before their cost is lowered
+NODES = (17, 33, 65, 129, 257)
 STEPS = 25
 EXACT = 3e-12  # what may be left of the equation, and of R in the last Chebyshev coefficients
 LONGEST_STEP = 0.5
 ROUGH = 1e-2  # rad: with shorter steps the fewest nodes are left
 _BLOCK = 128  # problems whose linear systems fit into the cache together
-
-Guess = Callable[[int], Array]
-"""Takes the number n of nodes, returns rotations there: shape (N, n, 3, 3)."""
 
 
 def minimum_acceleration_so3(
@@ -123,10 +124,11 @@ class ConvergenceError(RuntimeError):
 
 
 class Solution(NamedTuple):
-    """One problem solved: R at the nodes, c = R w'', what was left, and after how many steps."""
+    """One problem solved: R at the nodes, c = R w'', its cost, what was left, the steps."""
 
     R: Array
     c: Array
+    cost: float
     residual: float
     iterations: int
 
@@ -181,8 +183,9 @@ def grid(n: int) -> Grid:
 
 def along(matrix: Array, values: Array) -> Array:
     """Return a matrix of a `Grid` applied to values at the nodes, of any shape (N, n, ...)."""
-    count, n = values.shape[:2]
-    return (matrix @ values.reshape(count, n, -1)).reshape(count, -1, *values.shape[2:])
+    count, n, *core = values.shape
+    columns = values.reshape(count, n, math.prod(core))
+    return (matrix @ columns).reshape(count, len(matrix), *core)
 
 
 def in_body(R: Array, c: Array) -> Array:
@@ -206,6 +209,8 @@ class MinimumAcceleration(Curve):
         Where a solution was found. Elsewhere the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
         R w'', which does not depend on t: the angular jerk in the fixed frame.
+    cost : float or ndarray, shape (...)
+        The integral of 2 ‖w'‖², BK (18), by the rule of the nodes.
     residual : float or ndarray, shape (...)
         The largest entry of R0 + ∫ R ŵ dt − R(t) at the nodes, w from R w'' = c and the ends.
     iterations, nodes : int or ndarray of int, shape (...)
@@ -229,23 +234,14 @@ class MinimumAcceleration(Curve):
         self._part, self._place = np.full((2, len(solutions)), -1)
         for number, index in enumerate(same):
             self._part[index], self._place[index] = number, np.arange(len(index))
+        cost = np.array([s.cost if isinstance(s, Solution) else np.nan for s in solutions], float)
         residual = np.array([s.residual for s in solutions], float)
         iterations = np.array([s.iterations for s in solutions], int)
         self.c = c.reshape(*batch_shape, 3)
-        self.converged, self.nodes, self.residual, self.iterations = (
+        self.converged, self.nodes, self.cost, self.residual, self.iterations = (
             x.reshape(batch_shape) if batch_shape else x.item()
-            for x in (nodes > 0, nodes, residual, iterations)
+            for x in (nodes > 0, nodes, cost, residual, iterations)
         )
-
-    @property
-    def cost(self) -> float | Array:
-        """The integral of 2 ‖w'‖², BK (18), by the rule of the nodes; shape (...)."""
-        cost = np.full(len(self.ends.w0), np.nan)
-        for (index, R), (_, series) in zip(self._parts, self._velocities, strict=True):
-            nodes = grid(R.shape[1])
-            rates = chebyshev(nodes.t, series.shape[1]) @ series
-            cost[index] = 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
-        return cost.reshape(self.batch_shape) if self.batch_shape else cost.item()
 
     @cached_property
     def _rotations(self) -> list[Array]:
@@ -288,15 +284,15 @@ class MinimumAcceleration(Curve):
         return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 
 
-def velocity(ends: Ends, jerk: Array) -> Array:
-    """Return w at the nodes, from w'' there and w at the ends."""
-    nodes = grid(jerk.shape[1])
-    return nodes.blend @ np.stack([ends.w0, ends.w1], axis=1) + nodes.twice @ jerk
+def velocity(ends: Ends, R: Array, c: Array) -> Array:
+    """Return w at the nodes, from R w'' = c: Rᵀc twice integrated, with w0 and w1 at the ends."""
+    nodes = grid(R.shape[1])
+    return nodes.blend @ np.stack([ends.w0, ends.w1], axis=1) + nodes.twice @ in_body(R, c)
 
 
 def defects(ends: Ends, R: Array, c: Array) -> tuple[Array, Array]:
     """Return E = R0 + ∫ R ŵ − R at the nodes, with R w'' = c, and ŵ."""
-    W = hat(velocity(ends, in_body(R, c)))
+    W = hat(velocity(ends, R, c))
     return ends.R0[:, None] + along(grid(R.shape[1]).integral, R @ W) - R, W
 
 
@@ -316,9 +312,17 @@ def _rates(ends: Ends, jerk: Array) -> tuple[Array, Array]:
     return w, acceleration
 
 
-def from_curve(curve: Callable[[Array], Array]) -> Guess:
-    """Return a guess: a stack of curves at the nodes, kept for the next time."""
-    return cache(lambda n: np.moveaxis(curve(grid(n).t), 0, 1))
+def exact_cost(ends: Ends, R: Array, c: Array) -> Array:
+    """Return ∫ 2 ‖w'‖² dt, by the rule of the nodes, of solutions R, c."""
+    nodes = grid(R.shape[1])
+    _, series = _rates(ends, in_body(R, c))
+    rates = chebyshev(nodes.t, series.shape[1]) @ series
+    return 2 * np.sum(rates**2, axis=-1) @ nodes.integral[-1]
+
+
+def at_nodes(curve: Curve) -> Array:
+    """Return a stack of N curves at the nodes that `relax` starts from, shape (N, 17, 3, 3)."""
+    return np.moveaxis(curve(grid(COARSE).t), 0, 1)
 
 
 def first_guess(ends: Ends, R: Array) -> tuple[Array, Array]:
@@ -326,36 +330,33 @@ def first_guess(ends: Ends, R: Array) -> tuple[Array, Array]:
     nodes, R = grid(R.shape[1]), R.copy()
     R[:, 0], R[:, -1] = ends.R0, ends.R1
     w = vee(R.mT @ along(nodes.derivative, R))
-    lacking = (w - velocity(ends, np.zeros_like(w))).reshape(len(R), -1, 1)
+    lacking = (w - velocity(ends, R, np.zeros((len(R), 3)))).reshape(len(R), -1, 1)
     effect = along(nodes.twice, R.mT).reshape(len(R), -1, 3)
     return R, np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0]
 
 
-Solver = Callable[[Ends, Guess], list[Solution | Failure]]
+Solver = Callable[[Ends, Array], list[Solution | Failure]]
+"""Takes ends and rotations to start from, shape (N, 17, 3, 3)."""
 
 
 def solve(solver: Solver, given: Ends) -> MinimumAcceleration:
-    """Solve from a cumulative Bézier curve, its middle leg turned the short way or the other.
-
-    The cheaper of the two is as a rule next to the cheaper optimum. Where the costs of both, worked
-    out from the legs as for a curve in space, are within a factor of `CLOSE`, or nothing is found,
-    both are tried.
+    """Return for each problem the cheapest curve that the solver finds from its `starts`.
 
     Raises
     ------
     ConvergenceError
-        If both fail, for a single problem.
+        If all fail, for a single problem.
 
     Warns
     -----
     RuntimeWarning
-        If both fail, for some of a stack.
+        If all fail, for some of a stack.
     """
     batch, ends = given.w0.shape[:-1], given.flat()
     R0, R1 = (nearest(R)[0] for R in ends[:2])  # written with few digits, (19) would not settle
     ends = ends._replace(R0=R0, R1=R1)
     with np.errstate(over="ignore", invalid="ignore"):
-        solutions = _solutions(solver, ends)
+        solutions = _cheapest(solver, ends)
     if not batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
     curve = MinimumAcceleration(ends, solutions, batch)
@@ -363,52 +364,113 @@ def solve(solver: Solver, given: Ends) -> MinimumAcceleration:
     return curve
 
 
-def _solutions(solver: Solver, ends: Ends) -> list[Solution | Failure]:
-    legs = _legs(ends)
-    bends = legs[:, 1:] - legs[:, :-1]
-    costs = np.sum(bends**2, axis=(1, 3)) + np.sum(bends[:, 0] * bends[:, 1], axis=-1)
-    cheaper = costs.argmin(axis=0)
+def _cheapest(solver: Solver, ends: Ends) -> list[Solution | Failure]:
+    """Follow the starts that cost little when `lowered`; the rest where that is not enough.
 
-    def attempt(which: NDArray[np.intp], way: NDArray[np.intp]) -> list[Solution | Failure]:
-        part = ends.of(which)
-        return _attempt(solver, part, from_curve(_bezier(part.R0, legs[way[which], :, which])))
-
-    found = attempt(np.arange(len(cheaper)), cheaper)
-    failed = np.array([isinstance(solution, Failure) for solution in found], bool)
-    doubtful = np.flatnonzero((costs.max(axis=0) < CLOSE * costs.min(axis=0)) | failed)
-    if doubtful.size:
-        others, part = attempt(doubtful, 1 - cheaper), ends.of(doubtful)
-        better = _costs(part, others) < _costs(part, [found[i] for i in doubtful])
-        for k in np.flatnonzero(better):
-            found[doubtful[k]] = others[k]
+    It is not where nothing is found, or what is found costs more than a start.
+    """
+    problem, R = starts(ends)
+    cost = cost_at_nodes(R)
+    fast = np.linalg.norm([ends.w0, ends.w1], axis=-1).sum(axis=0) > FAST
+    some = fast[problem] | _are_close(problem, cost)
+    R[some], cost[some] = lowered(R[some])
+    likely = _are_close(problem, cost)
+    found = _followed(solver, ends, problem[likely], R[likely])
+    lost = np.array([_cost(one) for one in found])[problem] > cost * (1 + ROUGH)
+    rest = ~likely & np.isin(problem, problem[lost])
+    if rest.any():
+        others = _followed(solver, ends, problem[rest], R[rest])
+        found = [min(pair, key=_cost) for pair in zip(found, others, strict=True)]
     return found
 
 
-def _legs(ends: Ends) -> Array:
-    """Return the turns between Bézier's control points, shape (2, 3, N, 3): both ways round.
+def _are_close(problem: NDArray[np.intp], cost: Array) -> NDArray[np.bool_]:
+    """Tell which starts cost less than `CLOSE` times the cheapest of their problem, or as much."""
+    least = np.full(problem.max(initial=-1) + 1, np.inf)
+    np.fmin.at(least, problem, cost)
+    return ~(cost > CLOSE * least[problem])
 
-    Here and in `_bezier` in matrices: quicker for a single problem.
+
+def _followed(
+    solver: Solver, ends: Ends, problem: NDArray[np.intp], R: Array
+) -> list[Solution | Failure]:
+    """Return the cheapest solution of each problem from these starts, which have its number."""
+    found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(ends.w0)
+    for i, one in zip(problem, _attempt(solver, ends.of(problem), R), strict=True):
+        if isinstance(found[i], Failure) or _cost(one) < _cost(found[i]):
+            found[i] = one
+    return found
+
+
+def _cost(one: Solution | Failure) -> float:
+    return one.cost if isinstance(one, Solution) else np.inf
+
+
+def starts(ends: Ends) -> tuple[NDArray[np.intp], Array]:
+    """Return curves with these ends at the nodes, and the numbers of the problems they are for.
+
+    From Bézier's control point C₁ = R0 exp(ŵ0/3) to the other one, R1 exp(−ŵ1/3), turns v: the
+    shortest way, the other way round, and, where the legs ŵ0/3 and ŵ1/3 are longer than a full turn
+    together, both ways with a turn more. With β = 3t² − 2t³ the curve
+
+        R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
+
+    has the wanted ends. Moved ends give it moved, and R1, R0, −w1, −w0 give it run backwards.
     """
     first, last = (np.clip(w, -1e6, 1e6) / 3 for w in (ends.w0, ends.w1))  # fast enough to start
-    back, ahead = exp_so3(np.stack([-first, -last]))
-    middle = log_so3(back @ ends.R0.mT @ ends.R1 @ ahead)
-    return np.stack([[first, middle, last], [first, other_way(middle), last]])
+    ahead, back = exp_so3(np.stack([first, -last]))
+    C1 = ends.R0 @ ahead
+    v = log_so3(C1.mT @ ends.R1 @ back)
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    full = 2 * np.pi * v / np.where(angle == 0, 1, angle)
+    lengths = np.linalg.norm([first, last], axis=-1).sum(axis=0)
+    every, fast = np.arange(len(v)), np.flatnonzero(lengths > 2 * np.pi)
+    problem = np.concatenate([every, every, fast, fast])
+    v = np.concatenate([v, v - full, (v + full)[fast], (v - 2 * full)[fast]])
+    t = grid(COARSE).t[:, None]
+    eta = t**3 * last[:, None] - (1 - t) ** 3 * first[:, None]
+    turned = exp_so3(t * t * (3 - 2 * t) * v[:, None])
+    return problem, C1[problem, None] @ turned @ exp_so3(eta)[problem]
 
 
-def _bezier(R0: Array, legs: Array) -> Callable[[Array], Array]:
-    """Return the curves of `cumulative_bezier_so3` with these legs, shape (N, 3, 3)."""
+def lowered(R: Array) -> tuple[Array, Array]:
+    """Return curves with the same ends after three steps of Gauss and Newton, and their costs.
 
-    def curve(t: Array) -> Array:
-        shares = np.stack([1 - (1 - t) ** 3, t * t * (3 - 2 * t), t**3])
-        first, second, third = exp_so3(shares[..., None, None] * legs.swapaxes(0, 1)[:, None])
-        return R0 @ first @ second @ third
+    The acceleration of R exp(η̂) is, to first order, w' + (w × η)' + η''. Each step takes the η for
+    which the integral of its square is least, of all polynomials t²(1 − t)² p(t), p of degree 7.
+    """
+    nodes, (bump, slope, bend) = grid(R.shape[1]), _bumps(R.shape[1])
+    root = np.sqrt(nodes.integral[-1])[:, None]
+    for _ in range(DESCENTS):
+        w, a = _rates_at_nodes(R)
+        by_eta = bump[:, None, :, None] * hat(a)[:, :, :, None]
+        by_eta += slope[:, None, :, None] * hat(w)[:, :, :, None]
+        by_eta += bend[:, None, :, None] * np.eye(3)[:, None]
+        J = (root[..., None, None] * by_eta).reshape(len(R), 3 * len(root), 3 * BUMPS)
+        x = np.linalg.solve(J.mT @ J, -(J.mT @ (root * a).reshape(len(R), 3 * len(root), 1)))
+        R = R @ exp_so3(bump @ x.reshape(len(R), BUMPS, 3))
+    return R, cost_at_nodes(R)
 
-    return curve
+
+def cost_at_nodes(R: Array) -> Array:
+    """Return ∫ 2 ‖w'‖² dt of curves given by R at the nodes, about."""
+    return 2 * np.sum(_rates_at_nodes(R)[1] ** 2, axis=-1) @ grid(R.shape[1]).integral[-1]
 
 
-def _costs(ends: Ends, solutions: list[Solution | Failure]) -> Array:
-    costs = MinimumAcceleration(ends, solutions, (len(solutions),)).cost
-    return np.where(np.isnan(costs), np.inf, costs)
+def _rates_at_nodes(R: Array) -> tuple[Array, Array]:
+    """Return w and w' at the nodes, from R there."""
+    derivative = grid(R.shape[1]).derivative
+    w = vee(R.mT @ along(derivative, R))
+    return w, derivative @ w
+
+
+@lru_cache
+def _bumps(n: int) -> Array:
+    """Return t²(1 − t)² times Chebyshev polynomials at the nodes, and two derivatives."""
+    nodes = grid(n)
+    bump = (nodes.t * (1 - nodes.t))[:, None] ** 2 * chebyshev(nodes.t, BUMPS)
+    slope = nodes.derivative @ bump
+    return np.stack([bump, slope, nodes.derivative @ slope])
 
 
 def _warn_if_not_converged(curve: MinimumAcceleration) -> None:
@@ -422,110 +484,107 @@ def _warn_if_not_converged(curve: MinimumAcceleration) -> None:
         )
 
 
-def _attempt(solver: Solver, ends: Ends, guess: Guess) -> list[Solution | Failure]:
+def _attempt(solver: Solver, ends: Ends, R: Array) -> list[Solution | Failure]:
     """Treat singular or non-finite problems as failures, one problem at a time."""
     try:
-        return solver(ends, guess)
+        return solver(ends, R)
     except (FloatingPointError, np.linalg.LinAlgError, ValueError):
-        if len(ends.w0) == 1:
+        if len(R) == 1:
             return [Failure(np.inf, 0)]
-    parts = [slice(i, i + 1) for i in range(len(ends.w0))]
-    return [_attempt(solver, ends.of(one), _part(guess, one))[0] for one in parts]
+    parts = [slice(i, i + 1) for i in range(len(R))]
+    return [_attempt(solver, ends.of(one), R[one])[0] for one in parts]
 
 
-def _part(guess: Guess, which: slice) -> Guess:
-    return lambda n: guess(n)[which]
+def relax(ends: Ends, R: Array) -> list[Solution | Failure]:
+    """Solve (19) for a stack by Newton's method, from rotations at 17 nodes.
+
+    First on these nodes, until the steps are short; then on twice as many, and twice as many again,
+    until the last Chebyshev coefficients of R have decayed.
+    """
+    return [one for block in blocks(len(R), _BLOCK) for one in _relax(ends.of(block), R[block])]
 
 
-def relax(ends: Ends, guess: Guess) -> list[Solution | Failure]:
-    """Solve (19) for a stack, from 17 nodes on; what fails, from 33 nodes on."""
-    found: list[Solution | Failure] = []
-    for block in blocks(len(ends.w0), _BLOCK):
-        found += _refine(ends.of(block), guess(COARSE)[block])
-    failed = [i for i, solution in enumerate(found) if isinstance(solution, Failure)]
-    for block in blocks(len(failed), _BLOCK):
-        again = np.array(failed[block])
-        for i, solution in zip(again, _refine(ends.of(again), guess(33)[again]), strict=True):
-            found[i] = solution
-    return found
-
-
-def _refine(ends: Ends, R: Array) -> list[Solution | Failure]:
-    """Solve (19) on the nodes of the guess, then on more until the coefficients have decayed."""
+def _relax(ends: Ends, R: Array) -> list[Solution | Failure]:
     found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
-    intervals = R.shape[1] - 1
+    which, steps = np.arange(len(R)), np.zeros(len(R), int)
     R, c = first_guess(ends, R)
-    rough = _newton(_State(np.arange(len(R)), ends, R, c, np.zeros(len(R), int)), 1, found)
-    stride = 1
-    while rough and stride < 16:
-        stride *= 2
-        R = orthogonal(along(_interpolation(rough.R.shape[1], intervals * stride + 1), rough.R))
-        R[:, 0], R[:, -1] = rough.ends.R0, rough.ends.R1
-        rough = _newton(rough._replace(R=R), stride, found)
+    for n in NODES:
+        if not len(which):
+            break
+        if n > COARSE:
+            R = orthogonal(along(_interpolation(R.shape[1], n), R))
+            R[:, 0], R[:, -1] = ends.R0, ends.R1
+        now = _newton(ends, R, c)
+        steps = steps + now.steps
+        cost = exact_cost(ends, now.R, now.c)
+        for k, i in enumerate(which):
+            solved, outcome = now.verdict[k] == SOLVED, (float(now.left[k]), int(steps[k]))
+            found[i] = (
+                Solution(now.R[k], now.c[k], float(cost[k]), *outcome)
+                if solved
+                else Failure(*outcome)
+            )
+        finer = now.verdict == FINER
+        which, steps, ends, R, c = (
+            which[finer],
+            steps[finer],
+            ends.of(finer),
+            now.R[finer],
+            now.c[finer],
+        )
     return found
 
 
-class _State(NamedTuple):
-    """How far the problems are that are still worked at, and which they are."""
+FAILED, FINER, SOLVED = range(3)
 
-    which: NDArray[np.intp]
-    ends: Ends
+
+class Iterate(NamedTuple):
+    """What Newton's method makes of a stack on its nodes: solved, failed, or for finer ones."""
+
     R: Array
     c: Array
+    left: Array
     steps: NDArray[np.intp]
-
-    def of(self, part: NDArray[np.bool_]) -> _State:
-        """Return some of them."""
-        if part.all():
-            return self
-        which, ends, R, c, steps = self
-        return _State(which[part], ends.of(part), R[part], c[part], steps[part])
+    verdict: NDArray[np.intp]
 
 
-def _joined(states: list[_State]) -> _State:
-    which, ends, R, c, steps = zip(*states, strict=True)
-    joined = Ends(*(np.concatenate(array) for array in zip(*ends, strict=True)))
-    return _State(np.concatenate(which), joined, *map(np.concatenate, (R, c, steps)))
-
-
-def _newton(now: _State, stride: int, found: list[Solution | Failure]) -> _State | None:
-    """Improve R and c, no node turned about any axis of the frame by more than half a rad at once.
-
-    What is solved, or fails, is written into `found`; what wants more nodes is returned.
-    """
-    size = before = np.full(len(now.R), np.inf)
-    finer = []
+def _newton(ends: Ends, R: Array, c: Array) -> Iterate:
+    """Improve R and c, no node turned by more than half a rad at once."""
+    stride = (R.shape[1] - 1) // (COARSE - 1)
+    R, c, count = R.copy(), c.copy(), len(R)
+    left, size = np.full((2, count), np.inf)
+    steps, verdict = np.zeros((2, count), int)
+    active = np.arange(count)
     for _ in range(STEPS):
-        E, W = defects(now.ends, now.R, now.c)
-        left = np.abs(E).max(axis=(1, 2, 3))
+        E, W = defects(ends.of(active), R[active], c[active])
+        before, left[active] = left[active], np.abs(E).max(axis=(1, 2, 3))
         left[np.isnan(left)] = np.inf
-        if stride == 1:
-            solved, enough = np.zeros(len(left), bool), size < ROUGH
-        else:
-            tail, stalled = tails(now.R), (size < 1e-6) & (left > before / 2)
-            solved = (tail < EXACT) & (left < EXACT)
-            enough = (stalled | (tail > EXACT) & (size < 1e3 * tail)) & ~solved
-        done = solved | enough | ~np.isfinite(left)
-        if done.any():
-            for i in np.flatnonzero(done):
-                outcome = float(left[i]), int(now.steps[i])
-                found[now.which[i]] = (
-                    Solution(now.R[i], now.c[i], *outcome) if solved[i] else Failure(*outcome)
-                )
-            if enough.any():
-                finer.append(now.of(enough))
-            if done.all():
-                break
-            now, E, W, left, size = now.of(~done), E[~done], W[~done], left[~done], size[~done]
-        turn, dc = _newton_step(now.R, now.c, E, W, stride)
-        size, before = np.abs(turn).max(axis=(1, 2)), left
-        share = LONGEST_STEP / np.maximum(size, LONGEST_STEP)
-        R, c = _turned(now.R, share[:, None, None] * turn), now.c + share[:, None] * dc
-        now = _State(now.which, now.ends, R, c, now.steps + 1)
-    else:
-        for k, where in enumerate(now.which):
-            found[where] = Failure(float(left[k]), int(now.steps[k]))
-    return _joined(finer) if len(finer) > 1 else next(iter(finer), None)
+        verdict[active] = _verdicts(R[active], left[active], before, size[active])
+        going = (verdict[active] == FAILED) & np.isfinite(left[active])
+        if not going.any():
+            break
+        active, E, W = active[going], E[going], W[going]
+        turn, dc = _newton_step(R[active], c[active], E, W, stride)
+        size[active] = np.linalg.norm(turn, axis=-1).max(axis=1)
+        share = LONGEST_STEP / np.maximum(size[active], LONGEST_STEP)
+        R[active] = _turned(R[active], share[:, None, None] * turn)
+        c[active] += share[:, None] * dc
+        steps[active] += 1
+    return Iterate(R, c, left, steps, verdict)
+
+
+def _verdicts(R: Array, left: Array, before: Array, size: Array) -> NDArray[np.intp]:
+    """Tell what is solved, and what wants finer nodes, after a step of that size; else FAILED.
+
+    On the fewest nodes nothing is solved. On others it is where the equation and the coefficients
+    are; it wants finer ones where the coefficients are the larger, or rounding stops the iteration.
+    """
+    if R.shape[1] == COARSE:
+        return np.where(size < ROUGH, FINER, FAILED)
+    tail = tails(R)
+    stalled = (size < 1e-6) & (left > before / 2)
+    enough = stalled | (tail > EXACT) & (size < 1e3 * tail)
+    return np.where((tail < EXACT) & (left < EXACT), SOLVED, np.where(enough, FINER, FAILED))
 
 
 def _turned(R: Array, turn: Array) -> Array:

@@ -9,10 +9,10 @@ from rbcourse._numerics import Array
 from rbcourse.curves import Ends, check_ends
 from rbcourse.optimum import (
     Failure,
-    Guess,
     MinimumAcceleration,
     Solution,
     defects,
+    exact_cost,
     first_guess,
     grid,
     solve,
@@ -80,15 +80,15 @@ def shoot_minimum_acceleration_so3(
     return solve(shoot, check_ends(R0, R1, w0, w1))
 
 
-def shoot(ends: Ends, guess: Guess) -> list[Solution | Failure]:
+def shoot(ends: Ends, R: Array) -> list[Solution | Failure]:
     """Solve the problems of a stack, one by one."""
-    parts = [slice(i, i + 1) for i in range(len(ends.w0))]
-    return [_shoot(ends.of(one), guess(33)[one]) for one in parts]
+    parts = [slice(i, i + 1) for i in range(len(R))]
+    return [_shoot(ends.of(one), R[one]) for one in parts]
 
 
-def _shoot(ends: Ends, guess: Array) -> Solution | Failure:
+def _shoot(ends: Ends, start: Array) -> Solution | Failure:
     """Improve the aim (w'(0), b) by Newton's method, the hit moved by half a unit at most."""
-    aim = _first_aim(ends, guess)
+    aim = _first_aim(ends, start)
     for iteration in range(STEPS):
         miss, by_aim = _miss(ends, aim)
         size = float(np.abs(miss).max())
@@ -97,16 +97,17 @@ def _shoot(ends: Ends, guess: Array) -> Solution | Failure:
             c = ends.R0[0] @ (aim[3:] - np.cross(ends.w0[0], aim[:3]))
             residual = float(np.abs(defects(ends, R[None], c[None])[0]).max())
             if residual < 1e-10:
-                return Solution(R, c, residual, iteration)
+                cost = float(exact_cost(ends, R[None], c[None])[0])
+                return Solution(R, c, cost, residual, iteration)
             return Failure(residual, iteration)
         aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
     return Failure(size, STEPS)
 
 
-def _first_aim(ends: Ends, guess: Array) -> Array:
+def _first_aim(ends: Ends, start: Array) -> Array:
     """Return w'(0) and b = w''(0) + w(0) × w'(0) of the curve that `relax` would start with."""
-    [R], [c] = first_guess(ends, guess)
-    acceleration = MinimumAcceleration(ends, [Solution(R, c, 0.0, 0)], ())(0, 2)
+    [R], [c] = first_guess(ends, start)
+    acceleration = MinimumAcceleration(ends, [Solution(R, c, 0.0, 0.0, 0)], ())(0, 2)
     return np.concatenate([acceleration, R[0].T @ c + np.cross(ends.w0[0], acceleration)])
 
 

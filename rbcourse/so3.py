@@ -6,8 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
-from rbcourse._numerics import Array, cotangent_gap_ratio, sinc, sine_gap_ratio, versine_ratio
-from rbcourse.conversions import quaternion_from_matrix, rotation_vector_from_quaternion
+from rbcourse._numerics import Array, sinc
+from rbcourse.conversions import (
+    axis_and_angle,
+    quaternion_from_matrix,
+    rotation_vector_from_quaternion,
+)
 
 BASIS_SO3 = np.array(
     [
@@ -103,7 +107,9 @@ def exp_so3(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        I + (sin a)/a ŵ + (1 − cos a)/a² ŵ² with a = ‖w‖, accurate to a few eps (1 + a).
+        I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps (1 + a): a
+        rotation for every finite w, but beyond 1/eps ≈ 4.5e15 rad, where neighbouring
+        floating-point numbers are turns apart, not one digit of it is right.
 
     Raises
     ------
@@ -130,8 +136,8 @@ def exp_so3(w: ArrayLike) -> Array:
            [ 1.,  0.,  0.],
            [ 0.,  0.,  1.]])
     """
-    W, angle = _hat_and_angle(as_finite("w", w, 3))
-    return np.eye(3) + sinc(angle) * W + versine_ratio(angle) * W @ W
+    N, angle = _hat_and_angle(as_finite("w", w, 3))
+    return np.eye(3) + np.sin(angle) * N + 2 * np.sin(angle / 2) ** 2 * N @ N
 
 
 def log_so3(R: ArrayLike) -> Array:
@@ -218,8 +224,9 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        I − (1 − cos a)/a² ŵ + (a − sin a)/a³ ŵ² with a = ‖w‖, accurate to a few eps (1 + a). Its
-        transpose is the left Jacobian, which gives the velocity in the fixed frame.
+        I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps,
+        for every finite w. Its transpose is the left Jacobian, which gives the velocity in the
+        fixed frame.
 
     Raises
     ------
@@ -243,8 +250,8 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     >>> right_jacobian_so3([0, 0, 1]) @ [0, 0, 5]  # along the axis nothing changes
     array([0., 0., 5.])
     """
-    W, angle = _hat_and_angle(as_finite("w", w, 3))
-    return np.eye(3) - versine_ratio(angle) * W + sine_gap_ratio(angle) * W @ W
+    N, angle = _hat_and_angle(as_finite("w", w, 3))
+    return np.eye(3) - np.sin(angle / 2) * sinc(angle / 2) * N + (1 - sinc(angle)) * N @ N
 
 
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
@@ -258,7 +265,7 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        I + ŵ/2 + (1 − (a/2) cot(a/2))/a² ŵ² with a = ‖w‖.
+        I + ŵ/2 + (1 − (a/2) cot(a/2)) n̂² with a = ‖w‖ and n = w/a.
 
     Raises
     ------
@@ -280,9 +287,12 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     >>> bool(np.allclose(right_jacobian_inverse_so3(w) @ right_jacobian_so3(w), np.eye(3)))
     True
     """
-    W, angle = _hat_and_angle(as_finite("w", w, 3))
-    return np.eye(3) + W / 2 + cotangent_gap_ratio(angle) * W @ W
+    w = as_finite("w", w, 3)
+    N, angle = _hat_and_angle(w)
+    return np.eye(3) + hat(w) / 2 + (1 - np.cos(angle / 2) / sinc(angle / 2)) * N @ N
 
 
 def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    return hat(w), np.linalg.norm(w, axis=-1)[..., None, None]
+    """Return n̂ and a of w = a n, to go with matrices."""
+    axis, angle = axis_and_angle(w)
+    return hat(axis), angle[..., None]

@@ -188,9 +188,9 @@ def test_at_the_base_equal_links_fold_up():
     [
         ([3.6, 0], "tip: 0.5 to 3.5 m from the base wanted, got 3.6 m"),
         ([0, 0.4], "tip: 0.5 to 3.5 m from the base wanted, got 0.4 m"),
-        ([0, 3.5 + 1e-9], "tip: 0.5 to 3.5 m"),
-        ([0, 0.5 - 1e-9], "tip: 0.5 to 3.5 m"),
-        ([[1, 1], [0, 4], [0, 5]], r"tip\[1\]: 0.5 to 3.5 m from the base wanted, got 4 m"),
+        ([0, 3.5 + 1e-12], "tip: 0.5 to 3.5 m from the base wanted, got 3.500000000001 m"),
+        ([0.5 - 1e-12, 0], "tip: 0.5 to 3.5 m from the base wanted, got 0.499999999999 m"),
+        ([[1, 1], [0, 4], [0, 5]], r"tip\[1\]: 0.5 to 3.5 m from the base wanted, got 4.0 m"),
         ([1, np.nan], r"tip\[1\] is nan"),
         ([1, 2, 3], "tip: shape"),
     ],

@@ -145,7 +145,7 @@ def test_numbers_outside_the_unit_interval_are_refused():
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
-@pytest.mark.parametrize("size", [-1, (2, -3), 2.5, "2", (2, 1.5), {}, b"ab"])
+@pytest.mark.parametrize("size", [-1, (2, -3), 2.5, "2", (2, 1.5), {}, b"ab", True, (2, True)])
 def test_what_is_no_size_is_refused(sampler, size):
     with pytest.raises(ValueError, match=r"^size: "):
         sampler(size)

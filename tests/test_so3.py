@@ -55,6 +55,31 @@ def test_exp_of_long_vectors_loses_what_their_length_loses():
         assert np.abs(rb.exp_so3(w) - oracles.exp_so3(w)).max() < 4 * EPS * length
 
 
+@pytest.mark.parametrize("length", [1e16, 1e154, 1e160, 1.7e308])
+def test_of_huge_vectors_exp_is_a_rotation_and_the_jacobian_a_projection(length):
+    """About the axis: (1 − cos a)/a and (sin a)/a vanish, and n̂² + I is n nᵀ."""
+    n = awkward.UNIT_AXES[3]
+    R = rb.exp_so3(length * n)
+    assert np.abs(R @ R.T - np.eye(3)).max() < 8 * EPS
+    assert np.abs(R @ n - n).max() < 8 * EPS
+    assert np.abs(rb.right_jacobian_so3(length * n) - np.outer(n, n)).max() < 8 * EPS + 2 / length
+    inverse = rb.right_jacobian_inverse_so3(length / 1e3 * n)
+    assert np.abs(inverse @ n - n).max() < 8 * EPS * length
+    assert np.abs(np.linalg.norm(rb.quaternion_from_rotation_vector(length * n)) - 1) < 8 * EPS
+
+
+@pytest.mark.parametrize(
+    "function",
+    [rb.exp_so3, rb.right_jacobian_so3, rb.right_jacobian_inverse_so3, rb.exp_se3]
+    + [rb.quaternion_from_rotation_vector],
+)
+def test_a_norm_that_overflows_is_named(function):
+    w = np.zeros((2, 6 if function is rb.exp_se3 else 3))
+    w[1, :3] = 1.7e308
+    with pytest.raises(ValueError, match=r"^norm of w\[1\] is inf"):
+        function(w)
+
+
 def test_exp_of_nothing_is_exact():
     assert np.array_equal(rb.exp_so3([0, 0, 0]), np.eye(3))
     assert np.array_equal(rb.exp_so3([1e-300, 0, 0])[2, 1], 1e-300)

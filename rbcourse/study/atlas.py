@@ -14,7 +14,7 @@ from rbcourse._checks import Rng, as_count, as_generator, as_single
 from rbcourse._numerics import Array, blocks
 from rbcourse.cost import integral
 from rbcourse.curves import Curve, Ends, check_ends
-from rbcourse.optimum import MinimumAcceleration, from_curve, minimum_acceleration_so3, relax
+from rbcourse.optimum import MinimumAcceleration, at_nodes, minimum_acceleration_so3, relax
 from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic
 from rbcourse.rivals import (
     CLOSED_FORMS,
@@ -264,7 +264,7 @@ def in_words(excess: float) -> str:
 
 def _cost_from(ends: Ends, guess: Curve) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
-        solutions = relax(ends, from_curve(guess))
+        solutions = relax(ends, at_nodes(guess))
     return np.asarray(MinimumAcceleration(ends, solutions, (len(ends.w0),)).cost)
 
 
