@@ -9,7 +9,6 @@ import rbcourse as rb
 from benchmarks import references
 from benchmarks.contest import OURS, Contest, Method
 from rbcourse import textbook
-from rbcourse.projected_cubic import cubic_coefficients, polynomial
 
 SAMPLE = 100
 """So many of the N items are held against the truth."""
@@ -159,13 +158,13 @@ def projected_cubic(n, peers, rng):
     ends, t = cubic_ends(), rng.random(n)
     ours, spline = rb.projected_cubic_so3(*ends), _spline()
     R0, R1, w0, w1 = ends
-    coefficients = cubic_coefficients(R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1))
+    coefficients = textbook.cubic_coefficients(R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1))
     methods = [
         Method(OURS, "projected_cubic_so3", lambda: ours(t)),
         Method(
             "textbook",
             "project_so of the cubic",
-            lambda: textbook.project_so(polynomial(coefficients, t[:, None, None], 0)),
+            lambda: textbook.project_so(textbook.polynomial(coefficients, t[:, None, None], 0)),
         ),
         Method("SciPy, another curve", "RotationSpline", lambda: spline(t).as_matrix(), same=False),
     ]

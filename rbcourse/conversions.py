@@ -131,9 +131,13 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
     ValueError
         If a norm overflows.
     """
+    _, exponent = np.frexp(np.abs(w).max(axis=-1, keepdims=True))  # so that no square overflows
+    near_one = np.ldexp(w, -exponent)
+    length = np.linalg.norm(near_one, axis=-1, keepdims=True)
     with np.errstate(over="ignore"):
-        angle = as_finite("norm of w", np.hypot.reduce(w, axis=-1))[..., None]
-    return w / np.where(angle == 0, 1.0, angle), angle
+        angle = np.ldexp(length, exponent)
+    as_finite("norm of w", angle[..., 0])
+    return near_one / np.where(length == 0, 1.0, length), angle
 
 
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:

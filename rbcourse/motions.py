@@ -13,8 +13,7 @@ from rbcourse.curves import Chosen, Curve, Ends, broadcast_ends, geodesic_so3
 from rbcourse.optimum import relax, solve
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
-    cubic_coefficients,
-    polynomials,
+    hermite_stack,
     projected_cubic,
     watched,
 )
@@ -28,8 +27,9 @@ class RigidMotion(Curve):
     ----------
     rotation : Curve
         R(t), on SO(3).
-    coefficients : ndarray, shape (degree + 1, ..., 3)
-        Of 1, t, t², … in d(t): in m, fixed frame.
+    path : ndarray, shape (n, ..., 3)
+        d(0), d(1), and for a cubic d'(0), d'(1), for a quintic d''(0), d''(1) too: in m, fixed
+        frame.
 
     References
     ----------
@@ -37,19 +37,19 @@ class RigidMotion(Curve):
     """
 
     size = 4
-    per_curve: ClassVar[dict[str, int]] = {"rotation": 0, "coefficients": 1}
+    per_curve: ClassVar[dict[str, int]] = {"rotation": 0, "path": 1}
 
-    def __init__(self, rotation: Curve, coefficients: Array) -> None:
-        self.batch_shape = np.broadcast_shapes(rotation.batch_shape, coefficients.shape[1:-1])
-        shape = (len(coefficients), *self.batch_shape, 3)
-        self.coefficients = np.broadcast_to(coefficients, shape)
+    def __init__(self, rotation: Curve, *path: Array) -> None:
+        ends = np.stack(np.broadcast_arrays(*path))
+        self.batch_shape = np.broadcast_shapes(rotation.batch_shape, ends.shape[1:-1])
+        self.path = np.broadcast_to(ends, (len(ends), *self.batch_shape, 3))
         numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
         self.rotation = rotation._picked(np.broadcast_to(numbers, self.batch_shape))
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         """Write (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
-        path = np.moveaxis(self._flat(self.coefficients, 1), 1, -1)
-        d = np.moveaxis(polynomials(path, t, which, order), 0, -1)
+        path = np.moveaxis(self._flat(self.path, 1), 1, -1)
+        d = np.moveaxis(hermite_stack(path, t, which, order), 0, -1)
         R, turning = (np.empty((*out.shape[:2], *core)) for core in ((3, 3), (3,)))
         self.rotation._at(t, which, 0, R)
         if order == 0:
@@ -117,7 +117,7 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
     A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     check_broadcast(A0=(A0, 2), A1=(A1, 2))
     (R0, d0), (R1, d1) = split(A0), split(A1)
-    return RigidMotion(geodesic_so3(R0, R1), np.stack(np.broadcast_arrays(d0, d1 - d0)))
+    return RigidMotion(geodesic_so3(R0, R1), d0, d1)
 
 
 def projected_cubic_se3(
@@ -180,7 +180,7 @@ def projected_cubic_se3(
            [ 0.   ,  0.   ,  0.   ]])
     """
     ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
-    return ProjectedMotion(watched(projected_cubic(ends)), path)
+    return ProjectedMotion(watched(projected_cubic(ends)), *path)
 
 
 def minimum_acceleration_se3(
@@ -241,7 +241,7 @@ def minimum_acceleration_se3(
     array([1., 0., 0.])
     """
     ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
-    return RigidMotion(solve(relax, ends), path)
+    return RigidMotion(solve(relax, ends), *path)
 
 
 def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
@@ -421,7 +421,7 @@ def _cubic_ends(
     w1: ArrayLike,
     d0_dot: ArrayLike,
     d1_dot: ArrayLike,
-) -> tuple[Ends, Array]:
+) -> tuple[Ends, tuple[Array, ...]]:
     """Return the checked ends of the rotation, and the cubic path of the origin.
 
     Raises
@@ -441,4 +441,4 @@ def _cubic_ends(
         d1_dot=(v[1], 1),
     )
     (R0, d0), (R1, d1) = map(split, poses)
-    return broadcast_ends(R0, R1, *w), cubic_coefficients(d0, d1, *v)
+    return broadcast_ends(R0, R1, *w), (d0, d1, *v)

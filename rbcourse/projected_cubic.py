@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, check_broadcast
+from rbcourse._checks import as_finite, check_broadcast, check_order
 from rbcourse._numerics import Array
 from rbcourse.curves import (
     Chosen,
@@ -29,8 +31,8 @@ class ProjectedPolynomial(Curve):
 
     Attributes
     ----------
-    coefficients : ndarray, shape (degree + 1, ..., 3, 3)
-        Of 1, t, t², … in M(t).
+    ends : ndarray, shape (n, ..., 3, 3)
+        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1).
     margin : ndarray, shape (...)
         The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M. At 0
         the nearest rotation is not unique.
@@ -42,15 +44,15 @@ class ProjectedPolynomial(Curve):
     BK 6, BK 6.2.
     """
 
-    per_curve: ClassVar[dict[str, int]] = {"coefficients": 1}
+    per_curve: ClassVar[dict[str, int]] = {"ends": 1}
 
-    def __init__(self, coefficients: Array) -> None:
-        self.coefficients = coefficients
-        self.batch_shape = coefficients.shape[1:-2]
+    def __init__(self, *ends: Array) -> None:
+        self.ends = np.stack(np.broadcast_arrays(*ends))
+        self.batch_shape = self.ends.shape[1:-2]
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         """Write R, w or w' of the projection of M; its arrays have their components first."""
-        M = [polynomials(self._entries, t, which, k) for k in range(order + 1)]
+        M = [hermite_stack(self._entries, t, which, k) for k in range(order + 1)]
         R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
         self._check_defined(t, which, ~unique, NOT_UNIQUE)
         if order == 0:
@@ -61,8 +63,8 @@ class ProjectedPolynomial(Curve):
 
     @cached_property
     def _entries(self) -> Array:
-        """The coefficients, shape (degree + 1, 3, 3, count)."""
-        return np.ascontiguousarray(np.moveaxis(self._flat(self.coefficients, 1), 1, -1))
+        """The ends, shape (n, 3, 3, count)."""
+        return np.ascontiguousarray(np.moveaxis(self._flat(self.ends, 1), 1, -1))
 
     @property
     def margin(self) -> Array:
@@ -77,17 +79,17 @@ class ProjectedPolynomial(Curve):
     @cached_property
     def _least_gap(self) -> tuple[Array, Array]:
         def gap_at(t: Array) -> Array:
-            return gap(polynomial(self.coefficients, t[..., None, None]))
+            return gap(hermite(self.ends, t[..., None, None]))
 
         return least_over_time(gap_at, self.batch_shape)
 
     def may_jump(self) -> bool:
         """Tell whether the gap at 65 times, if not at 9, leaves room for a zero in between."""
         may = np.ones(self.count, bool)
-        coefficients = self._flat(self.coefficients, 1)
+        ends = self._flat(self.ends, 1)
         for count in (9, 65):
             times = np.linspace(0, 1, count)[:, None, None, None]
-            M = polynomial(coefficients[:, may], times)
+            M = hermite(ends[:, may], times)
             change = np.linalg.norm(np.diff(M, axis=0), axis=(-2, -1)).max(axis=0)
             may[may] = (gap(M) < change).any(axis=0)
         return bool(may.any())
@@ -216,13 +218,13 @@ def projected_quintic_so3(
     check_broadcast(R0=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     (R0, R1, w0, w1), W0, W1 = ends, hat(ends.w0), hat(ends.w1)
     curvatures = R0 @ (W0 @ W0 + hat(a0)), R1 @ (W1 @ W1 + hat(a1))
-    return watched(ProjectedPolynomial(quintic_coefficients(R0, R1, R0 @ W0, R1 @ W1, *curvatures)))
+    return watched(ProjectedPolynomial(R0, R1, R0 @ W0, R1 @ W1, *curvatures))
 
 
 def projected_cubic(ends: Ends) -> ProjectedPolynomial:
     """Return `projected_cubic_so3` of checked ends, without a warning of its margin."""
     R0, R1, w0, w1 = ends
-    return ProjectedPolynomial(cubic_coefficients(R0, R1, R0 @ hat(w0), R1 @ hat(w1)))
+    return ProjectedPolynomial(R0, R1, R0 @ hat(w0), R1 @ hat(w1))
 
 
 def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
@@ -232,109 +234,52 @@ def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
     return curve
 
 
-def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
-    """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
+def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
+    """Return the polynomial of least degree with these ends, or a derivative, at the times t.
 
-    It is the minimum-acceleration curve: of all curves with these ends it has the least
-    ∫ ‖x''‖² dt.
-
-    Parameters
-    ----------
-    x0, x1, v0, v1 : ndarray
-        They broadcast.
-
-    Returns
-    -------
-    ndarray, shape (4, ...)
-        The coefficients of 1, t, t², t³.
-
-    References
-    ----------
-    BK 6.2.
-
-    Examples
-    --------
-    >>> cubic_coefficients(0.0, 1.0, 0.0, 0.0)
-    array([ 0.,  0.,  3., -2.])
-    """
-    gap = x1 - x0
-    return _stack(x0, v0, 3 * gap - 2 * v0 - v1, v0 + v1 - 2 * gap)
-
-
-def quintic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array, a0: Array, a1: Array) -> Array:
-    """Return the quintic on [0, 1] with given values, first and second derivatives at its ends.
-
-    It is the minimum-jerk curve: of all curves with these ends it has the least ∫ ‖x'''‖² dt.
+    Written from the nearer end, it meets both exactly, however they differ in size. Of all curves
+    with its ends the line has the least ∫ ‖x'‖² dt, the cubic the least ∫ ‖x''‖² dt, and the
+    quintic the least ∫ ‖x'''‖² dt.
 
     Parameters
     ----------
-    x0, x1, v0, v1, a0, a1 : ndarray
-        They broadcast.
-
-    Returns
-    -------
-    ndarray, shape (6, ...)
-        The coefficients of 1, t, …, t⁵.
-
-    References
-    ----------
-    BK 6.
-
-    Examples
-    --------
-    >>> quintic_coefficients(0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
-    array([  0.,   0.,   0.,  10., -15.,   6.])
-    """
-    gap = x1 - x0 - v0 - a0 / 2
-    speed = v1 - v0 - a0
-    bend = a1 - a0
-    return _stack(
-        x0,
-        v0,
-        a0 / 2,
-        10 * gap - 4 * speed + bend / 2,
-        -15 * gap + 7 * speed - bend,
-        6 * gap - 3 * speed + bend / 2,
-    )
-
-
-def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
-    """Return a polynomial, or one of its derivatives, at the times t.
-
-    Parameters
-    ----------
-    coefficients : ndarray, shape (degree + 1, ...)
-        Of 1, t, t², ….
+    ends : sequence of array_like
+        x0, x1 of a line; x0, x1, v0, v1 of a cubic; x0, x1, v0, v1, a0, a1 of a quintic: values and
+        derivatives at t = 0 and 1.
     t : ndarray
-        The times; they broadcast with one coefficient.
-    order : int, optional
+        The times; they broadcast with the ends.
+    order : {0, 1, 2}, optional
         Which derivative.
 
     Returns
     -------
     ndarray
 
+    Raises
+    ------
+    ValueError
+        If `order` is another.
+
+    References
+    ----------
+    BK 6, BK 6.2.
+
     Examples
     --------
-    >>> polynomial(np.array([1.0, 2.0, 3.0]), np.array([0.0, 1.0]), 1)
-    array([2., 8.])
+    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
+    array([0. , 0.5, 1. ])
     """
-    for _ in range(order):
-        powers = np.arange(len(coefficients)).reshape(-1, *(1,) * (coefficients.ndim - 1))
-        coefficients = (powers * coefficients)[min(1, len(coefficients) - 1) :]
-    value: Array = np.array(coefficients[-1] + 0.0 * t)
-    for coefficient in coefficients[-2::-1]:  # Horner's scheme
-        value *= t
-        value += coefficient
-    return value[()]
+    weights = _weights(len(ends), t, check_order(order))
+    first, *others = (w * x for w, x in zip(weights, _terms(ends), strict=True))
+    return sum(others, first)
 
 
-def polynomials(coefficients: Array, t: Array, which: Chosen, order: int) -> Array:
-    """Return polynomials of a stack, or a derivative, components first.
+def hermite_stack(ends: Array, t: Array, which: Chosen, order: int) -> Array:
+    """Return `hermite` of a stack, components first.
 
     Parameters
     ----------
-    coefficients : ndarray, shape (degree + 1, ..., count)
+    ends : ndarray, shape (n, ..., count)
     t : ndarray, shape (T, K) or (T, 1)
     which : ndarray of int, shape (K,)
     order : int
@@ -343,19 +288,57 @@ def polynomials(coefficients: Array, t: Array, which: Chosen, order: int) -> Arr
     -------
     ndarray, shape (..., T, K)
     """
-    if len(t) > 1 or len(which) == 1 or not has_long_runs(which):
-        return polynomial(np.take(coefficients, which, axis=-1)[..., None, :], t, order)
-    core = coefficients.shape[1:-1]
-    powers = polynomial(np.eye(len(coefficients))[:, :, None], t[0], order)
-    flat = coefficients.reshape(len(coefficients), -1, coefficients.shape[-1])
-    values = np.empty((flat.shape[1], len(which)))
-    for curve, run in runs(which):
-        np.matmul(flat[:, :, curve].T, powers[:, run], out=values[:, run])
-    return values.reshape(*core, 1, len(which))
+    core = ends.shape[1:-1]
+    if len(which) != 1 and not (len(t) == 1 and has_long_runs(which)):
+        return hermite(np.take(ends, which, axis=-1)[..., None, :], t, order)
+    weights = np.stack(_weights(len(ends), t.ravel(), order))
+    terms = np.stack(_terms(ends)).reshape(len(weights), math.prod(core), ends.shape[-1])
+    values = np.empty((terms.shape[1], weights.shape[1]))
+    every = [(int(which[0]), slice(None))] if len(which) == 1 else runs(which)
+    for curve, run in every:
+        np.matmul(terms[:, :, curve].T, weights[:, run], out=values[:, run])
+    return values.reshape(*core, len(t), len(which))
 
 
-def _stack(*coefficients: Array) -> Array:
-    return np.stack(np.broadcast_arrays(*coefficients))
+def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
+    """Return what `_weights` are for: x0, x1, x1 − x0 and the derivatives at the ends."""
+    x0, x1, *rates = map(np.asarray, ends)
+    return [x0, x1, x1 - x0, *rates]
+
+
+def _weights(count: int, t: Array, order: int) -> list[Array]:
+    starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
+    early, none = t.real < 0.5, np.zeros_like(t)
+    if order == 0:
+        values = [none + early, none + ~early, np.where(early, ends[0], -starts[0])]
+    else:
+        values = [none, none, (-1) ** order * ends[0]]
+    rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
+    return [*values, *(weight for pair in rates for weight in pair)]
+
+
+def _start_weights(count: int, t: Array, order: int) -> list[Array]:
+    """Return the weights of x0, v0, a0, or their derivatives; those of x1, … are theirs at 1 − t.
+
+    The signs of the odd ones change.
+    """
+    s = 1 - t
+    table: list[list[Array]]
+    if count == 2:
+        table = [[s, 0 * t - 1, 0 * t]]
+    elif count == 4:
+        table = [
+            [s * s * (1 + 2 * t), -6 * t * s, 6 * (t - s)],
+            [t * s * s, s * (1 - 3 * t), 2 - 6 * s],
+        ]
+    else:
+        ss, sss = s * s, s * s * s
+        table = [
+            [sss * (1 + 3 * t + 6 * t * t), -30 * t * t * ss, 60 * t * s * (t - s)],
+            [t * sss * (1 + 3 * t), ss * (1 - 3 * t) * (1 + 5 * t), -12 * t * s * (3 - 5 * t)],
+            [t * t * sss / 2, t * ss * (2 - 5 * t) / 2, s * (1 - 8 * t + 10 * t * t)],
+        ]
+    return [row[order] for row in table]
 
 
 def _rates(R: Array, M: Array, M_rate: Array, M_bend: Array | None = None) -> list[Array]:

@@ -5,7 +5,7 @@ Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
 from typing import ClassVar
@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import check_order, first_index
+from rbcourse._checks import first_index
 from rbcourse._jets import Jet, angular_velocity, exp, multiply, product, rotation, slerp
 from rbcourse._numerics import EPS, Array
 from rbcourse.conversions import quaternion_from_matrix
@@ -26,7 +26,7 @@ from rbcourse.curves import (
     least_over_time,
     which_curve,
 )
-from rbcourse.projected_cubic import projected_cubic_so3
+from rbcourse.projected_cubic import hermite, projected_cubic_so3
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import exp_so3, log_so3, right_jacobian_inverse_so3
 
@@ -518,48 +518,3 @@ def _cubic(ends: Array, t: Array, order: int) -> Jet:
 def _rate(q: Array, w: Array) -> Array:
     """Return q' = q (0, w)/2."""
     return quaternion_multiply(q, np.concatenate([np.zeros_like(w[..., :1]), w], axis=-1)) / 2
-
-
-def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
-    """Return that cubic, or one of its first two derivatives, at the times t.
-
-    Written by its ends, it meets them exactly, however they differ in size.
-
-    Parameters
-    ----------
-    ends : sequence of array_like
-        x0, x1, v0, v1, as for `cubic_coefficients`.
-    t : ndarray
-        The times; they broadcast with the ends.
-    order : {0, 1, 2}, optional
-        Which derivative.
-
-    Returns
-    -------
-    ndarray
-
-    Raises
-    ------
-    ValueError
-        If `order` is another.
-
-    References
-    ----------
-    BK 6.2.
-
-    Examples
-    --------
-    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
-    array([0. , 0.5, 1. ])
-    """
-    check_order(order)
-    weights: list[Array]
-    s = 1 - t
-    if order == 0:
-        weights = [s * s * (1 + 2 * t), t * t * (1 + 2 * s), t * s * s, -t * t * s]
-    elif order == 1:
-        weights = [-6 * t * s, 6 * t * s, s * (1 - 3 * t), t * (1 - 3 * s)]
-    else:
-        weights = [6 * (t - s), 6 * (s - t), 2 - 6 * s, 6 * t - 2]
-    first, *others = (w * x for w, x in zip(weights, map(np.asarray, ends), strict=True))
-    return sum(others, first)

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
-from rbcourse.projected_cubic import cubic_coefficients, polynomial
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
 
@@ -101,6 +100,66 @@ def projected_cubic_so3(
     A_rate, S_rate = Rt @ M_bend - W @ A, A - W @ S
     a = np.linalg.solve(_spin(S), 2 * vee_so3(A_rate)[..., None] - _spin(S_rate) @ w)
     return R, w[..., 0], a[..., 0]
+
+
+def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
+    """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
+
+    It is the minimum-acceleration curve: of all curves with these ends it has the least
+    ∫ ‖x''‖² dt.
+
+    Parameters
+    ----------
+    x0, x1, v0, v1 : ndarray
+        They broadcast.
+
+    Returns
+    -------
+    ndarray, shape (4, ...)
+        The coefficients of 1, t, t², t³.
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> cubic_coefficients(*map(np.asarray, (0.0, 1.0, 0.0, 0.0)))
+    array([ 0.,  0.,  3., -2.])
+    """
+    gap = x1 - x0
+    return np.stack([x0, v0, 3 * gap - 2 * v0 - v1, v0 + v1 - 2 * gap])
+
+
+def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
+    """Return a polynomial, or one of its derivatives, at the times t.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (degree + 1, ...)
+        Of 1, t, t², ….
+    t : ndarray
+        The times; they broadcast with one coefficient.
+    order : int, optional
+        Which derivative.
+
+    Returns
+    -------
+    ndarray
+
+    Examples
+    --------
+    >>> polynomial(np.array([1.0, 2.0, 3.0]), np.array([0.0, 1.0]), 1)
+    array([2., 8.])
+    """
+    for _ in range(order):
+        powers = np.arange(len(coefficients)).reshape(-1, *(1,) * (coefficients.ndim - 1))
+        coefficients = (powers * coefficients)[min(1, len(coefficients) - 1) :]
+    value: Array = np.array(coefficients[-1] + 0.0 * t)
+    for coefficient in coefficients[-2::-1]:  # Horner's scheme
+        value *= t
+        value += coefficient
+    return value[()]
 
 
 def _spin(S: Array) -> Array:

@@ -24,6 +24,21 @@ def exact_polynomial(coefficients, t):
     return mp.fsum(c * t**k for k, c in enumerate(coefficients))
 
 
+def polynomial_through(ends, t):
+    """The polynomial with the values, then the derivatives, ... at 0 and 1, solved for; at t."""
+    count, ends = len(ends), np.asarray(ends, float)
+    with mp.workdps(DIGITS):
+        rows = [
+            [mp.ff(k, order) * mp.mpf(at) ** max(k - order, 0) for k in range(count)]
+            for order in range(count // 2)
+            for at in (0, 1)
+        ]
+        weights = mp.lu_solve(mp.matrix(rows).T, mp.matrix([mp.mpf(t) ** k for k in range(count)]))
+        columns = ends.reshape(count, -1).T.tolist()
+        values = [mp.fsum(w * mp.mpf(x) for w, x in zip(weights, c, strict=True)) for c in columns]
+        return np.array(values, float).reshape(ends.shape[1:])
+
+
 def exact_exp(w):
     """Rodrigues' formula, as an mpmath matrix; the caller sets the precision."""
     angle, W = exact_norm(w), exact_hat([mp.mpf(x) for x in w])

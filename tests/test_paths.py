@@ -93,6 +93,35 @@ def test_the_joints_are_as_smooth_as_stated(leg, poses):
     assert leg not in WITHOUT_VELOCITIES or np.abs(c.jumps(1)).max() > 0.1
 
 
+@pytest.mark.parametrize("ratio", [1, 10, 100, 1e4])
+@pytest.mark.parametrize("leg", [rb.projected_cubic_so3, rb.projected_quintic_so3])
+def test_uneven_steps_cost_no_digits(leg, ratio):
+    """At the poses, just before them, and in the joints; a rate to eps of ‖w‖ and ‖w‖² + ‖w'‖."""
+    steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
+    times = np.append(0, np.cumsum(steps))
+    c = rb.chain(times, POSES, leg=leg)
+    assert np.abs(c(times) - POSES).max() < 8 * EPS
+    assert np.abs(c.legs(1.0) - POSES[1:]).max() < 8 * EPS
+    speed = np.abs(c(times, 1)).max()
+    scales = 1, speed, speed**2 + np.abs(c(times, 2)).max()
+    for order in range(3 if leg is rb.projected_quintic_so3 else 2):
+        assert np.abs(c.jumps(order)).max() < 20 * EPS * scales[order]
+
+
+@pytest.mark.parametrize("ratio", [1, 10, 100, 1e4])
+def test_quintics_between_uneven_times_are_the_nearest_rotations(ratio):
+    """Against 60 digits; the rounding of M, however large, over its two least eigenvalues."""
+    times = np.append(0, np.cumsum([1, ratio, 1, ratio, ratio, 1, 1, ratio]))
+    legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic_so3).legs
+    for i, s in np.ndindex(N - 1, 5):
+        share = [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9][s]
+        M = oracles.polynomial_through(legs.ends[:, i], share)
+        R = oracles.nearest_rotation(M)
+        gap = oracles.two_smallest_eigenvalues(R.T @ M)
+        size = np.abs(legs.ends[:, i]).max()
+        assert np.abs(legs[i](share) - R).max() < 8 * EPS * max(1, size / gap)
+
+
 def test_optima_are_rotations_between_their_nodes():
     """Their series are cut off at 3e-12."""
     c = rb.chain(TIMES, ROTATIONS, 8 * TWISTS[:, :3], leg=rb.minimum_acceleration_so3)
@@ -410,8 +439,7 @@ def test_many_ways_and_one_turn():
     """A leg whose rotation is one for all."""
 
     def sliding(A0, A1):
-        path = np.stack([A0[:, :3, 3], A1[:, :3, 3] - A0[:, :3, 3]])
-        return RigidMotion(rb.geodesic_so3(np.eye(3), np.eye(3)), path)
+        return RigidMotion(rb.geodesic_so3(np.eye(3), np.eye(3)), A0[:, :3, 3], A1[:, :3, 3])
 
     places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
     c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))

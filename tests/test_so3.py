@@ -70,8 +70,13 @@ def test_of_huge_vectors_exp_is_a_rotation_and_the_jacobian_a_projection(length)
 
 @pytest.mark.parametrize(
     "function",
-    [rb.exp_so3, rb.right_jacobian_so3, rb.right_jacobian_inverse_so3, rb.exp_se3]
-    + [rb.quaternion_from_rotation_vector],
+    [
+        rb.exp_so3,
+        rb.right_jacobian_so3,
+        rb.right_jacobian_inverse_so3,
+        rb.exp_se3,
+        rb.quaternion_from_rotation_vector,
+    ],
 )
 def test_a_norm_that_overflows_is_named(function):
     w = np.zeros((2, 6 if function is rb.exp_se3 else 3))

@@ -55,7 +55,7 @@ def test_the_projected_cubic_is_the_textbooks():
         R0, R1 = Rotation.random(2, rng=rng).as_matrix()
         w0, w1 = 3 * rng.normal(size=(2, 3))
         curve = rb.projected_cubic_so3(R0, R1, w0, w1)
-        size = np.linalg.norm(curve.coefficients, axis=(-2, -1)).sum() / min(curve.margin, 1)
+        size = np.linalg.norm(curve.ends, axis=(-2, -1)).sum() / min(curve.margin, 1)
         for order, want in enumerate(textbook.projected_cubic_so3(R0, R1, w0, w1, t)):
             assert np.abs(curve(t, order) - want).max() < 4 * EPS * size ** (1 + order)
 
