@@ -366,6 +366,7 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
     rbcourse.textbook.geodesic_so3 : The same in two lines.
     projected_line_so3 : The same path by projection, at another speed.
     slerp : The same curve in quaternions.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----

@@ -96,6 +96,7 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
     See Also
     --------
     screw_se3 : The other natural motion, a geodesic of another metric.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -160,6 +161,7 @@ def projected_cubic_se3(
     See Also
     --------
     minimum_acceleration_se3 : The optimum with the same ends.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -223,6 +225,7 @@ def minimum_acceleration_se3(
     See Also
     --------
     projected_cubic_se3 : Its near-optimal stand-in, in closed form.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -267,6 +270,7 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
     --------
     geodesic_se3 : The same turn, while the origin runs straight.
     screw_from_pose : The axis and the pitch.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----

@@ -82,9 +82,9 @@ def chain(
 
     Notes
     -----
-    It is at its poses to a few eps, however uneven the steps are. What the joints have, to a few
-    eps of ‖w‖ and of ‖w‖² + ‖w'‖ where legs are projected; in between a leg is as accurate as alone,
-    at a time that is rounded to eps of its duration:
+    It is at its poses to a few eps, however uneven the steps are. Between them a leg is as accurate
+    as alone, at a time that is rounded to eps of its duration. What the joints have; where legs are
+    projected, to a few eps of the largest ‖w‖ and of ‖w‖² + ‖w'‖:
 
     ==========================================================  ==================================
     `geodesic_so3`, `geodesic_se3`, `screw_se3`,                C⁰: the velocity jumps

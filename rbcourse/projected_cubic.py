@@ -34,8 +34,13 @@ class ProjectedPolynomial(Curve):
     ends : ndarray, shape (n, ..., 3, 3)
         M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1).
     margin : ndarray, shape (...)
-        The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M. At 0
-        the nearest rotation is not unique.
+        The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M: how
+        far the curve stays from where the nearest rotation is not unique. A small margin condemns
+        a cubic: of 4,000 random ones (‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9) those with less than 0.7 cost at
+        least four times the optimum. A large one certifies nothing: BK Figure 5 has 1.75 of at most
+        2 and costs 1.77 times the optimum, and others with more than 1.9 cost up to 38 times. Where
+        det M < 0 at some time, as in a fifth of these cubics, the curve is defined and smooth, and
+        dear: there the median is 114 times the optimum, elsewhere 2.2 times.
     margin_time : ndarray, shape (...)
         When that is.
 
@@ -132,14 +137,15 @@ def projected_cubic_so3(
     rbcourse.textbook.projected_cubic_so3 : The same, matrix by matrix.
     minimum_acceleration_so3 : The optimum with the same ends.
     acceleration_cost : What both cost.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
-    Singular set: where the two smallest eigenvalues of RᵀM sum to 0, at some time; det M may
-    change its sign before, which does no harm. A curve past such a time is returned, and is right
-    on both sides; in between it jumps. Near it, where ``margin`` is small, the curve turns by up to
-    π in a time of about ``margin`` over the speed of M, and is accurate to a few eps ‖M‖ over the
-    sum at that time, its derivatives to that over its square and its cube.
+    Singular set: where the two smallest eigenvalues of RᵀM sum to 0, at some time. A curve past
+    such a time is returned, and is right on both sides; in between it jumps. Near it, where
+    ``margin`` is small, the curve turns by up to π in a time of about ``margin`` over the speed of
+    M, and is accurate to a few eps ‖M‖ over the sum at that time, its derivatives to that over its
+    square and its cube.
 
     Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1.
 
@@ -195,9 +201,15 @@ def projected_quintic_so3(
     See Also
     --------
     projected_cubic_so3 : The projection of a cubic, for given velocities only.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
+    The curve is in general not near the one of least jerk. From rest to rest, where the geodesic at
+    the pace of the quintic has the least ∫ ‖w''‖² dt, it has 1.002 times that for a turn by 20°,
+    1.17 times for 60°, 2.3 times for 90°, 11.6 times for 120° and 448 times for the 153° of BK
+    Figure 5.
+
     Singular set and invariance: as for `projected_cubic_so3`.
 
     References
@@ -230,7 +242,7 @@ def projected_cubic(ends: Ends) -> ProjectedPolynomial:
 def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
     """Return the curve, with a warning if its margin is below 1e-6."""
     if curve.may_jump():
-        warn_if_nearly_singular(curve.margin)
+        warn_if_nearly_singular(curve.margin, curve.margin_time)
     return curve
 
 

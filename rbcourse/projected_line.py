@@ -48,7 +48,7 @@ class ProjectedLine(AlongGeodesic):
         super().__init__(R0, rotation_vector)
         self._angle = as_angle(self._angle)
         self.margin = 2 * np.cos(self._angle / 2)
-        warn_if_nearly_singular(self.margin)
+        warn_if_nearly_singular(self.margin, 0.5)
         self._f, self._f_batch = timing, self.batch_shape
         self._number = np.arange(self.count).reshape(self.batch_shape)
         which = np.arange(self.count)
@@ -140,6 +140,7 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
     geodesic_so3 : The same path at constant speed.
     rbcourse.projected_line.f : The timing for constant speed (see the example).
     project_so : The projection, for any matrix.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----

@@ -58,7 +58,8 @@ def exponential_cubic_so3(
 
     See Also
     --------
-    projected_cubic_so3, minimum_acceleration_so3
+    projected_cubic_so3 : In the space of matrices.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -110,6 +111,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     See Also
     --------
     cumulative_bezier_so3 : From the same control points, quicker.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -169,6 +171,7 @@ def cumulative_bezier_so3(
     See Also
     --------
     bezier_so3 : De Casteljau's construction, from the same control points.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -222,6 +225,7 @@ def quaternion_cubic_so3(
     See Also
     --------
     projected_cubic_so3 : The same with matrices.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -278,6 +282,7 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     See Also
     --------
     exponential_cubic_so3 : The same in exponential coordinates.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----

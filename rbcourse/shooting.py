@@ -50,8 +50,8 @@ def shoot_minimum_acceleration_so3(
     ValueError
         If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
-        For a single problem, if Newton's method does not converge from either of two guesses: rare
-        for ‖w0‖, ‖w1‖ < 12. It takes seconds to say so for ‖w‖ of 30, and minutes for 1000.
+        For a single problem, if Newton's method converges from none of its starts: rare for ‖w0‖,
+        ‖w1‖ < 12. It takes seconds to say so for ‖w‖ of 30, and minutes for 1000.
 
     Warns
     -----
@@ -61,6 +61,7 @@ def shoot_minimum_acceleration_so3(
     See Also
     --------
     minimum_acceleration_so3 : The faster and more robust way.
+    retime : From [0, 1] to T seconds.
 
     Notes
     -----

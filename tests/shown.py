@@ -18,6 +18,7 @@ __import__("shown").record({folder!r})
 # What of a CSV need not be in the picture as a number: a pattern of "figure, column", and the share
 # that is there all the same.
 SHARES = {
+    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # beside what is drawn
     r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|problems \[1\])": 0,  # order, or colour
     r".*, (.* )?theta\d? \[rad\]": 0,  # where links and corners are
     r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface of fewer points
@@ -78,9 +79,13 @@ def numbers_of(artists):
 def not_shown(figures, shown):
     """The columns of the CSV files of figures whose numbers the artists do not hold."""
     for file in sorted(figures.glob("*.csv")):
+        if not file.with_suffix(".png").exists():
+            continue  # a table beside figures
         pool = np.load(shown / f"{file.stem}.npy")
         with file.open(encoding="utf-8", newline="") as lines:
             header, *rows = csv.reader(lines)
+        if "drawn [1]" in header:
+            rows = [row for row in rows if row[header.index("drawn [1]")] == "1"]
         for column, cells in zip(header, zip(*rows, strict=True), strict=True):
             place = f"{file.stem}, {column}"
             share = min((s for form, s in SHARES.items() if re.fullmatch(form, place)), default=1)

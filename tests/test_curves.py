@@ -186,7 +186,7 @@ def test_in_a_stack_the_pair_a_half_turn_apart_is_named():
 
 def test_just_before_the_half_turn_the_line_is_still_right():
     w = np.array([0, 0, np.pi - 1e-8])
-    with pytest.warns(RuntimeWarning, match="^margin < 1e-6: "):
+    with pytest.warns(RuntimeWarning, match="^margin < 1e-6: it is 1.0e-08 at t = 0.5,"):
         curve = rb.projected_line_so3(np.eye(3), oracles.exp_so3(w))
     assert abs(curve.margin - 1e-8) < 4 * EPS
     want = oracles.theta(0.5 + 1e-9, w[2]) * w[2]
@@ -346,6 +346,8 @@ def test_bad_arguments_are_named(make):
     curve = make(STARTS[0], GOALS[0])
     with pytest.raises(ValueError, match=r"t\[2\] is 1.5, a time in \[0, 1\] is wanted"):
         curve([0, 1, 1.5])
+    with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got True"):
+        GEODESICS(0.5, True)
     with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got 3"):
         curve(0.5, 3)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import oracles
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import rbcourse as rb
 from rbcourse.study import atlas
@@ -51,9 +52,11 @@ def test_every_figure_has_its_files_and_units_in_every_column():
     names = {file.stem for file in FIGURES.iterdir()}
     for name in names:
         files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
-        assert files - {".gif"} == {".png", ".pdf", ".csv"}
+        assert files - {".gif"} == {".png", ".pdf", ".csv"} or name == "paper_fig5_costs"
         for column in committed(name)[0]:
-            assert re.search(r" \[(1|m|rad|s|(m|rad)/s²?)\]$", column) or column in (
+            assert re.search(r" \[(1|m²?|rad²?|s|(m|rad)/s²?)\]$", column) or column in (
+                "figure",
+                "curve",
                 "frame",
                 "family",
             ), column
@@ -150,20 +153,39 @@ def test_the_data_of_paper_fig4(name, extra):
 def test_the_data_of_paper_fig5():
     w0, w1 = np.array([1, 2, 3]), np.array([2, 1, 1])
     turn = np.pi / 6 * np.array([1, 4, 3])
-    best, near = numbers("paper_fig5a"), numbers("paper_fig5b")
-    t = best["t [1]"]
-    R = np.array([best[f"R{i}{j} [1]"] for i in (1, 2, 3) for j in (1, 2, 3)]).T.reshape(-1, 3, 3)
-    want = oracles.rotation_of_quaternions(oracles.minimum_acceleration(turn, w0, w1).sol(t)[:4])
-    assert np.abs(R - want).max() < 1e-9
+    solution = oracles.minimum_acceleration(turn, w0, w1)
+    t = np.arange(106) / 105
+    R = oracles.rotation_of_quaternions(solution.sol(t)[:4])
     d0, d1, v0, v1 = np.zeros(3), np.array([8, 10, 12]), np.ones(3), np.array([1, 5, 3])
-    u = t[:, None]
-    path = d0 + v0 * u + (3 * (d1 - d0) - 2 * v0 - v1) * u**2 + (2 * (d0 - d1) + v0 + v1) * u**3
-    for data in (best, near):
-        assert np.abs(np.array([data[f"{x} [m]"] for x in "xyz"]).T - path).max() < 1e-10
-    ends = np.eye(3), rb.exp_so3(turn), w0, w1
-    projected = rb.projected_cubic_so3(*ends)(t)
-    R = np.array([near[f"R{i}{j} [1]"] for i in (1, 2, 3) for j in (1, 2, 3)]).T.reshape(-1, 3, 3)
-    assert np.abs(R - projected).max() < 1e-11
+    p = CubicHermiteSpline([0, 1], [d0, d1], [v0, v1])
+    costs = []
+    for name in ("paper_fig5a", "paper_fig5b"):
+        data = numbers(name)
+        read = {kind: np.stack([data[k] for k in data if k[0] == kind], axis=1) for kind in "Rva"}
+        w, w_dot = (
+            np.stack([data[f"w{i}{x} [rad]"] for i in (1, 2, 3)], axis=1) for x in ("", "'")
+        )
+        drawn = R if name == "paper_fig5a" else read["R"].reshape(-1, 3, 3)
+        assert np.abs(data["t [1]"] - t).max() < 1e-12
+        assert np.array_equal(np.flatnonzero(data["drawn [1]"]), np.arange(0, 106, 15))
+        assert np.abs(read["R"].reshape(-1, 3, 3) - drawn).max() < 1e-9
+        assert np.abs(np.stack([data[f"{x} [m]"] for x in "xyz"], axis=1) - p(t)).max() < 1e-10
+        for values, order in (("v", 1), ("a", 2)):
+            body = (np.swapaxes(drawn, 1, 2) @ p(t, order)[..., None])[..., 0]
+            assert np.abs(read[values] - body).max() < 1e-8
+        # The velocity of R, and its derivative, by splines through the numbers of the file.
+        entries = make_interp_spline(t, drawn.reshape(-1, 9), 7)
+        rate = np.swapaxes(drawn, 1, 2) @ entries(t, 1).reshape(-1, 3, 3)
+        assert np.abs(rb.vee_so3(rate) - w)[5:-5].max() < 1e-4
+        assert np.abs(make_interp_spline(t, w, 7)(t, 1) - w_dot)[5:-5].max() < 1e-3
+        costs.append([simpson(2 * np.sum(w_dot**2, 1), x=t), 2396])
+    assert np.abs(numbers("paper_fig5a")["w1' [rad]"] - solution.sol(t)[7]).max() < 1e-8
+    projected = rb.projected_cubic_so3(np.eye(3), rb.exp_so3(turn), w0, w1)(t)
+    assert np.abs(drawn - projected).max() < 1e-11
+    header, rows = committed("paper_fig5_costs")
+    assert header == ["figure", "curve", "rotation [rad²]", "translation [m²]"]
+    assert [row[:2] for row in rows] == [["5a", "optimum"], ["5b", "projection"]]
+    assert np.array([row[2:] for row in rows], float) == pytest.approx(np.array(costs), rel=1e-3)
 
 
 @pytest.mark.source("BK 1", "BK 7")

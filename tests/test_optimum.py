@@ -1,5 +1,7 @@
 """The optimum: two solvers of ours, SciPy's, and the equation itself."""
 
+import warnings
+
 import numpy as np
 import oracles
 import pytest
@@ -8,6 +10,9 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
+from rbcourse.curves import Ends
+from rbcourse.optimum import Solution, grid, relax
+from rbcourse.rivals import CLOSED_FORMS
 
 REST = np.zeros(3)
 ALONG = np.pi / 6 * np.array([1, 2, 3])
@@ -17,6 +22,11 @@ PAPER = {
     "4c": (ALONG, ALONG, ALONG + 5 * E1),
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
 }
+ASTRAY = (
+    [-0.46787982, 1.84514378, 2.04665512],
+    [-1.84205908, -6.79718364, -1.48113244],
+    [2.12409307, -7.32863165, -2.12777328],
+)
 SOLVERS = {
     "relaxation": rb.minimum_acceleration_so3,
     "shooting": rb.shoot_minimum_acceleration_so3,
@@ -24,12 +34,12 @@ SOLVERS = {
 TIMES = np.linspace(0, 1, 101)
 
 
-def random_ends(rng, angle, speed):
-    """A turn and two velocities, uniform in balls."""
-    directions = rng.normal(size=(3, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    lengths = np.array([angle, speed, speed]) * rng.random(3) ** (1 / 3)
-    return lengths[:, None] * directions
+def random_ends(rng, angle, speed, count):
+    """Turns and two velocities, uniform in balls, shape (3, count, 3)."""
+    directions = rng.normal(size=(3, count, 3))
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    lengths = np.reshape([angle, speed, speed], (3, 1, 1)) * np.cbrt(rng.random((3, count, 1)))
+    return lengths * directions
 
 
 def interpolants(values, degree):
@@ -91,17 +101,86 @@ def test_end_velocities_along_the_geodesic_give_the_closed_form(solver, shares):
     assert np.abs(curve(TIMES, 2) - np.outer(p(TIMES, 2), ALONG)).max() < 1e-9
 
 
+FAST = random_ends(np.random.default_rng(12), np.pi, 12, 1000)
+FASTEST = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(FAST[0]), *FAST[1:])
+
+
 @pytest.mark.source("BK 6.2")
-def test_500_random_problems_converge_and_none_costs_more_than_its_projection():
-    rng = np.random.default_rng(500)
-    turns, w0, w1 = np.moveaxis([random_ends(rng, 3, 9) for _ in range(500)], 1, 0)
-    ends = np.eye(3), rb.exp_so3(turns), w0, w1
-    best = rb.minimum_acceleration_so3(*ends)
-    assert best.residual.max() < 1e-11
-    assert np.abs([best(0) - ends[0], best(1) - ends[1]]).max() < 1e-11
-    assert np.abs([best(0, 1) - w0, best(1, 1) - w1]).max() < 1e-11
-    near = [rb.projected_cubic_so3(ends[0], *one) for one in zip(*ends[1:], strict=True)]
-    assert np.all([rb.acceleration_cost(curve) for curve in near] > best.cost)
+def test_1000_fast_problems_converge_to_their_ends():
+    R1 = rb.exp_so3(FAST[0])
+    assert FASTEST.residual.max() < 1e-11
+    assert np.abs([FASTEST(0) - np.eye(3), FASTEST(1) - R1]).max() < 1e-11
+    assert np.abs([FASTEST(0, 1) - FAST[1], FASTEST(1, 1) - FAST[2]]).max() < 1e-11
+
+
+@pytest.mark.source("BK 1", "BK 6.2")
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_no_closed_form_costs_less(name):
+    turn, w0, w1 = FAST
+    if name == "Bézier":
+        turn, w0, w1 = FAST[:, (np.linalg.norm(FAST[1:], axis=-1) < 9.42).all(axis=0)]
+    ends = np.eye(3), rb.exp_so3(turn), w0, w1
+    best = rb.minimum_acceleration_so3(*ends) if name == "Bézier" else FASTEST
+    times = np.linspace(0, 1, 2001)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "margin < 1e-6", RuntimeWarning)
+        curves = CLOSED_FORMS[name](*ends)
+    for part in (slice(i, i + 100) for i in range(0, len(turn), 100)):
+        squares = np.sum(curves[part](times, 2) ** 2, axis=-1)
+        rough = 2 * np.trapezoid(squares, times, axis=0)  # never much too low
+        assert np.all(rough > best.cost[part] * (1 - 1e-3))
+
+
+@pytest.mark.source("BK 6.2")
+def test_neither_way_round_costs_less():
+    """Newton's method from Bézier's curves in cumulative form, written out, all four ways."""
+    turn, w0, w1 = FAST
+    ends = Ends(np.eye(3) + np.zeros((1000, 1, 1)), rb.exp_so3(turn), w0, w1)
+    first, last, R1 = rb.exp_so3(-w0 / 3), rb.exp_so3(-w1 / 3), ends.R1
+    middle = rb.log_so3(first @ R1 @ last)
+    axis = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
+    t = grid(17).t[:, None]
+    for ways in (0, -1, 1, -2):
+        legs = (1 - (1 - t) ** 3) * w0[:, None] / 3, t**3 * w1[:, None] / 3
+        between = (3 * t**2 - 2 * t**3) * (middle + 2 * np.pi * ways * axis)[:, None]
+        R = rb.exp_so3(legs[0]) @ rb.exp_so3(between) @ rb.exp_so3(legs[1])
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = relax(ends, R)
+        costs = [one.cost if isinstance(one, Solution) else np.inf for one in found]
+        assert np.all(costs > FASTEST.cost * (1 - 1e-9))
+
+
+@pytest.mark.source("BK 6.2")
+def test_a_turned_room_a_turned_body_and_reversed_time_change_no_cost():
+    (turn, w0, w1), rng = FAST, np.random.default_rng(3)
+    L, Q = (Rotation.random(1000, rng=rng).as_matrix() for _ in range(2))
+    R1 = rb.exp_so3(turn)
+    inside = [(Q.mT @ w[..., None])[..., 0] for w in (w0, w1)]
+    for ends in ((L, L @ R1, w0, w1), (Q, R1 @ Q, *inside), (R1, np.eye(3), -w1, -w0)):
+        cost = rb.minimum_acceleration_so3(*ends).cost
+        assert np.abs(cost / FASTEST.cost - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+def test_a_problem_whose_short_way_leads_astray(solver):
+    """That costs 3504; Bézier's curves 603 and 553, the way round that was found first 549."""
+    turn, w0, w1 = np.array(ASTRAY)
+    curve = solver(np.eye(3), rb.exp_so3(turn), w0, w1)
+    assert curve.cost == pytest.approx(502.3476, rel=1e-6)
+    assert rb.acceleration_cost(curve) == pytest.approx(curve.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2])
+def test_along_a_path_of_goals_the_cost_has_no_jump(seed):
+    """Where two families cross it bends; a step then is no larger than its neighbours."""
+    if seed:
+        axis, w0, w1 = random_ends(np.random.default_rng(seed), np.pi, 12, 1)[:, 0]
+    else:
+        axis, w0, w1 = np.array(ASTRAY)
+    turns = np.linspace(0, 2 * np.pi, 500)[:, None] * axis / np.linalg.norm(axis)
+    cost = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(turns), w0, w1).cost
+    steps = np.abs(np.diff(cost))
+    assert np.all(steps[1:-1] < 3 * np.maximum(steps[:-2], steps[2:]) + 1e-9 * cost.max())
 
 
 @pytest.mark.source("BK (18)")
@@ -223,7 +302,7 @@ def test_what_does_not_converge_says_how_far_it_got(solver, speed):
 def random_stack(count, seed=300):
     """R0, R1, w0, w1 of random problems: turns up to 3 rad, velocities up to 6."""
     rng = np.random.default_rng(seed)
-    turn, w0, w1 = np.moveaxis([random_ends(rng, 3, 6) for _ in range(count)], 1, 0)
+    turn, w0, w1 = random_ends(rng, 3, 6, count)
     R0 = Rotation.random(count, rng=rng).as_matrix()
     return R0, R0 @ rb.exp_so3(turn), w0, w1
 

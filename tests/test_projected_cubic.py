@@ -91,6 +91,16 @@ def test_velocity_and_acceleration_are_the_derivatives(curve):
         assert np.abs(curve(t, 2) - rate)[calm].max() < 1e-6
 
 
+@pytest.mark.parametrize(("degrees", "times"), [(20, 1.002), (60, 1.17), (90, 2.31), (120, 11.6)])
+def test_the_quintic_is_not_of_least_jerk(degrees, times):
+    """About one axis least jerk is a quintic in the angle: 720 angle² from rest to rest."""
+    rest, angle = np.zeros(3), np.radians(degrees)
+    curve = rb.projected_quintic_so3(np.eye(3), rb.exp_so3([0, 0, angle]), rest, rest, rest, rest)
+    t = np.linspace(0, 1, 4001)
+    jerk = np.gradient(curve(t, 2)[:, 2], t, edge_order=2)
+    assert np.trapezoid(jerk**2, t) / (720 * angle**2) == pytest.approx(times, rel=2e-3)
+
+
 @pytest.mark.source("BK 6.1")
 def test_the_projected_line_has_the_ends_of_a_cubic_and_a_quintic_that_project_to_it():
     """They are the line times a positive number ρ(t), which the projection does not see."""
@@ -136,7 +146,9 @@ def test_the_margin_is_the_least_gap():
 def test_a_margin_of_nothing_is_said():
     """From rest to rest over a half-turn: the cubic runs through a matrix of rank 1."""
     half, rest = np.diag([1.0, -1, -1]), np.zeros(3)
-    with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6: .* jumps there"):
+    with pytest.warns(
+        RuntimeWarning, match=r"^margin < 1e-6: it is below 1e-12 at t = 0\.5, .* jumps"
+    ):
         curve = rb.projected_cubic_so3(np.eye(3), half, rest, rest)
     assert curve.margin < 8 * EPS
     assert np.abs(curve([0, 0.3, 0.7, 1]) - [np.eye(3), np.eye(3), half, half]).max() < 80 * EPS
@@ -144,7 +156,7 @@ def test_a_margin_of_nothing_is_said():
         with pytest.raises(ValueError, match=r"^t = 0\.5: the nearest rotation is not unique"):
             curve([0.3, 0.5], order)
     pair = np.stack([np.eye(3), half])
-    with pytest.warns(RuntimeWarning, match=r"of curve \[1\]"):
+    with pytest.warns(RuntimeWarning, match=r"of curve \[1\]: .* at t = 0\.5,"):
         curves = rb.projected_quintic_so3(np.eye(3), pair, rest, rest, rest, rest)
     assert np.abs(curves.margin - [2, 0]).max() < 8 * EPS
     with pytest.raises(ValueError, match=r"t = 0\.5 of curve \[1\]"):

@@ -41,6 +41,15 @@ def test_the_cubic_is_the_papers():
     assert np.abs(cubic_coefficients(R0, R1, V0, V1) - printed).max() < 20 * EPS
 
 
+@pytest.mark.source("BK 6.2")
+def test_the_cubic_by_its_ends_is_that_of_its_coefficients():
+    ends, t = RNG.normal(size=(4, 3, 3)), np.linspace(0, 1, 9)[:, None, None]
+    coefficients = cubic_coefficients(*ends)
+    for order in (0, 1, 2):
+        want = polynomial(coefficients, t, order)
+        assert np.abs(hermite(ends, t, order) - want).max() < 200 * EPS * np.abs(ends).max()
+
+
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.source("BK 6")
 def test_all_are_optimal(count):

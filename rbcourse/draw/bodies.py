@@ -11,6 +11,7 @@ from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from rbcourse._numerics import Array
+from rbcourse.curves import Curve
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.so3 import angle_between
 
@@ -26,6 +27,28 @@ def pose_table(first: Table, poses: Array) -> Table:
     position = dict(zip(["x [m]", "y [m]", "z [m]"], poses[:, :3, 3].T, strict=True))
     entries = {f"R{i + 1}{j + 1} [1]": poses[:, i, j] for i in range(3) for j in range(3)}
     return {**first, **position, **entries}
+
+
+def motion_table(t: Array, motion: Curve, drawn: Array) -> Table:
+    """Return times, which of them are drawn, and the poses, twists and accelerations of a motion.
+
+    The twists (w, v) and the accelerations (w', a), a = Rᵀ d'', are in the body frame (BK 6.3).
+
+    Examples
+    --------
+    >>> from rbcourse import geodesic_se3
+    >>> t = np.linspace(0, 1, 7)
+    >>> list(motion_table(t, geodesic_se3(np.eye(4), np.eye(4)), t[::2])["drawn [1]"])
+    [1, 0, 1, 0, 1, 0, 1]
+    """
+    first = {"t [1]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
+    parts = {"w{} [rad]": (1, 0), "v{} [m]": (1, 3), "w{}' [rad]": (2, 0), "a{} [m]": (2, 3)}
+    rates = {
+        name.format(i + 1): motion(t, order)[:, start + i]
+        for name, (order, start) in parts.items()
+        for i in range(3)
+    }
+    return {**pose_table(first, motion(t)), **rates}
 
 
 def draw_box(ax: Any, pose: Array, edges: float | Array) -> Poly3DCollection:

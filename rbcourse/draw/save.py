@@ -71,15 +71,20 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
     The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, or else
     to ``figures`` in the current folder. The same input gives the same bytes.
     """
-    text = csv_text(data)
+    save_table(name, data)
     folder = figures_folder()
     picture = io.BytesIO()
     fig.savefig(picture, format="png", metadata={"Software": None})
     fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
     plt.close(fig)
     (folder / f"{name}.png").write_bytes(picture.getvalue())
-    (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
     return Picture(name, alt, picture.getvalue())
+
+
+def save_table(name: str, data: Table) -> None:
+    """Save numbers as a CSV, in the folder of `save_figure`."""
+    text = csv_text(data)
+    (figures_folder() / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
 
 
 def figures_folder() -> Path:
