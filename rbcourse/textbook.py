@@ -214,7 +214,7 @@ def minimum_acceleration_so3(
     --------
     >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
     >>> R, w, a = minimum_acceleration_so3(I, R1, rest, rest, np.array([0, 0.5, 1]))
-    >>> log_so3(R)[:, 2].round(9)
+    >>> log_so3(R)[:, 2].round(9) + 0.0
     array([0.  , 0.75, 1.5 ])
     """
     from scipy.integrate import solve_bvp

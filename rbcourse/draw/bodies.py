@@ -38,8 +38,8 @@ def motion_table(t: Array, motion: Curve, drawn: Array) -> Table:
     --------
     >>> from rbcourse import geodesic_se3
     >>> t = np.linspace(0, 1, 7)
-    >>> list(motion_table(t, geodesic_se3(np.eye(4), np.eye(4)), t[::2])["drawn [1]"])
-    [1, 0, 1, 0, 1, 0, 1]
+    >>> motion_table(t, geodesic_se3(np.eye(4), np.eye(4)), t[::2])["drawn [1]"]
+    array([1, 0, 1, 0, 1, 0, 1])
     """
     first = {"t [1]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
     parts = {"w{} [rad]": (1, 0), "v{} [m]": (1, 3), "w{}' [rad]": (2, 0), "a{} [m]": (2, 3)}
