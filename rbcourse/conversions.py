@@ -131,13 +131,13 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
     ValueError
         If a norm overflows.
     """
-    _, exponent = np.frexp(np.abs(w).max(axis=-1, keepdims=True))  # so that no square overflows
-    near_one = np.ldexp(w, -exponent)
-    length = np.linalg.norm(near_one, axis=-1, keepdims=True)
     with np.errstate(over="ignore"):
-        angle = np.ldexp(length, exponent)
-    as_finite("norm of w", angle[..., 0])
-    return near_one / np.where(length == 0, 1.0, length), angle
+        angle = np.linalg.norm(w, axis=-1, keepdims=True)
+        extreme = ~((angle > 1e-150) & (angle < 1e150))[..., 0]
+        if extreme.any():  # squares have left the range of floating-point numbers
+            angle[extreme] = np.hypot.reduce(w[extreme], axis=-1, keepdims=True)
+            as_finite("norm of w", angle[..., 0])
+    return w / np.where(angle == 0, 1.0, angle), angle
 
 
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from rbcourse.optimum import relax, solve
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
     hermite_stack,
+    hermite_terms,
     projected_cubic,
     watched,
 )
@@ -48,8 +50,7 @@ class RigidMotion(Curve):
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         """Write (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
-        path = np.moveaxis(self._flat(self.path, 1), 1, -1)
-        d = np.moveaxis(hermite_stack(path, t, which, order), 0, -1)
+        d = np.moveaxis(hermite_stack(self._entries, t, which, order), 0, -1)
         R, turning = (np.empty((*out.shape[:2], *core)) for core in ((3, 3), (3,)))
         self.rotation._at(t, which, 0, R)
         if order == 0:
@@ -58,6 +59,12 @@ class RigidMotion(Curve):
         else:
             self.rotation._at(t, which, order, turning)
             out[..., :3], out[..., 3:] = turning, (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
+
+    @cached_property
+    def _entries(self) -> Array:
+        """The terms of the path, shape (n + 1, 3, count)."""
+        terms = hermite_terms(np.moveaxis(self._flat(self.path, 1), 1, -1))
+        return np.stack([np.ascontiguousarray(x) for x in terms])
 
     def _events(self) -> list[tuple[float, float]]:
         return self.rotation._events()

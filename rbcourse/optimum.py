@@ -525,22 +525,16 @@ def _relax(ends: Ends, R: Array) -> list[Solution | Failure]:
             R = orthogonal(along(_interpolation(R.shape[1], n), R))
             R[:, 0], R[:, -1] = ends.R0, ends.R1
         now = _newton(ends, R, c)
-        steps = steps + now.steps
-        cost = exact_cost(ends, now.R, now.c)
-        for k, i in enumerate(which):
-            solved, outcome = now.verdict[k] == SOLVED, (float(now.left[k]), int(steps[k]))
-            found[i] = (
-                Solution(now.R[k], now.c[k], float(cost[k]), *outcome)
-                if solved
-                else Failure(*outcome)
-            )
-        finer = now.verdict == FINER
-        which, steps, ends, R, c = (
-            which[finer],
-            steps[finer],
+        steps += now.steps
+        solved, finer = now.verdict == SOLVED, now.verdict == FINER
+        for i, left, taken in zip(which, now.left.tolist(), steps.tolist(), strict=True):
+            found[i] = Failure(left, taken)
+        costs = exact_cost(ends.of(solved), now.R[solved], now.c[solved])
+        for k, cost in zip(np.flatnonzero(solved), costs.tolist(), strict=True):
+            found[which[k]] = Solution(now.R[k], now.c[k], cost, *found[which[k]])
+        ends, (which, steps, R, c) = (
             ends.of(finer),
-            now.R[finer],
-            now.c[finer],
+            (x[finer] for x in (which, steps, now.R, now.c)),
         )
     return found
 

@@ -68,8 +68,9 @@ class ProjectedPolynomial(Curve):
 
     @cached_property
     def _entries(self) -> Array:
-        """The ends, shape (n, 3, 3, count)."""
-        return np.ascontiguousarray(np.moveaxis(self._flat(self.ends, 1), 1, -1))
+        """The terms, shape (n + 1, 3, 3, count)."""
+        terms = hermite_terms(np.moveaxis(self._flat(self.ends, 1), 1, -1))
+        return np.stack([np.ascontiguousarray(x) for x in terms])
 
     @property
     def margin(self) -> Array:
@@ -281,17 +282,15 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
     array([0. , 0.5, 1. ])
     """
-    weights = _weights(len(ends), t, check_order(order))
-    first, *others = (w * x for w, x in zip(weights, _terms(ends), strict=True))
-    return sum(others, first)
+    return _sum(_weights(len(ends), t, check_order(order)), hermite_terms(ends))
 
 
-def hermite_stack(ends: Array, t: Array, which: Chosen, order: int) -> Array:
-    """Return `hermite` of a stack, components first.
+def hermite_stack(terms: Array, t: Array, which: Chosen, order: int) -> Array:
+    """Return `hermite` of a stack with these `hermite_terms`, components first.
 
     Parameters
     ----------
-    ends : ndarray, shape (n, ..., count)
+    terms : ndarray, shape (n + 1, ..., count)
     t : ndarray, shape (T, K) or (T, 1)
     which : ndarray of int, shape (K,)
     order : int
@@ -300,33 +299,42 @@ def hermite_stack(ends: Array, t: Array, which: Chosen, order: int) -> Array:
     -------
     ndarray, shape (..., T, K)
     """
-    core = ends.shape[1:-1]
+    core = terms.shape[1:-1]
     if len(which) != 1 and not (len(t) == 1 and has_long_runs(which)):
-        return hermite(np.take(ends, which, axis=-1)[..., None, :], t, order)
-    weights = np.stack(_weights(len(ends), t.ravel(), order))
-    terms = np.stack(_terms(ends)).reshape(len(weights), math.prod(core), ends.shape[-1])
-    values = np.empty((terms.shape[1], weights.shape[1]))
-    every = [(int(which[0]), slice(None))] if len(which) == 1 else runs(which)
-    for curve, run in every:
-        np.matmul(terms[:, :, curve].T, weights[:, run], out=values[:, run])
+        chosen = np.take(terms, which, axis=-1)[..., None, :]
+        return _sum(_weights(len(terms) - 1, t, order), chosen)
+    weights = np.stack(_weights(len(terms) - 1, t.ravel(), order))
+    flat = terms[-len(weights) :].reshape(len(weights), math.prod(core), terms.shape[-1])
+    if len(which) == 1:
+        values = flat[:, :, which[0]].T @ weights
+    else:
+        values = np.empty((flat.shape[1], weights.shape[1]))
+        for curve, run in runs(which):
+            np.matmul(flat[:, :, curve].T, weights[:, run], out=values[:, run])
     return values.reshape(*core, len(t), len(which))
 
 
-def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
-    """Return what `_weights` are for: x0, x1, x1 − x0 and the derivatives at the ends."""
+def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
+    """Return the sum of the last terms, weighed."""
+    first, *others = (w * x for w, x in zip(weights, terms[-len(weights) :], strict=True))
+    return sum(others, first)
+
+
+def hermite_terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
+    """Return what a polynomial is a sum of: x0, x1, x1 − x0 and the derivatives at the ends."""
     x0, x1, *rates = map(np.asarray, ends)
     return [x0, x1, x1 - x0, *rates]
 
 
 def _weights(count: int, t: Array, order: int) -> list[Array]:
+    """Return what the terms weigh; those of derivatives begin with x1 − x0."""
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
-    early, none = t.real < 0.5, np.zeros_like(t)
-    if order == 0:
-        values = [none + early, none + ~early, np.where(early, ends[0], -starts[0])]
-    else:
-        values = [none, none, (-1) ** order * ends[0]]
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
-    return [*values, *(weight for pair in rates for weight in pair)]
+    weights = [weight for pair in rates for weight in pair]
+    if order:
+        return [(-1) ** order * ends[0], *weights]
+    early = t.real < 0.5
+    return [early + 0 * t, ~early + 0 * t, np.where(early, ends[0], -starts[0]), *weights]
 
 
 def _start_weights(count: int, t: Array, order: int) -> list[Array]:
@@ -335,22 +343,27 @@ def _start_weights(count: int, t: Array, order: int) -> list[Array]:
     The signs of the odd ones change.
     """
     s = 1 - t
-    table: list[list[Array]]
-    if count == 2:
-        table = [[s, 0 * t - 1, 0 * t]]
-    elif count == 4:
-        table = [
-            [s * s * (1 + 2 * t), -6 * t * s, 6 * (t - s)],
-            [t * s * s, s * (1 - 3 * t), 2 - 6 * s],
-        ]
-    else:
-        ss, sss = s * s, s * s * s
-        table = [
-            [sss * (1 + 3 * t + 6 * t * t), -30 * t * t * ss, 60 * t * s * (t - s)],
-            [t * sss * (1 + 3 * t), ss * (1 - 3 * t) * (1 + 5 * t), -12 * t * s * (3 - 5 * t)],
-            [t * t * sss / 2, t * ss * (2 - 5 * t) / 2, s * (1 - 8 * t + 10 * t * t)],
-        ]
-    return [row[order] for row in table]
+    match count, order:
+        case 2, 0:
+            return [s]
+        case 2, 1:
+            return [0 * t - 1]
+        case 2, 2:
+            return [0 * t]
+        case 4, 0:
+            return [s * s * (1 + 2 * t), t * s * s]
+        case 4, 1:
+            return [-6 * t * s, s * (1 - 3 * t)]
+        case 4, 2:
+            return [6 * (t - s), 2 - 6 * s]
+        case 6, 0:
+            sss = s * s * s
+            return [sss * (1 + 3 * t + 6 * t * t), t * sss * (1 + 3 * t), t * t * sss / 2]
+        case 6, 1:
+            ts, ss = t * s, s * s
+            return [-30 * ts * ts, ss * (1 - 3 * t) * (1 + 5 * t), ts * s * (2 - 5 * t) / 2]
+    ts = t * s
+    return [60 * ts * (t - s), -12 * ts * (3 - 5 * t), s * (1 - 8 * t + 10 * t * t)]
 
 
 def _rates(R: Array, M: Array, M_rate: Array, M_bend: Array | None = None) -> list[Array]:
