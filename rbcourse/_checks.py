@@ -30,7 +30,8 @@ def as_array(
         names the argument, the wanted and the given.
     """
     given: Any
-    if isinstance(value, np.ma.MaskedArray):
+    parts: Any = value if isinstance(value, list | tuple) else [value]
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
         raise ValueError(f"{name}: a masked array, whose mask would be lost; fill or compress it")
     try:
         given = np.asarray(value)

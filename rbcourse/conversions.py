@@ -103,7 +103,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        If `w` is not finite or not of that shape.
+        If `w` or its norm is not finite, or `w` is not of that shape.
 
     See Also
     --------
@@ -134,7 +134,7 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
     with np.errstate(over="ignore"):
         angle = np.linalg.norm(w, axis=-1, keepdims=True)
         extreme = ~((angle > 1e-150) & (angle < 1e150))[..., 0]
-        if extreme.any():  # squares have left the range of floating-point numbers
+        if extreme.any():  # zero, or squares have left the range of numbers
             angle[extreme] = np.hypot.reduce(w[extreme], axis=-1, keepdims=True)
             as_finite("norm of w", angle[..., 0])
     return w / np.where(angle == 0, 1.0, angle), angle

@@ -16,12 +16,15 @@ from rbcourse.curves import Chosen, Curve, Ends, check_ends, combine
 from rbcourse.projection import nearest
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-COARSE = 17  # nodes, on which curves are started and systems solved
+COARSE = 17  # nodes, on which curves are started and systems solved;
+LESS_COARSE = 33  # where that does not do
+MOST_TURNS = 4  # starts have fewer full turns more than the shortest way
 DESCENTS = 3  # steps that lower the cost of a start
 BUMPS = 8  # polynomials that each component of such a step is made of
 CLOSE = 2.0  # starts that cost more than this many times the cheapest are dropped,
 FAST = 12.0  # rad: but where ‖w0‖ + ‖w1‖ is larger, not before their cost is lowered
-NODES = (17, 33, 65, 129, 257)
+FASTER = 24.0  # rad: beyond this both are done
+ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
 STEPS = 25
 EXACT = 3e-12  # what may be left of the equation, and of R in the last Chebyshev coefficients
 LONGEST_STEP = 0.5
@@ -123,7 +126,7 @@ class ConvergenceError(RuntimeError):
     def __init__(self, residual: float, iterations: int) -> None:
         super().__init__(
             f"no convergence: residual {residual:.1e} after {iterations} iterations; "
-            "the end velocities may be too large, or the rotations a half-turn apart"
+            "the end velocities may be too large"
         )
         self.residual = residual
         self.iterations = iterations
@@ -331,7 +334,7 @@ def exact_cost(ends: Ends, R: Array, c: Array) -> Array:
 
 
 def at_nodes(curve: Curve) -> Array:
-    """Return a stack of N curves at the nodes that `relax` starts from, shape (N, 17, 3, 3)."""
+    """Return a stack of N curves at 17 nodes, to `relax` from, shape (N, 17, 3, 3)."""
     return np.moveaxis(curve(grid(COARSE).t), 0, 1)
 
 
@@ -346,7 +349,7 @@ def first_guess(ends: Ends, R: Array) -> tuple[Array, Array]:
 
 
 Solver = Callable[[Ends, Array], list[Solution | Failure]]
-"""Takes ends and rotations to start from, shape (N, 17, 3, 3)."""
+"""Takes ends and rotations to start from, shape (N, n, 3, 3)."""
 
 
 def solve(solver: Solver, given: Ends) -> MinimumAcceleration:
@@ -375,22 +378,24 @@ def solve(solver: Solver, given: Ends) -> MinimumAcceleration:
 
 
 def _cheapest(solver: Solver, ends: Ends) -> list[Solution | Failure]:
-    """Follow the starts that cost little when `lowered`; the rest where that is not enough.
+    """Follow the starts that cost little when `lowered`; where that is not enough, all as they are.
 
-    It is not where nothing is found, or what is found costs more than a start.
+    It is not where nothing is found, or what is found costs more than a start, lowered or not.
     """
-    problem, R = starts(ends)
-    cost = cost_at_nodes(R)
-    fast = np.linalg.norm([ends.w0, ends.w1], axis=-1).sum(axis=0) > FAST
-    some = fast[problem] | _are_close(problem, cost)
+    problem, R = starts(ends, COARSE)
+    raw = cost_at_nodes(R)
+    speed = np.linalg.norm([ends.w0, ends.w1], axis=-1).sum(axis=0)
+    some, cost = (speed > FAST)[problem] | _are_close(problem, raw), raw.copy()
     R[some], cost[some] = lowered(R[some])
     likely = _are_close(problem, cost)
     found = _followed(solver, ends, problem[likely], R[likely])
-    lost = np.array([_cost(one) for one in found])[problem] > cost * (1 + ROUGH)
-    rest = ~likely & np.isin(problem, problem[lost])
-    if rest.any():
-        others = _followed(solver, ends, problem[rest], R[rest])
-        found = [min(pair, key=_cost) for pair in zip(found, others, strict=True)]
+    bound = ABOUT * np.fmin(raw, cost)
+    dear = np.array([_cost(one) for one in found])[problem] > bound
+    lost = np.unique(problem[dear | (speed > FASTER)[problem]])
+    if lost.size:
+        again, R = starts(ends.of(lost), LESS_COARSE)
+        for i, one in zip(lost, _followed(solver, ends.of(lost), again, R), strict=True):
+            found[i] = min(found[i], one, key=_cost)
     return found
 
 
@@ -416,12 +421,12 @@ def _cost(one: Solution | Failure) -> float:
     return one.cost if isinstance(one, Solution) else np.inf
 
 
-def starts(ends: Ends) -> tuple[NDArray[np.intp], Array]:
-    """Return curves with these ends at the nodes, and the numbers of the problems they are for.
+def starts(ends: Ends, n: int) -> tuple[NDArray[np.intp], Array]:
+    """Return curves with these ends at n nodes, and the numbers of the problems they are for.
 
     From Bézier's control point C₁ = R0 exp(ŵ0/3) to the other one, R1 exp(−ŵ1/3), turns v: the
-    shortest way, the other way round, and, where the legs ŵ0/3 and ŵ1/3 are longer than a full turn
-    together, both ways with a turn more. With β = 3t² − 2t³ the curve
+    shortest way and the other way round, and both with k full turns more where the legs ŵ0/3 and
+    ŵ1/3 are together longer than 2k − 1 full turns. With β = 3t² − 2t³ the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
 
@@ -431,16 +436,19 @@ def starts(ends: Ends) -> tuple[NDArray[np.intp], Array]:
     ahead, back = exp_so3(np.stack([first, -last]))
     C1 = ends.R0 @ ahead
     v = log_so3(C1.mT @ ends.R1 @ back)
-    angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    full = 2 * np.pi * v / np.where(angle == 0, 1, angle)
-    lengths = np.linalg.norm([first, last], axis=-1).sum(axis=0)
-    every, fast = np.arange(len(v)), np.flatnonzero(lengths > 2 * np.pi)
-    problem = np.concatenate([every, every, fast, fast])
-    v = np.concatenate([v, v - full, (v + full)[fast], (v - 2 * full)[fast]])
-    t = grid(COARSE).t[:, None]
-    eta = t**3 * last[:, None] - (1 - t) ** 3 * first[:, None]
-    turned = exp_so3(t * t * (3 - 2 * t) * v[:, None])
-    return problem, C1[problem, None] @ turned @ exp_so3(eta)[problem]
+    along_v = v + 1e-9 * (first + last)  # a direction where v is 0
+    full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-300)[:, None]
+    length = np.linalg.norm([first, last], axis=-1).sum(axis=0)
+    problem, turns = [], []
+    for more in range(MOST_TURNS):
+        some = np.flatnonzero(length >= (4 * more - 2) * np.pi)
+        problem += [some, some]
+        turns += [(v + more * full)[some], (v - (more + 1) * full)[some]]
+    number, turn = np.concatenate(problem), np.concatenate(turns)
+    t = grid(n).t[:, None]
+    between = exp_so3(t * t * (3 - 2 * t) * turn[:, None])
+    over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
+    return number, C1[number, None] @ between @ over[number]
 
 
 def lowered(R: Array) -> tuple[Array, Array]:
@@ -506,7 +514,7 @@ def _attempt(solver: Solver, ends: Ends, R: Array) -> list[Solution | Failure]:
 
 
 def relax(ends: Ends, R: Array) -> list[Solution | Failure]:
-    """Solve (19) for a stack by Newton's method, from rotations at 17 nodes.
+    """Solve (19) for a stack by Newton's method, from rotations at nodes, shape (N, n, 3, 3).
 
     First on these nodes, until the steps are short; then on twice as many, and twice as many again,
     until the last Chebyshev coefficients of R have decayed.
@@ -518,13 +526,14 @@ def _relax(ends: Ends, R: Array) -> list[Solution | Failure]:
     found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
     which, steps = np.arange(len(R)), np.zeros(len(R), int)
     R, c = first_guess(ends, R)
-    for n in NODES:
+    intervals = R.shape[1] - 1
+    for stride in (1, 2, 4, 8, 16):
         if not len(which):
             break
-        if n > COARSE:
-            R = orthogonal(along(_interpolation(R.shape[1], n), R))
+        if stride > 1:
+            R = orthogonal(along(_interpolation(R.shape[1], stride * intervals + 1), R))
             R[:, 0], R[:, -1] = ends.R0, ends.R1
-        now = _newton(ends, R, c)
+        now = _newton(ends, R, c, stride)
         steps += now.steps
         solved, finer = now.verdict == SOLVED, now.verdict == FINER
         for i, left, taken in zip(which, now.left.tolist(), steps.tolist(), strict=True):
@@ -552,9 +561,8 @@ class Iterate(NamedTuple):
     verdict: NDArray[np.intp]
 
 
-def _newton(ends: Ends, R: Array, c: Array) -> Iterate:
+def _newton(ends: Ends, R: Array, c: Array, stride: int) -> Iterate:
     """Improve R and c, no node turned by more than half a rad at once."""
-    stride = (R.shape[1] - 1) // (COARSE - 1)
     R, c, count = R.copy(), c.copy(), len(R)
     left, size = np.full((2, count), np.inf)
     steps, verdict = np.zeros((2, count), int)
@@ -563,7 +571,11 @@ def _newton(ends: Ends, R: Array, c: Array) -> Iterate:
         E, W = defects(ends.of(active), R[active], c[active])
         before, left[active] = left[active], np.abs(E).max(axis=(1, 2, 3))
         left[np.isnan(left)] = np.inf
-        verdict[active] = _verdicts(R[active], left[active], before, size[active])
+        verdict[active] = (
+            np.where(size[active] < ROUGH, FINER, FAILED)
+            if stride == 1
+            else _verdicts(R[active], left[active], before, size[active])
+        )
         going = (verdict[active] == FAILED) & np.isfinite(left[active])
         if not going.any():
             break
@@ -580,11 +592,9 @@ def _newton(ends: Ends, R: Array, c: Array) -> Iterate:
 def _verdicts(R: Array, left: Array, before: Array, size: Array) -> NDArray[np.intp]:
     """Tell what is solved, and what wants finer nodes, after a step of that size; else FAILED.
 
-    On the fewest nodes nothing is solved. On others it is where the equation and the coefficients
-    are; it wants finer ones where the coefficients are the larger, or rounding stops the iteration.
+    It is solved where the equation and the last coefficients are small; it wants finer nodes where
+    the coefficients are the larger, or where rounding stops the iteration.
     """
-    if R.shape[1] == COARSE:
-        return np.where(size < ROUGH, FINER, FAILED)
     tail = tails(R)
     stalled = (size < 1e-6) & (left > before / 2)
     enough = stalled | (tail > EXACT) & (size < 1e3 * tail)

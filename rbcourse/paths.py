@@ -137,8 +137,10 @@ def chain(
         raise ValueError(f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}")
     legs = _made(leg, {name: ends[name] for name in wanted})
     if moves and "A0" not in wanted:
-        path = _ends("d{}", poses[:, :3, 3]) | _ends("w{}", d_dot, h) | _ends("a{}", d_bend, h**2)
-        legs = RigidMotion(legs, *(x for k, x in path.items() if k[0] == "d" or k in wanted))
+        path = [(poses[:, :3, 3], 1.0), (d_dot, h), (d_bend, h**2)]
+        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # that legs ask for
+        ends = [_ends("d{}", *part).values() for part in path[: 1 + order]]
+        legs = RigidMotion(legs, *(x for pair in ends for x in pair))
     _check_arrival(legs, poses)
     return Chain(times, legs, velocities)
 

@@ -35,12 +35,12 @@ class ProjectedPolynomial(Curve):
         M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1).
     margin : ndarray, shape (...)
         The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M: how
-        far the curve stays from where the nearest rotation is not unique. A small margin condemns
-        a cubic: of 4,000 random ones (‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9) those with less than 0.7 cost at
-        least four times the optimum. A large one certifies nothing: BK Figure 5 has 1.75 of at most
-        2 and costs 1.77 times the optimum, and others with more than 1.9 cost up to 38 times. Where
-        det M < 0 at some time, as in a fifth of these cubics, the curve is defined and smooth, and
-        dear: there the median is 114 times the optimum, elsewhere 2.2 times.
+        far the curve stays from where the nearest rotation is not unique. A small margin is a sign
+        of a poor cubic: of 4,000 random ones (‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9) those with less than 0.7
+        cost about four times the optimum or more. A large one certifies nothing: BK Figure 5 has
+        1.75 of at most 2 and costs 1.77 times the optimum, and others with more than 1.9 cost up to
+        some 40 times. A fifth of these cubics have det M < 0 at some time: they are defined and
+        smooth, and expensive, in the median about 100 times the optimum, the others 2.2 times.
     margin_time : ndarray, shape (...)
         When that is.
 
@@ -271,7 +271,7 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     Raises
     ------
     ValueError
-        If `order` is another.
+        If `order` is another, or there are not two, four or six ends.
 
     References
     ----------
@@ -362,8 +362,10 @@ def _start_weights(count: int, t: Array, order: int) -> list[Array]:
         case 6, 1:
             ts, ss = t * s, s * s
             return [-30 * ts * ts, ss * (1 - 3 * t) * (1 + 5 * t), ts * s * (2 - 5 * t) / 2]
-    ts = t * s
-    return [60 * ts * (t - s), -12 * ts * (3 - 5 * t), s * (1 - 8 * t + 10 * t * t)]
+        case 6, 2:
+            ts = t * s
+            return [60 * ts * (t - s), -12 * ts * (3 - 5 * t), s * (1 - 8 * t + 10 * t * t)]
+    raise ValueError(f"ends: two, four or six wanted, got {count}")
 
 
 def _rates(R: Array, M: Array, M_rate: Array, M_bend: Array | None = None) -> list[Array]:

@@ -48,7 +48,7 @@ class ProjectedLine(AlongGeodesic):
         super().__init__(R0, rotation_vector)
         self._angle = as_angle(self._angle)
         self.margin = 2 * np.cos(self._angle / 2)
-        warn_if_nearly_singular(self.margin, 0.5)
+        warn_if_nearly_singular(self.margin, 0.5, "t" if timing is identity else "f(t)")
         self._f, self._f_batch = timing, self.batch_shape
         self._number = np.arange(self.count).reshape(self.batch_shape)
         which = np.arange(self.count)

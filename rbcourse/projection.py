@@ -382,8 +382,8 @@ def project_se(B: ArrayLike) -> Array:
     return A
 
 
-def warn_if_nearly_singular(margin: Array, time: Array | float) -> None:
-    """Warn of the first curve of a stack whose margin is below 1e-6, and say when that is."""
+def warn_if_nearly_singular(margin: Array, time: Array | float, name: str = "t") -> None:
+    """Warn of the first curve of a stack whose margin is below 1e-6, and say at which time."""
     low = np.argwhere(np.asarray(margin) < 1e-6)
     if len(low):
         first = tuple(low[0])
@@ -391,8 +391,8 @@ def warn_if_nearly_singular(margin: Array, time: Array | float) -> None:
         least, when = float(margin[first]), float(np.broadcast_to(time, np.shape(margin))[first])
         size = f"{least:.1e}" if least > 1e-12 else "below 1e-12"
         warnings.warn(
-            f"margin < 1e-6{which}: it is {size} at t = {when:.6g}, where other rotations are "
-            "almost as near as the nearest one: the curve almost jumps there",
+            f"margin < 1e-6{which}: it is {size} at {name} = {when:.6g}, where other rotations "
+            "are almost as near as the nearest one: the curve almost jumps there",
             RuntimeWarning,
             stacklevel=4,
         )

@@ -107,14 +107,14 @@ def exp_so3(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps (1 + a): a
-        rotation for every finite w, but beyond 1/eps ≈ 4.5e15 rad, where neighbouring
-        floating-point numbers are turns apart, not one digit of it is right.
+        I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps (1 + a). It is
+        a rotation however large a is, but beyond 1/eps ≈ 4.5e15 rad, where neighbouring
+        floating-point numbers are turns apart, no digit is significant.
 
     Raises
     ------
     ValueError
-        If `w` is not finite or not of that shape.
+        If `w` or its norm is not finite, or `w` is not of that shape.
 
     See Also
     --------
@@ -225,13 +225,13 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps,
-        for every finite w. Its transpose is the left Jacobian, which gives the velocity in the
+        however large a is. Its transpose is the left Jacobian, which gives the velocity in the
         fixed frame.
 
     Raises
     ------
     ValueError
-        If `w` is not finite or not of that shape.
+        If `w` or its norm is not finite, or `w` is not of that shape.
 
     See Also
     --------

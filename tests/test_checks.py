@@ -25,6 +25,7 @@ EPS = np.finfo(float).eps
         ([[1, 2], [3, -np.inf]], (2,), "x[1, 1] is -inf, a finite number is wanted"),
         (np.nan, (), "x is nan, a finite number is wanted"),
         (np.ma.array([1.0, 2, 3], mask=[0, 1, 0]), (3,), "x: a masked array"),
+        ([np.ma.array([1.0, 2, 3], mask=[0, 1, 0])], (3,), "x: a masked array"),
     ],
 )
 def test_bad_arguments_are_named(value, core, message):

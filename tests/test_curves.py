@@ -176,6 +176,12 @@ def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused()
                 curve([0.25, 0.5], order)
 
 
+def test_a_timed_line_is_told_where_on_the_line_its_margin_is():
+    w = [0, 0, np.pi - 1e-7]
+    with pytest.warns(RuntimeWarning, match=r"it is 1\.0e-07 at f\(t\) = 0\.5,"):
+        rb.projected_line_so3(np.eye(3), rb.exp_so3(w), lambda t, k: (t * t, 2 * t, 2 + 0 * t)[k])
+
+
 def test_in_a_stack_the_pair_a_half_turn_apart_is_named():
     R1 = np.stack([np.diag([1.0, 1, 1]), np.diag([-1.0, 1, -1])])
     with pytest.warns(RuntimeWarning, match=r"of curve \[0, 1\]"):

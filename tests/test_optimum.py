@@ -170,6 +170,20 @@ def test_a_problem_whose_short_way_leads_astray(solver):
     assert rb.acceleration_cost(curve) == pytest.approx(curve.cost, rel=1e-9)
 
 
+@pytest.mark.parametrize("speed", [6, 15, 25, 35])
+def test_fast_spins_about_one_axis_make_as_many_turns_as_cost_least(speed):
+    """There p(t) is a cubic, to σ and any number of turns; the optimum costs no more."""
+    rng = np.random.default_rng(speed)
+    sigma, k0 = rng.uniform(-np.pi, np.pi, 60), rng.uniform(speed - 5, speed + 5, 60)
+    k1, axis = k0 + rng.uniform(-0.5, 0.5, 60), Rotation.random(rng=rng).as_matrix()[0]
+    ends = [x[:, None] * axis for x in (sigma, k0, k1)]
+    curve = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(ends[0]), *ends[1:])
+    angle = sigma + 2 * np.pi * np.arange(-9, 10)[:, None]
+    square, cube = 3 * angle - 2 * k0 - k1, k0 + k1 - 2 * angle
+    least = 8 * (square**2 + 3 * square * cube + 3 * cube**2).min(axis=0)
+    assert np.all(curve.cost < least + 1e-9 * speed**2)
+
+
 @pytest.mark.parametrize("seed", [None, 1, 2])
 def test_along_a_path_of_goals_the_cost_has_no_jump(seed):
     """Where two families cross it bends; a step then is no larger than its neighbours."""

@@ -180,6 +180,21 @@ def test_the_quintic_bends_as_the_parabola_does():
     assert np.abs(c(TIMES[[0, -1]], 2)).max() < 1e-12
 
 
+def test_the_origin_has_as_many_ends_as_legs_ask_for():
+    """Of legs that ask for accelerations a quintic, for one velocity a cubic."""
+
+    def bent(R0, R1, a0, a1):
+        return rb.geodesic_so3(R0, R1)
+
+    def leaving(R0, R1, w0):
+        return rb.geodesic_so3(R0, R1)
+
+    t = np.linspace(*TIMES[[0, -1]], 50)
+    for leg, other in ((bent, rb.projected_quintic_so3), (leaving, rb.projected_cubic_so3)):
+        path = rb.chain(TIMES, POSES, leg=leg)(t)[:, :3, 3]
+        assert np.abs(path - rb.chain(TIMES, POSES, leg=other)(t)[:, :3, 3]).max() < 1e-13
+
+
 def test_times_in_any_order_and_shape():
     c = rb.chain(TIMES, POSES)
     t = RNG.uniform(*c.domain, size=(3, 5000))
