@@ -137,10 +137,10 @@ def chain(
         raise ValueError(f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}")
     legs = _made(leg, {name: ends[name] for name in wanted})
     if moves and "A0" not in wanted:
-        path = [(poses[:, :3, 3], 1.0), (d_dot, h), (d_bend, h**2)]
+        path = [(poses[:, :3, 3], h**0), (d_dot, h), (d_bend, h**2)]
         order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # that legs ask for
-        ends = [_ends("d{}", *part).values() for part in path[: 1 + order]]
-        legs = RigidMotion(legs, *(x for pair in ends for x in pair))
+        pairs = [_ends("d{}", x, scale).values() for x, scale in path[: 1 + order]]
+        legs = RigidMotion(legs, *(x for pair in pairs for x in pair))
     _check_arrival(legs, poses)
     return Chain(times, legs, velocities)
 
