@@ -168,9 +168,9 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
     """Return the shape of a batch: () for None, (n,) for n; a ValueError if it is no shape."""
     given: Any = () if size is None else size
     lengths = given if isinstance(given, tuple | list) else [given]
-    if any(isinstance(length, bool) for length in lengths):
-        raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}")
     try:
+        if any(isinstance(length, bool) for length in lengths):
+            raise TypeError("True and False are integers to Python")
         shape = tuple(map(index, lengths))
     except TypeError as error:
         raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}") from error

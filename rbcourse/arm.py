@@ -162,11 +162,9 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     slack = 4 * EPS * (a + b)  # the rounding of a tip that was computed
     out = (r > a + b + slack) | (r < abs(a - b) - slack)
     if out.any():
-        name, reach = (
-            first_index("tip", out),
-            f"{abs(a - b) * size:.15g} to {(a + b) * size:.15g} m",
-        )
-        raise ValueError(f"{name}: {reach} from the base wanted, got {r[out].flat[0] * size} m")
+        reach = f"{abs(a - b) * size:.15g} to {(a + b) * size:.15g} m from the base"
+        given = r[out].flat[0] * size
+        raise ValueError(f"{first_index('tip', out)}: {reach} wanted, got {given} m")
     beyond, within = (a + b - r) * (a + b + r), (r - abs(a - b)) * (r + abs(a - b))
     half = np.arctan2(np.sqrt(np.maximum(beyond, 0)), np.sqrt(np.maximum(within, 0)))
     elbow = 2 * np.stack([half, -half], axis=-1)

@@ -15,8 +15,8 @@ from rbcourse.optimum import relax, solve
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
     hermite_stack,
-    hermite_terms,
     projected_cubic,
+    stack_terms,
     watched,
 )
 from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
@@ -63,8 +63,7 @@ class RigidMotion(Curve):
     @cached_property
     def _entries(self) -> Array:
         """The terms of the path, shape (n + 1, 3, count)."""
-        terms = hermite_terms(np.moveaxis(self._flat(self.path, 1), 1, -1))
-        return np.stack([np.ascontiguousarray(x) for x in terms])
+        return stack_terms(self._flat(self.path, 1))
 
     def _events(self) -> list[tuple[float, float]]:
         return self.rotation._events()

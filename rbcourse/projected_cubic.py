@@ -69,8 +69,7 @@ class ProjectedPolynomial(Curve):
     @cached_property
     def _entries(self) -> Array:
         """The terms, shape (n + 1, 3, 3, count)."""
-        terms = hermite_terms(np.moveaxis(self._flat(self.ends, 1), 1, -1))
-        return np.stack([np.ascontiguousarray(x) for x in terms])
+        return stack_terms(self._flat(self.ends, 1))
 
     @property
     def margin(self) -> Array:
@@ -282,11 +281,11 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
     array([0. , 0.5, 1. ])
     """
-    return _sum(_weights(len(ends), t, check_order(order)), hermite_terms(ends))
+    return _sum(_weights(len(ends), t, check_order(order)), _terms(ends))
 
 
 def hermite_stack(terms: Array, t: Array, which: Chosen, order: int) -> Array:
-    """Return `hermite` of a stack with these `hermite_terms`, components first.
+    """Return `hermite` of a stack with these `stack_terms`, components first.
 
     Parameters
     ----------
@@ -320,7 +319,12 @@ def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
     return sum(others, first)
 
 
-def hermite_terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
+def stack_terms(ends: Array) -> Array:
+    """Return the terms of a stack: of ends of shape (n, count, ...), shape (n + 1, ..., count)."""
+    return np.stack([np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in _terms(ends)])
+
+
+def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
     """Return what a polynomial is a sum of: x0, x1, x1 − x0 and the derivatives at the ends."""
     x0, x1, *rates = map(np.asarray, ends)
     return [x0, x1, x1 - x0, *rates]
@@ -338,9 +342,9 @@ def _weights(count: int, t: Array, order: int) -> list[Array]:
 
 
 def _start_weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of x0, v0, a0, or their derivatives; those of x1, … are theirs at 1 − t.
+    """Return the weights of x0, v0 and a0.
 
-    The signs of the odd ones change.
+    By symmetry x1, v1 and a1 have the same at 1 − t; the sign changes for each derivative.
     """
     s = 1 - t
     match count, order:

@@ -111,7 +111,7 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     Parameters
     ----------
     x0, x1, v0, v1 : ndarray
-        They broadcast.
+        Of one shape.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
 
     Examples
     --------
-    >>> cubic_coefficients(*map(np.asarray, (0.0, 1.0, 0.0, 0.0)))
+    >>> cubic_coefficients(0.0, 1.0, 0.0, 0.0)
     array([ 0.,  0.,  3., -2.])
     """
     gap = x1 - x0
