@@ -391,8 +391,8 @@ def warn_if_nearly_singular(margin: Array, time: Array | float, name: str = "t")
         least, when = float(margin[first]), float(np.broadcast_to(time, np.shape(margin))[first])
         size = f"{least:.1e}" if least > 1e-12 else "below 1e-12"
         warnings.warn(
-            f"margin < 1e-6{which}: it is {size} at {name} = {when:.6g}, where other rotations "
-            "are almost as near as the nearest one: the curve almost jumps there",
+            f"margin < 1e-6{which}: {size} at {name} = {when:.6g}; "
+            "another rotation is almost as near, and the curve almost jumps there",
             RuntimeWarning,
             stacklevel=4,
         )

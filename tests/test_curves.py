@@ -178,7 +178,7 @@ def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused()
 
 def test_a_timed_line_is_told_where_on_the_line_its_margin_is():
     w = [0, 0, np.pi - 1e-7]
-    with pytest.warns(RuntimeWarning, match=r"it is 1\.0e-07 at f\(t\) = 0\.5,"):
+    with pytest.warns(RuntimeWarning, match=r": 1\.0e-07 at f\(t\) = 0\.5; "):
         rb.projected_line_so3(np.eye(3), rb.exp_so3(w), lambda t, k: (t * t, 2 * t, 2 + 0 * t)[k])
 
 
@@ -192,7 +192,7 @@ def test_in_a_stack_the_pair_a_half_turn_apart_is_named():
 
 def test_just_before_the_half_turn_the_line_is_still_right():
     w = np.array([0, 0, np.pi - 1e-8])
-    with pytest.warns(RuntimeWarning, match="^margin < 1e-6: it is 1.0e-08 at t = 0.5,"):
+    with pytest.warns(RuntimeWarning, match="^margin < 1e-6: 1.0e-08 at t = 0.5; "):
         curve = rb.projected_line_so3(np.eye(3), oracles.exp_so3(w))
     assert abs(curve.margin - 1e-8) < 4 * EPS
     want = oracles.theta(0.5 + 1e-9, w[2]) * w[2]
