@@ -70,6 +70,8 @@ def main():
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
+    # a test run starts a hundred Pythons: each would compile all that it imports anew
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     if further and known.task not in ("test", "lab", "browser"):
         parser.error("%s takes no %s" % (known.task, " ".join(further)))
     if known.task == "test" and known.releases:
@@ -165,15 +167,12 @@ def keep_lab_quiet():
 
 
 def look_in_browser(further):
-    """Try every lesson in a browser; then, with nothing beside it, how fast its pictures follow."""
+    """Try every lesson and every explorer in a browser."""
     set_up_extra("browser")
     os.environ["CHROMIUM"] = find_chromium()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     keep_lab_quiet()
-    folder = Path("tests") / "browser"
-    lessons = [str(folder / "test_lab.py"), str(folder / "test_lecture.py")]
-    run("-m", "pytest", "-n", "auto", *(lessons + further))
-    run("-m", "pytest", str(folder / "test_speed.py"), *further)
+    run("-m", "pytest", "-n", "auto", "--dist", "worksteal", "tests/browser", *further)
 
 
 def set_up():
