@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -124,27 +125,27 @@ def copy_lessons(lessons: Path, work: Path) -> None:
     otherwise.
     """
     work.mkdir(exist_ok=True)
-    record, notary = work / ".copied.json", NotebookNotary()
-    copied = _read_record(record)
-    for path in lesson_paths(lessons):
-        lesson, target = path.read_bytes(), work / path.name
-        notebook = _parsed(path)
-        last, now = copied.get(path.name), [_digest(lesson), _digest(_cells(lesson))]
-        if target.exists() and last and last[0] == now[0]:
-            continue
-        if not _left_alone(target, lesson, last):
-            target = next(p for p in _numbered(target) if not p.exists())
-            print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
-        target.write_bytes(lesson)
-        try:
-            notary.sign(notebook)
-        except OSError as error:
-            print(f"{target.name} is copied, but not marked as trusted: {error}")
-        copied[path.name] = now
-        part = record.with_suffix(".part")
-        part.write_text(json.dumps(copied, indent=1), encoding="utf-8")
-        part.replace(record)
-    notary.store.close()
+    record = work / ".copied.json"
+    copied, notary = _read_record(record), NotebookNotary()
+    with closing(notary.store):
+        for path in lesson_paths(lessons):
+            lesson, target = path.read_bytes(), work / path.name
+            notebook = _parsed(path)
+            last, now = copied.get(path.name), [_digest(lesson), _digest(_cells(lesson))]
+            if target.exists() and last and last[0] == now[0]:
+                continue
+            if not _left_alone(target, lesson, last):
+                target = next(p for p in _numbered(target) if not p.exists())
+                print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
+            target.write_bytes(lesson)
+            try:
+                notary.sign(notebook)
+            except OSError as error:
+                print(f"{target.name} is copied, but not marked as trusted: {error}")
+            copied[path.name] = now
+            part = record.with_suffix(".part")
+            part.write_text(json.dumps(copied, indent=1), encoding="utf-8")
+            part.replace(record)
 
 
 def _read_record(record: Path) -> dict[str, list[str]]:

@@ -6,7 +6,7 @@ import nbformat
 import nbval.kernel
 import pytest
 from nbclient.exceptions import CellExecutionError
-from nbformat.sign import NotebookNotary
+from nbformat.sign import NotebookNotary, SQLiteSignatureStore
 from nbformat.v4 import new_code_cell, new_notebook
 
 from rbcourse.course import notebooks
@@ -20,43 +20,60 @@ def notebook_at(path, *sources):
     return path
 
 
-def test_runs_give_the_same_bytes(tmp_path):
-    source = "import uuid\nprint(object(), uuid.uuid4().hex)\nobject()"
-    path = notebook_at(tmp_path / "01_ids.ipynb", source, "print(uuid.uuid4().hex)")
-    first = notebooks.execute(path, tmp_path)
-    assert first == notebooks.execute(path, tmp_path)
-    assert "0x0>" in first
-    assert f"{1:032x}" in first
-    assert f"{2:032x}" in first
+SOURCES = {
+    "ids": "import uuid\nprint(object(), uuid.uuid4().hex)\nobject()",
+    "more ids": "print(uuid.uuid4().hex)",
+    "names": "key = 'd41d8cd98f00b204e9800998ecf8427e'; place = '0xdeadbeef'",
+    "pieces": "print('one', flush=True)\nprint('two')",
+    "kernel": "import ipykernel, json\n"
+    "print(json.loads(ipykernel.get_connection_info())['transport'])",
+    "explorer": "from rbcourse import explore\nexplore.arm_explorer()",
+}
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory):
+    """A lesson with these cells, run twice."""
+    folder = tmp_path_factory.mktemp("lesson")
+    path = notebook_at(folder / "01_all.ipynb", *SOURCES.values())
+    return [notebooks.execute(path, folder) for _ in range(2)]
+
+
+@pytest.fixture(scope="module")
+def stored(twice):
+    return nbformat.reads(twice[0], as_version=4)
+
+
+def cell_of(stored, name):
+    return stored.cells[list(SOURCES).index(name)]
+
+
+def test_runs_give_the_same_bytes(twice, stored):
+    assert twice[0] == twice[1]
+    assert "0x0>" in cell_of(stored, "ids").outputs[0].text
+    assert f"{1:032x}" in cell_of(stored, "ids").outputs[0].text
+    assert f"{2:032x}" in cell_of(stored, "more ids").outputs[0].text
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there kernels listen at ports")
-def test_kernels_listen_at_files(tmp_path):
-    source = (
-        "import ipykernel, json\nprint(json.loads(ipykernel.get_connection_info())['transport'])"
-    )
-    ran = notebooks.execute(notebook_at(tmp_path / "01_kernel.ipynb", source), tmp_path)
-    assert nbformat.reads(ran, as_version=4).cells[0].outputs[0].text == "ipc\n"
+def test_kernels_listen_at_files(stored):
+    assert cell_of(stored, "kernel").outputs[0].text == "ipc\n"
     assert nbval.kernel.KernelManager(kernel_name="python3").transport == "ipc"
 
 
-def test_of_an_explorer_its_still_is_stored_the_same_each_time(tmp_path):
-    source = "from rbcourse import explore\nexplore.arm_explorer()"
-    path = notebook_at(tmp_path / "01_arm.ipynb", source)
-    first = notebooks.execute(path, tmp_path)
-    assert first == notebooks.execute(path, tmp_path)
-    stored = nbformat.reads(first, as_version=4)
-    (output,) = stored.cells[0].outputs
+def test_of_an_explorer_its_still_is_stored(stored):
+    (output,) = cell_of(stored, "explorer").outputs
     assert set(output.data) == {"text/html", "text/plain"}
     assert "data:image/png" in output.data["text/html"]
     assert "widgets" not in stored.metadata
 
 
-def test_sources_are_left_as_they_are(tmp_path):
-    source = "key = 'd41d8cd98f00b204e9800998ecf8427e'; place = '0xdeadbeef'"
-    path = notebook_at(tmp_path / "01_key.ipynb", source)
-    stored = nbformat.reads(notebooks.execute(path, tmp_path), as_version=4)
-    assert stored.cells[0].source == source
+def test_sources_are_left_as_they_are(stored):
+    assert [cell.source for cell in stored.cells] == list(SOURCES.values())
+
+
+def test_what_is_printed_in_pieces_is_stored_as_one(stored):
+    assert [output.text for output in cell_of(stored, "pieces").outputs] == ["one\ntwo\n"]
 
 
 def test_without_lessons_nothing_is_removed(tmp_path):
@@ -64,13 +81,6 @@ def test_without_lessons_nothing_is_removed(tmp_path):
     with pytest.raises(ValueError, match="no lessons here"):
         notebooks.regenerate(tmp_path, tmp_path)
     assert (tmp_path / "thesis.pdf").exists()
-
-
-def test_what_is_printed_in_pieces_is_stored_as_one(tmp_path):
-    source = "import time\nprint('one', flush=True)\ntime.sleep(0.5)\nprint('two')"
-    path = notebook_at(tmp_path / "01_pieces.ipynb", source)
-    stored = nbformat.reads(notebooks.execute(path, tmp_path), as_version=4)
-    assert [output.text for output in stored.cells[0].outputs] == ["one\ntwo\n"]
 
 
 def test_nothing_is_rewritten_when_a_lesson_fails(tmp_path):
@@ -172,10 +182,13 @@ def test_a_damaged_record_is_no_record(folders, damaged):
     assert len(list(folders[1].glob("*.ipynb"))) == 1
 
 
-def test_a_lesson_that_is_no_notebook_is_named_and_not_copied(folders):
+def test_a_lesson_that_is_no_notebook_is_named_and_not_copied(folders, monkeypatch):
+    closed, close = [], SQLiteSignatureStore.close
+    monkeypatch.setattr(SQLiteSignatureStore, "close", lambda s: closed.append(close(s)))
     (folders[0] / "02_arm.ipynb").write_text("<<<<<<< HEAD")
     with pytest.raises(ValueError, match=r"02_arm\.ipynb is no notebook"):
         notebooks.copy_lessons(*folders)
+    assert len(closed) == 1  # what is trusted is a database
     assert not (folders[1] / "02_arm.ipynb").exists()
     assert (folders[1] / "01_plane.ipynb").exists()
 
