@@ -27,6 +27,7 @@ from rbcourse.assignments.tampering import find_in_cells
 from rbcourse.course.notebooks import KERNEL, kernel_address
 
 CELL_SECONDS = 60
+STOP_SECONDS = 20  # so long a cell may take to end when it is told to
 CELL_BYTES = 2_000_000
 ALL_BYTES = 10_000_000
 COPIED_BYTES = 50_000_000
@@ -139,7 +140,7 @@ class _Client(NotebookClient):
 
     def _begin(self, cell: NotebookNode, cell_index: int) -> None:
         self.at, self._bytes = cell_index + 1, min(CELL_BYTES, self._left)
-        if len(self.slow) > 1:  # or the first one cannot be stopped
+        if len(self.slow) > 1:
             raise CellTimeoutError("cells take too long")
         print(f"\rrunning cell {self.at} of {len(self.nb.cells)} ", end="", flush=True)
 
@@ -195,7 +196,8 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
             allow_errors=True,
             timeout=seconds,
             interrupt_on_timeout=True,
-            iopub_timeout=2,
+            iopub_timeout=STOP_SECONDS,
+            raise_on_iopub_timeout=True,
             error_on_timeout={"ename": "TimeoutError", "evalue": SLOW, "traceback": [SLOW]},
             extra_arguments=["--log-level=CRITICAL"],
             resources={"metadata": {"path": work}},
@@ -211,7 +213,8 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
                 "the cells after it were not run"
             )
         except CellTimeoutError:
-            remarks.append(f"cells from {client.at} on were not run")
+            first = client.at + (client.at in client.slow)
+            remarks.append(f"cells from {first} on were not run")
         except (RuntimeError, KeyError) as error:
             raise ValueError(
                 f"Python could not be started for the notebook ({error}); install what "
