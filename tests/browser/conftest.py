@@ -1,17 +1,22 @@
-"""A headless Chromium, and the two servers that it looks at: JupyterLab and the lecture view."""
+"""A headless Chromium and a JupyterLab, one of each for all workers, and pages side by side."""
 
 import os
 import shutil
 import subprocess
 import sys
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import expect, sync_playwright
 from servers import serving
 
 ROOT = Path(__file__).parents[2]
-QUIET = [
+PATIENCE = 900_000  # milliseconds: no test fails because a machine is slow
+CHROMIUM = [
+    "--headless=new",
+    "--remote-debugging-port=0",
     "--no-sandbox",
     "--disable-quic",
     "--no-first-run",
@@ -19,44 +24,86 @@ QUIET = [
     "--disable-component-update",
     "--disable-sync",
 ]
+STARTED = pytest.StashKey[dict[str, str]]()
 
 
 def pytest_addoption(parser):
     parser.addoption("--screenshots", help="a folder to put pictures of the pages in")
 
 
-@pytest.fixture(scope="session")
-def context():
-    """A browser that keeps what it has loaded, as a person's does; course.py names it."""
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=os.environ["CHROMIUM"], args=QUIET)
-        yield chromium.new_context()
+def pytest_configure(config):
+    """Start what the workers share, before there are any."""
+    if not hasattr(config, "workerinput"):
+        stack = ExitStack()
+        config.add_cleanup(stack.close)
+        config.stash[STARTED] = stack.enter_context(started())
 
 
-@pytest.fixture(scope="session")
-def home(tmp_path_factory):
-    """An environment with an empty home, and the course in it: lessons copied, as a user has."""
-    home = tmp_path_factory.mktemp("home")
+def pytest_configure_node(node):
+    """Tell a worker where it is."""
+    node.workerinput |= node.config.stash[STARTED]
+
+
+@contextmanager
+def started():
+    """A home with the course in it, as a user has it, a browser, and a JupyterLab."""
+    with TemporaryDirectory(ignore_cleanup_errors=True) as home:
+        course, env = Path(home, "course"), environment(home)
+        for folder in ("notebooks", "benchmarks"):
+            shutil.copytree(ROOT / folder, course / folder)
+        copy = [sys.executable, "-m", "rbcourse.course.notebooks", "copy"]
+        subprocess.run(copy, cwd=course, env=env, check=True)
+        chromium = [os.environ["CHROMIUM"], *CHROMIUM, f"--user-data-dir={home}/chromium"]
+        lab = [sys.executable, "-m", "jupyterlab", "--no-browser", "--ServerApp.port=0"]
+        lab += [f"--ServerApp.root_dir={course / 'work'}"]
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            lab.append("--allow-root")
+        address = r"(http://127\.0\.0\.1:\d+)/lab\?(token=\w+)"
+        with (
+            serving(chromium, course, env, r"DevTools listening on (ws://\S+)") as browser,
+            serving(lab, course, env, address) as server,
+        ):
+            yield {
+                "home": home,
+                "browser": browser[1],
+                "lab": f"{server[1]}/lab/%s?{server[2]}",
+            }
+
+
+def environment(home):
+    """The environment of a user with this home."""
     kept = ("PATH", "SYSTEMROOT", "LANG")
     env = {name: os.environ[name] for name in kept if name in os.environ}
-    env |= {"HOME": str(home), "USERPROFILE": str(home), "PYTHONPATH": str(ROOT)}
-    for folder in ("notebooks", "benchmarks"):
-        shutil.copytree(ROOT / folder, home / "course" / folder)
-    words = [sys.executable, "-m", "rbcourse.course.notebooks", "copy"]
-    subprocess.run(words, cwd=home / "course", env=env, check=True)
-    return home / "course", env
+    return env | {"HOME": home, "USERPROFILE": home, "PYTHONPATH": str(ROOT)}
 
 
 @pytest.fixture(scope="session")
-def lab(home):
-    """The address of a JupyterLab that shows the lessons, with its token: ``lab(path)``."""
-    course, env = home
-    words = ["jupyterlab", "--no-browser", "--ServerApp.port=0", "--ServerApp.open_browser=False"]
-    words += [f"--ServerApp.root_dir={course / 'work'}"]
-    if hasattr(os, "geteuid") and os.geteuid() == 0:
-        words.append("--allow-root")
-    with serving(words, course, env, r"(http://127\.0\.0\.1:\d+)/lab\?(token=\w+)") as found:
-        yield lambda path: f"{found[1]}/lab/{path}?{found[2]}"
+def shared(request):
+    return getattr(request.config, "workerinput", None) or request.config.stash[STARTED]
+
+
+@pytest.fixture(scope="session")
+def context(shared):
+    """What the pages of a worker have in common; it keeps what it has loaded."""
+    expect.set_options(timeout=PATIENCE)
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.connect_over_cdp(shared["browser"])
+        context = chromium.new_context()
+        context.set_default_timeout(PATIENCE)
+        yield context
+        context.close()
+
+
+@pytest.fixture(scope="session")
+def home(shared):
+    """The folder of the course in the home, and the environment."""
+    return Path(shared["home"], "course"), environment(shared["home"])
+
+
+@pytest.fixture(scope="session")
+def lab(shared):
+    """The address of something in JupyterLab, with its token: ``lab(path)``."""
+    return lambda path: shared["lab"] % path
 
 
 @pytest.fixture
@@ -99,5 +146,5 @@ def pytest_terminal_summary(terminalreporter):
     rows = [value for report in reports for key, value in report.user_properties if key == "speed"]
     if rows:
         head = f"{'explorer':26}{'median':>10}{'longest':>10}{'held':>10}{'last after':>12}"
-        terminalreporter.write_line("From key press to changed picture")
+        terminalreporter.write_line("From key press to changed picture, beside the other tests")
         terminalreporter.write_line("\n".join([head, *rows]))

@@ -1,9 +1,12 @@
 """Every lesson in the lecture view: large letters, question and explorer on one screen."""
 
 import re
+import sys
+from contextlib import ExitStack
 from itertools import pairwise
 
-from pages import SEEN, move_every_slider
+import pytest
+from pages import SEEN, move_every_slider, wait_for
 from servers import serving
 
 SMALL = """(least) => {
@@ -20,60 +23,66 @@ SMALL = """(least) => {
   return found;
 }"""
 
+TYPESET = """() => ![...document.querySelectorAll("#rendered_cells .jp-MarkdownOutput")]
+    .some((cell) => /\\$[^$]+\\$/.test(cell.innerText))"""
 
-def test_a_lesson_can_be_shown_to_a_class(lesson, home, page, pictures):
+
+@pytest.fixture
+def show(home, page):
+    """Show a lesson as a lecturer does: ``show("02")`` returns its explorer."""
     course, env = home
-    words = ["rbcourse.course.lecture", lesson[:2], "--no-browser"]
-    with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
-        page.set_viewport_size({"width": 1024, "height": 768})
-        page.goto(found[1], timeout=120_000)
-        explorer = page.locator(".rbcourse-explorer")
-        explorer.wait_for(timeout=60_000)
-        page.locator("mjx-container").first.wait_for()
-        page.wait_for_timeout(500)
-        assert not page.evaluate(SEEN)
-        assert not page.evaluate(SMALL, 24)
-        assert page.evaluate("document.documentElement.scrollWidth") <= 1024
-        if lesson[:2] != "00":
-            look_at_question_and_explorer(page, explorer)
-        move_every_slider(page, explorer)
-        pictures(f"lecture_{lesson}", lambda: to_question(page))
+    with ExitStack() as stack:
+
+        def shown(number):
+            words = [sys.executable, "-m", "rbcourse.course.lecture", number, "--no-browser"]
+            address = r"(http://127\.0\.0\.1:\d+/\?token=\w+)"
+            page.set_viewport_size({"width": 1024, "height": 768})
+            page.goto(stack.enter_context(serving(words, course, env, address))[1])
+            explorer = wait_for(page.locator(".rbcourse-explorer"))
+            page.locator("mjx-container").first.wait_for()
+            page.wait_for_function(TYPESET)
+            return explorer
+
+        yield shown
         page.goto("about:blank")  # before the server ends
 
 
-def test_the_keys_of_a_remote_control_turn_the_pages(home, page):
-    course, env = home
-    words = ["rbcourse.course.lecture", "02", "--no-browser"]
-    with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/\?token=\w+)") as found:
-        page.set_viewport_size({"width": 1024, "height": 768})
-        page.goto(found[1], timeout=120_000)
-        page.locator(".rbcourse-explorer").wait_for(timeout=60_000)
-        page.wait_for_timeout(1000)
-        places = [page.evaluate("scrollY")]
-        while len(places) < 60:
-            if len(places) == 4:
-                handle = page.locator(".noUi-handle").first  # as after the mouse was there
-                handle.evaluate("(handle) => handle.focus({ preventScroll: true })")
-            page.keyboard.press("PageDown")
-            page.wait_for_timeout(30)
-            places.append(page.evaluate("scrollY"))
-            if places[-1] == places[-2]:
-                break
-        steps = [after - before for before, after in pairwise(places)]
-        assert len(places) > 20
-        assert max(steps) <= 768  # nothing is passed over
-        assert all(step > 0 for step in steps[:-1])
-        for _ in range(60):
-            page.keyboard.press("PageUp")
-            page.wait_for_timeout(30)
-        assert page.evaluate("scrollY") == 0
-        answer = page.locator(".lecture-answer").first
-        page.evaluate("(answer) => answer.scrollIntoView()", answer.element_handle())
-        page.keyboard.press("PageUp")
+def test_a_lesson_can_be_shown_to_a_class(lesson, show, page, pictures):
+    explorer = show(lesson[:2])
+    assert not page.evaluate(SEEN)
+    assert not page.evaluate(SMALL, 24)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1024
+    if lesson[:2] != "00":
+        look_at_question_and_explorer(page, explorer)
+    move_every_slider(explorer)
+    assert not page.evaluate(SEEN)
+    pictures(f"lecture_{lesson}", lambda: to_question(page))
+
+
+def test_the_keys_of_a_remote_control_turn_the_pages(show, page):
+    show("02")
+    places = [page.evaluate("scrollY")]
+    while len(places) < 60:
+        if len(places) == 4:
+            handle = page.locator(".noUi-handle").first  # as after the mouse was there
+            handle.evaluate("(handle) => handle.focus({ preventScroll: true })")
         page.keyboard.press("PageDown")
-        page.keyboard.press("Enter")
-        assert answer.evaluate("(answer) => answer.open")
-        page.goto("about:blank")
+        places.append(page.evaluate("scrollY"))
+        if places[-1] == places[-2]:
+            break
+    steps = [after - before for before, after in pairwise(places)]
+    assert len(places) > 20
+    assert max(steps) <= 768  # nothing is passed over
+    assert all(step > 0 for step in steps[:-1])
+    for _ in range(60):
+        page.keyboard.press("PageUp")
+    assert page.evaluate("scrollY") == 0
+    answer = page.locator(".lecture-answer").first
+    page.evaluate("(answer) => answer.scrollIntoView()", answer.element_handle())
+    page.keyboard.press("PageUp")
+    page.keyboard.press("PageDown")
+    page.keyboard.press("Enter")
+    assert answer.evaluate("(answer) => answer.open")
 
 
 def to_question(page):
@@ -92,7 +101,6 @@ def to_question(page):
 
 def look_at_question_and_explorer(page, explorer):
     assert re.match(r"Poll \d", to_question(page))
-    page.wait_for_timeout(300)
     for part in ("img", ".rbcourse-panel"):
         box = explorer.locator(part).bounding_box()
         assert 0 <= box["x"] <= box["x"] + box["width"] <= 1024

@@ -1,10 +1,10 @@
-"""From key press to changed picture, in JupyterLab, for every explorer; printed as a table."""
+"""Every explorer in JupyterLab: the pictures follow the keys; printed as a table, how fast."""
 
 import statistics
 import time
 
 import nbformat
-from pages import NOTE, centre, open_in_lab, run_all
+from pages import IDLE, NOTE, centre, move_every_slider, open_in_lab, run_all, wait_for
 
 from rbcourse import explore
 from rbcourse.course.notebooks import KERNEL
@@ -18,9 +18,9 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     sources = ["from rbcourse import explore", *(f"explore.{name}()" for name in explore.__all__)]
     cells = [nbformat.v4.new_code_cell(source) for source in sources]
     notebook = nbformat.v4.new_notebook(cells=cells, metadata={"kernelspec": KERNEL})
-    nbformat.write(notebook, course / "work" / "speed.ipynb")
+    nbformat.write(notebook, course / "work" / "explorers.ipynb")
     page.set_viewport_size({"width": 1280, "height": 9000})  # all explorers are there at once
-    open_in_lab(page, lab("workspaces/speed/tree/speed.ipynb"))
+    open_in_lab(page, lab("workspaces/explorers/tree/explorers.ipynb"))
     run_all(page)
     explorers = page.locator(".rbcourse-explorer")
     explorers.last.wait_for()
@@ -28,34 +28,33 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     page.set_viewport_size({"width": 1280, "height": 800})
     page.evaluate(NOTE)
     for name, explorer in zip(explore.__all__, explorers.all(), strict=True):
-        centre(page, explorer)
+        centre(explorer)
+        move_every_slider(wait_for(explorer))
+        settle(page)
         handles = explorer.locator(".noUi-handle").all()
         held = handles[SOLVES.get(name, -1)]
         waits = [wait for handle in (handles[0], held) for wait in follow(page, handle)]
-        shown, late = hold(page, held)
-        wait = statistics.median(waits)
-        row = f"{name.removesuffix('_explorer'):22}{kind(name):4}{wait:7.0f} ms"
+        shown, after, late = hold(page, held)
+        row = f"{name.removesuffix('_explorer'):22}{kind(name):4}{statistics.median(waits):7.0f} ms"
         row += f"{max(waits):7.0f} ms{shown / HELD:8.0f}/s{late:9.0f} ms"
         record_property("speed", row)
-        # on a loud machine measured by its own single pictures; a backlog would take seconds
-        assert late < max(500, 6 * wait), f"{name}: keys held down left a backlog"
-        assert shown > min(3 * HELD, 1000 * HELD / (4 * wait))
+        assert after <= 3, f"{name}: keys held down left a backlog"
 
 
 def follow(page, handle):
     """Press keys on a slider; return the milliseconds to each new picture."""
-    handle.focus()
     for key in ("ArrowLeft", "ArrowRight"):
         page.evaluate("keys.length = pictures.length = 0")
-        page.keyboard.press(key)
-        page.wait_for_timeout(150)
+        handle.press(key)
+        settle(page)
         pressed, shown = page.evaluate("[keys, pictures]")
         if shown:  # the slider was not at its end
             yield shown[0] - pressed[0]
 
 
 def hold(page, handle):
-    """Hold keys, 30 a second; return how many pictures came, and how late the last of them."""
+    """Hold keys, 30 a second; return how many pictures came, how many of them after the last key,
+    and how late the last of them."""
     handle.focus()
     page.evaluate("keys.length = pictures.length = 0")
     start, n = time.monotonic(), 0
@@ -64,9 +63,18 @@ def hold(page, handle):
             page.keyboard.press("ArrowRight" if now < HELD / 2 else "ArrowLeft")
             n += 1
         time.sleep(0.002)
-    page.wait_for_timeout(600)
+    settle(page)
     keys, pictures = page.evaluate("[keys, pictures]")
-    return len(pictures), pictures[-1] - keys[-1]
+    after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
+    return len(pictures), len(after), max(after, default=0)
+
+
+def settle(page):
+    """Wait until the kernel has nothing more to do and no more pictures come."""
+    before = None
+    while before != (before := page.evaluate("pictures.length")):
+        page.wait_for_timeout(300)
+        page.get_by_text(IDLE).wait_for()
 
 
 def kind(name):
