@@ -162,11 +162,13 @@ def series(w0, start, number, pieces=25, order=20):
     R, w, acceleration, c = _array(np.eye(3), number), _array(w0, number), start[:3], start[3:]
     rotations, share = [R], number(1) / pieces
     for _ in range(pieces):
-        Rs, ws, hats = [R], [w, acceleration], []
+        Rs, hats = np.empty((2, order + 1, 3, 3), dtype=R.dtype)
+        ws = np.empty((order + 2, 3), dtype=R.dtype)
+        Rs[0], ws[0], ws[1] = R, w, acceleration
         for n in range(order):
-            hats.insert(0, _hat(ws[n]))
-            ws.append(Rs[n].T @ c / ((n + 1) * (n + 2)))
-            Rs.append(sum(A @ W for A, W in zip(Rs, hats, strict=True)) / (n + 1))
+            hats[n] = _hat(ws[n])
+            ws[n + 2] = Rs[n].T @ c / ((n + 1) * (n + 2))
+            Rs[n + 1] = np.einsum("kij,kjl->il", Rs[: n + 1], hats[n::-1]) / (n + 1)
         rotations += [_sum(Rs, share * k / 4) for k in range(1, 5)]
         R, w = rotations[-1], _sum(ws, share)
         acceleration = _sum([k * v for k, v in enumerate(ws)][1:], share)

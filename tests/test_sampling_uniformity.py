@@ -4,6 +4,8 @@ The seeds are fixed. A correct sampler would give a p-value below 1e-8 in one of
 statistics less than once in ten million seeds.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -45,10 +47,9 @@ def twice(column, other):
     return change
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_million_uniform_draws_pass(seed):
-    assert failed(rb.sample_rotation(MILLION, rng=seed)) == set()
-    assert failed(random_matrices(rb.sample_quaternion(MILLION, rng=seed))) == set()
+def test_a_million_uniform_draws_pass():
+    assert failed(rb.sample_rotation(MILLION, rng=1)) == set()
+    assert failed(random_matrices(rb.sample_quaternion(MILLION, rng=1))) == set()
 
 
 def test_other_uniform_samplers_pass():
@@ -65,32 +66,32 @@ def test_a_negated_column_is_uniform_too():
 
 
 @pytest.mark.source("errata 17")
-def test_a_million_naive_draws_fail():
+def test_naive_draws_fail():
     """Matrices and quaternions alike, though they take their angles the other way round."""
     for R in (
-        rb.sampling.sample_rotation_naive(MILLION, rng=1),
-        random_matrices(rb.sampling.sample_quaternion_naive(MILLION, rng=1)),
+        rb.sampling.sample_rotation_naive(100_000, rng=1),
+        random_matrices(rb.sampling.sample_quaternion_naive(100_000, rng=1)),
     ):
         assert failed(R, 1e-6) >= {"E tr²", "angle", "image of e₁", "image of e₃"}
-        assert abs(rb.sampling.uniformity_tests(R)["E tr²"].statistic - 7 / 8) < 0.01
+        assert abs(rb.sampling.uniformity_tests(R)["E tr²"].statistic - 7 / 8) < 0.02
 
 
 @pytest.mark.parametrize(
-    "R",
+    "draw",
     [
-        by_arvo(lambda x: x * [0.5, 1, 1]),
-        by_arvo(lambda x: x * [1, 0.5, 1]),
-        by_arvo(lambda x: x ** [1, 1, 2]),
-        by_shoemake(lambda x: x * [1, 0.5, 0.5]),
-        by_shoemake(lambda x: x ** [2, 1, 1]),
+        lambda: by_arvo(lambda x: x * [0.5, 1, 1]),
+        lambda: by_arvo(lambda x: x * [1, 0.5, 1]),
+        lambda: by_arvo(lambda x: x ** [1, 1, 2]),
+        lambda: by_shoemake(lambda x: x * [1, 0.5, 0.5]),
+        lambda: by_shoemake(lambda x: x ** [2, 1, 1]),
         *(
-            make(twice(i, j))
+            partial(make, twice(i, j))
             for make in (by_arvo, by_shoemake)
             for i, j in [(0, 1), (0, 2), (1, 2)]
         ),
-        np.repeat(by_arvo(lambda x: x, 10_000), 2, axis=0),
-        np.tile(by_arvo(lambda x: x, 10_000), (2, 1, 1)),
-        np.tile(rb.sample_rotation(rng=1), (100, 1, 1)),
+        lambda: np.repeat(by_arvo(lambda x: x, 10_000), 2, axis=0),
+        lambda: np.tile(by_arvo(lambda x: x, 10_000), (2, 1, 1)),
+        lambda: np.tile(rb.sample_rotation(rng=1), (100, 1, 1)),
     ],
     ids=[
         "Arvo, θ in [0, π)",
@@ -108,8 +109,8 @@ def test_a_million_naive_draws_fail():
         "one draw only",
     ],
 )
-def test_a_deliberate_fault_is_caught(R):
-    assert failed(R) != set()
+def test_a_deliberate_fault_is_caught(draw):
+    assert failed(draw()) != set()
 
 
 def test_a_z_without_its_root_in_two_places_only_is_caught():
@@ -126,14 +127,14 @@ def test_one_angle_of_shoemake_over_half_the_circle_is_no_fault_of_the_rotations
 
 
 def test_p_values_are_uniform_for_uniform_rotations():
-    """2000 samples of 500: the share below a level is the level, to five standard deviations."""
+    """800 samples of 500: the share below a level is the level, to five standard deviations."""
     rng = np.random.default_rng(11)
-    tests = [rb.sampling.uniformity_tests(rb.sample_rotation(500, rng=rng)) for _ in range(2000)]
+    tests = [rb.sampling.uniformity_tests(rb.sample_rotation(500, rng=rng)) for _ in range(800)]
     assert set(tests[0]) == ALL
     for name in ALL:
         p = np.array([test[name].p_value for test in tests])
         for level in (0.05, 0.5):  # the laws hold for large samples, here to a hundredth
-            assert abs((p < level).mean() - level) < 5 * np.sqrt(level * (1 - level) / 2000) + 0.01
+            assert abs((p < level).mean() - level) < 5 * np.sqrt(level * (1 - level) / 800) + 0.01
 
 
 def test_the_law_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions():

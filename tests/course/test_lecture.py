@@ -35,7 +35,7 @@ def lecture(folder):
 
 def get(address, token=True):
     parts = urlsplit(address)
-    connection = http.client.HTTPConnection(parts.netloc, timeout=60)
+    connection = http.client.HTTPConnection(parts.netloc)
     connection.request("GET", f"{parts.path}?{parts.query}" if token else parts.path)
     response = connection.getresponse()
     text = response.read().decode()
@@ -108,7 +108,7 @@ def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
             kernels = address.split("?")[0] + f"api/kernels/{kernel}{what}"
             assert get(kernels, token=False)[0] in (401, 403)
         server.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
-        server.wait(timeout=10)
+        server.wait()
     folded = text[text.index('<details class="lecture-answer">') : text.index(">After")]
     assert "Tiny" not in folded
     assert "Answer" in folded

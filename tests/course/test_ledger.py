@@ -11,21 +11,25 @@ from nbformat.v4 import new_markdown_cell, new_notebook
 from rbcourse.course import ledger
 
 ROOT = Path(__file__).parents[2]
-FOUND = ledger.collect(ROOT)
 PAGE = (ROOT / "LEDGER.md").read_text("utf-8")
 ENTRIES = ledger.SOURCES["entries"]
 
 
-def test_the_stored_ledger_is_fresh():
-    assert ledger.render(FOUND) == PAGE
+@pytest.fixture(scope="module")
+def found():
+    return ledger.collect(ROOT)
 
 
-def test_every_entry_has_function_test_and_lesson():
-    assert {key: lacks for key in ENTRIES if (lacks := FOUND[key].lacks())} == {}
+def test_the_stored_ledger_is_fresh(found):
+    assert ledger.render(found) == PAGE
 
 
-def test_every_misprint_has_a_test():
-    assert [key for key in ledger.MISPRINTS if not FOUND[key].tests] == []
+def test_every_entry_has_function_test_and_lesson(found):
+    assert {key: lacks for key in ENTRIES if (lacks := found[key].lacks())} == {}
+
+
+def test_every_misprint_has_a_test(found):
+    assert [key for key in ledger.MISPRINTS if not found[key].tests] == []
     assert len(ledger.MISPRINTS) == 22
 
 
@@ -52,11 +56,11 @@ def test_all_of_both_texts_is_listed():
     assert set(ENTRIES) - wanted == {"BK 1", "BK 3", "BK 4", "BK 5", "BK 6", "BK 7", "RR 2", "RR 4"}
 
 
-def test_every_name_in_it_resolves():
-    for name in {name for entry in FOUND.values() for name in entry.functions}:
+def test_every_name_in_it_resolves(found):
+    for name in {name for entry in found.values() for name in entry.functions}:
         module, function = name.rsplit(".", 1)
         assert hasattr(importlib.import_module(f"rbcourse.{module}"), function), name
-    for name in {name for entry in FOUND.values() for name in entry.tests}:
+    for name in {name for entry in found.values() for name in entry.tests}:
         file, function = name.split("::")
         source = (ROOT / "tests" / file).read_text("utf-8")
         assert len(re.findall(rf"^def {function}\(", source, re.MULTILINE)) == 1, name
@@ -104,10 +108,10 @@ def test_an_unknown_key_is_named(course):
 
 
 @pytest.mark.source("errata 4")
-def test_the_printed_numbers_of_the_propositions_repeat_one_and_skip_one():
+def test_the_printed_numbers_of_the_propositions_repeat_one_and_skip_one(found):
     printed = [1, 2, 2, 4, 5, 6, 7]
     corrected = [int(key.split()[-1]) for key in ENTRIES if key.startswith("BK Prop.")]
     assert len(set(printed)) < len(printed)
     assert corrected == list(range(1, 8))
     for number, word in {2: "nearest", 3: "invariant"}.items():
-        assert any(word in name for name in FOUND[f"BK Prop. {number}"].tests)
+        assert any(word in name for name in found[f"BK Prop. {number}"].tests)

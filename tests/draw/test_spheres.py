@@ -18,8 +18,17 @@ TABLE = spheres.image_table(IMAGES)
 MOMENTS = np.array([1.0, 2, 3])
 TIMES = np.linspace(0, 24, 481)
 STARTS = {"axis 1": [2, 0.01, 0.01], "axis 2": [0.01, 2, 0.01], "axis 3": [0.01, 0.01, 2]}
-TURNS, W = rb.geodesic_flow(np.diag(MOMENTS), np.eye(3), list(STARTS.values()), TIMES)
-SPINS = {name: W[:, k] for k, name in enumerate(STARTS)}
+
+
+@pytest.fixture(scope="module")
+def turning():
+    """Orientations and angular velocities of the three spins, shape (times, spins, ...)."""
+    return rb.geodesic_flow(np.diag(MOMENTS), np.eye(3), list(STARTS.values()), TIMES)
+
+
+@pytest.fixture(scope="module")
+def spins(turning):
+    return {name: turning[1][:, k] for k, name in enumerate(STARTS)}
 
 
 @pytest.fixture
@@ -133,28 +142,28 @@ def space():
 
 
 @pytest.mark.source("BK (8)")
-def test_spins_are_drawn_with_a_line_for_each_component():
+def test_spins_are_drawn_with_a_line_for_each_component(spins):
     fig, axes = plt.subplots(1, 3)
-    lines = spheres.draw_spins(axes, TIMES, SPINS)
+    lines = spheres.draw_spins(axes, TIMES, spins)
     assert len(lines) == 9
     for k, name in enumerate(STARTS):
         assert axes[k].get_title() == name
         for i in range(3):
-            assert np.array_equal(lines[3 * k + i].get_ydata(), W[:, k, i])
+            assert np.array_equal(lines[3 * k + i].get_ydata(), spins[name][:, i])
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
     plt.close(fig)
 
 
-def test_the_description_counts_flips():
-    said = spheres.describe_spins(SPINS)
-    flips = np.count_nonzero(np.diff(np.sign(W[:, 1, 1])))
+def test_the_description_counts_flips(spins):
+    said = spheres.describe_spins(spins)
+    flips = np.count_nonzero(np.diff(np.sign(spins["axis 2"][:, 1])))
     assert flips >= 1
     assert f"axis 1: it stays; axis 2: it changes its sign {flips} times; axis 3: it stays" in said
 
 
 @pytest.mark.source("BK (8)")
-def test_momenta_lie_on_the_sphere_on_paths_of_equal_energy(space):
-    L = spheres.momentum_directions(MOMENTS, W)
+def test_momenta_lie_on_the_sphere_on_paths_of_equal_energy(space, turning):
+    L = spheres.momentum_directions(MOMENTS, turning[1])
     table = spheres.momentum_table(L)
     assert np.array_equal(np.stack([table[f"{axis} [1]"] for axis in "xyz"], axis=-1), L)
     assert L.shape == (3, 481, 3)
@@ -177,23 +186,24 @@ def test_momenta_lie_on_the_sphere_on_paths_of_equal_energy(space):
     assert "none round axis 2" in said
 
 
-def test_the_book_turns_and_its_pin_with_it(space):
+def test_the_book_turns_and_its_pin_with_it(space, turning):
     edges = np.array([2.0, 1, 0.5])
-    update = spheres.moving_book(space, TIMES, TURNS[:, 1], edges)
+    turns, _ = turning
+    update = spheres.moving_book(space, TIMES, turns[:, 1], edges)
     flat = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * edges / 2
     for i in (0, 40, 100, 120, 130, 160):
         artists = update(i)
         (pin,) = [artist for artist in artists if hasattr(artist, "get_data_3d")]
         e, a = np.radians([space.elev, space.azim])
         eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        assert (artists[-1] is pin) == (TURNS[i, 1, :, 1] @ eye > 0)  # in front, drawn last
+        assert (artists[-1] is pin) == (turns[i, 1, :, 1] @ eye > 0)  # in front, drawn last
         (book,) = [artist for artist in artists if hasattr(artist, "_faces")]
         (clock,) = [artist for artist in artists if hasattr(artist, "get_text")]
         assert clock.get_text() == f"t = {TIMES[i]:.1f}"
         corners = np.unique(np.asarray(book._faces)[:6, :4].reshape(-1, 3).round(12), axis=0)
-        assert np.abs(np.sort(corners, 0) - np.sort(flat @ TURNS[i, 1].T, 0)).max() < 1e-11
+        assert np.abs(np.sort(corners, 0) - np.sort(flat @ turns[i, 1].T, 0)).max() < 1e-11
         foot, tip = np.transpose(pin.get_data_3d())
-        assert np.abs(foot - edges[1] / 2 * TURNS[i, 1, :, 1]).max() < 1e-14
+        assert np.abs(foot - edges[1] / 2 * turns[i, 1, :, 1]).max() < 1e-14
         assert np.abs(np.cross(tip, foot)).max() < 1e-14
         assert tip @ foot > foot @ foot
 
