@@ -139,7 +139,7 @@ def run_in(venv, *words):
 def test_in(venv, *words):
     """Run the tests: a worker for each processor, with one thread each.
 
-    File by file in their order: the lessons come last, and fill what time is left.
+    File by file in their order: what is short comes last, and fills what time is left.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     files = ("--dist", "loadfile", "--no-loadscope-reorder")

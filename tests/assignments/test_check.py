@@ -146,7 +146,7 @@ def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(handout, cap
 @pytest.mark.skipif(os.name == "nt", reason="there interrupts are no signals")
 @pytest.mark.usefixtures("one_second_for_loops")
 def test_a_loop_that_cannot_be_stopped_ends_the_run(handout, capsys, monkeypatch):
-    monkeypatch.setattr(check, "STOP_SECONDS", 1)
+    monkeypatch.setattr(check, "STOP_SECONDS", 5)
     loop = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nwhile True:\n    pass"
     edited(handout, lambda notebook: None, **{"square-answer": loop})
     check.check(handout / "ps0.ipynb", seconds=1)

@@ -312,7 +312,7 @@ def test_a_set_without_submissions_and_an_unknown_one_are_told(tmp_path):
 def test_a_cell_that_cannot_be_stopped_is_refused(tmp_path, template):
     course = Class(tmp_path, template)
     with (tmp_path / "nbgrader_config.py").open("a") as config:
-        config.write("c.Execute.iopub_timeout = 1\n")
+        config.write("c.Execute.iopub_timeout = 5\n")
     stubborn = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nwhile True: pass"
     course.submit("ann", half=stubborn + "  # never ends")
     grade("ps0", tmp_path)
