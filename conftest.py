@@ -48,6 +48,8 @@ class Lesson(IPyNbFile):
     def collect(self):
         """Return the items in their order."""
         self.cells = list(super().collect())
+        for cell in self.cells:
+            cell.output_timeout = 600  # seconds; nbval's 5 are too few on a busy machine
         return [*self.cells, Remains.from_parent(self, name="Outputs and figures")]
 
     def setup(self):

@@ -65,12 +65,12 @@ def main():
     collect.add_argument("--due", help='what is later is listed: "2026-12-01 23:59"')
     grade = tasks.add_parser("grade", help="grade what was collected; write feedback and a table")
     grade.add_argument("sets", nargs="*", metavar="set", help="ps1; without, all there are")
-    tasks.add_parser("browser", help="try every lesson in Chromium; further words go to pytest")
+    tasks.add_parser("browser", help="try all pages in Chromium; further words go to pytest")
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
-    # a test run starts a hundred Pythons: each would compile all that it imports anew
+    # the tests start about a hundred processes, which would all compile what they import
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     if further and known.task not in ("test", "lab", "browser"):
         parser.error("%s takes no %s" % (known.task, " ".join(further)))

@@ -1,4 +1,4 @@
-"""Each slider of an explorer over its range, in 25 places, and pairs of extremes."""
+"""Each slider of an explorer at 25 places of its range, and pairs of extremes."""
 
 import html
 import re
@@ -51,7 +51,7 @@ def _range(control):
     if hasattr(control, "options"):
         return list(control.options)
     steps = round((control.max - control.min) / control.step)
-    chosen = np.unique(np.linspace(0, steps, 25).round())
+    chosen = np.unique(np.append(np.linspace(0, steps, 24), steps / 2).round())
     return [control.min + i * control.step for i in chosen[:-1]] + [control.max]
 
 

@@ -1,5 +1,6 @@
 """The files round the package agree with each other, and the package works without them."""
 
+import os
 import re
 import subprocess
 import sys
@@ -251,6 +252,7 @@ def test_tests_run_in_the_environment_that_is_asked_for(
     (module.ROOT / "pyproject.toml").write_text(RANGES)
     ran = []
     monkeypatch.setattr(module, "run_in", lambda venv, *words: ran.append((venv, words)))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     monkeypatch.setattr(sys, "argv", ["course.py", "test", *releases, "-q", "tests/test_so3.py"])
     module.main()
     ((venv, words),) = ran
@@ -260,6 +262,7 @@ def test_tests_run_in_the_environment_that_is_asked_for(
     assert all(str(module.python(venv)) in command for command in done[1:])
     assert words[:2] == ("-m", "pytest")
     assert words[-2:] == ("-q", "tests/test_so3.py")
+    assert "PYTHONDONTWRITEBYTECODE" not in os.environ
     left_out = [word for word in words if word.startswith("--deselect=")]
     stored = ["--deselect=notebooks", "--deselect=tests/test_notebooks.py"]
     assert left_out == (stored if releases else [])

@@ -133,7 +133,7 @@ def test_p_values_are_uniform_for_uniform_rotations():
     assert set(tests[0]) == ALL
     for name in ALL:
         p = np.array([test[name].p_value for test in tests])
-        for level in (0.05, 0.5):  # the laws hold for large samples, here to a hundredth
+        for level in (0.2, 0.5):  # the laws hold for large samples, here to a hundredth
             assert abs((p < level).mean() - level) < 5 * np.sqrt(level * (1 - level) / 800) + 0.01
 
 

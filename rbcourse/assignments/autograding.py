@@ -56,7 +56,7 @@ def configure(config: Config) -> None:
         nbgrader.AssignLatePenalties,
         nbgrader.CheckCellMetadata,
     ]
-    config.Execute.iopub_timeout = 20  # so long a loop may take to end when it is told to
+    config.Execute.iopub_timeout = 20  # seconds that an interrupted cell may take to stop
     # nbgrader gives no points where anything is written to stderr, be it a mere warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."

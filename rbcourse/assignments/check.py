@@ -27,7 +27,7 @@ from rbcourse.assignments.tampering import find_in_cells
 from rbcourse.course.notebooks import KERNEL, kernel_address
 
 CELL_SECONDS = 60
-STOP_SECONDS = 20  # so long a cell may take to end when it is told to
+STOP_SECONDS = 20  # that an interrupted cell may take to stop
 CELL_BYTES = 2_000_000
 ALL_BYTES = 10_000_000
 COPIED_BYTES = 50_000_000
@@ -140,6 +140,7 @@ class _Client(NotebookClient):
 
     def _begin(self, cell: NotebookNode, cell_index: int) -> None:
         self.at, self._bytes = cell_index + 1, min(CELL_BYTES, self._left)
+        self.raise_on_iopub_timeout = False
         if len(self.slow) > 1:
             raise CellTimeoutError("cells take too long")
         print(f"\rrunning cell {self.at} of {len(self.nb.cells)} ", end="", flush=True)
@@ -156,6 +157,7 @@ class _Client(NotebookClient):
         self, timeout: int, cell: NotebookNode | None = None
     ) -> dict[str, Any] | None:
         self.slow.append(self.at)
+        self.raise_on_iopub_timeout = True  # what does not stop now cannot be stopped
         reply: dict[str, Any] | None = await super()._async_handle_timeout(timeout, cell)
         return reply
 
@@ -197,7 +199,6 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
             timeout=seconds,
             interrupt_on_timeout=True,
             iopub_timeout=STOP_SECONDS,
-            raise_on_iopub_timeout=True,
             error_on_timeout={"ename": "TimeoutError", "evalue": SLOW, "traceback": [SLOW]},
             extra_arguments=["--log-level=CRITICAL"],
             resources={"metadata": {"path": work}},
@@ -208,13 +209,16 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
         try:
             client.execute(env={**os.environ, "IPYTHONDIR": own})
         except DeadKernelError:
+            notebook.cells[client.at - 1].execution_count = None
             remarks.append(
                 f"the kernel died in cell {client.at}: it called exit, or used up the memory; "
                 "the cells after it were not run"
             )
         except CellTimeoutError:
+            notebook.cells[client.at - 1].execution_count = None
             first = client.at + (client.at in client.slow)
-            remarks.append(f"cells from {first} on were not run")
+            if first <= len(notebook.cells):
+                remarks.append(f"cells from {first} on were not run")
         except (RuntimeError, KeyError) as error:
             raise ValueError(
                 f"Python could not be started for the notebook ({error}); install what "
@@ -298,7 +302,7 @@ def _tests(notebook: NotebookNode) -> list[bool]:
         if not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
             print(f"hidden  {name_cell(notebook.cells, at)} has hidden tests only")
             continue
-        error = _error(cell) or ("" if cell.execution_count else "it was not run")
+        error = _error(cell) or ("" if cell.execution_count else "it was not run to its end")
         passed.append(not error)
         print(f"{'FAILED' if error else 'passed'}  {name_cell(notebook.cells, at)}", end="")
         print(f": {error}" if error else "")

@@ -37,7 +37,9 @@ def execute(path: Path, figures: Path) -> str:
         record_timing=False,
         coalesce_streams=True,
         store_widget_state=False,
-        timeout=120,
+        timeout=600,
+        iopub_timeout=600,
+        raise_on_iopub_timeout=True,
         extra_arguments=["--log-level=ERROR"],
         resources={"metadata": {"path": str(path.parent)}},
     )

@@ -50,17 +50,24 @@ export default {
       image.addEventListener("pointermove", point);
     }
     // Give buttons and sliders names for screen readers.
-    const name = () => {
-      const panel = el.closest(".rbcourse-explorer");
-      panel?.querySelectorAll(".widget-slider").forEach((slider) => {
+    const name = (panel) => {
+      panel.querySelectorAll(".widget-slider").forEach((slider) => {
         const label = slider.querySelector(".widget-label").textContent;
         slider.querySelector(".noUi-handle")?.setAttribute("aria-label", label);
       });
-      panel?.querySelectorAll(".widget-play button").forEach((button, i) => {
+      panel.querySelectorAll(".widget-play button").forEach((button, i) => {
         button.title = ["Play or pause", "Stop"][i] ?? "";
       });
     };
-    setTimeout(name, 1000);
+    const observer = new MutationObserver(() => name(panel));
+    let panel = null;
+    const begin = () => {
+      panel = el.closest(".rbcourse-explorer");
+      if (!panel) { setTimeout(begin, 100); return; }
+      name(panel);
+      observer.observe(panel, { childList: true, subtree: true });
+    };
+    begin();
     model.on("change:png", draw);
     draw();
     el.append(image);

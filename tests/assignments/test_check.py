@@ -3,8 +3,10 @@
 import os
 import subprocess
 import sys
+import time
 from functools import partial
 from hashlib import sha256
+from textwrap import dedent
 
 import nbformat
 import pytest
@@ -121,18 +123,33 @@ def test_a_changed_test_does_not_help_and_the_name_is_put_right(handout, capsys)
 
 
 @pytest.fixture
-def one_second_for_loops(monkeypatch):
-    """Only a cell with a loop has a limit; for all others the test waits."""
+def endless(monkeypatch, tmp_path):
+    """``endless(name)``: only that cell has a limit, a second from where its loop begins.
 
-    def limit(cell):
-        return 1 if "while True" in cell.source else None
+    The loop begins when the file exists whose path is returned.
+    """
 
-    monkeypatch.setattr(check, "_Client", partial(check._Client, timeout_func=limit))
+    def begin(name):
+        begun = tmp_path / "begun"
+
+        def limit(cell):
+            if cell.metadata.get("nbgrader", {}).get("grade_id") != name:
+                return None
+            while not begun.exists():
+                time.sleep(0.01)
+            return 1
+
+        monkeypatch.setattr(check, "_Client", partial(check._Client, timeout_func=limit))
+        return str(begun)
+
+    return begin
 
 
-@pytest.mark.usefixtures("one_second_for_loops")
-def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(handout, capsys):
-    loop = "while True:\n    print('x' * 10000)"
+def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(
+    handout, capsys, monkeypatch, endless
+):
+    monkeypatch.setattr(check, "STOP_SECONDS", 600)
+    loop = f"open({endless('square-answer')!r}, 'w')\nwhile True:\n    print('x' * 10000)"
     edited(handout, lambda notebook: None, **{"square-answer": loop})
     check.check(handout / "ps0.ipynb", seconds=1)
     said = capsys.readouterr().out
@@ -144,15 +161,22 @@ def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(handout, cap
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there interrupts are no signals")
-@pytest.mark.usefixtures("one_second_for_loops")
-def test_a_loop_that_cannot_be_stopped_ends_the_run(handout, capsys, monkeypatch):
-    monkeypatch.setattr(check, "STOP_SECONDS", 5)
-    loop = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nwhile True:\n    pass"
-    edited(handout, lambda notebook: None, **{"square-answer": loop})
+def test_a_loop_that_cannot_be_stopped_ends_the_run(handout, capsys, monkeypatch, endless):
+    monkeypatch.setattr(check, "STOP_SECONDS", 1)
+    loop = f"""
+        def square(x):
+            import signal
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            open({endless("square-test")!r}, "w")
+            while True:
+                pass
+    """
+    edited(handout, lambda notebook: None, **{"square-answer": dedent(loop)})
     check.check(handout / "ps0.ipynb", seconds=1)
     said = capsys.readouterr().out
     assert "took longer than 1 s" in said
-    assert "cells from 4 on were not run" in said
+    assert "cells from 5 on were not run" in said
+    assert "FAILED  the test cell 'square-test'" in said
     assert "0 of 2 visible tests passed" in said
 
 

@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 from pathlib import Path
+from textwrap import dedent
 
 import nbformat
 import pytest
@@ -36,29 +37,50 @@ def cell(notebook, grade_id):
 
 
 CONFIG = """
+import time
+from pathlib import Path
+
 from rbcourse.assignments.autograding import configure
+
 c = get_config()
 configure(c)
 c.Execute.timeout = 1
-c.Execute.timeout_func = lambda cell: 1 if "never ends" in cell.source else None
+c.Execute.iopub_timeout = 600
+
+
+def limit(cell, endless="endless"):
+    if endless not in cell.source:
+        return None
+    begun = Path("FOLDER", "begun")
+    while not begun.exists():
+        time.sleep(0.01)
+    begun.unlink()
+    return 1
+
+
+c.Execute.timeout_func = limit
 """
 
 
 @pytest.fixture(scope="module")
 def template(tmp_path_factory):
-    """A course folder with the tiny set and its gradebook; what never ends gets a second."""
+    """A course folder with the tiny set and its gradebook.
+
+    Only cells whose source says that they are endless have a limit, a second from when they write
+    the file "begun".
+    """
     folder = tmp_path_factory.mktemp("template")
     write_tiny_set(folder)
-    (folder / "nbgrader_config.py").write_text(CONFIG)
+    (folder / "nbgrader_config.py").write_text(CONFIG.replace("FOLDER", str(folder)))
     assert run_step(GenerateAssignment, course_config("ps0", folder))["success"]
-    return folder, release("ps0", folder)["ps0.ipynb"]
+    return folder, release("ps0", folder)["ps0.ipynb"], f"open({str(folder / 'begun')!r}, 'w')"
 
 
 class Class:
     """A course folder with the tiny set, and students who hand in."""
 
     def __init__(self, folder, template):
-        made, self.given = template
+        made, self.given, self.begin = template
         self.folder = shutil.copytree(made, folder, dirs_exist_ok=True)
 
     def gradebook(self):
@@ -155,7 +177,9 @@ def hand_in_all(course):
         "half right", square="def square(x):\n    return 2 * x", half="import sys\nsys.exit()"
     )
     course.submit(
-        "endless", square="while True: pass  # never ends", half="half = 0.5\n'x' * 10**9"
+        "endless",
+        square=f"{course.begin}\nwhile True: pass  # endless",
+        half="half = 0.5\n'x' * 10**9",
     )
     course.submit("loud", half=LOUD, square=ANSWERS["square-answer"] + "\nprint('x' * 10**9)")
     course.submit("dies", half="import os\nos._exit(1)")
@@ -310,13 +334,21 @@ def test_a_set_without_submissions_and_an_unknown_one_are_told(tmp_path):
 
 
 def test_a_cell_that_cannot_be_stopped_is_refused(tmp_path, template):
+    """Here the test cell, which calls what never ends."""
     course = Class(tmp_path, template)
     with (tmp_path / "nbgrader_config.py").open("a") as config:
-        config.write("c.Execute.iopub_timeout = 5\n")
-    stubborn = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nwhile True: pass"
-    course.submit("ann", half=stubborn + "  # never ends")
+        config.write("c.Execute.iopub_timeout = 5\nlimit.__defaults__ = ('square(2) == 4',)\n")
+    stubborn = f"""
+        def square(x):
+            import signal
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            {course.begin}
+            while True:
+                pass
+    """
+    course.submit("ann", square=dedent(stubborn))
     grade("ps0", tmp_path)
-    why = "answer cell half-answer cannot be stopped"
+    why = "cell square-test cannot be stopped"
     assert course.rows()["ann"]["remarks"] == f"refused: {why}"
 
 

@@ -1,7 +1,9 @@
-"""A headless Chromium and a JupyterLab, one of each for all workers, and pages side by side."""
+"""One headless Chromium and one JupyterLab, shared by all workers; pages side by side."""
 
+import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
@@ -13,10 +15,8 @@ from playwright.sync_api import expect, sync_playwright
 from servers import serving
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 900_000  # milliseconds: no test fails because a machine is slow
-CHROMIUM = [
-    "--headless=new",
-    "--remote-debugging-port=0",
+PATIENCE = 600_000  # milliseconds; long enough for a slow machine
+QUIET = [
     "--no-sandbox",
     "--disable-quic",
     "--no-first-run",
@@ -31,14 +31,21 @@ def pytest_addoption(parser):
     parser.addoption("--screenshots", help="a folder to put pictures of the pages in")
 
 
-def pytest_configure(config):
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session):
     """Start what the workers share, before there are any."""
-    if not hasattr(config, "workerinput"):
-        stack = ExitStack()
-        config.add_cleanup(stack.close)
-        config.stash[STARTED] = stack.enter_context(started())
+    config = session.config
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    if not os.environ.get("CHROMIUM"):
+        raise pytest.UsageError("CHROMIUM must name a browser; course.py browser looks for one")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the servers end too
+    stack = ExitStack()
+    config.add_cleanup(stack.close)
+    config.stash[STARTED] = stack.enter_context(started())
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_configure_node(node):
     """Tell a worker where it is."""
     node.workerinput |= node.config.stash[STARTED]
@@ -51,23 +58,22 @@ def started():
         course, env = Path(home, "course"), environment(home)
         for folder in ("notebooks", "benchmarks"):
             shutil.copytree(ROOT / folder, course / folder)
-        copy = [sys.executable, "-m", "rbcourse.course.notebooks", "copy"]
-        subprocess.run(copy, cwd=course, env=env, check=True)
-        chromium = [os.environ["CHROMIUM"], *CHROMIUM, f"--user-data-dir={home}/chromium"]
-        lab = [sys.executable, "-m", "jupyterlab", "--no-browser", "--ServerApp.port=0"]
+        copy = ["-m", "rbcourse.course.notebooks", "copy"]
+        subprocess.run([sys.executable, *copy], cwd=course, env=env, check=True)
+        chromium = {"executablePath": os.environ["CHROMIUM"], "args": QUIET}
+        Path(home, "chromium.json").write_text(json.dumps(chromium))
+        browser = ["playwright", "launch-server", "--browser=chromium"]
+        browser += [f"--config={home}/chromium.json"]
+        lab = ["jupyterlab", "--no-browser", "--ServerApp.port=0"]
         lab += [f"--ServerApp.root_dir={course / 'work'}"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             lab.append("--allow-root")
         address = r"(http://127\.0\.0\.1:\d+)/lab\?(token=\w+)"
         with (
-            serving(chromium, course, env, r"DevTools listening on (ws://\S+)") as browser,
+            serving(browser, course, os.environ | env, r"(ws://\S+)\n") as found,
             serving(lab, course, env, address) as server,
         ):
-            yield {
-                "home": home,
-                "browser": browser[1],
-                "lab": f"{server[1]}/lab/%s?{server[2]}",
-            }
+            yield {"home": home, "browser": found[1], "lab": f"{server[1]}/lab/%s?{server[2]}"}
 
 
 def environment(home):
@@ -87,7 +93,7 @@ def context(shared):
     """What the pages of a worker have in common; it keeps what it has loaded."""
     expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.connect_over_cdp(shared["browser"])
+        chromium = playwright.chromium.connect(shared["browser"], timeout=PATIENCE)
         context = chromium.new_context()
         context.set_default_timeout(PATIENCE)
         yield context
@@ -146,5 +152,5 @@ def pytest_terminal_summary(terminalreporter):
     rows = [value for report in reports for key, value in report.user_properties if key == "speed"]
     if rows:
         head = f"{'explorer':26}{'median':>10}{'longest':>10}{'held':>10}{'last after':>12}"
-        terminalreporter.write_line("From key press to changed picture, beside the other tests")
+        terminalreporter.write_line("From key press to new picture, while the other tests run")
         terminalreporter.write_line("\n".join([head, *rows]))

@@ -19,7 +19,7 @@ SEEN = """() => {
       faults.push("player that starts by itself: " + image.id);
   }
   const text = document.body.innerText;
-  for (const wrong of ["model not found", "Error displaying widget", "Loading widget",
+  for (const wrong of ["model not found", "Error displaying widget",
                        "Error rendering output", "Traceback (most recent call last)"])
     if (text.includes(wrong)) faults.push(wrong);
   return faults;
@@ -36,13 +36,26 @@ NOTE = """() => {
 }"""
 
 
+PICTURES = """() => [...document.querySelectorAll(".jp-Cell figure img")]
+    .filter((image) => image.complete).map((image) => image.alt)"""
+LOADED = """() => !document.body.innerText.includes("Loading widget")"""
+STARRED = """() => [...document.querySelectorAll(".jp-InputPrompt")]
+    .some((prompt) => prompt.textContent.includes("[*]"))"""
+
+
 def walk(page):
-    """Scroll a notebook to its end, a large screen at a time; return what is wrong."""
-    faults = set()
+    """Scroll a notebook to its end, a large screen at a time.
+
+    Return what is wrong, and the descriptions of the pictures.
+    """
+    faults, seen = set(), set()
     page.set_viewport_size({"width": 1280, "height": 6000})
+    page.evaluate(f"document.querySelector('{SCROLLER}').scrollTop = 0")
     while True:
         page.wait_for_timeout(150)  # so that pictures are drawn
+        page.wait_for_function(LOADED)
         faults.update(page.evaluate(SEEN))
+        seen.update(page.evaluate(PICTURES))
         at_end = page.evaluate(
             f"""() => {{
                 const box = document.querySelector('{SCROLLER}'), before = box.scrollTop;
@@ -52,7 +65,7 @@ def walk(page):
         )
         if at_end:
             page.set_viewport_size({"width": 1280, "height": 800})
-            return faults
+            return faults, seen
 
 
 def open_in_lab(page, address):
@@ -64,13 +77,17 @@ def open_in_lab(page, address):
 def run_all(page):
     """Run all cells and wait until the last of them is done."""
     page.get_by_text(IDLE).wait_for()
+    page.evaluate(
+        f"""() => {{
+            window.started = false;
+            const look = () => {{ window.started ||= ({STARRED})(); }};
+            new MutationObserver(look).observe(document.body, {{ childList: true, subtree: true }});
+        }}"""
+    )
     page.get_by_role("menuitem", name="Run", exact=True).click()
     page.get_by_text("Run All Cells", exact=True).click()
-    page.locator(".jp-InputPrompt", has_text="[*]").last.wait_for(state="attached")
-    page.wait_for_function(
-        """() => ![...document.querySelectorAll(".jp-InputPrompt")]
-            .some((prompt) => prompt.textContent.includes("[*]"))"""
-    )
+    page.wait_for_function("window.started")
+    page.wait_for_function(f"() => !({STARRED})()")
     page.get_by_text(IDLE).wait_for()
 
 

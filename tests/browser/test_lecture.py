@@ -1,7 +1,6 @@
 """Every lesson in the lecture view: large letters, question and explorer on one screen."""
 
 import re
-import sys
 from contextlib import ExitStack
 from itertools import pairwise
 
@@ -34,7 +33,7 @@ def show(home, page):
     with ExitStack() as stack:
 
         def shown(number):
-            words = [sys.executable, "-m", "rbcourse.course.lecture", number, "--no-browser"]
+            words = ["rbcourse.course.lecture", number, "--no-browser"]
             address = r"(http://127\.0\.0\.1:\d+/\?token=\w+)"
             page.set_viewport_size({"width": 1024, "height": 768})
             page.goto(stack.enter_context(serving(words, course, env, address))[1])

@@ -53,7 +53,7 @@ def test_the_keyboard_reaches_every_control(explorer):
 
 
 def test_every_setting_gives_a_picture_and_says_something(explorer):
-    """Each slider at eight places, and all pairs of ends, drawn in full."""
+    """Each slider at eight or nine places, and all pairs of ends, drawn in full."""
     first = explorer.values
     chosen = [s for i, s in enumerate(settings(explorer)) if len(s) == 2 or i % 3 == 0]
     for setting in chosen:
