@@ -73,7 +73,11 @@ export default {
     el.append(image);
     model.set("density", window.devicePixelRatio);
     model.save_changes();
-    return () => { model.off("change:png", draw); URL.revokeObjectURL(image.src); };
+    return () => {
+      model.off("change:png", draw);
+      observer.disconnect();
+      URL.revokeObjectURL(image.src);
+    };
   }
 };
 """
