@@ -4,9 +4,11 @@ import re
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import psutil
 
 
 @contextmanager
@@ -20,12 +22,19 @@ def serving(words, folder, env, pattern):
         try:
             yield _address(job, log, pattern)
         finally:
-            job.terminate()
-            try:
-                job.wait(60)
-            except subprocess.TimeoutExpired:
-                job.kill()
-                job.wait()
+            _end(job)
+
+
+def _end(job):
+    """End a program and all that it has started, at the latest after a minute."""
+    family = [psutil.Process(job.pid)] if job.poll() is None else []
+    family += [child for parent in family for child in parent.children(recursive=True)]
+    for process in family:
+        with suppress(psutil.NoSuchProcess):
+            process.terminate()
+    for process in psutil.wait_procs(family, 60)[1]:
+        process.kill()
+    job.wait()
 
 
 def _address(job, log, pattern):
