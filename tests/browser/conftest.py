@@ -64,7 +64,7 @@ def started():
         Path(home, "chromium.json").write_text(json.dumps(chromium))
         browser = ["playwright", "launch-server", "--browser=chromium"]
         browser += [f"--config={home}/chromium.json"]
-        lab = ["jupyterlab", "--no-browser", "--ServerApp.port=0"]
+        lab = ["jupyterlab", "--no-browser", "--ServerApp.port=0", "--expose-app-in-browser"]
         lab += [f"--ServerApp.root_dir={course / 'work'}"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             lab.append("--allow-root")
