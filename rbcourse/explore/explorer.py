@@ -52,7 +52,7 @@ export default {
     // Give buttons and sliders names for screen readers.
     const name = (panel) => {
       panel.querySelectorAll(".widget-slider").forEach((slider) => {
-        const label = slider.querySelector(".widget-label").textContent;
+        const label = slider.querySelector(".widget-label")?.textContent ?? "";
         slider.querySelector(".noUi-handle")?.setAttribute("aria-label", label);
       });
       panel.querySelectorAll(".widget-play button").forEach((button, i) => {
@@ -60,10 +60,10 @@ export default {
       });
     };
     const observer = new MutationObserver(() => name(panel));
-    let panel = null;
+    let panel = null, timer = 0;
     const begin = () => {
       panel = el.closest(".rbcourse-explorer");
-      if (!panel) { setTimeout(begin, 100); return; }
+      if (!panel) { timer = setTimeout(begin, 100); return; }
       name(panel);
       observer.observe(panel, { childList: true, subtree: true });
     };
@@ -76,6 +76,7 @@ export default {
     return () => {
       model.off("change:png", draw);
       observer.disconnect();
+      clearTimeout(timer);
       URL.revokeObjectURL(image.src);
     };
   }
