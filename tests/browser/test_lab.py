@@ -10,6 +10,8 @@ from playwright.sync_api import expect
 
 OPEN = """async (path) => {
   window.opened = await jupyterapp.commands.execute("docmanager:open", { path });
+  await opened.sessionContext.ready; // what is closed while its kernel starts fails
+  await opened.sessionContext.session.kernel.info;
 }"""
 
 
