@@ -60,11 +60,14 @@ def main():
     check.add_argument("file", type=os.path.abspath, help="the notebook: ps1.ipynb")
     handout = tasks.add_parser("handout", help="pack a problem set for students")
     handout.add_argument("set", help="its name: ps1")
+    handout.add_argument("--solutions", action="store_true", help="the model answers instead")
     collect = tasks.add_parser("collect", help="sort what Moodle and Canvas give you")
     collect.add_argument("folder", type=os.path.abspath, help="with the downloads")
     collect.add_argument("--due", help='what is later is listed: "2026-12-01 23:59"')
     grade = tasks.add_parser("grade", help="grade what was collected; write feedback and a table")
     grade.add_argument("sets", nargs="*", metavar="set", help="ps1; without, all there are")
+    grade.add_argument("--require-box", action="store_true", help="refuse to grade without a box")
+    tasks.add_parser("hostile", help="grade submissions that mean harm; further words go to pytest")
     tasks.add_parser("browser", help="try all pages in Chromium; further words go to pytest")
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
@@ -72,7 +75,7 @@ def main():
     known, further = parser.parse_known_args()
     # the tests start about a hundred processes, which would all compile what they import
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    if further and known.task not in ("test", "lab", "browser"):
+    if further and known.task not in ("test", "lab", "browser", "hostile"):
         parser.error("%s takes no %s" % (known.task, " ".join(further)))
     if known.task == "test" and known.releases:
         venv = set_up_range(known.releases)
@@ -95,12 +98,16 @@ def main():
     elif known.task == "check":
         run("-m", "rbcourse.assignments.check", known.file)
     elif known.task == "handout":
-        run("-m", "rbcourse.assignments.handout", known.set)
+        run("-m", "rbcourse.assignments.handout", known.set, *["--solutions"] * known.solutions)
     elif known.task == "collect":
         due = ["--due", known.due] if known.due else []
         run("-m", "rbcourse.assignments.collect", known.folder, *due)
     elif known.task == "grade":
-        run("-m", "rbcourse.assignments.grade", *known.sets)
+        box = ["--require-box"] * known.require_box
+        run("-m", "rbcourse.assignments.grade", *(known.sets + box))
+    elif known.task == "hostile":
+        install_package("bwrap", "bubblewrap")
+        test_in(VENV, "tests/hostile", *further)
     elif known.task == "browser":
         look_in_browser(further)
     elif known.task == "ledger":
@@ -256,15 +263,21 @@ def find_chromium():
     there = [os.environ.get("CHROMIUM")] + [shutil.which(name) for name in CHROMIUM]
     if any(there):
         return next(filter(None, there))
-    if not shutil.which("apt-get"):
-        sys.exit("No Chromium or Chrome is found: install one, and name it in CHROMIUM.")
-    print("Installing Chromium", end="", flush=True)
-    root = [] if os.geteuid() == 0 else ["sudo"]
-    apt_get = root + ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "--yes"]
-    patiently(*(apt_get + ["update"]))
-    patiently(*(apt_get + ["install", "--no-install-recommends", "chromium"]))
-    print(" done.", flush=True)
-    return shutil.which("chromium")
+    return install_package("chromium", "chromium")
+
+
+def install_package(command, package):
+    """Return the path of a command; install its package where Debian's packages are to be had."""
+    if not shutil.which(command):
+        if not shutil.which("apt-get"):
+            sys.exit("%s is not found: install %s." % (command, package))
+        print("Installing %s" % package, end="", flush=True)
+        root = [] if os.geteuid() == 0 else ["sudo"]
+        apt_get = root + ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "--yes"]
+        patiently(*(apt_get + ["update"]))
+        patiently(*(apt_get + ["install", "--no-install-recommends", package]))
+        print(" done.", flush=True)
+    return shutil.which(command)
 
 
 def install(venv, *words):

@@ -1,9 +1,10 @@
-"""nbgrader preprocessors: restore locked cells, run under limits, hide the hidden tests.
+"""nbgrader preprocessors: restore cells, run in a box, make feedback that gives nothing away.
 
-These are preprocessors of nbgrader; `configure` names them in its configuration, so that they
-also work in its own commands.
+`configure` names them in the configuration of nbgrader, so that they also work in its own commands
+and in the formgrader.
 """
 
+import html
 import os
 import re
 import shutil
@@ -12,21 +13,30 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import bleach
+import nbformat
+from jinja2 import pass_context
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbformat import NotebookNode
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
+from nbformat.v4 import new_output
 from nbgrader import preprocessors as nbgrader
-from nbgrader.api import Gradebook
-from nbgrader.utils import find_all_files, is_grade, is_solution
-from traitlets import Bool
+from nbgrader.utils import find_all_files
 from traitlets.config import Config
 
-from rbcourse.assignments.quota import CUT
+from rbcourse.assignments import sandbox
+from rbcourse.assignments.client import CUT, BoundedClient
+from rbcourse.assignments.restore import is_answer, is_test, marks_of, name_cell, restore
 from rbcourse.assignments.tampering import find_in_cells
-from rbcourse.course.notebooks import kernel_address
 
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
+# what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
+TAGS = {"b", "blockquote", "br", "code", "dd", "del", "div", "dl", "dt", "em", "hr", "i", "img"}
+TAGS |= {"h1", "h2", "h3", "h4", "h5", "h6", "li", "ol", "p", "pre", "s", "span", "strong", "ul"}
+TAGS |= {"sub", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr"}
+SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
+SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
 
 class RefusedError(ValueError):
@@ -40,23 +50,19 @@ def configure(config: Config) -> None:
         tools = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
         os.environ["PATH"] = os.pathsep.join(tools)
     config.Autograde.sanitize_preprocessors = [
-        nbgrader.ClearOutput,
         RestoreCells,
-        nbgrader.DeduplicateIds,
         nbgrader.OverwriteKernelspec,
-        nbgrader.OverwriteCells,
+        nbgrader.OverwriteCells,  # which adds the hidden tests
+        RefuseTampering,
         nbgrader.CheckCellMetadata,
     ]
-    config.OverwriteCells.add_missing_cells = True
     config.Autograde.autograde_preprocessors = [
-        BoundedExecute,
+        BoxedExecute,
         nbgrader.IgnorePattern,
-        nbgrader.LimitOutput,
         nbgrader.SaveAutoGrades,
         nbgrader.AssignLatePenalties,
         nbgrader.CheckCellMetadata,
     ]
-    config.Execute.iopub_timeout = 20  # seconds that an interrupted cell may take to stop
     # nbgrader gives no points where anything is written to stderr, be it a mere warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."
@@ -66,175 +72,138 @@ def configure(config: Config) -> None:
         nbgrader.ClearHiddenTests,
         nbgrader.ClearMarkScheme,
         nbgrader.ClearOutput,
-        BoundedExecute,
+        BoxedExecute,
         NoteUnseen,
-        nbgrader.LimitOutput,
         CSSHTMLHeaderPreprocessor,
     ]
+    # in the feedback and in the formgrader
+    config.HTMLExporter.sanitize_html = True
+    here = "rbcourse.assignments.autograding"
+    filters = {"clean_html": f"{here}.inert_html", "markdown2html": f"{here}.inert_markdown"}
+    config.HTMLExporter.filters = filters
+
+
+def inert_html(content: object) -> str:
+    """Return HTML without scripts, styles, frames, forms and links; pictures are embedded ones.
+
+    Examples
+    --------
+    >>> inert_html('<p onclick="steal()">x</p><img src="https://a.b/c.png"><script>1</script>')
+    '<p>x</p><img>&lt;script&gt;1&lt;/script&gt;'
+    """
+    return str(bleach.clean(str(content), TAGS, _is_inert, protocols={"data"}))
+
+
+def _is_inert(tag: str, name: str, value: str) -> bool:
+    embedded = name == "src" and value.startswith("data:image/")
+    return tag == "img" and (name in ("alt", "title") or embedded)
+
+
+class _Renderer(IPythonRenderer):
+    """A renderer of Markdown that writes the address of a link instead of making one."""
+
+    def link(self, text: str, url: str, title: str | None = None) -> str:
+        return f"{text} ({html.escape(url)})"
+
+
+@pass_context
+def inert_markdown(context: Any, source: str) -> str:
+    """Return the HTML of Markdown, with nothing in it that runs or loads."""
+    attached = context.get("cell", {}).get("attachments", {})
+    renderer = _Renderer(escape=False, attachments=attached)
+    return inert_html(MarkdownWithMath(renderer=renderer).render(source))
 
 
 class RestoreCells(nbgrader.NbGraderPreprocessor):
-    """Restore locked cells; reject code that overrides names used by the tests."""
+    """Restore the cells that students must not change."""
 
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any]
     ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Restore the notebook; what was missing is noted in its metadata."""
-        about = resources["nbgrader"]
-        with Gradebook(about["db_url"]) as gradebook:
-            given = _given_cells(gradebook.find_notebook(about["notebook"], about["assignment"]))
-        nb.cells, remarks = _restored(nb.cells, given)
+        """Restore the notebook as it was released; what was changed is noted in its metadata."""
+        about, course = resources["nbgrader"], self.parent.parent.coursedir
+        released = course.format_path(course.release_directory, ".", about["assignment"])
+        original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
+        try:
+            first, *more = restore(nb, original) or [""]
+        except ValueError as error:
+            raise RefusedError(str(error)) from error
+        for cell in nb.cells:
+            if is_answer(cell) or not marks_of(cell):  # what looks like a region stops nbgrader
+                regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
+                cell.source = re.sub(regions, r"\1-\2", cell.source)
+        remarks = [first] * bool(first) + [f"and {len(more)} more changes"] * bool(more)
         nb.metadata = NotebookNode({"remarks": remarks})
-        _refuse_tampering(nb.cells)
         return nb, resources
 
 
-def _given_cells(notebook: Any) -> dict[str, NotebookNode]:
-    """Return the cells as the gradebook has them, in their order."""
-    points = {cell.name: cell.max_score for cell in [*notebook.grade_cells, *notebook.task_cells]}
-    kinds = {
-        "grade": {cell.name for cell in notebook.grade_cells},
-        "solution": {cell.name for cell in notebook.solution_cells},
-        "task": {cell.name for cell in notebook.task_cells},
-    }
-    given = {}
-    for cell in notebook.source_cells:
-        is_code = cell.cell_type == "code"
-        made = new_code_cell(cell.source) if is_code else new_markdown_cell(cell.source)
-        about = {"schema_version": 3, "grade_id": cell.name, "cell_type": cell.cell_type}
-        about |= {"locked": cell.locked, "checksum": cell.checksum}
-        about |= {kind: cell.name in names for kind, names in kinds.items()}
-        about |= {"points": points[cell.name]} if cell.name in points else {}
-        made.metadata = NotebookNode({"nbgrader": NotebookNode(about)})
-        given[cell.name] = made
-    return given
+class RefuseTampering(nbgrader.NbGraderPreprocessor):
+    """Refuse code that overrides what the tests, also the hidden ones, rely on."""
+
+    def preprocess(
+        self, nb: NotebookNode, resources: dict[str, Any]
+    ) -> tuple[NotebookNode, dict[str, Any]]:
+        """Raise a RefusedError at the first line of that kind."""
+        for at, line, what in find_in_cells(nb.cells):
+            raise RefusedError(f"{name_cell(nb.cells, at)}, line {line} {what}: grade by hand")
+        return nb, resources
 
 
-def _restored(
-    cells: list[NotebookNode], given: dict[str, NotebookNode]
-) -> tuple[list[NotebookNode], list[str]]:
-    """Return the cells of the set as they were given, with the answers of the student."""
-    names = [_name(cell) for cell in cells]
-    marked = {name for name, cell in given.items() if is_grade(cell) or is_solution(cell)}
-    if not marked & set(names):
-        raise RefusedError("no problem of the set is in it: another notebook, or made anew")
-    last = {name: index for index, name in enumerate(names) if name in given}
-    remarks = [
-        f"{name} is there twice, the last one counts" for name in last if names.count(name) > 1
-    ]
-    restored: list[NotebookNode] = []
-    for index, (cell, name) in enumerate(zip(cells, names, strict=True)):
-        known = given[name] if last.get(name) == index else None
-        restored.append(_as_given(cell, known))
-    before = ""
-    for name, cell in given.items():
-        if name not in last:
-            there = [_name(other) for other in restored]
-            restored.insert(there.index(before) + 1 if before else 0, cell)
-            remarks += [f"{name} was missing"] if name in marked else []
-        before = name
-    return restored, remarks
+class BoxedExecute(BoundedClient, nbgrader.Execute):
+    """Run a notebook in a new folder, and in a box where there is one."""
 
-
-def _name(cell: NotebookNode) -> str:
-    about = cell.metadata.get("nbgrader")
-    return str(about.get("grade_id", "")) if isinstance(about, dict) else ""
-
-
-def _as_given(cell: NotebookNode, given: NotebookNode | None) -> NotebookNode:
-    """Return a cell with its original metadata (student-added tags could skip execution)."""
-    if given is not None and not is_solution(given):
-        return given
-    # what looks like a region of nbgrader would stop it
-    source = re.sub(r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)", r"\1-\2", cell.source)
-    if given is not None and given.cell_type != cell.cell_type:
-        given.source = source
-        return given
-    cell.source = source
-    cell.metadata = NotebookNode() if given is None else given.metadata
-    return cell
-
-
-def _refuse_tampering(cells: list[NotebookNode]) -> None:
-    """Raise a RefusedError if code of the student replaces what tests rely on."""
-    code = [cell for cell in cells if cell.cell_type == "code"]
-    found = find_in_cells((cell.source, not _name(cell) or is_solution(cell)) for cell in code)
-    for at, line, what in found:
-        where = describe(code[at], cells.index(code[at]))
-        raise RefusedError(f"{where}, line {line} {what}: grade by hand")
-
-
-def describe(cell: NotebookNode, index: int) -> str:
-    """Return how a cell is called in a message."""
-    kind = "answer cell" if is_solution(cell) else "cell"
-    return f"{kind} {_name(cell) or index + 1}"
-
-
-class BoundedExecute(nbgrader.Execute):
-    """Run a notebook in a new folder, with a bound on its output."""
-
-    store_widget_state = Bool(False)
+    @property
+    def converter(self) -> Any:
+        """The step of nbgrader that this is a part of."""
+        return getattr(self.parent, "parent", None)
 
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any], km: Any = None
     ) -> tuple[NotebookNode, dict[str, Any]]:
         """Run all cells; errors are among the outputs."""
-        remarks = nb.metadata.get("remarks", [])
-        path = resources["metadata"]["path"]
+        remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            self._folder = Path(folder)
-            work = self._folder / "work"
-            self._copy_given_files(resources["nbgrader"]["assignment"], work)
-            resources["metadata"]["path"] = str(work)
-            extension = "--IPKernelApp.extensions=rbcourse.assignments.quota"
-            self.extra_arguments = [extension, "--log-level=CRITICAL"]
-            self.shutdown_kernel = "immediate"
+            self.folder = Path(folder)
+            sandbox.prepare(self.folder)
+            self._copy_given_files(resources["nbgrader"]["assignment"])
+            resources["metadata"]["path"] = str(self.folder / "work")
             try:
-                nb, resources = super().preprocess(nb, resources, km)
+                nb, resources = nbgrader.Execute.preprocess(self, nb, resources, km)
             finally:
                 resources["metadata"]["path"] = path
-        nb.metadata["remarks"] = remarks + self._remarks_on(nb.cells)
+        nb.metadata.pop("widgets", None)
+        long = f"stopped after {self.timeout} s"
+        remarks += [f"{name_cell(nb.cells, at)}: {long}" for at in self.slow]
+        remarks += [f"{name_cell(nb.cells, at)}: {CUT}" for at in self.cut]
+        for at, cell in enumerate(nb.cells):
+            outputs = cell.get("outputs", [])
+            if any(output.get("ename") == "MemoryError" for output in outputs):
+                remarks.append(f"{name_cell(nb.cells, at)}: takes too much memory")
+            for output in (output for output in outputs if "data" in output):
+                output.metadata = NotebookNode()
+                output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
+        nb.metadata["remarks"] = remarks
         return nb, resources
 
-    def _remarks_on(self, cells: list[NotebookNode]) -> list[str]:
-        errors = {
-            "CellTimeoutError": f"stopped after {self.timeout} s",
-            "TooMuchOutputError": "prints without end",
-            "MemoryError": "takes too much memory",
-        }
-        found: dict[str, None] = {}
-        for index, cell in enumerate(cells):
-            for output in cell.get("outputs", []):
-                what = errors.get(output.get("ename", ""))
-                if CUT in output.get("text", "") or CUT in output.get("data", {}).get(
-                    "text/plain", ""
-                ):
-                    what = "output cut"
-                found |= {f"{describe(cell, index)}: {what}": None} if what else {}
-        return list(found)
-
-    def _copy_given_files(self, assignment: str, work: Path) -> None:
+    def _copy_given_files(self, assignment: str) -> None:
         """Copy the files of the set; those of the student could pass for modules of the tests."""
-        course = self.parent.parent.coursedir
+        course = self.converter.coursedir
         source = course.format_path(course.source_directory, ".", assignment)
-        work.mkdir()
         for file in find_all_files(source, [*course.ignore, "*.ipynb"]):
-            target = work / os.path.relpath(file, source)
+            target = self.folder / "work" / os.path.relpath(file, source)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(file, target)
 
     def create_kernel_manager(self) -> Any:
-        """Return a manager of a kernel that listens at files of this run only."""
+        """Return a manager of a kernel in a box."""
         manager = super().create_kernel_manager()
-        for name, value in kernel_address(str(self._folder)).items():
-            setattr(manager, name, value)
+        if not sandbox.missing():
+            sandbox.put_in_box(manager, self.folder)
         return manager
 
     def start_new_kernel(self, **kwargs: Any) -> None:
-        """Start the kernel; what it keeps, it keeps in the folder of this run."""
-        folder = str(self._folder)
-        own = {"IPYTHONDIR": folder, "TMPDIR": folder, "TEMP": folder, "OMP_NUM_THREADS": "1"}
-        super().start_new_kernel(env={**os.environ, **own, "OPENBLAS_NUM_THREADS": "1"}, **kwargs)
+        """Start the kernel."""
+        super().start_new_kernel(env=sandbox.environment(self.folder), **kwargs)
 
     def preprocess_cell(
         self, cell: NotebookNode, resources: dict[str, Any], index: int
@@ -243,17 +212,10 @@ class BoundedExecute(nbgrader.Execute):
         try:
             return super().preprocess_cell(cell, resources, index)
         except DeadKernelError as error:
-            where = describe(cell, index)
+            where = name_cell(self.nb.cells, index)
             raise RefusedError(f"Python ended in or before {where}: grade by hand") from error
         except CellTimeoutError as error:
-            raise RefusedError(f"{describe(cell, index)} cannot be stopped") from error
-
-    def on_cell_executed(self, **kwargs: Any) -> None:
-        """Keep what nbgrader reads as points out of a cell that fails."""
-        super().on_cell_executed(**kwargs)
-        cell = kwargs["cell"]
-        if any(output.output_type == "error" for output in cell.outputs):
-            cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]
+            raise RefusedError(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error
 
 
 class NoteUnseen(nbgrader.NbGraderPreprocessor):
@@ -263,8 +225,8 @@ class NoteUnseen(nbgrader.NbGraderPreprocessor):
         self, cell: NotebookNode, resources: dict[str, Any], index: int
     ) -> tuple[NotebookNode, dict[str, Any]]:
         """Add a line to the outputs of a test cell without points whose visible part passes."""
-        if cell.cell_type == "code" and is_grade(cell) and not is_solution(cell):
-            failed = any(output.output_type == "error" for output in cell.outputs)
-            if not failed and cell.metadata.nbgrader.points and not cell.metadata.nbgrader.score:
-                cell.outputs.append(new_output("stream", name="stdout", text=UNSEEN))
+        marks, outputs = marks_of(cell), cell.get("outputs", [])
+        unseen = is_test(cell) and marks["points"] and not marks["score"]
+        if unseen and not any(output.output_type == "error" for output in outputs):
+            outputs.append(new_output("stream", name="stdout", text=UNSEEN))
         return cell, resources

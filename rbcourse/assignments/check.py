@@ -5,7 +5,6 @@ A student runs this, without nbgrader.
 
 import argparse
 import io
-import json
 import logging
 import os
 import re
@@ -13,26 +12,29 @@ import shutil
 import sys
 import tempfile
 import time
-import warnings
 from pathlib import Path
-from typing import Any
 
 import nbformat
-from nbclient import NotebookClient
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 
-from rbcourse.assignments.restore import grade_id, is_test, marks_of, mend, name_cell
+from rbcourse.assignments.client import CUT, SLOW, BoundedClient
+from rbcourse.assignments.restore import (
+    grade_id,
+    is_answer,
+    is_test,
+    marks_of,
+    name_cell,
+    read_notebook,
+    restore,
+    title_of,
+)
 from rbcourse.assignments.tampering import find_in_cells
-from rbcourse.course.notebooks import KERNEL, kernel_address
+from rbcourse.course.notebooks import KERNEL
 
 CELL_SECONDS = 60
-STOP_SECONDS = 20  # that an interrupted cell may take to stop
-CELL_BYTES = 2_000_000
-ALL_BYTES = 10_000_000
 COPIED_BYTES = 50_000_000
-SLOW = "the cell took too long"
-SHOWN = ("stream", "display_data", "execute_result", "update_display_data")
+LARGE_BYTES = 20_000_000
 
 
 def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS) -> Path:
@@ -49,19 +51,18 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
     if path.name != original.name:
         print(f"it is to be submitted under the name {original.name}")
     number = len(notebook.cells)
-    _list(mend(notebook, wanted))
+    _list(restore(notebook, wanted))
     if len(notebook.cells) != number:
-        print("from here on cells are counted in the file to submit")
+        print("cells are counted in the file to submit")
     notebook.metadata.kernelspec = dict(KERNEL)
     _list(_not_graded(notebook))
-    remarks = _run(notebook, path.parent, seconds)
-    _list(remarks + _failures(notebook, wanted))
-    passed = _tests(notebook)
+    _list(_run(notebook, path.parent, seconds) + _failures(notebook))
+    passed = _print_problems(notebook, wanted)
     target = path.parent / "to_submit" / original.name
     _write(notebook, target)
-    size = target.stat().st_size / 1e6
-    if size > 2 * ALL_BYTES / 1e6:
-        _list([f"the file has {size:.0f} MB: are there pictures in its text? Make them smaller"])
+    if target.stat().st_size > LARGE_BYTES:
+        size = f"{target.stat().st_size / 1e6:.0f} MB"
+        _list([f"the file has {size}: are there pictures in its text? Make them smaller"])
     print(
         f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run when it is graded; "
         f"the file to submit is {target}"
@@ -75,34 +76,11 @@ def _list(remarks: list[str]) -> None:
 
 
 def _read(path: Path) -> NotebookNode:
+    if not path.exists():
+        raise ValueError(f"{path} is missing: there is no such file")
     if path.suffix != ".ipynb":
         raise ValueError(f"{path.name} is no notebook; give the file that ends with .ipynb")
-    if not path.is_file():
-        raise ValueError(f"{path}: there is no such file")
-    content = path.read_bytes()
-    if not content.strip():
-        raise ValueError(f"{path.name} is empty; open it in JupyterLab and save it, or start anew")
-    if re.search(rb"^(<{7}|>{7}) ", content, re.MULTILINE):
-        raise ValueError(f"{path.name} still has merge marks, <<<<<<< and >>>>>>>; resolve them")
-    try:
-        with warnings.catch_warnings():  # on cells without ids, which get them later
-            warnings.simplefilter("ignore")
-            logging.disable()
-            notebook = nbformat.reads(content.decode("utf-8-sig"), as_version=4)
-            cells = notebook.cells
-    except Exception as error:  # whatever nbformat stumbles over
-        raise ValueError(
-            f"{path.name} is damaged or no notebook ({str(error).splitlines()[0][:80]}); "
-            "take an earlier copy, or save it in JupyterLab again"
-        ) from error
-    finally:
-        logging.disable(logging.NOTSET)
-    if not cells:
-        raise ValueError(f"{path.name} has no cells; open it in JupyterLab and save it again")
-    for cell in cells:
-        if cell.cell_type == "code":
-            cell.outputs, cell.execution_count = [], None
-    return notebook
+    return read_notebook(path.read_bytes(), path.name)
 
 
 def _find_original(path: Path) -> Path:
@@ -118,64 +96,16 @@ def _find_original(path: Path) -> Path:
     return notebooks[0]
 
 
-class _Client(NotebookClient):
-    """A client that tells where it is and keeps a limited amount of output.
+class _Client(BoundedClient):
+    """A client that tells where it is, and ends a run in which two cells took too long."""
 
-    Attributes
-    ----------
-    at : int
-        The number of the cell that is run, from 1.
-    slow : list of int
-        The cells that took too long.
-    cut : list of int
-        The cells of which not all output is kept.
-    """
+    at = 0
 
-    def __init__(self, notebook: NotebookNode, **settings: Any) -> None:
-        hooks: dict[str, Any] = {"on_cell_start": self._begin, "on_cell_executed": self._end}
-        super().__init__(notebook, **hooks, **settings)
-        self.at, self._bytes, self._left = 0, 0, ALL_BYTES
-        self.slow: list[int] = []
-        self.cut: list[int] = []
-
-    def _begin(self, cell: NotebookNode, cell_index: int) -> None:
-        self.at, self._bytes = cell_index + 1, min(CELL_BYTES, self._left)
-        self.raise_on_iopub_timeout = False
+    def on_cell_start(self, cell: NotebookNode, cell_index: int) -> None:
         if len(self.slow) > 1:
             raise CellTimeoutError("cells take too long")
-        print(f"\rrunning cell {self.at} of {len(self.nb.cells)} ", end="", flush=True)
-
-    def _end(self, cell: NotebookNode, cell_index: int, execute_reply: dict[str, Any]) -> None:
-        """Keep an error that did not come through: without it a test seems to pass."""
-        reply = execute_reply["content"]
-        if reply["status"] != "ok" and (self.at in self.slow or not _error(cell)):
-            empty = {"ename": "Error", "evalue": "it was not run", "traceback": []}
-            what = {key: reply.get(key, value) for key, value in empty.items()}
-            cell.outputs.append(nbformat.v4.new_output("error", **what))
-
-    async def _async_handle_timeout(
-        self, timeout: int, cell: NotebookNode | None = None
-    ) -> dict[str, Any] | None:
-        self.slow.append(self.at)
-        self.raise_on_iopub_timeout = True  # what does not stop now cannot be stopped
-        reply: dict[str, Any] | None = await super()._async_handle_timeout(timeout, cell)
-        return reply
-
-    def process_message(
-        self, msg: dict[str, Any], cell: NotebookNode, cell_index: int
-    ) -> NotebookNode | None:
-        content = msg["content"]
-        if msg["msg_type"] == "error":
-            content["evalue"] = content["evalue"][:5000]
-            content["traceback"] = [line[:5000] for line in content["traceback"][-50:]]
-        elif msg["msg_type"] in SHOWN:
-            size = len(content.get("text") or json.dumps(content, default=str))
-            if self.at in self.cut or size > self._bytes:
-                self.cut += [self.at] * (self.at not in self.cut)
-                return None
-            self._bytes -= size
-            self._left -= size
-        return super().process_message(msg, cell, cell_index)
+        self.at = cell_index
+        print(f"\rrunning cell {self.at + 1} of {len(self.nb.cells)} ", end="", flush=True)
 
 
 def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
@@ -187,56 +117,43 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
         remarks = _copy_files(folder, Path(work))
         log = logging.getLogger(__name__)
         log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
-        client = _Client(
-            notebook,
-            log=log,
-            kernel_name=KERNEL["name"],
-            record_timing=False,
-            coalesce_streams=True,
-            store_widget_state=False,
-            shutdown_kernel="immediate",
-            allow_errors=True,
-            timeout=seconds,
-            interrupt_on_timeout=True,
-            iopub_timeout=STOP_SECONDS,
-            error_on_timeout={"ename": "TimeoutError", "evalue": SLOW, "traceback": [SLOW]},
-            extra_arguments=["--log-level=CRITICAL"],
-            resources={"metadata": {"path": work}},
-        )
-        kernel = client.create_kernel_manager()
-        for name, value in kernel_address(own).items():
-            setattr(kernel, name, value)
+        path = {"metadata": {"path": work}}
+        client = _Client(notebook, log=log, kernel_name=KERNEL["name"], resources=path)
+        client.timeout, client.folder = seconds, Path(own)
         try:
-            client.execute(env={**os.environ, "IPYTHONDIR": own})
-        except DeadKernelError:
-            notebook.cells[client.at - 1].execution_count = None
-            remarks.append(
-                f"the kernel died in cell {client.at}: it called exit, or used up the memory; "
-                "the cells after it were not run"
-            )
-        except CellTimeoutError:
-            notebook.cells[client.at - 1].execution_count = None
-            first = client.at + (client.at in client.slow)
-            if first <= len(notebook.cells):
-                remarks.append(f"cells from {first} on were not run")
-        except (RuntimeError, KeyError) as error:
+            client.create_kernel_manager()
+            client.start_new_kernel(env={**os.environ, "IPYTHONDIR": own})
+            client.start_new_kernel_client()
+        except (OSError, RuntimeError, KeyError) as error:
             raise ValueError(
                 f"Python could not be started for the notebook ({error}); install what "
                 "requirements.txt of the handout lists"
             ) from error
+        try:
+            client.execute()
+        except DeadKernelError:
+            notebook.cells[client.at].execution_count = None
+            remarks.append(
+                f"the kernel died in cell {client.at + 1}: it called exit, or used up the memory; "
+                "the cells after it were not run"
+            )
+        except CellTimeoutError:
+            notebook.cells[client.at].execution_count = None
+            first = client.at + 1 + (client.at in client.slow)
+            if first <= len(notebook.cells):
+                remarks.append(f"cells from {first} on were not run")
         print(flush=True)
-    return remarks + _note(notebook, client, seconds)
+    cells = notebook.cells
+    long = f"took longer than {seconds} s and was stopped"
+    remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
+    return remarks + [f"{name_cell(cells, at)}: {CUT}" for at in client.cut]
 
 
 def _not_graded(notebook: NotebookNode) -> list[str]:
     """Say what a machine will not grade: it could be meant to deceive the tests."""
-    code = [i for i, cell in enumerate(notebook.cells) if cell.cell_type == "code"]
-    marks = [marks_of(notebook.cells[i]) for i in code]
-    own = [not mark.get("grade_id") or bool(mark.get("solution")) for mark in marks]
-    sources = (notebook.cells[i].source for i in code)
     return [
-        f"{name_cell(notebook.cells, code[at])}, line {line} {what}: not graded so, change it"
-        for at, line, what in find_in_cells(zip(sources, own, strict=True))
+        f"{name_cell(notebook.cells, at)}, line {line} {what}: not graded so, change it"
+        for at, line, what in find_in_cells(notebook.cells)
     ]
 
 
@@ -256,18 +173,6 @@ def _copy_files(folder: Path, work: Path) -> list[str]:
     return remarks
 
 
-def _note(notebook: NotebookNode, client: _Client, seconds: int) -> list[str]:
-    """Put into the outputs, and say, what was too long."""
-    names = [name_cell(notebook.cells, at - 1) for at in client.slow]
-    remarks = [f"{name} took longer than {seconds} s and was stopped" for name in names]
-    for at in client.cut:
-        words = "the output is too large; what is too much is left out"
-        remarks.append(f"{name_cell(notebook.cells, at - 1)}: {words}")
-        note = nbformat.v4.new_output("stream", name="stdout", text=f"\n({words})\n")
-        notebook.cells[at - 1].outputs.append(note)
-    return remarks
-
-
 def _error(cell: NotebookNode) -> str:
     """Return the last line of the last error of a cell, or an empty string."""
     errors = [o for o in cell.get("outputs", []) if o.output_type == "error"]
@@ -280,32 +185,45 @@ def _error(cell: NotebookNode) -> str:
     return f"{errors[-1].ename}: {words}" if words else str(errors[-1].ename)
 
 
-def _failures(notebook: NotebookNode, original: NotebookNode) -> list[str]:
-    """Name the cells that fail, except tests and unanswered questions."""
-    empty = {grade_id(c): c.source.strip() for c in original.cells if marks_of(c).get("solution")}
+def _failures(notebook: NotebookNode) -> list[str]:
+    """Name the cells that fail and belong to no problem; those that took too long are named."""
     return [
         f"{name_cell(notebook.cells, at)} fails: {_error(cell)}"
         for at, cell in enumerate(notebook.cells)
-        if _error(cell)
-        and not _error(cell).endswith(SLOW)  # this is said already
-        and not is_test(cell)
-        and cell.source.strip() != empty.get(grade_id(cell))
+        if _error(cell) and not _error(cell).endswith(SLOW) and not is_test(cell)
+        if not is_answer(cell)
     ]
 
 
-def _tests(notebook: NotebookNode) -> list[bool]:
-    """Print how the visible tests went."""
-    passed = []
+def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
+    """Print a line a problem, under its title; return which of the visible tests passed."""
+    empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
+    problems: dict[str, list[tuple[str, str]]] = {}
+    passed, answered = [], True
     for at, cell in enumerate(notebook.cells):
-        if not is_test(cell):
+        if is_answer(cell):
+            answered = cell.source.strip() not in ("", empty[grade_id(cell)])
+            found = ("", "") if answered else ("empty", "is not answered yet")
+            if answered and _error(cell):
+                found = ("FAILED", f"fails: {_error(cell)}")
+            elif answered and marks_of(cell).get("grade"):
+                found = ("words", "is graded by a person")
+        elif not is_test(cell):
             continue
-        if not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
-            print(f"hidden  {name_cell(notebook.cells, at)} has hidden tests only")
-            continue
-        error = _error(cell) or ("" if cell.execution_count else "it was not run to its end")
-        passed.append(not error)
-        print(f"{'FAILED' if error else 'passed'}  {name_cell(notebook.cells, at)}", end="")
-        print(f": {error}" if error else "")
+        elif not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
+            found = ("hidden", "has hidden tests only")
+        else:
+            error = _error(cell) or ("" if cell.execution_count else "it was not run to its end")
+            passed.append(not error)
+            found = ("FAILED", error) if error and answered else ("passed" * (not error), "")
+        problems.setdefault(title_of(notebook.cells, at), []).append(
+            (found[0], f"cell {at + 1} {found[1]}".replace(" fails: ", ": ") if found[1] else "")
+        )
+    for title, found_in in problems.items():
+        kinds = [kind for kind, _ in found_in]
+        status = next((k for k in ("FAILED", "empty", "passed", "words") if k in kinds), "hidden")
+        said = "; ".join(words for _, words in found_in if words)
+        print(f"{status}  {title}" + f": {said}" * bool(said))
     return passed
 
 
@@ -341,7 +259,8 @@ def main() -> None:
     known = parser.parse_args()
     path, course = known.file.absolute(), Path("notebooks", "assignments")
     try:
-        if known.original or (path.parent / "original").exists() or not course.is_dir():
+        own = known.original or (path.parent / "original").exists() or not course.is_dir()
+        if own or not path.exists():
             check(path, known.original)
         else:
             _check_with_course(path, course)

@@ -1,25 +1,41 @@
 """Grade problem sets: each submission on its own, with feedback and a table of the points."""
 
 import argparse
-import csv
-import io
+import base64
+import glob
+import html
+import os
+import re
+import shutil
 import sys
-from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+import time
+from collections.abc import Iterable, Iterator
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+import nbformat
 from nbgrader.api import Gradebook, MissingEntry
-from nbgrader.converters import GenerateAssignment
+from nbgrader.converters import Autograde, GenerateAssignment, GenerateFeedback
 from nbgrader.coursedir import CourseDirectory
-from nbgrader.utils import rmtree
+from nbgrader.utils import capture_log, rmtree
 from traitlets.config import Config
 
-from rbcourse.assignments.handout import last_line
-from rbcourse.assignments.isolated import course_config, grade_apart, run_step
+from rbcourse.assignments import sandbox
+from rbcourse.assignments.autograding import RefusedError, configure
+from rbcourse.assignments.handout import find_set, last_line, quiet_log, read_config, secret_lines
+from rbcourse.assignments.restore import grade_id, is_answer, marks_of, read_notebook
+from rbcourse.assignments.tables import write_csv
 
 SECONDS = 600  # for a student, all in all
 MEMORY = 1_500_000_000  # bytes, for each process of a student
+LARGEST = 30_000_000  # bytes of a notebook
+POINTS = """
+SELECT student_id, submitted_assignment.assignment_id, cell_id, auto_score, manual_score,
+extra_credit FROM grade JOIN submitted_notebook ON submitted_notebook.id = grade.notebook_id
+JOIN submitted_assignment ON submitted_assignment.id = submitted_notebook.assignment_id
+"""
 
 
 def sets_submitted(assignments: Path) -> list[str]:
@@ -38,9 +54,12 @@ def grade(
     """Grade all submissions of a set, write the feedback and a table; a line a student is printed.
 
     What a human has given points for is kept. A submission that is refused loses the points that
-    a machine gave it before, and its feedback.
+    a machine gave it before, and its feedback. When points of one student change while another
+    is graded, or exceed the maximum, a ValueError names them and no table is written;
+    ``gradebook.before-NAME.db`` holds the gradebook as it was.
     """
     config = course_config(name, assignments)
+    course = CourseDirectory(config=config)
     students = sorted(path.parent.name for path in assignments.glob(f"submitted/*/{name}/"))
     if not students:
         raise ValueError(f"There is no submission of {name}: submitted/STUDENT/{name}/{name}.ipynb")
@@ -49,47 +68,237 @@ def grade(
         table.open("a").close()
     except PermissionError as error:
         raise ValueError(f"{table} cannot be written: close it where it is open") from error
+    before = Path(course.root, "gradebook.db")
+    if before.exists():
+        shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
-    found: dict[str, dict[str, Any]] = {}
-    with ThreadPoolExecutor(workers) as pool:
-        jobs = {
-            pool.submit(grade_apart, name, assignments, student, seconds, memory): student
-            for student in students
-        }
-        for job in as_completed(jobs):
-            student = jobs[job]
-            try:
-                found[student] = _row(config, name, student, job.result())
-            except Exception as error:  # one student's trouble is not that of the others
-                remarks = f"not graded: {type(error).__name__}: {error}"
-                found[student] = {"student": student, "set": name, "remarks": remarks}
-            print(f"{student}: {_summary(found[student])}", flush=True)
-    return _write_table(table, [found[who] for who in students])
-
-
-def _row(config: Config, name: str, student: str, found: dict[str, Any]) -> dict[str, Any]:
-    """Return the row of a student in the table."""
-    course = CourseDirectory(config=config)
-    remarks = found.get("remarks", [])
-    row: dict[str, Any] = {"student": student, "set": name}
+    rows: dict[str, dict[str, Any]] = {}
     with Gradebook(course.db_url) as gradebook:
-        if "refused" in found:
-            _withdraw(gradebook, Path(course.root), name, student)
-            return row | {"remarks": f"refused: {found['refused']}"}
-        submission = gradebook.find_submission_notebook(name, name, student)
-        order = [cell.name for cell in submission.notebook.source_cells]
-        grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))
-        to_do = [g.name for g in grades if g.auto_score is None and g.manual_score is None]
-        row |= {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades}
-        row["automatic"] = f"{sum(grade.auto_score or 0 for grade in grades):g}"
-        row["total"] = f"{submission.score:g}"
-        row["maximum"] = f"{submission.max_score:g}"
-        late = submission.assignment.total_seconds_late
-        row["by hand"] = " ".join(to_do)
-        row["late"] = f"{late / 3600:.1f} h" if late else ""
-    return row | {"remarks": "; ".join(remarks)}
+        known = _points(gradebook)
+    for student, found, meanwhile in _graded(name, assignments, students, seconds, memory, workers):
+        with Gradebook(course.db_url) as gradebook:
+            now, at_work = _points(gradebook), {student, *meanwhile}
+            for other in sorted({*known, *now} - at_work):
+                if known.get(other) != now.get(other):
+                    raise ValueError(
+                        f"The points of {other} changed while {' and '.join(sorted(at_work))} was "
+                        f"graded. gradebook.before-{name}.db holds what they were"
+                    )
+            try:
+                rows[student] = _row(gradebook, course, student, found)
+            except MissingEntry as error:
+                rows[student] = {"remarks": f"not graded: {error}"}
+            known = now | {student: _points(gradebook).get(student)}
+        print(f"{student}: {_summary(rows[student])}", flush=True)
+    boxed = "no" if sandbox.missing() else "yes"
+    first = {"set": name, "boxed": boxed}
+    write_csv(table, [{"student": student} | first | rows[student] for student in students])
+    return table
+
+
+def course_config(name: str, assignments: Path) -> Config:
+    """Return the settings of nbgrader for a set."""
+    source = find_set(name, assignments)
+    config = Config()
+    configure(config)
+    config.merge(read_config(assignments))
+    config.CourseDirectory.root = os.path.realpath(assignments)
+    config.CourseDirectory.source_directory = source.parent.name
+    config.CourseDirectory.assignment_id = name
+    return config
+
+
+def run_step(converter: Any, config: Config) -> dict[str, Any]:
+    """Run a step of nbgrader, over what it made before."""
+    course = CourseDirectory(config=config)
+    step = converter(course, config=config, log=quiet_log("steps"))
+    step.force = True
+    return capture_log(step)
+
+
+def _points(gradebook: Any) -> dict[str, Any]:
+    """Return the points of each student, as a sorted list of rows."""
+    points: dict[str, Any] = {}
+    for student, *row in sorted(
+        map(tuple, gradebook.db.connection().exec_driver_sql(POINTS)), key=str
+    ):
+        points.setdefault(student, []).append(row)
+    return points
+
+
+def _graded(
+    name: str, assignments: Path, students: list[str], seconds: float, memory: int, workers: int
+) -> Iterator[tuple[str, dict[str, Any], list[str]]]:
+    """Grade submissions, each in a process of its own; with each, yield who is at work besides.
+
+    A process that takes too long is ended, and with it, where there is a box, all that it started.
+    """
+    # on Linux it is copied from one that has loaded nbgrader, which takes seconds
+    context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
+    context.set_forkserver_preload(["rbcourse.assignments.grade"])
+    waiting, running = students[::-1], dict[Connection, tuple[str, Any, float]]()
+    try:
+        while waiting or running:
+            while waiting and len(running) < workers:
+                student = waiting.pop()
+                result, send = context.Pipe(duplex=False)
+                of = name, assignments, student, memory, send
+                worker = context.Process(target=_work, args=of)
+                worker.start()
+                send.close()
+                running[result] = student, worker, time.monotonic() + seconds
+            left = min(until for *_, until in running.values()) - time.monotonic()
+            ready: list[Any] = wait(list(running), max(left, 0))
+            late = [c for c, (*_, until) in running.items() if until <= time.monotonic()]
+            for result in dict.fromkeys(ready + late):
+                student, worker, _ = running.pop(result)
+                found = {"refused": f"not done after {seconds:g} s"}
+                if result in ready:
+                    found = _received(result)
+                worker.kill()
+                worker.join()
+                result.close()
+                yield student, found, [other for other, *_ in running.values()]
+    finally:
+        for _, worker, _ in running.values():
+            worker.kill()
+
+
+def _received(result: Connection) -> dict[str, Any]:
+    try:
+        return dict(result.recv())
+    except EOFError:
+        return {"refused": "its process ended, or took too much memory"}
+
+
+def _work(name: str, assignments: Path, student: str, memory: int, send: Connection) -> None:
+    """Grade a submission in this process, under limits and with nothing printed."""
+    with open(os.devnull, "r+b") as nowhere:
+        for stream in (0, 1, 2):
+            os.dup2(nowhere.fileno(), stream)
+    if sys.platform == "linux":  # others have the limit, and do not keep it
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+    try:
+        found = grade_one(name, assignments, student)
+    except Exception as error:  # told, and the others are graded
+        found = {"refused": f"{type(error).__name__}: {error}"}
+    send.send(found)
+
+
+def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
+    """Grade one submission in this process."""
+    config = course_config(name, folder)
+    config.CourseDirectory.student_id = glob.escape(student)
+    graded = folder / "autograded" / student / name / f"{name}.ipynb"
+    before = _words(graded)
+    try:
+        check_submission(folder / "submitted" / student / name, name)
+        done = run_step(Autograde, config)
+        if not done["success"]:
+            raise RefusedError(last_line(done))
+    except RefusedError as error:
+        return {"refused": str(error)}
+    remarks = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
+    now = _words(graded)
+    new = [key for key in now if key in before and now[key] != before[key]]
+    remarks += [f"{key} is another answer than when it was graded before" for key in new]
+    return {"remarks": remarks + _give_feedback(name, folder, student, config)}
+
+
+def _words(path: Path) -> dict[str, str]:
+    """Return the answers that a human grades, as they were graded last."""
+    if not path.exists():
+        return {}
+    cells = nbformat.read(path, as_version=4).cells
+    words = (cell for cell in cells if is_answer(cell) and marks_of(cell).get("grade"))
+    return {grade_id(cell): cell.source for cell in words}
+
+
+def check_submission(folder: Path, name: str) -> None:
+    """Refuse what is no notebook of the right name, or is not written as nbgrader reads it."""
+    wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
+    path = folder / wanted
+    if wanted not in there:
+        raise RefusedError(f"there is no {wanted}, but {', '.join(there) or 'nothing'}")
+    if any(place.is_symlink() for place in (path, folder, folder.parent)):
+        raise RefusedError(f"{wanted} is a link")
+    if path.stat().st_size > LARGEST:
+        raise RefusedError(f"{wanted} has more than {LARGEST:,} bytes")
+    content = path.read_bytes()
+    try:
+        read_notebook(content, wanted)
+    except ValueError as error:
+        raise RefusedError(str(error)) from error
+    if content.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
+        raise RefusedError(f"{wanted} is not plain UTF-8: collect it again, or save it in Jupyter")
+
+
+def _give_feedback(name: str, folder: Path, student: str, config: Config) -> list[str]:
+    """Write the feedback; return what is to be said of it."""
+    done = run_step(GenerateFeedback, config)
+    if not done["success"]:
+        return [f"no feedback: {last_line(done)}"]
+    path = folder / "feedback" / student / name / f"{name}.html"
+    page = html.unescape(re.sub(r"<[^>]*>", "", path.read_text("utf-8")))
+    own = nbformat.read(folder / "submitted" / student / name / f"{name}.ipynb", as_version=4)
+    source = nbformat.read(find_set(name, folder) / f"{name}.ipynb", as_version=4)
+    written = squeezed("".join(cell.source for cell in own.cells))
+    secrets = map(squeezed, secret_lines(source, solutions=False))
+    if gives_away(page, [secret for secret in secrets if secret not in written]):
+        path.unlink()
+        return ["no feedback: it would show hidden tests or the mark scheme; look at the outputs"]
+    return []
+
+
+def squeezed(words: str) -> str:
+    """Return a text without its white space."""
+    return re.sub(r"\s+", "", words)
+
+
+def gives_away(page: str, secrets: Iterable[str]) -> bool:
+    """Return whether a text holds one of some squeezed texts: plain, reversed or in base64.
+
+    Examples
+    --------
+    >>> gives_away("9==)3-(erauqs", ["square(-3)==9"])
+    True
+    """
+    shown = squeezed(page)
+    runs = re.findall(r"[A-Za-z0-9+/]{16,}", shown)
+    parts = [run[start:] for run in (*runs, *(run[::-1] for run in runs)) for start in range(4)]
+    decoded = (base64.b64decode(part[: len(part) // 4 * 4]) for part in parts)
+    texts = [shown, *(squeezed(code.decode("utf-8", "ignore")) for code in decoded)]
+    return any(secret in words or secret[::-1] in words for secret in secrets for words in texts)
+
+
+def _row(
+    gradebook: Any, course: CourseDirectory, student: str, found: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the row of a student in the table."""
+    name = course.assignment_id
+    if "refused" in found:
+        _withdraw(gradebook, Path(course.root), name, student)
+        return {"remarks": f"refused: {found['refused']}"}
+    submission = gradebook.find_submission_notebook(name, name, student)
+    order = [cell.name for cell in submission.notebook.source_cells]
+    grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))
+    extra = sum(grade.extra_credit or 0 for grade in grades)
+    if submission.score > submission.max_score + extra:
+        total = f"{submission.score:g} of {submission.max_score:g}"
+        raise ValueError(f"{student} has {total} points: look at the gradebook")
+    to_do = [g.name for g in grades if g.auto_score is None and g.manual_score is None]
+    late = submission.assignment.total_seconds_late
+    row = {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades}
+    row["automatic"] = f"{sum(grade.auto_score or 0 for grade in grades):g}"
+    row["total"] = f"{submission.score:g}"
+    row["maximum"] = f"{submission.max_score:g}"
+    row["by hand"] = " ".join(to_do)
+    row["late"] = f"{late / 3600:.1f} h" if late else ""
+    return row | {"remarks": "; ".join(found["remarks"])}
 
 
 def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:
@@ -114,25 +323,15 @@ def _summary(row: dict[str, Any]) -> str:
     return "; ".join([*parts, row["remarks"]] if row["remarks"] else parts)
 
 
-def _write_table(path: Path, rows: list[dict[str, Any]]) -> Path:
-    columns: dict[str, None] = {}
-    for row in sorted(rows, key=len, reverse=True):
-        columns |= dict.fromkeys(row)
-    text = io.StringIO(newline="")
-    table = csv.DictWriter(text, list(columns), lineterminator="\n")
-    table.writeheader()
-    table.writerows(rows)
-    part = path.with_suffix(".part")
-    part.write_text(text.getvalue(), encoding="utf-8-sig", newline="")  # as Excel wants it
-    part.replace(path)
-    return path
-
-
-def grade_all(names: Iterable[str], assignments: Path) -> list[Path]:
+def grade_all(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:
     """Grade sets one after the other."""
     chosen = list(names) or sets_submitted(assignments)
     if not chosen:
         raise ValueError("There are no submissions: submitted/STUDENT/ps1/ps1.ipynb")
+    if why := sandbox.missing():
+        if require_box:
+            raise ValueError(f"There is no box for submissions: {why}")
+        print(f"Submissions run without a box, and can do what you can: {why}", flush=True)
     tables = []
     for name in chosen:
         print(f"{name}:", flush=True)
@@ -145,8 +344,10 @@ def main() -> None:
     """Grade from the command line: ``python -m rbcourse.assignments.grade ps1``, in the course."""
     parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.grade")
     parser.add_argument("sets", nargs="*", metavar="set", help="as ps1; all that are submitted")
+    parser.add_argument("--require-box", action="store_true", help="refuse to grade without a box")
+    known = parser.parse_args()
     try:
-        grade_all(parser.parse_args().sets, Path("notebooks", "assignments"))
+        grade_all(known.sets, Path("notebooks", "assignments"), known.require_box)
     except (OSError, ValueError) as error:
         sys.exit(str(error))
 

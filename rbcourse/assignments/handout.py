@@ -14,16 +14,21 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import nbformat
+from nbclient.exceptions import CellExecutionError
 from nbformat import NotebookNode
 from nbgrader.converters import GenerateAssignment
 from nbgrader.coursedir import CourseDirectory
+from nbgrader.preprocessors import ClearHiddenTests, ClearMarkScheme
 from nbgrader.utils import capture_log
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
+from rbcourse.assignments.client import BoundedClient
+from rbcourse.course.notebooks import KERNEL
+
 # what a student needs of environment.txt
 NEEDED = ["numpy", "scipy", "matplotlib", "pillow", "anywidget", "ipykernel", "ipywidgets"]
-NEEDED += ["jupyterlab", "nbclient", "nbformat"]
+NEEDED += ["jupyterlab", "nbclient", "nbformat", "tqdm"]
 LEFTOVER = re.compile(
     r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
     re.IGNORECASE,
@@ -226,10 +231,33 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
             entry = ZipInfo(f"{name}/{path}")  # of the first day a zip knows
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
-    target = assignments / "handouts" / f"{name}.zip"
+    return _write(assignments / "handouts" / f"{name}.zip", packed.getvalue())
+
+
+def make_solutions(name: str, assignments: Path) -> Path:
+    """Write ``handouts/NAME-solutions.ipynb``: the model answers, run, for after the deadline.
+
+    Hidden tests and mark schemes are left out.
+    """
+    notebook = nbformat.read(find_set(name, assignments) / f"{name}.ipynb", as_version=4)
+    for step in (ClearHiddenTests(), ClearMarkScheme()):
+        notebook, _ = step.preprocess(notebook, {})
+    for cell in notebook.cells:
+        cell.source = re.sub(r"^.*### (BEGIN|END) SOLUTION.*\n?", "", cell.source, flags=re.M)
+        cell.metadata = NotebookNode()
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        client = BoundedClient(notebook, kernel_name=KERNEL["name"])
+        client.folder, client.allow_errors = Path(folder), False
+        client.execute(cwd=folder)
+    notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
+    target = assignments / "handouts" / f"{name}-solutions.ipynb"
+    return _write(target, (nbformat.writes(notebook) + "\n").encode())
+
+
+def _write(target: Path, content: bytes) -> Path:
     target.parent.mkdir(exist_ok=True)
     part = target.with_suffix(".part")
-    part.write_bytes(packed.getvalue())
+    part.write_bytes(content)
     part.replace(target)
     return target
 
@@ -238,9 +266,14 @@ def main() -> None:
     """Make a handout from the command line, in the folder of the course."""
     parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.handout")
     parser.add_argument("set", help="its name: ps1")
+    parser.add_argument("--solutions", action="store_true", help="the model answers")
+    known, assignments = parser.parse_args(), Path("notebooks", "assignments")
     try:
-        print(make_handout(parser.parse_args().set, Path("notebooks", "assignments"), Path()))
-    except (OSError, ValueError) as error:
+        if known.solutions:
+            print(make_solutions(known.set, assignments))
+        else:
+            print(make_handout(known.set, assignments, Path()))
+    except (OSError, ValueError, CellExecutionError) as error:
         sys.exit(str(error))
 
 

@@ -1,15 +1,63 @@
-"""Compare a problem set with the original, cell by cell, and restore what must not change.
+"""Read a problem set, and restore what a student must not change: cell by cell, as handed out.
 
-Cells are told apart as nbgrader does, by their grade_id, but without it: students do not have it.
+Students and graders use the same functions. Cells are told apart as nbgrader does, by their
+grade_id, but without it: students do not have it.
 """
 
 import copy
+import logging
 import re
 import uuid
+import warnings
 from typing import Any
 
 import nbformat
 from nbformat import NotebookNode
+
+MERGE = re.compile(r"^(<{7}|>{7}) ", re.MULTILINE)
+
+
+def decode(content: bytes) -> str:
+    r"""Return the text of a file in UTF-8 or, with its mark at the beginning, in UTF-16.
+
+    Examples
+    --------
+    >>> decode("ü".encode("utf-16")) == decode("ü".encode("utf-8-sig")) == "ü"
+    True
+    """
+    marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    return content.decode("utf-16" if marked else "utf-8-sig")
+
+
+def read_notebook(content: bytes, name: str) -> NotebookNode:
+    """Return the notebook in a file; a ValueError says what the file is instead, and what helps."""
+    if not content.strip():
+        raise ValueError(f"{name} is empty; open it in JupyterLab and save it, or start anew")
+    if content.startswith((b"%PDF", b"PK")):
+        raise ValueError(
+            f"{name} is no notebook, but a PDF or an archive under another name; hand in the "
+            "notebook itself"
+        )
+    try:
+        text = decode(content)
+        if MERGE.search(text):
+            raise ValueError("merge marks, <<<<<<< and >>>>>>>, are left in it")
+        with warnings.catch_warnings():  # on cells without ids, which get them later
+            warnings.simplefilter("ignore")
+            logging.disable()
+            notebook = nbformat.reads(text, as_version=4)
+            nbformat.validate(notebook)
+    except Exception as error:  # whatever nbformat stumbles over
+        why = (str(error).splitlines() or [type(error).__name__])[0][:80]
+        raise ValueError(
+            f"{name} is damaged or no notebook ({why}); take an earlier copy, or open it in "
+            "JupyterLab and save it again"
+        ) from error
+    finally:
+        logging.disable(logging.NOTSET)
+    if not notebook.cells:
+        raise ValueError(f"{name} has no cells; open it in JupyterLab and save it again")
+    return notebook
 
 
 def marks_of(cell: NotebookNode) -> dict[str, Any]:
@@ -23,29 +71,41 @@ def grade_id(cell: NotebookNode) -> str:
     return str(marks_of(cell).get("grade_id") or "")
 
 
+def is_answer(cell: NotebookNode) -> bool:
+    """Tell whether a cell is to be written by the student."""
+    return bool(marks_of(cell).get("solution"))
+
+
 def is_test(cell: NotebookNode) -> bool:
     """Tell whether a cell holds tests."""
-    marks = marks_of(cell)
-    return bool(cell.cell_type == "code" and marks.get("grade") and not marks.get("solution"))
+    return bool(cell.cell_type == "code" and marks_of(cell).get("grade") and not is_answer(cell))
 
 
-def name_cell(cells: list[NotebookNode], at: int, number: bool = True) -> str:
-    """Return words by which a person finds a cell."""
-    cell = cells[at]
-    kind = "answer" if marks_of(cell).get("solution") else "test" if is_test(cell) else "locked"
-    headings = [
+def title_of(cells: list[NotebookNode], at: int) -> str:
+    """Return the last heading above a cell, or in it, that is not the student's."""
+    titles = [
         match[1].strip()
-        for above in cells[: at + 1]
-        if above.cell_type == "markdown"
-        for match in re.finditer(r"^#+\s+(.+)", above.source, re.MULTILINE)
+        for cell in cells[: at + 1]
+        if cell.cell_type == "markdown" and grade_id(cell) and not is_answer(cell)
+        for match in re.finditer(r"^#+\s+(.+)", cell.source, re.MULTILINE)
     ]
-    place = [f"cell {at + 1}"] * number + [f"after the heading '{h}'" for h in headings[-1:]]
-    words = f"{kind} cell '{grade_id(cell)}'" if grade_id(cell) else "cell without a name"
-    return f"the {words} ({', '.join(place)})" if place else f"the {words}"
+    return titles[-1] if titles else ""
 
 
-def mend(notebook: NotebookNode, original: NotebookNode) -> list[str]:
-    """Put the locked cells of a notebook back as they were, and say what was done."""
+def name_cell(cells: list[NotebookNode], at: int) -> str:
+    """Return words by which a person finds a cell."""
+    cell, title = cells[at], title_of(cells, at)
+    kind = "answer" if is_answer(cell) else "test" if is_test(cell) else "locked cell"
+    kind = kind if grade_id(cell) else "added cell"
+    return f"cell {at + 1}, {kind}" + f" of “{title}”" * bool(title)
+
+
+def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
+    """Put the locked cells of a notebook back as they were, and say what was changed.
+
+    The answers stay. Of several cells with a name the last one counts, and the others become
+    cells of the student; these lose their metadata, which could keep them from being run.
+    """
     cells, wanted = notebook.cells, {grade_id(c): c for c in original.cells if grade_id(c)}
     ids = {grade_id(cell) for cell in cells} - {""}
     if len(ids & set(wanted)) <= len(ids - set(wanted)):
@@ -53,100 +113,62 @@ def mend(notebook: NotebookNode, original: NotebookNode) -> list[str]:
             "the cells are not those of this problem set; check that this is the right file, and "
             "that it is the notebook handed out, not a new one"
         )
-    remarks = [
-        f"cell {at} still has merge marks, <<<<<<< and >>>>>>>; resolve them"
-        for at, cell in enumerate(cells, 1)
-        if re.search(r"^(<{7}|>{7}) ", cell.source, re.MULTILINE)
-    ]
-    remarks += _drop_extra_marks(cells, wanted)
+    remarks = []
+    last = {grade_id(cell): at for at, cell in enumerate(cells)}
     for at, cell in enumerate(cells):
-        if grade_id(cell):
-            remarks += _put_back(cells, at, original.cells)
+        name = grade_id(cell)
+        if name in wanted and last[name] == at:
+            remarks += _put_back(cells, at, wanted[name])
+            continue
+        if name in wanted:
+            counts = f"is there again as cell {last[name] + 1}, which counts"
+            remarks.append(f"{name_cell(cells, at)}: {counts}")
+        cell.metadata = NotebookNode()
     remarks += _add_missing(cells, original.cells)
     there = [grade_id(cell) for cell in cells if grade_id(cell)]
-    if there != [name for name in wanted if name in there]:
-        remarks.append("cells with names are not in the order of the original; this is left so")
+    if there != list(wanted):
+        remarks.append("cells are not in the order of the original; they are run in yours")
     used: set[str] = set()
     for cell in cells:
         if cell.get("id") in used | {None}:
             cell.id = uuid.uuid4().hex[:8]
         used.add(cell.id)
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
     notebook.nbformat_minor = max(5, notebook.nbformat_minor)
     return remarks
 
 
-def _drop_extra_marks(cells: list[NotebookNode], wanted: dict[str, NotebookNode]) -> list[str]:
-    """Make ordinary cells of copies; of several with a name nbgrader takes the last."""
-    remarks: list[str] = []
-    last = {grade_id(cell): at for at, cell in enumerate(cells)}
-    for at, cell in enumerate(cells):
-        name = grade_id(cell)
-        if name and name not in wanted:
-            remarks.append(
-                f"cell {at + 1} has the name '{name}', which the set does not have; "
-                "it is taken as a cell of your own"
-            )
-        elif name and last[name] != at:
-            remarks.append(
-                f"{name_cell(cells, at)} is there again as cell {last[name] + 1}, which "
-                f"counts; cell {at + 1} is taken as a cell of your own"
-            )
-        else:
-            continue
-        for key in ("nbgrader", "editable", "deletable"):
-            cell.metadata.pop(key, None)
-    return remarks
-
-
-def _put_back(cells: list[NotebookNode], at: int, original: list[NotebookNode]) -> list[str]:
-    cell = cells[at]
-    wanted = next(c for c in original if grade_id(c) == grade_id(cell))
-    where = name_cell(cells, at)
-    changes = _changes(cell, wanted)
-    if not marks_of(wanted).get("solution"):
-        if not changes and cell.source == wanted.source:
-            return []
-        cells[at] = _copy(wanted)
-        changes = ["was changed"] * (cell.source != wanted.source) + changes
-        return [f"{name_cell(cells, at)} {' and '.join(changes)}; it is put back as it was"]
-    remarks = []
-    if changes:
-        remarks.append(f"{where} {' and '.join(changes)}; this is put back, your answer stays")
-        cells[at] = _copy(wanted)
-        cells[at].source = cell.source
-    if cell.source.strip() in ("", wanted.source.strip()):
-        remarks.append(f"{name_cell(cells, at)} is not answered yet")
-    return remarks
-
-
-def _copy(cell: NotebookNode) -> NotebookNode:
-    return nbformat.from_dict(copy.deepcopy(dict(cell)))
-
-
-def _changes(cell: NotebookNode, wanted: NotebookNode) -> list[str]:
-    """Say what was changed of a cell beside its content."""
+def _put_back(cells: list[NotebookNode], at: int, wanted: NotebookNode) -> list[str]:
+    cell, kept = cells[at], _copy(wanted)
     old, new = marks_of(wanted), marks_of(cell)
-    changes = []
-    if cell.cell_type != wanted.cell_type:
-        changes.append(f"was made a {cell.cell_type} cell")
+    changes = [f"was made a {cell.cell_type} cell"] * (cell.cell_type != wanted.cell_type)
     if old.get("points") != new.get("points"):
         changes.append(f"has other points ({new.get('points')}, not {old.get('points')})")
     if any(old.get(key) != new.get(key) for key in {*old, *new} - {"points", "cell_type"}):
         changes.append("has other marks for grading")
     if any(cell.metadata.get(k) != wanted.metadata.get(k) for k in ("editable", "deletable")):
         changes.append("was unlocked")
-    return changes
+    if is_answer(wanted):
+        kept.source = cell.source
+    elif cell.source != wanted.source:
+        changes.insert(0, "was changed")
+    cells[at] = kept
+    return [f"{name_cell(cells, at)} {' and '.join(changes)}; it is put back"] if changes else []
+
+
+def _copy(cell: NotebookNode) -> NotebookNode:
+    return nbformat.from_dict(copy.deepcopy(dict(cell)))
 
 
 def _add_missing(cells: list[NotebookNode], original: list[NotebookNode]) -> list[str]:
     remarks, before = [], ""
-    for at, wanted in enumerate(original):
+    for wanted in original:
         name = grade_id(wanted)
         there = [grade_id(cell) for cell in cells]
         if name and name not in there:
-            cells.insert(there.index(before) + 1 if before else 0, _copy(wanted))
-            empty = ", not answered" if marks_of(wanted).get("solution") else ""
-            where = name_cell(original, at, number=False)
-            remarks.append(f"{where} was deleted; it is put back as it was{empty}")
+            at = there.index(before) + 1 if before else 0
+            cells.insert(at, _copy(wanted))
+            remarks.append(f"{name_cell(cells, at)} was missing; it is put back")
         before = name or before
     return remarks

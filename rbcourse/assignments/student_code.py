@@ -1,19 +1,21 @@
-"""Call a student's function: report its errors, and calls of functions that it should replace."""
+"""Call a student's function: tell where it stops, and which functions it uses that it should not.
 
-import dis
+Only what a function names is looked at: that tells an honest student what is not meant.
+"""
+
+import ast
 import functools
-import gc
+import inspect
 import linecache
 import sys
 import textwrap
 import traceback
 from collections.abc import Iterator, Sequence
-from types import CodeType, FrameType, FunctionType, MethodType, ModuleType
+from types import CellType, CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
-TOOLS = {"__main__", "builtins", "numpy", "matplotlib", "mpl_toolkits", "IPython", "ipykernel"}
-# what these call is their own business: printing sends messages, imports ask every finder
-OF_THEIR_OWN = {"matplotlib", "mpl_toolkits", "IPython", "ipykernel", "importlib", "zipimport"}
+TOOLS = {"__main__", "builtins", "numpy", "matplotlib", "mpl_toolkits", "IPython", "ipywidgets"}
+TOOLS |= {"anywidget", "traitlets", "tqdm"}
 
 
 class NotYet(AssertionError):
@@ -27,34 +29,17 @@ def call_student(
     function: Any, arguments: tuple[Any, ...], allowed: Sequence[str], times: int = 1
 ) -> list[Any]:
     """Return what a student's function returns, each time."""
-    _refuse(_foreign_names(function, allowed))
-    watch, before, collecting = _Watch(allowed), sys.getprofile(), gc.isenabled()
-    gc.disable()  # what it cleans up is not the student's
-    sys.setprofile(watch)
+    for foreign in _foreign_names(function, allowed):
+        raise NotYet(
+            f"This uses {foreign}. Write it yourself: with Python, NumPy, and what the problem set "
+            "allows."
+        )
     try:
-        results = [function(*arguments) for _ in range(min(times, 10))]
-        sys.setprofile(before)
-        if collecting:
-            gc.enable()
-        results += [function(*arguments) for _ in range(times - 10)]
+        return [function(*arguments) for _ in range(times)]
     except NotImplementedError:
         raise NotYet("Nothing is written here yet.") from None
     except Exception as error:
         raise NotYet(_trouble(error)) from None
-    finally:
-        sys.setprofile(before)
-        if collecting:
-            gc.enable()
-    _refuse(watch.seen)
-    return results
-
-
-def _refuse(foreign: Sequence[str]) -> None:
-    if foreign:
-        raise NotYet(
-            f"This uses {foreign[0]}. Write it yourself: with Python, NumPy, and what the problem "
-            "set allows."
-        )
 
 
 def _trouble(error: Exception) -> str:
@@ -75,37 +60,8 @@ def _is_tool(module: str | None) -> bool:
     return _root(module) in TOOLS or _root(module) in sys.stdlib_module_names
 
 
-class _Watch:
-    """A profile function that notes whose functions a student's code calls."""
-
-    def __init__(self, allowed: Sequence[str]) -> None:
-        self.allowed = allowed
-        self.seen: list[str] = []
-
-    def __call__(self, frame: FrameType, event: str, argument: Any) -> None:
-        module, name = frame.f_globals.get("__name__"), frame.f_code.co_name
-        if event != "call" or _is_tool(module) or not _is_students(frame.f_back):
-            return
-        if _root(module) not in sys.modules:  # as of what Python itself writes for a named tuple
-            return
-        if not (_root(module) == "rbcourse" and name in self.allowed):
-            self.seen.append(f"{_root(module)}.{name}")
-
-
-def _is_students(frame: FrameType | None) -> bool:
-    """Return whether a call from here was meant: by the student's code, if by way of NumPy."""
-    module = ""
-    while frame and module != "__main__":
-        module = frame.f_globals.get("__name__", "")
-        if not _is_tool(module) or _root(module) in OF_THEIR_OWN:
-            return False
-        frame = frame.f_back
-    return module == "__main__"
-
-
-def _foreign_names(function: Any, allowed: Sequence[str]) -> list[str]:
-    """Return what a function refers to that is neither the student's own nor a tool."""
-    found: list[str] = []
+def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
+    """Yield what a function refers to that is neither the student's own nor a tool."""
     waiting, known = [function], set[int]()
     while waiting:
         value = waiting.pop()
@@ -115,56 +71,77 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> list[str]:
         if isinstance(value, functools.partial):
             waiting += [value.func, *value.args]
         elif isinstance(value, MethodType):
-            waiting.append(value.__func__)
+            waiting += [value.__func__, value.__self__]
         elif isinstance(value, FunctionType) and value.__module__ == "__main__":
             waiting += _referred_to(value)
-        elif isinstance(value, ModuleType) or callable(value):
-            found += _judged(value, allowed)
-    return found
-
-
-def _judged(value: Any, allowed: Sequence[str]) -> list[str]:
-    if isinstance(value, ModuleType):
-        return [] if _is_tool(value.__name__) else [value.__name__]
-    module = getattr(value, "__module__", None) or type(value).__module__
-    name = getattr(value, "__name__", type(value).__name__)
-    if _is_tool(module) or (_root(module) == "rbcourse" and name in allowed):
-        return []
-    return [f"{_root(module)}.{name}"]
+        else:
+            is_named = isinstance(value, ModuleType | FunctionType | type)
+            module = value.__name__ if isinstance(value, ModuleType) else None
+            module = module or getattr(value if is_named else type(value), "__module__", "")
+            name = getattr(value, "__name__", type(value).__name__)
+            if not _is_tool(module) and not (_root(module) == "rbcourse" and name in allowed):
+                yield str(name) if isinstance(value, ModuleType) else f"{_root(module)}.{name}"
 
 
 def _referred_to(function: FunctionType) -> Iterator[Any]:
-    """Yield the values of all global names, defaults and enclosed names of a function."""
+    """Yield the defaults of a function, and what its global and enclosed names stand for."""
+    enclosed = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    values = {
+        **function.__globals__,
+        **{n: c.cell_contents for n, c in enclosed.items() if _is_full(c)},
+    }
+    for name in _local_names(function.__code__):
+        values.pop(name, None)
     yield from function.__defaults__ or ()
     yield from (function.__kwdefaults__ or {}).values()
-    yield from (cell.cell_contents for cell in function.__closure__ or () if _is_full(cell))
-    for code in _codes(function.__code__):
-        steps = list(dis.get_instructions(code))
-        for i, step in enumerate(steps):
-            if step.opname in ("LOAD_GLOBAL", "LOAD_NAME") and step.argval in function.__globals__:
-                yield _followed(function.__globals__[step.argval], steps[i + 1 :])
-            elif step.opname == "IMPORT_NAME" and _root(step.argval) != "rbcourse":
-                yield sys.modules.get(_root(step.argval)) or ModuleType(step.argval)
+    nodes, followed = list(ast.walk(_tree_of(function))), set[ast.AST]()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                name = alias.asname or _root(alias.name)
+                values[name] = _imported(alias.name if alias.asname else name)
+        elif isinstance(node, ast.ImportFrom):
+            module = _imported(node.module or "")
+            for alias in node.names:
+                values[alias.asname or alias.name] = getattr(module, alias.name, module)
+    for node in nodes:
+        if isinstance(node, ast.Name | ast.Attribute):
+            value = _value_of(node, values)
+            if node not in followed:
+                yield value
+            if isinstance(node, ast.Attribute) and (node in followed or value is not None):
+                followed.add(node.value)
 
 
-def _is_full(cell: Any) -> bool:
+def _is_full(cell: CellType) -> bool:
     try:
         return cell.cell_contents is not None
     except ValueError:
         return False
 
 
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _codes(constant)
+def _local_names(code: CodeType) -> set[str]:
+    inner = [_local_names(part) for part in code.co_consts if isinstance(part, CodeType)]
+    return set[str]().union(code.co_varnames, code.co_cellvars, *inner)
 
 
-def _followed(value: Any, steps: Sequence[dis.Instruction]) -> Any:
-    """Follow a name through its attributes, as in numpy.linalg.svd, while they are modules."""
-    for step in steps:
-        if not isinstance(value, ModuleType) or step.opname not in ("LOAD_ATTR", "LOAD_METHOD"):
-            return value
-        value = getattr(value, step.argval, None)
-    return value
+def _tree_of(function: FunctionType) -> ast.AST:
+    """Return the code of a function; nothing where it is not to be had."""
+    try:
+        return ast.parse(textwrap.dedent(inspect.getsource(function)))
+    except (OSError, SyntaxError, TypeError):
+        return ast.Module([], [])
+
+
+def _imported(name: str) -> Any:
+    return sys.modules.get(name) or ModuleType(name)
+
+
+def _value_of(node: ast.AST, values: dict[str, Any]) -> Any:
+    """Return what a name, or an attribute of a module, stands for; None for all else."""
+    if isinstance(node, ast.Name):
+        return values.get(node.id)
+    if isinstance(node, ast.Attribute):
+        module = _value_of(node.value, values)
+        return getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
+    return None

@@ -1,4 +1,8 @@
-"""Find code in a submission that overrides names used by the tests."""
+"""Find code in a submission that overrides what the tests rely on.
+
+This reads the code and does not run it: it finds what students write in earnest or in jest, not
+what an expert takes pains to hide.
+"""
 
 import ast
 import builtins
@@ -6,113 +10,87 @@ import re
 from collections.abc import Iterable, Iterator
 
 from IPython.core.inputtransformer2 import TransformerManager
+from nbformat import NotebookNode
+
+from rbcourse.assignments.restore import grade_id, is_answer
 
 # each leads round what can be read in the code
-DARK = {
-    *("exec", "eval", "globals", "__import__", "__builtins__", "get_ipython", "_getframe"),
-    *("__dict__", "__setattr__", "__delattr__", "__code__", "__globals__", "__subclasses__"),
-    *("displayhook", "settrace", "setprofile"),
-}
-DARK_MODULES = {"builtins", "ctypes", "gc", "importlib", "inspect", "IPython", "ipykernel"}
-DARK_MODULES |= {"nbgrader", "pytest", "unittest"}
+NAMES = {"exec", "eval", "globals", "locals", "__import__", "__builtins__", "get_ipython"}
+ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
+ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
+ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
+ATTRIBUTES |= {"__setattr__", "__delattr__", "__globals__", "__closure__", "__subclasses__"}
+ATTRIBUTES |= {"__builtins__", "__wrapped__", "__self__", "__bases__", "__mro__"}
+MODULES = {"builtins", "ctypes", "gc", "importlib", "inspect", "IPython", "ipykernel", "pkgutil"}
+MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq"}
 # an object that equals everything passes every test
-DARK_METHODS = {f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "bool")}
-DARK_METHODS |= {"__array_ufunc__", "__array_function__"}
-MAGICS = {"matplotlib", "pinfo", "pinfo2", "time", "timeit", "capture"}
+METHODS = {f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "bool", "array_ufunc")}
+METHODS |= {"__array_function__"}
+# magics and help that do no harm; of those that run code only their names are left out
+MAGICS = re.compile(
+    r"(\A\s*%%(?:time|capture)\b[ \t\w-]*$|^[ \t]*%time(?:it)?\b(?:[ \t]+-\w+[ \t]*\d*)*[ \t]*"
+    r"|\A\s*%%timeit\b(?:[ \t]+-\w+[ \t]*\d*)*[ \t]*)"
+    r"|^[ \t]*(?:%(?:matplotlib|precision|autoreload)\b[ \t\w.-]*|%load_ext[ \t]+autoreload"
+    r"|%config[ \t]+InlineBackend\.\w+[ \t]*=[ \t]*[\[{]?['\"]\w+['\"][\]}]?"
+    r"|\?{0,2}[\w.]+\?{1,2})[ \t]*$",
+    re.MULTILINE,
+)
 CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
 
 
-def names_relied_on(locked: Iterable[str]) -> set[str]:
-    """Return the names that students may not give a new meaning.
+def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
+    """Find where the student's cells of a notebook override what its locked cells rely on.
 
-    Examples
-    --------
-    >>> sorted(names_relied_on(["import numpy as np", "assert all(np.isclose(x, 1))"]))
-    ['all', 'np']
+    Returns
+    -------
+    list of (int, int, str)
+        The index of the cell, the line in it, and what it does.
     """
+    code = {at: cell for at, cell in enumerate(cells) if cell.cell_type == "code"}
+    trees = {at: _parsed(cell.source) for at, cell in code.items()}
+    own = [at for at, cell in code.items() if is_answer(cell) or not grade_id(cell)]
+    relied = _relied_on(tree for at, tree in trees.items() if at not in own)
+    imported: set[str] = set()
+    found = []
+    for at, tree in trees.items():
+        nodes = list(ast.walk(tree))
+        for node in nodes:
+            _learn(node, imported)
+        if at in own:
+            bound = [(line, name) for line, name in _rebound(tree) if name in relied]
+            said = {(line, f"gives {name} another meaning") for line, name in bound}
+            for node in nodes:
+                line = getattr(node, "lineno", 0)
+                said |= {(line, what) for what in _suspicious(node, relied, imported)}
+            found += [(at, *what) for what in sorted(said)]
+    return found
+
+
+def _parsed(source: str) -> ast.Module:
+    """Return the code; nothing if it is not Python, and so does not run."""
+    harmless = MAGICS.sub(lambda found: "" if found[1] else "pass", source)
+    for text in (harmless, source):
+        try:
+            tree = ast.parse(TransformerManager().transform_cell(text))
+            return ast.increment_lineno(tree, len(text) - len(text.lstrip("\n")))
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            continue
+    return ast.Module([], [])
+
+
+def _relied_on(trees: Iterable[ast.Module]) -> set[str]:
+    """Return the names that students may not give a new meaning, attributes among them."""
     relied: set[str] = set()
-    for node in (node for source in locked for node in ast.walk(_parsed(source))):
+    for node in (node for tree in trees for node in ast.walk(tree)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             relied |= {_bound(alias) for alias in node.names}
         elif isinstance(node, ast.FunctionDef | ast.ClassDef):
             relied.add(node.name)
         elif isinstance(node, ast.Name) and hasattr(builtins, node.id):
             relied.add(node.id)
+        elif isinstance(node, ast.Attribute):
+            relied.add(node.attr)
     return relied - {"*"}
-
-
-def find_tampering(
-    source: str, relied: set[str], imported: set[str] | None = None
-) -> list[tuple[int, str]]:
-    r"""Find where code replaces what tests rely on, or hides what it does.
-
-    This reads the code and does not run it: it finds what students write in earnest or in jest,
-    not what an expert takes pains to hide.
-
-    Examples
-    --------
-    >>> find_tampering("import numpy as np\nnp.allclose = print", {"np"})
-    [(2, 'replaces np.allclose')]
-    >>> find_tampering("import matplotlib.pyplot as plt\nplt.rcParams['font.size'] = 9", {"np"})
-    []
-    """
-    imported = set() if imported is None else imported
-    tree = _parsed(source)
-    nodes = list(ast.walk(tree))
-    for node in nodes:
-        _learn(node, imported)
-    rebound = _rebound(tree)
-    found = {(line, f"gives {name} another meaning") for line, name in rebound if name in relied}
-    for node in nodes:
-        found |= {(getattr(node, "lineno", 0), what) for what in _suspicious(node, imported)}
-    return sorted(found)
-
-
-def find_in_cells(cells: Iterable[tuple[str, bool]]) -> list[tuple[int, int, str]]:
-    """Find where a notebook replaces what its tests rely on."""
-    cells = list(cells)
-    relied = names_relied_on(source for source, own in cells if not own)
-    imported: set[str] = set()
-    found = [find_tampering(source, relied, imported) for source, _ in cells]
-    return [(i, *what) for i, (_, own) in enumerate(cells) if own for what in found[i]]
-
-
-class _Magics(ast.NodeTransformer):
-    """Replace magics that do no harm by the code that they run."""
-
-    def visit_Expr(self, node: ast.Expr) -> ast.AST | list[ast.stmt]:
-        name, body = _magic(node.value)
-        if name not in ("time", "timeit", "capture"):
-            return self.generic_visit(node)
-        inner = _parsed(body)
-        below = "cell" in ast.unparse(node)[:24]
-        return ast.increment_lineno(inner, node.lineno - (not below)).body
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        name, body = _magic(node)
-        harmless = name in MAGICS or (name == "config" and body.startswith("InlineBackend."))
-        return ast.copy_location(ast.Constant(None), node) if harmless else self.generic_visit(node)
-
-
-def _magic(node: ast.AST) -> tuple[str, str]:
-    """Return the name of a magic and the code, or what else is given to it."""
-    if isinstance(node, ast.Call) and re.match(
-        r"get_ipython\(\)\.run_(line|cell)_magic\(", ast.unparse(node)
-    ):
-        words = [str(arg.value) for arg in node.args if isinstance(arg, ast.Constant)]
-        return (words[0], words[-1]) if words else ("", "")
-    return "", ""
-
-
-def _parsed(source: str) -> ast.Module:
-    """Return the code; nothing if it is not Python, and so does not run."""
-    try:
-        tree = ast.parse(TransformerManager().transform_cell(source))
-        blank = len(source) - len(source.lstrip("\n"))
-        changed = _Magics().visit(ast.increment_lineno(tree, blank))
-        return changed if isinstance(changed, ast.Module) else tree
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return ast.Module([], [])
 
 
 def _bound(alias: ast.alias) -> str:
@@ -155,29 +133,33 @@ def _rebound(tree: ast.Module) -> Iterator[tuple[int, str]]:
             todo += ast.iter_child_nodes(node)
 
 
-def _suspicious(node: ast.AST, imported: set[str]) -> Iterator[str]:
-    if isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
-        if _root(node) in imported:
+def _suspicious(node: ast.AST, relied: set[str], imported: set[str]) -> Iterator[str]:
+    if isinstance(node, ast.Attribute):
+        own = _root(node) == "self"  # of an object that the student describes
+        if isinstance(node.ctx, ast.Load):
+            yield from [f"uses {node.attr}"] * (node.attr in ATTRIBUTES)
+        elif _root(node) in imported or (node.attr in relied | ATTRIBUTES and not own):
             yield f"replaces {ast.unparse(node)}"
-    elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("setattr", "delattr", "vars"):
-        first = ast.unparse(node.args[0]) if node.args else "everything"
-        if not node.args or _root(node.args[0]) in imported:
-            yield f"replaces parts of {first}"
-    elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
-        if ast.unparse(node.value) == "sys.modules":
-            yield "replaces sys.modules"
-    elif isinstance(node, ast.ImportFrom) and node.module != "IPython.display":
-        yield from _dark(node.module or "", [alias.name for alias in node.names])
-    elif isinstance(node, ast.Import):
-        yield from (what for alias in node.names for what in _dark(alias.name, []))
-    elif isinstance(node, ast.FunctionDef) and node.name in DARK_METHODS:
+    elif isinstance(node, ast.Name) and node.id in NAMES:
+        yield "uses a magic or a shell" if node.id == "get_ipython" else f"uses {node.id}"
+    elif isinstance(node, ast.Call):
+        called, given = ast.unparse(node.func), node.args
+        if called in ("setattr", "delattr", "vars") and _root((given or [node])[0]) in imported:
+            yield f"replaces parts of {ast.unparse(given[0])}"
+        if called in ("setattr", "delattr", "getattr") and len(given) > 1:
+            name = given[1].value if isinstance(given[1], ast.Constant) else None
+            if name is None or name in ATTRIBUTES or (called != "getattr" and name in relied):
+                yield f"uses {called} with {ast.unparse(given[1])}"
+    elif isinstance(node, ast.Import | ast.ImportFrom):
+        place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+        dark = (_dark(place + alias.name) for alias in node.names)
+        yield from (f"imports {name}" for name in dark if name)
+    elif isinstance(node, ast.FunctionDef) and node.name in METHODS:
         yield f"defines {node.name}"
-    name = getattr(node, "attr", getattr(node, "id", ""))
-    if name in DARK and (isinstance(node, ast.Name) or name.startswith("_") or "display" in name):
-        yield "uses a magic or a shell" if name == "get_ipython" else f"uses {name}"
 
 
-def _dark(module: str, names: list[str]) -> Iterator[str]:
-    for name in (module.split(".")[0], *names):
-        if name in DARK_MODULES | DARK:
-            yield f"imports {name}"
+def _dark(name: str) -> str:
+    """Return the part of the name of an import that leads round what can be read in the code."""
+    parts = name.split(".")
+    dark = [part for part in (parts[0], parts[-1]) if part in MODULES | NAMES | ATTRIBUTES]
+    return dark[0] if dark and not name.startswith("IPython.display") else ""

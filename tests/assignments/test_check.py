@@ -15,7 +15,8 @@ from nbgrader.preprocessors import ClearHiddenTests, ClearSolutions, ComputeChec
 from tiny import MODULE
 from tiny_set import ANSWERS, write_tiny_set
 
-from rbcourse.assignments import check
+from rbcourse.assignments import check, client
+from rbcourse.assignments.restore import restore
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +60,7 @@ def mended(release, edit):
     for name, source in {**ANSWERS, "words-answer": "Signs."}.items():
         cell_of(notebook, name).source = source
     edit(notebook)
-    said = check.mend(notebook, original)
+    said = restore(notebook, original)
     nbformat.validate(notebook)
     return said, notebook
 
@@ -102,8 +103,7 @@ def test_failing_tests_are_named_with_their_hint_and_do_not_keep_from_handing_in
     edited(handout, edit, **{"square-answer": "def square(x):\n    return x"})
     check.check(handout / "ps0.ipynb")
     said = capsys.readouterr().out
-    assert "FAILED  the test cell 'square-test' (cell 4, after the heading 'A tiny set')" in said
-    assert "AssertionError: times itself\n" in said
+    assert "FAILED  A tiny set: cell 4 AssertionError: times itself; cell 8 is graded by" in said
     assert "1 of 2 visible tests passed" in said
     assert "NameError: name 'nowhere' is not defined" in said
     assert not (handout / "made_by_a_run").exists()
@@ -117,7 +117,7 @@ def test_a_changed_test_does_not_help_and_the_name_is_put_right(handout, capsys)
     assert check.check(path) == handout / "to_submit" / "ps0.ipynb"
     said = capsys.readouterr().out
     assert "submitted under the name ps0.ipynb" in said
-    assert "'half-test' (cell 6, after the heading 'A tiny set') was changed; it is put" in said
+    assert "- cell 6, test of “A tiny set” was changed; it is put back\n" in said
     assert "1 of 2 visible tests passed" in said
     assert cell_of(submitted(handout), "half-test").source.startswith("assert half < 1")
 
@@ -148,13 +148,12 @@ def endless(monkeypatch, tmp_path):
 def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(
     handout, capsys, monkeypatch, endless
 ):
-    monkeypatch.setattr(check, "STOP_SECONDS", 600)
+    monkeypatch.setattr(client.BoundedClient.iopub_timeout, "default_value", 600)
     loop = f"open({endless('square-answer')!r}, 'w')\nwhile True:\n    print('x' * 10000)"
     edited(handout, lambda notebook: None, **{"square-answer": loop})
     check.check(handout / "ps0.ipynb", seconds=1)
     said = capsys.readouterr().out
-    assert "the answer cell 'square-answer' (cell 3, " in said
-    assert "took longer than 1 s" in said
+    assert "- cell 3, answer of “A tiny set” took longer than 1 s" in said
     assert "the output is too large" in said
     assert "1 of 2 visible tests passed" in said
     assert (handout / "to_submit" / "ps0.ipynb").stat().st_size < 3_000_000
@@ -162,7 +161,7 @@ def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(
 
 @pytest.mark.skipif(os.name == "nt", reason="there interrupts are no signals")
 def test_a_loop_that_cannot_be_stopped_ends_the_run(handout, capsys, monkeypatch, endless):
-    monkeypatch.setattr(check, "STOP_SECONDS", 1)
+    monkeypatch.setattr(client.BoundedClient.iopub_timeout, "default_value", 1)
     loop = f"""
         def square(x):
             import signal
@@ -176,7 +175,7 @@ def test_a_loop_that_cannot_be_stopped_ends_the_run(handout, capsys, monkeypatch
     said = capsys.readouterr().out
     assert "took longer than 1 s" in said
     assert "cells from 5 on were not run" in said
-    assert "FAILED  the test cell 'square-test'" in said
+    assert "FAILED  A tiny set: cell 4 " in said
     assert "0 of 2 visible tests passed" in said
 
 
@@ -188,19 +187,18 @@ def test_a_dead_kernel_is_named(handout, capsys):
     check.check(handout / "ps0.ipynb")
     said = capsys.readouterr().out
     assert "the kernel died in cell 5" in said
-    assert "passed  the test cell 'square-test'" in said
-    assert "FAILED  the test cell 'half-test'" in said
-    assert "it was not run" in said
+    assert "1 of 2 visible tests passed" in said
+    assert "FAILED  A tiny set: cell 6 it was not run" in said
 
 
-def test_what_is_as_it_was_handed_out_is_not_answered_yet(release):
-    notebook, original = (nbformat.reads(release, as_version=4) for _ in range(2))
-    said = check.mend(notebook, original)
-    assert [what.split(" (")[0] for what in said] == [
-        f"the answer cell '{name}'" for name in ("square-answer", "half-answer", "words-answer")
-    ]
-    assert all(what.endswith("is not answered yet") for what in said)
-    assert mended(release, lambda notebook: None)[0] == []
+def test_what_is_as_it_was_handed_out_is_not_answered_yet(handout, capsys):
+    check.check(handout / "ps0.ipynb")
+    said = capsys.readouterr().out
+    (line,) = [line for line in said.splitlines() if "A tiny set" in line]
+    assert line == "empty  A tiny set: " + "; ".join(
+        f"cell {at} is not answered yet" for at in (3, 5, 8)
+    )
+    assert "0 of 2 visible tests passed" in said
 
 
 @pytest.mark.parametrize("name", ["title", "square-answer", "square-test", "words-answer"])
@@ -208,8 +206,7 @@ def test_a_deleted_cell_is_named_and_comes_back_in_its_place(name, release):
     original = nbformat.reads(release, as_version=4)
     said, notebook = mended(release, lambda n: n.cells.remove(cell_of(n, name)))
     (what,) = said
-    assert f"'{name}'" in what
-    assert "was deleted" in what
+    assert what.endswith(" was missing; it is put back")
     assert names(notebook) == names(original)
     assert cell_of(notebook, name).source == cell_of(original, name).source
 
@@ -230,8 +227,7 @@ def test_of_copies_the_last_counts_as_for_nbgrader(release):
         notebook.cells.append(twin)
 
     said, notebook = mended(release, edit)
-    assert "'half-answer' (cell 5" in said[0]
-    assert "as cell 9, which counts" in said[0]
+    assert said[0] == "cell 5, answer of “A tiny set”: is there again as cell 9, which counts"
     assert cell_of(notebook, "half-answer").source == "half = 0.25"
     assert names(notebook).count("half-answer") == 1
     assert "order" in said[-1]
@@ -299,6 +295,7 @@ def test_a_notebook_of_another_set_is_refused(release):
         (b"no json", "damaged or no notebook"),
         (b'{"cells": 3}', "damaged or no notebook"),
         (b"\xff\xfe", "damaged or no notebook"),
+        (b"%PDF-1.7", "a PDF or an archive under another name"),
         (b'{\n<<<<<<< HEAD\n"a": 1\n=======\n>>>>>>> b\n}', "merge marks"),
     ],
 )
@@ -320,7 +317,7 @@ def test_what_grading_would_refuse_is_said_before(handout, capsys):
     edited(handout, lambda notebook: None, **{"half-answer": "half = 0.5\nmath.isclose = print"})
     check.check(handout / "ps0.ipynb")
     said = capsys.readouterr().out
-    assert "the answer cell 'half-answer' (cell 5, after the heading 'A tiny set'), line 2" in said
+    assert "- cell 5, answer of “A tiny set”, line 2 " in said
     assert "replaces math.isclose: not graded so, change it" in said
 
 
@@ -345,10 +342,8 @@ def test_a_test_that_is_hidden_as_a_whole_is_not_counted(release, capsys):
     notebook = nbformat.reads(release, as_version=4)
     cell_of(notebook, "half-test").source = "# the tests of this cell are hidden"
     cell_of(notebook, "square-test").execution_count = 1
-    assert check._tests(notebook) == [True]
-    assert (
-        "'half-test' (cell 6, after the heading 'A tiny set') has hidden" in capsys.readouterr().out
-    )
+    assert check._print_problems(notebook, notebook) == [True]
+    assert "cell 6 has hidden tests only" in capsys.readouterr().out
 
 
 def test_nothing_of_nbgrader_is_needed():
@@ -370,7 +365,7 @@ def test_files_beside_the_notebook_are_there_when_it_runs(handout, capsys):
 def test_an_error_whose_output_is_lost_is_an_error():
     notebook = nbformat.v4.new_notebook(cells=[new_code_cell("1 / 0")])
     reply = {"status": "error", "ename": "ZeroDivisionError", "evalue": "by zero", "traceback": []}
-    check._Client(notebook)._end(notebook.cells[0], 0, {"content": reply})
+    check._Client(notebook).on_cell_executed(notebook.cells[0], 0, {"content": reply})
     assert check._error(notebook.cells[0]) == "ZeroDivisionError: by zero"
 
 

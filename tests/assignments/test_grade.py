@@ -1,8 +1,5 @@
 """A class full of submissions is graded in one go, and none of them harms another."""
 
-import csv
-import html
-import json
 import os
 import re
 import shutil
@@ -13,106 +10,26 @@ from textwrap import dedent
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
-from nbgrader.api import Gradebook
-from nbgrader.converters import GenerateAssignment
+from tiny_class import Class, cell, make_template
 from tiny_set import ANSWERS, write_tiny_set
 from traitlets.config import Config
 
 from rbcourse.assignments.autograding import configure
-from rbcourse.assignments.grade import grade, grade_all, sets_submitted
-from rbcourse.assignments.handout import read_config, release
-from rbcourse.assignments.isolated import course_config, run_step
+from rbcourse.assignments.grade import (
+    grade,
+    grade_all,
+    sets_submitted,
+)
+from rbcourse.assignments.handout import read_config
 
 ROOT = Path(__file__).parents[2]
 HIDDEN = ["square(-3)==9", "isclose(half,0.5)"]
 MEMORY = 700_000_000
 
 
-def cell(notebook, grade_id):
-    """The cell of a name."""
-    (found,) = [
-        c for c in notebook.cells if c.metadata.get("nbgrader", {}).get("grade_id") == grade_id
-    ]
-    return found
-
-
-CONFIG = """
-import time
-from pathlib import Path
-
-from rbcourse.assignments.autograding import configure
-
-c = get_config()
-configure(c)
-c.Execute.timeout = 1
-c.Execute.iopub_timeout = 600
-ENDLESS = "endless"
-
-
-def limit(cell):
-    if ENDLESS not in cell.source:
-        return None
-    begun = Path("FOLDER", "begun")
-    while not begun.exists():
-        time.sleep(0.01)
-    begun.unlink()
-    return 1
-
-
-c.Execute.timeout_func = limit
-"""
-
-
 @pytest.fixture(scope="module")
 def template(tmp_path_factory):
-    """A course folder with the tiny set and its gradebook.
-
-    Only cells whose source says that they are endless have a limit, a second from when they write
-    the file "begun".
-    """
-    folder = tmp_path_factory.mktemp("template")
-    write_tiny_set(folder)
-    (folder / "nbgrader_config.py").write_text(CONFIG.replace("FOLDER", folder.as_posix()))
-    assert run_step(GenerateAssignment, course_config("ps0", folder))["success"]
-    return folder, release("ps0", folder)["ps0.ipynb"], f"open({str(folder / 'begun')!r}, 'w')"
-
-
-class Class:
-    """A course folder with the tiny set, and students who hand in."""
-
-    def __init__(self, folder, template):
-        made, self.given, self.begin = template
-        self.folder = shutil.copytree(made, folder, dirs_exist_ok=True)
-
-    def gradebook(self):
-        return Gradebook(f"sqlite:///{self.folder / 'gradebook.db'}")
-
-    def submit(self, student, change=None, **answers):
-        """Hand in the right answers, but for those that are given, changed."""
-        notebook = nbformat.reads(self.given.decode(), as_version=4)
-        given = {name.replace("_", "-") + "-answer": text for name, text in answers.items()}
-        for name, text in (ANSWERS | {"words-answer": "It is."} | given).items():
-            cell(notebook, name).source = text
-        if change:
-            change(notebook)
-        self.submit_bytes(student, json.dumps(notebook).encode())
-
-    def submit_bytes(self, student, content, name="ps0.ipynb"):
-        path = self.folder / "submitted" / student / "ps0" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-
-    def rows(self):
-        with (self.folder / "ps0-grades.csv").open(encoding="utf-8-sig", newline="") as table:
-            return {row["student"]: row for row in csv.DictReader(table)}
-
-    def graded(self, student):
-        return self.folder / "autograded" / student / "ps0" / "ps0.ipynb"
-
-    def feedback(self, student):
-        """The text of the feedback."""
-        page = (self.folder / "feedback" / student / "ps0" / "ps0.html").read_text("utf-8")
-        return html.unescape(re.sub(r"<[^>]*>", "", page.split("<body>", 1)[1]))
+    return make_template(tmp_path_factory.mktemp("template"))
 
 
 def rewrite_tests(notebook):
@@ -156,7 +73,8 @@ import sys
 from IPython.display import HTML, display
 display(HTML("<p>" * 10**7))
 try:
-    while True:
+    BEGIN
+    while True:  # endless
         print("on and on" * 1000, file=sys.stderr)
 finally:
     half = 0.5
@@ -182,7 +100,11 @@ def hand_in_all(course):
         square=f"{course.begin}\nwhile True: pass  # endless",
         half="half = 0.5\n'x' * 10**9",
     )
-    course.submit("loud", half=LOUD, square=ANSWERS["square-answer"] + "\nprint('x' * 10**9)")
+    course.submit(
+        "loud",
+        half=LOUD.replace("BEGIN", course.begin),
+        square=ANSWERS["square-answer"] + "\nprint('x' * 10**9)",
+    )
     course.submit("dies", half="import os\nos._exit(1)")
     course.submit("nosy", square=NOSY)
     course.submit("stripped", strip_metadata)
@@ -213,12 +135,12 @@ def rows(course):
     ("student", "square", "half", "remarks"),
     [
         ("good one", "2", "1", []),
-        ("rewrites", "0", "0", []),
-        ("deletes", "2", "0", ["square-test was missing", "half-answer was missing"]),
+        ("rewrites", "0", "0", ["cell 4, test of “A tiny set” was changed", "and 2 more changes"]),
+        ("deletes", "2", "0", ["cell 2, answer of “A tiny set”: is there again", "4 more changes"]),
         ("renames", "0", "0", []),
         ("half right", "0", "0", []),
-        ("endless", "0", "1", ["cell square-answer: stopped after 1 s", "half-answer: "]),
-        ("loud", "2", "1", ["square-answer: ", "answer cell half-answer: prints without end"]),
+        ("endless", "0", "1", ["cell 3, answer of “A tiny set”: stopped after 1 s", "cell 5, "]),
+        ("loud", "2", "1", ["cell 3, answer", "cell 5, answer of “A tiny set”: stopped after"]),
         ("nosy", "0", "1", []),
     ],
 )
@@ -238,12 +160,12 @@ def test_points_and_remarks(rows, student, square, half, remarks):
 @pytest.mark.parametrize(
     ("student", "why"),
     [
-        ("replaces", "answer cell square-answer, line 3 replaces math.isclose: grade by hand"),
-        ("dies", "Python ended in or before answer cell half-answer: grade by hand"),
-        ("stripped", "no problem of the set is in it: another notebook, or made anew"),
-        ("other set", "no problem of the set is in it: another notebook, or made anew"),
+        ("replaces", "cell 3, answer of “A tiny set”, line 3 replaces math.isclose: grade by hand"),
+        ("dies", "Python ended in or before cell 5, answer of “A tiny set”: grade by hand"),
+        ("stripped", "the cells are not those of this problem set"),
+        ("other set", "the cells are not those of this problem set"),
         ("pdf", "ps0.ipynb is no notebook, but a PDF or an archive under another name"),
-        ("broken", "ps0.ipynb is no notebook: "),
+        ("broken", "ps0.ipynb is damaged or no notebook ("),
         ("empty", "ps0.ipynb is empty"),
         ("wrong name", "there is no ps0.ipynb, but PS0.ipynb"),
     ],
@@ -306,7 +228,7 @@ def test_grading_again_keeps_what_a_human_gave(tmp_path, template):
     assert "Score: 5.5 / 6.0" in course.feedback("ann")
     changed = "words-answer is another answer than when it was graded before"
     assert course.rows()["bob"]["remarks"] == changed
-    assert course.rows()["eve"]["remarks"] == "refused: ps0.ipynb is empty"
+    assert course.rows()["eve"]["remarks"].startswith("refused: ps0.ipynb is empty")
     with course.gradebook() as gradebook:
         assert gradebook.find_submission("ps0", "eve").score == 2.5
 
@@ -349,7 +271,7 @@ def test_a_cell_that_cannot_be_stopped_is_refused(tmp_path, template):
     """
     course.submit("ann", square=dedent(stubborn))
     grade("ps0", tmp_path)
-    why = "cell square-test cannot be stopped"
+    why = "cell 4, test of “A tiny set” cannot be stopped"
     assert course.rows()["ann"]["remarks"] == f"refused: {why}"
 
 

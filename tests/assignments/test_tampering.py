@@ -1,22 +1,21 @@
 """What replaces the means of the tests is found; what students write every day is not."""
 
 import pytest
+from nbformat.v4 import new_code_cell
 
-from rbcourse.assignments.tampering import find_in_cells, find_tampering, names_relied_on
+from rbcourse.assignments.tampering import find_in_cells
 
 LOCKED = [
     "import math, numpy as np\nfrom rbcourse import marking\ndef helper(): pass",
-    "assert all(isinstance(v, float) for v in np.ravel(answer(2)))",
+    "assert all(isinstance(v, float) for v in np.ravel(answer(2))) and P.accepts(answer)",
 ]
-RELIED = names_relied_on(LOCKED)
 
 
-def found(source):
-    return find_tampering(source, RELIED, {"np", "math", "marking"})
-
-
-def test_what_the_locked_cells_import_define_and_use_is_relied_on():
-    assert {"math", "np", "marking", "helper", "all", "isinstance", "float"} == RELIED
+def found(source, locked=LOCKED):
+    """What is said of a cell of a student below locked cells."""
+    marks = {"grade_id": "locked", "locked": True}
+    cells = [new_code_cell(text, metadata={"nbgrader": marks}) for text in locked]
+    return [(line, what) for _, line, what in find_in_cells([*cells, new_code_cell(source)])]
 
 
 @pytest.mark.parametrize(
@@ -33,27 +32,35 @@ def test_what_the_locked_cells_import_define_and_use_is_relied_on():
         ("np.allclose.__code__ = f.__code__", "replaces np.allclose.__code__"),
         ("np.__dict__['allclose'] = print", "uses __dict__"),
         ("vars(np)['allclose'] = print", "replaces parts of np"),
-        ("import sys\nsys.modules['numpy'] = None", "replaces sys.modules"),
+        ("import sys\nsys.modules['numpy'] = None", "uses modules"),
         ("import sys\nsys.displayhook(2.0)", "uses displayhook"),
         ("get_ipython().run_cell('1')", "uses a magic or a shell"),
         ("shell = get_ipython()", "uses a magic or a shell"),
         ("!ls", "uses a magic or a shell"),
         ("%run other.py", "uses a magic or a shell"),
         ("%%time\nnp.allclose = print", "replaces np.allclose"),
+        ("%%capture out\nnp.allclose = print", "replaces np.allclose"),
+        ("%%timeit -n 3\nnp.allclose = print", "replaces np.allclose"),
+        ("%timeit np.linalg.norm = print", "replaces np.linalg.norm"),
+        ("%time (\nnp.allclose = print", "uses a magic or a shell"),
         ("eval('1')", "uses eval"),
         ("from unittest import mock", "imports unittest"),
         ("class math:\n    isclose = print", "gives math another meaning"),
         ("import json as math", "gives math another meaning"),
         ("all = print", "gives all another meaning"),
         ("def f():\n    global np\n    np = 1", "gives np another meaning"),
+        ("P = [marking.Problem][0]\nP.accepts = print", "replaces P.accepts"),
+        ('locals()["np"] = None', "uses locals"),
+        ('import sys\nsys.modules["IPython"]', "uses modules"),
+        ("x.input_transformers_post.append(print)", "uses input_transformers_post"),
+        ("import sys\nsys.setprofile(None)", "uses setprofile"),
+        ("getattr(x, 'mod' + 'ules')", "uses getattr with 'mod' + 'ules'"),
+        ("setattr(P, 'accepts', print)", "uses setattr with 'accepts'"),
         ("class Yes:\n    def __eq__(self, other):\n        return True", "defines __eq__"),
     ],
 )
 def test_what_replaces_the_means_of_the_tests_is_found(source, what):
     assert what in [said for _, said in found(source)]
-    assert what in [
-        said for *_, said in find_in_cells([*((text, False) for text in LOCKED), (source, True)])
-    ]
 
 
 @pytest.mark.parametrize(
@@ -64,6 +71,8 @@ def test_what_replaces_the_means_of_the_tests_is_found(source, what):
         "%matplotlib inline",
         "%config InlineBackend.figure_format = 'retina'",
         "%%time\nx = 1",
+        "%timeit -n 3 -r 2 x = 1",
+        "%load_ext autoreload\n%autoreload 2",
         "np.eye?",
         "import numpy as np, math\nfrom math import pi\nimport math as m",
         "class Arm:\n    def __init__(self):\n        self.x = 1\narm = Arm()\narm.y = 2",
@@ -73,6 +82,13 @@ def test_what_replaces_the_means_of_the_tests_is_found(source, what):
         "[np for np in range(3)]",
         "np.random.seed(0)\nnp.set_printoptions(precision=3)",
         "from IPython.display import HTML, display",
+        "import IPython.display as ipd",
+        "from IPython import display",
+        "from ipywidgets import interact\ninteract(print, x=(0, 1))",
+        "from tqdm.auto import tqdm\nfor i in tqdm(range(3)): pass",
+        "from threading import Thread\nThread(target=print).start()",
+        "class Body:\n    def accepts(self):\n        self.accepts = 1",
+        "getattr(plt, 'figure')()",
         "import re\nre.compile('a')",
         "sum = 3",
         "this is no Python (",
@@ -88,11 +104,11 @@ def test_the_line_is_that_of_the_cell():
 
 
 def test_pyplot_may_be_imported_in_either_way():
-    relied = names_relied_on(["import matplotlib.pyplot as plt"])
+    locked = ["import matplotlib.pyplot as plt"]
     for source in ("from matplotlib import pyplot as plt", "import matplotlib.pyplot as plt"):
-        assert find_tampering(source, relied) == []
-    assert find_tampering("from json import tool as plt", relied)
+        assert found(source, locked) == []
+    assert found("from json import tool as plt", locked)
 
 
 def test_what_the_locked_cells_do_themselves_is_in_order():
-    assert find_in_cells([("import math\nmath.tau = 6", False), ("x = 1", True)]) == []
+    assert found("x = 1", ["import math\nmath.tau = 6"]) == []

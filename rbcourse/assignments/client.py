@@ -1,0 +1,114 @@
+"""Run a notebook of a student: time and output are bounded, and no error is lost."""
+
+import json
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from nbclient import NotebookClient
+from nbformat import NotebookNode
+from nbformat.v4 import new_output
+from traitlets import Bool, Integer
+
+from rbcourse.course.notebooks import kernel_address
+
+STOP_SECONDS = 20  # that an interrupted cell may take to stop
+PRINTED = 100_000  # characters that a cell may print
+DISPLAYED = 2_000_000  # characters of its pictures and pages
+ALL_OUTPUT = 10_000_000  # characters, for a notebook
+DISPLAYS = ("display_data", "execute_result", "update_display_data")
+SLOW = "the cell took too long"
+CUT = "the output is too large; what is too much is left out"
+WIDGET = "application/vnd.jupyter.widget-view+json"
+
+
+class BoundedClient(NotebookClient):
+    """A client for a notebook whose cells may loop, flood or die.
+
+    Its kernel keeps what it keeps in `folder`, which is to be set before it starts.
+
+    Attributes
+    ----------
+    slow, cut : list of int
+        The indices of the cells that took too long, and of which not all output is kept.
+    """
+
+    store_widget_state = Bool(True)  # without it nbclient fails at a widget that holds outputs
+    iopub_timeout = Integer(STOP_SECONDS).tag(config=True)
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.error_on_timeout = {"ename": "TimeoutError", "evalue": SLOW, "traceback": [SLOW]}
+        self.extra_arguments = ["--log-level=CRITICAL"]
+        self.shutdown_kernel = "immediate"
+        self.allow_errors = self.interrupt_on_timeout = self.coalesce_streams = True
+        self.record_timing = False
+        self.folder = Path()
+
+    def reset_execution_trackers(self) -> None:
+        """Begin to count."""
+        super().reset_execution_trackers()
+        self.slow: list[int] = []
+        self.cut: list[int] = []
+        self._at, self._left, self._room = -1, ALL_OUTPUT, dict[bool, int]()
+
+    def create_kernel_manager(self) -> Any:
+        """Return a manager of a kernel that listens in the folder."""
+        manager = super().create_kernel_manager()
+        for name, value in kernel_address(str(self.folder)).items():
+            setattr(manager, name, value)
+        return manager
+
+    async def _async_handle_timeout(
+        self, timeout: int, cell: NotebookNode | None = None
+    ) -> dict[str, Any] | None:
+        self.slow.append(self._at)
+        self.raise_on_iopub_timeout = True  # what does not stop now cannot be stopped
+        reply: dict[str, Any] | None = await super()._async_handle_timeout(timeout, cell)
+        return reply
+
+    def process_message(
+        self, msg: dict[str, Any], cell: NotebookNode, cell_index: int
+    ) -> NotebookNode | None:
+        """Add an output to its cell, unless the cell has too many."""
+        if cell_index != self._at:
+            self._at, self.raise_on_iopub_timeout = cell_index, False
+            self._room = {False: PRINTED, True: DISPLAYED}
+        kind, content = msg["msg_type"], msg["content"]
+        if kind == "error":
+            content["evalue"] = content["evalue"][:5000]
+            content["traceback"] = [line[:5000] for line in content["traceback"][-50:]]
+        elif kind == "stream" or kind in DISPLAYS:
+            content.get("data", {}).pop(WIDGET, None)  # it lives with its kernel
+            size = len(content["text"]) if kind == "stream" else len(json.dumps(content["data"]))
+            room = min(self._room[kind != "stream"], self._left)
+            if size > room:
+                self.cut += [cell_index] * (cell_index not in self.cut)
+                if kind != "stream" or not room:
+                    return None
+                content["text"], size = content["text"][:room], room
+            self._room[kind != "stream"] -= size
+            self._left -= size
+        return super().process_message(msg, cell, cell_index)
+
+    def handle_comm_msg(
+        self, outs: list[NotebookNode], msg: dict[str, Any], cell_index: int
+    ) -> None:
+        """Follow a widget; what nbclient does not know of widgets does not stop a run."""
+        with suppress(AssertionError, AttributeError, LookupError, TypeError):
+            super().handle_comm_msg(outs, msg, cell_index)
+
+    def on_cell_executed(
+        self, cell: NotebookNode, cell_index: int, execute_reply: dict[str, Any]
+    ) -> None:
+        """Keep the error that the reply names: without it a test would seem to pass."""
+        reply = execute_reply["content"]
+        if reply["status"] != "ok":
+            kept = [out for out in cell.outputs if out.output_type != "execute_result"]
+            empty = {"ename": "Error", "evalue": "it was not run", "traceback": []}
+            error = {key: reply.get(key, value) for key, value in empty.items()}
+            if not any(out.get("ename") == error["ename"] for out in kept):
+                kept.append(new_output("error", **error))
+            cell.outputs = kept
+        if cell_index in self.cut:
+            cell.outputs.append(new_output("stream", name="stdout", text=f"\n({CUT})\n"))
