@@ -27,8 +27,8 @@ LIBRARIES = {
     "study": {"IPython", "matplotlib"},
     "report": {"matplotlib"},
     "course": {"nbclient", "nbformat", "tornado", "traitlets", "voila"},
-    "assignments": {"IPython", "matplotlib", "nbclient", "nbconvert", "nbformat", "nbgrader"}
-    | {"psutil", "traitlets"},
+    "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}
+    | {"nbformat", "nbgrader", "traitlets"},
 }
 
 

@@ -110,7 +110,7 @@ class _Renderer(IPythonRenderer):
 def inert_markdown(context: Any, source: str) -> str:
     """Return the HTML of Markdown, with nothing in it that runs or loads."""
     attached = context.get("cell", {}).get("attachments", {})
-    renderer = _Renderer(escape=False, attachments=attached)
+    renderer = _Renderer(escape=False, attachments=attached, exclude_anchor_links=True)
     return inert_html(MarkdownWithMath(renderer=renderer).render(source))
 
 

@@ -264,7 +264,7 @@ def gives_away(page: str, secrets: Iterable[str]) -> bool:
 
     Examples
     --------
-    >>> gives_away("9==)3-(erauqs", ["square(-3)==9"])
+    >>> gives_away("72-==)3-(ebuc", ["cube(-3)==-27"])
     True
     """
     shown = squeezed(page)

@@ -9,9 +9,10 @@ from zipfile import ZipFile
 
 import nbformat
 import pytest
+from nbclient.exceptions import CellExecutionError
 from tiny_set import write_tiny_set
 
-from rbcourse.assignments.handout import NEEDED, make_handout, release
+from rbcourse.assignments.handout import NEEDED, make_handout, make_solutions, release
 
 ROOT = Path(__file__).parents[2]
 SECRETS = ["return x * x", "half = 0.5", "square(-3)", "isclose", "Like signs", "Mark scheme"]
@@ -173,3 +174,23 @@ def test_the_readme_is_plain_text_for_every_system(unpacked):
     readme = (unpacked / "README.txt").read_bytes()
     assert readme.count(b"\r\n") == readme.count(b"\n") > 20
     assert io.TextIOWrapper(io.BytesIO(readme), "ascii").read().startswith("Problem set ps0")
+
+
+def test_solutions_are_run_and_hold_no_hidden_test_and_no_mark_scheme(course):
+    path = make_solutions("ps0", course)
+    assert path == course / "handouts" / "ps0-solutions.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    text = "\n".join(cell.source for cell in notebook.cells)
+    for shown in ("return x * x", "half = 0.5", "Like signs"):
+        assert shown in text
+    for hidden in ("square(-3)", "isclose", "###", "nbgrader"):
+        assert hidden not in path.read_text("utf-8")
+    assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
+
+
+def test_solutions_that_fail_are_not_written(tmp_path):
+    path = write_tiny_set(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("return x * x", "return x"), "utf-8")
+    with pytest.raises(CellExecutionError, match="times itself"):
+        make_solutions("ps0", tmp_path)
+    assert not (tmp_path / "handouts").exists()

@@ -34,6 +34,16 @@ def kinds(name):
     return tests, {key: value for key, value in points.items() if key not in tests}
 
 
+def solved(name, text):
+    """The release with the model answers."""
+    notebook = nbformat.reads(text, as_version=4)
+    answers = {cell.metadata.nbgrader.grade_id: cell.source for cell in source_of(name).cells}
+    for cell in notebook.cells:
+        if cell.metadata.nbgrader.solution:
+            cell.source = answers[cell.metadata.nbgrader.grade_id]
+    return nbformat.writes(notebook)
+
+
 def wrong(name, text):
     """The release with a wrong answer in each problem."""
     notebook = nbformat.reads(text, as_version=4)
@@ -54,8 +64,7 @@ def course(tmp_path_factory):
     shutil.copy(ASSIGNMENTS / "nbgrader_config.py", folder)
     for name in SETS:
         given = release(name, folder)[f"{name}.ipynb"].decode()
-        solved = nbformat.writes(source_of(name))
-        handed_in = {"solved": solved, "untouched": given}
+        handed_in = {"solved": solved(name, given), "untouched": given}
         if name == SETS[0]:
             handed_in["wrong"] = wrong(name, given)
         for student, text in handed_in.items():

@@ -334,6 +334,7 @@ def test_pages_hold_nothing_of_students_that_runs_or_loads(course):
         assert not re.search(r"\son\w+\s*=|javascript:|evil\.example|<(iframe|form|svg)", tags)
         loaded = re.findall(r"\s(?:src|href)=\"([^\"]*)\"", tags)
         assert all(address.startswith(("data:image/", "#")) for address in loaded), student
+    assert ">A tiny set</h1>" in pages(course)["writes words"]
     assert "$a &lt; b$" in pages(course)["writes words"]
 
 
