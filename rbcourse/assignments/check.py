@@ -30,6 +30,7 @@ from rbcourse.assignments.restore import (
     title_of,
 )
 from rbcourse.assignments.tampering import find_in_cells
+from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
 
 CELL_SECONDS = 60
@@ -201,39 +202,37 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered = [], True
     for at, cell in enumerate(notebook.cells):
+        error, status, said = _error(cell), "", ""
         if is_answer(cell):
             answered = cell.source.strip() not in ("", empty[grade_id(cell)])
-            found = ("", "") if answered else ("empty", "is not answered yet")
-            if answered and _error(cell):
-                found = ("FAILED", f"fails: {_error(cell)}")
-            elif answered and marks_of(cell).get("grade"):
-                found = ("words", "is graded by a person")
-        elif not is_test(cell):
-            continue
-        elif not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
-            found = ("hidden", "has hidden tests only")
-        else:
-            error = _error(cell) or ("" if cell.execution_count else "it was not run to its end")
+            if not answered:
+                status, said = "empty", "is not answered yet"
+            elif error:
+                status, said = "FAILED", error
+            elif marks_of(cell).get("grade"):
+                status, said = "words", "is graded by a person"
+        elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
+            status, said = "hidden", "has hidden tests only"
+        elif is_test(cell):
+            error = error or ("" if cell.execution_count else "it was not run to its end")
             passed.append(not error)
-            found = ("FAILED", error) if error and answered else ("passed" * (not error), "")
-        problems.setdefault(title_of(notebook.cells, at), []).append(
-            (found[0], f"cell {at + 1} {found[1]}".replace(" fails: ", ": ") if found[1] else "")
-        )
-    for title, found_in in problems.items():
-        kinds = [kind for kind, _ in found_in]
-        status = next((k for k in ("FAILED", "empty", "passed", "words") if k in kinds), "hidden")
-        said = "; ".join(words for _, words in found_in if words)
-        print(f"{status}  {title}" + f": {said}" * bool(said))
+            status = "passed" if not error else "FAILED" * answered
+            said = error * answered
+        if status:
+            words = f"cell {at + 1} {said}" if said else ""
+            problems.setdefault(title_of(notebook.cells, at), []).append((status, words))
+    for title, found in problems.items():
+        order = ("FAILED", "empty", "passed", "words", "hidden")
+        words = "; ".join(said for _, said in found if said)
+        status = min((status for status, _ in found), key=order.index)
+        print(f"{status}  {title}" + f": {words}" * bool(words))
     return passed
 
 
 def _write(notebook: NotebookNode, target: Path) -> None:
     notebook.metadata.pop("widgets", None)
     nbformat.validate(notebook)
-    target.parent.mkdir(exist_ok=True)
-    part = target.with_suffix(".part")
-    part.write_text(nbformat.writes(notebook) + "\n", encoding="utf-8", newline="\n")
-    part.replace(target)
+    write_whole(target, (nbformat.writes(notebook) + "\n").encode())
 
 
 def _check_with_course(path: Path, assignments: Path) -> None:

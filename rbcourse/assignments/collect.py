@@ -9,7 +9,6 @@ import argparse
 import contextlib
 import io
 import re
-import stat
 import sys
 import unicodedata
 import zipfile
@@ -22,7 +21,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rbcourse.assignments.restore import decode, grade_id, read_notebook
-from rbcourse.assignments.tables import read_csv, write_csv
+from rbcourse.assignments.writing import read_csv, write_csv, write_whole
 
 MOODLE = re.compile(
     r"(?:.*?/)??(?P<name>[^/]+?)(?:_(?P<id>\d+))?"
@@ -185,14 +184,13 @@ def _look_into(
             # what a student packed has the dates of the student's machine
             when = dates if upload else (_date(entry), newest)
             where, full = f"{label}: {inner}", f"{name}/{inner}" if upload else inner
-            fault, content = _fault(entry), b""
-            if not fault and inner.lower().endswith((".ipynb", ".zip")):
-                try:
-                    content = archive.read(entry)
-                except BROKEN as error:
-                    fault = f"broken: {error}"
-            if fault:
-                rows.append(("refused", where, fault))
+            wanted = inner.lower().endswith((".ipynb", ".zip"))
+            try:
+                if wanted and entry.file_size > FILE_BYTES:
+                    raise ValueError("too large")
+                content = archive.read(entry) if wanted else b""
+            except BROKEN as error:
+                rows.append(("refused", where, str(error)))
             else:
                 yield from _look(where, full, io.BytesIO(content), when, rows)
 
@@ -204,16 +202,6 @@ def _entry_name(entry: zipfile.ZipInfo) -> str:
         with contextlib.suppress(UnicodeError):
             name = name.encode("cp437").decode("utf-8")
     return _shown(name)
-
-
-def _fault(entry: zipfile.ZipInfo) -> str:
-    if entry.flag_bits & 1:
-        return "encrypted"
-    if stat.S_ISLNK(entry.external_attr >> 16):
-        return "a link"
-    if re.search(r"(^|[/\\])\.\.([/\\]|$)|^[A-Za-z]:|^[/\\]", entry.orig_filename):
-        return "a name that leads out of its folder"
-    return "too large" if entry.file_size > FILE_BYTES else ""
 
 
 def _date(entry: zipfile.ZipInfo) -> datetime:
@@ -319,11 +307,8 @@ def _take(uploads: list[Upload], submitted: Path, record: Record) -> Rows:
         if _age(old) > age if old else not newer:
             return [*rows, ("duplicates", label, f"{why}: what was collected before is newer")]
         why += ": replaces what was collected before"
-    place.mkdir(parents=True, exist_ok=True)
-    for path, text in ((target, best.text), (stamp, f"{best.date}\n")):
-        part = path.with_suffix(".part")
-        part.write_bytes(text.encode())
-        part.replace(path)
+    write_whole(target, best.text.encode())
+    write_whole(stamp, f"{best.date}\n".encode())
     record[key] = asdict(best)
     return [*rows, ("collected", label, why)]
 

@@ -26,7 +26,7 @@ from rbcourse.assignments import sandbox
 from rbcourse.assignments.autograding import RefusedError, configure
 from rbcourse.assignments.handout import find_set, last_line, quiet_log, read_config, secret_lines
 from rbcourse.assignments.restore import grade_id, is_answer, marks_of, read_notebook
-from rbcourse.assignments.tables import write_csv
+from rbcourse.assignments.writing import write_csv
 
 SECONDS = 600  # for a student, all in all
 MEMORY = 1_500_000_000  # bytes, for each process of a student

@@ -24,6 +24,8 @@ from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
 from rbcourse.assignments.client import BoundedClient
+from rbcourse.assignments.restore import grade_id, is_answer
+from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
 
 # what a student needs of environment.txt
@@ -36,38 +38,6 @@ LEFTOVER = re.compile(
 REGION = re.compile(
     r"BEGIN (SOLUTION|HIDDEN TESTS|MARK SCHEME).*?\n(.*?)^[^\n]*END \1", re.M | re.S
 )
-README = """\
-Problem set {name}
-
-You need Python 3.11 or newer. Open a terminal in this folder, the one that holds
-requirements.txt, and type:
-
-Windows PowerShell
-    py -m venv .venv
-    .venv\\Scripts\\python -m pip install -r requirements.txt
-    .venv\\Scripts\\jupyter lab {name}.ipynb
-
-macOS and Linux
-    python3 -m venv .venv
-    .venv/bin/python -m pip install -r requirements.txt
-    .venv/bin/jupyter lab {name}.ipynb
-
-On later days the last line is enough.
-
-Before you hand in, save the notebook and type, on Windows
-    .venv\\Scripts\\python -m rbcourse.assignments.check {name}.ipynb
-and on macOS and Linux
-    .venv/bin/python -m rbcourse.assignments.check {name}.ipynb
-It checks the notebook and writes to_submit/{name}.ipynb. Hand in that file.
-
-When something fails
-- "No module named venv", on Debian and Ubuntu: sudo apt install python3-venv
-- pip finds no matching version: python3 --version (Windows: py --version) must say 3.11 or more.
-- An installation stopped half way: delete the folder .venv and begin again.
-- The notebook is broken: copy original/{name}.ipynb over it. That starts the set again.
-- A cell runs for ever: in the menu Kernel, Restart Kernel.
-- Anything else: send your teacher the whole message.
-"""
 
 
 def find_set(name: str, assignments: Path) -> Path:
@@ -137,25 +107,23 @@ def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> N
     """Raise a ValueError if a file contains solutions, hidden tests or mark schemes."""
     released = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
     for cell in released.cells:
-        where = f"cell {cell.metadata.get('nbgrader', {}).get('grade_id') or cell.get('id')}"
-        if cell.get("outputs") or cell.get("execution_count"):
-            raise ValueError(f"{name}, {where}: outputs are left")
-        if cell.get("attachments") and cell.metadata.get("nbgrader", {}).get("solution"):
-            raise ValueError(f"{name}, {where}: nbgrader leaves the attachment of an answer there")
         left = LEFTOVER.search(cell.source)
-        if left:
-            raise ValueError(f"{name}, {where}: {left[0].strip()!r} is left over")
-    secrets = secret_lines(source)
+        fault = f"{left[0].strip()!r} is left over" if left else ""
+        if cell.get("outputs") or cell.get("execution_count"):
+            fault = "outputs are left"
+        elif cell.get("attachments") and is_answer(cell):
+            fault = "nbgrader leaves the attachment of an answer there"
+        if fault:
+            raise ValueError(f"{name}, cell {grade_id(cell) or cell.get('id')}: {fault}")
+    secrets = [*map(re.escape, secret_lines(source)), LEFTOVER.pattern]
     for path, content in files.items():
         text = content.decode("utf-8", errors="replace")
         if path.endswith(".ipynb"):
             if path != f"{name}.ipynb":
                 raise ValueError(f"{name}: {path} is a second notebook; a set has one")
             text = "\n".join(_strings(json.loads(text)))
-        shown = next((line for line in secrets if line in text), None) or LEFTOVER.search(text)
-        if shown:
-            shown = shown if isinstance(shown, str) else shown[0]
-            raise ValueError(f"{name}: {path} gives away {shown!r}")
+        if shown := re.search("|".join(secrets), text, LEFTOVER.flags):
+            raise ValueError(f"{name}: {path} gives away {shown[0]!r}")
 
 
 def secret_lines(notebook: NotebookNode, *, solutions: bool = True) -> list[str]:
@@ -215,10 +183,11 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
     files = release(name, assignments)
     wheel, content = build_wheel(course)
     environment = (course / "environment.txt").read_text("utf-8")
+    readme = Path(__file__).with_suffix(".txt").read_text("ascii")
     own = {
         f"original/{name}.ipynb": files[f"{name}.ipynb"],
         "requirements.txt": student_requirements(environment, wheel).encode(),
-        "README.txt": README.format(name=name).replace("\n", "\r\n").encode("ascii"),
+        "README.txt": readme.format(name=name).replace("\n", "\r\n").encode("ascii"),
         wheel: content,
     }
     if files.keys() & own.keys():
@@ -231,7 +200,7 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
             entry = ZipInfo(f"{name}/{path}")  # of the first day a zip knows
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
-    return _write(assignments / "handouts" / f"{name}.zip", packed.getvalue())
+    return write_whole(assignments / "handouts" / f"{name}.zip", packed.getvalue())
 
 
 def make_solutions(name: str, assignments: Path) -> Path:
@@ -244,6 +213,7 @@ def make_solutions(name: str, assignments: Path) -> Path:
         notebook, _ = step.preprocess(notebook, {})
     for cell in notebook.cells:
         cell.source = re.sub(r"^.*### (BEGIN|END) SOLUTION.*\n?", "", cell.source, flags=re.M)
+        cell.source = re.sub(r"\s*^\*\*Mark scheme\b.*", "", cell.source, flags=re.M | re.S)
         cell.metadata = NotebookNode()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         client = BoundedClient(notebook, kernel_name=KERNEL["name"])
@@ -251,15 +221,7 @@ def make_solutions(name: str, assignments: Path) -> Path:
         client.execute(cwd=folder)
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     target = assignments / "handouts" / f"{name}-solutions.ipynb"
-    return _write(target, (nbformat.writes(notebook) + "\n").encode())
-
-
-def _write(target: Path, content: bytes) -> Path:
-    target.parent.mkdir(exist_ok=True)
-    part = target.with_suffix(".part")
-    part.write_bytes(content)
-    part.replace(target)
-    return target
+    return write_whole(target, (nbformat.writes(notebook) + "\n").encode())
 
 
 def main() -> None:

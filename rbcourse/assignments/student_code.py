@@ -3,19 +3,20 @@
 Only what a function names is looked at: that tells an honest student what is not meant.
 """
 
-import ast
 import functools
-import inspect
 import linecache
 import sys
 import textwrap
 import traceback
 from collections.abc import Iterator, Sequence
-from types import CellType, CodeType, FunctionType, MethodType, ModuleType
+from contextlib import suppress
+from itertools import chain
+from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 TOOLS = {"__main__", "builtins", "numpy", "matplotlib", "mpl_toolkits", "IPython", "ipywidgets"}
 TOOLS |= {"anywidget", "traitlets", "tqdm"}
+LIBRARIES = {"rbcourse", "scipy", "sympy", "pytransform3d", "jax", "torch", "quaternion"}
 
 
 class NotYet(AssertionError):
@@ -74,74 +75,37 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             waiting += [value.__func__, value.__self__]
         elif isinstance(value, FunctionType) and value.__module__ == "__main__":
             waiting += _referred_to(value)
+        elif isinstance(value, ModuleType):
+            yield from [] if _is_tool(value.__name__) else [value.__name__]
         else:
-            is_named = isinstance(value, ModuleType | FunctionType | type)
-            module = value.__name__ if isinstance(value, ModuleType) else None
-            module = module or getattr(value if is_named else type(value), "__module__", "")
-            name = getattr(value, "__name__", type(value).__name__)
-            if not _is_tool(module) and not (_root(module) == "rbcourse" and name in allowed):
-                yield str(name) if isinstance(value, ModuleType) else f"{_root(module)}.{name}"
+            named = value if isinstance(value, FunctionType | type) else type(value)
+            module, name = _root(named.__module__), getattr(value, "__name__", named.__name__)
+            if not _is_tool(module) and not (module == "rbcourse" and name in allowed):
+                yield f"{module}.{name}"
 
 
 def _referred_to(function: FunctionType) -> Iterator[Any]:
-    """Yield the defaults of a function, and what its global and enclosed names stand for."""
-    enclosed = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
-    values = {
-        **function.__globals__,
-        **{n: c.cell_contents for n, c in enclosed.items() if _is_full(c)},
-    }
-    for name in _local_names(function.__code__):
-        values.pop(name, None)
+    """Yield the defaults of a function, and what its global and enclosed names stand for.
+
+    The names of a function do not tell where they stand: of a module that is no tool all is taken
+    that has one of them.
+    """
     yield from function.__defaults__ or ()
     yield from (function.__kwdefaults__ or {}).values()
-    nodes, followed = list(ast.walk(_tree_of(function))), set[ast.AST]()
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                name = alias.asname or _root(alias.name)
-                values[name] = _imported(alias.name if alias.asname else name)
-        elif isinstance(node, ast.ImportFrom):
-            module = _imported(node.module or "")
-            for alias in node.names:
-                values[alias.asname or alias.name] = getattr(module, alias.name, module)
-    for node in nodes:
-        if isinstance(node, ast.Name | ast.Attribute):
-            value = _value_of(node, values)
-            if node not in followed:
-                yield value
-            if isinstance(node, ast.Attribute) and (node in followed or value is not None):
-                followed.add(node.value)
+    with suppress(ValueError):  # an enclosed name that has no value yet
+        yield from (cell.cell_contents for cell in function.__closure__ or ())
+    names = _names(function.__code__)
+    for name in names:
+        value = function.__globals__.get(name)
+        if name not in function.__globals__ and _root(name) in LIBRARIES:  # imported inside
+            value = sys.modules.get(name) or ModuleType(name)
+        if isinstance(value, ModuleType) and not _is_tool(value.__name__):
+            used = [getattr(value, inner) for inner in names if hasattr(value, inner)]
+            yield from used or [value]
+        else:
+            yield value
 
 
-def _is_full(cell: CellType) -> bool:
-    try:
-        return cell.cell_contents is not None
-    except ValueError:
-        return False
-
-
-def _local_names(code: CodeType) -> set[str]:
-    inner = [_local_names(part) for part in code.co_consts if isinstance(part, CodeType)]
-    return set[str]().union(code.co_varnames, code.co_cellvars, *inner)
-
-
-def _tree_of(function: FunctionType) -> ast.AST:
-    """Return the code of a function; nothing where it is not to be had."""
-    try:
-        return ast.parse(textwrap.dedent(inspect.getsource(function)))
-    except (OSError, SyntaxError, TypeError):
-        return ast.Module([], [])
-
-
-def _imported(name: str) -> Any:
-    return sys.modules.get(name) or ModuleType(name)
-
-
-def _value_of(node: ast.AST, values: dict[str, Any]) -> Any:
-    """Return what a name, or an attribute of a module, stands for; None for all else."""
-    if isinstance(node, ast.Name):
-        return values.get(node.id)
-    if isinstance(node, ast.Attribute):
-        module = _value_of(node.value, values)
-        return getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
-    return None
+def _names(code: CodeType) -> list[str]:
+    inner = [_names(part) for part in code.co_consts if isinstance(part, CodeType)]
+    return [*code.co_names, *chain.from_iterable(inner)]

@@ -183,7 +183,7 @@ def test_solutions_are_run_and_hold_no_hidden_test_and_no_mark_scheme(course):
     text = "\n".join(cell.source for cell in notebook.cells)
     for shown in ("return x * x", "half = 0.5", "Like signs"):
         assert shown in text
-    for hidden in ("square(-3)", "isclose", "###", "nbgrader"):
+    for hidden in ("square(-3)", "isclose", "###", "nbgrader", "Mark scheme"):
         assert hidden not in path.read_text("utf-8")
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
 

@@ -1,4 +1,4 @@
-"""Read and write tables that people open in spreadsheets."""
+"""Write files whole or not at all, and tables that people open in spreadsheets."""
 
 import csv
 import io
@@ -6,6 +6,15 @@ from pathlib import Path
 from typing import Any
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def write_whole(path: Path, content: bytes) -> Path:
+    """Write a file, and the folder that it is in; whoever reads it sees the old or the new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_bytes(content)
+    part.replace(path)
+    return path
 
 
 def quoted(cell: str) -> str:
@@ -28,9 +37,7 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
     table = csv.writer(content, lineterminator="\n")
     table.writerow(columns)
     table.writerows([quoted(str(row.get(key, ""))) for key in columns] for row in rows)
-    part = path.with_suffix(".part")
-    part.write_text(content.getvalue(), encoding="utf-8-sig", newline="")  # as Excel wants it
-    part.replace(path)
+    write_whole(path, content.getvalue().encode("utf-8-sig"))  # as Excel wants it
 
 
 def read_csv(path: Path) -> list[dict[str, str]]:
