@@ -23,6 +23,7 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from nbgrader import preprocessors as nbgrader
 from nbgrader.utils import find_all_files
+from traitlets import Bool, default
 from traitlets.config import Config
 
 from rbcourse.assignments import sandbox
@@ -152,6 +153,12 @@ class RefuseTampering(nbgrader.NbGraderPreprocessor):
 class BoxedExecute(BoundedClient, nbgrader.Execute):
     """Run a notebook in a new folder, and in a box where there is one."""
 
+    boxed = Bool(help="whether there is a box; without, it is tried").tag(config=True)
+
+    @default("boxed")
+    def _default_boxed(self) -> bool:
+        return not sandbox.missing()
+
     @property
     def converter(self) -> Any:
         """The step of nbgrader that this is a part of."""
@@ -197,7 +204,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
     def create_kernel_manager(self) -> Any:
         """Return a manager of a kernel in a box."""
         manager = super().create_kernel_manager()
-        if not sandbox.missing():
+        if self.boxed:
             sandbox.put_in_box(manager, self.folder)
         return manager
 

@@ -138,13 +138,14 @@ def _graded(
     # on Linux it is copied from one that has loaded nbgrader, which takes seconds
     context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
     context.set_forkserver_preload(["rbcourse.assignments.grade"])
+    boxed = not sandbox.missing()
     waiting, running = students[::-1], dict[Connection, tuple[str, Any, float]]()
     try:
         while waiting or running:
             while waiting and len(running) < workers:
                 student = waiting.pop()
                 result, send = context.Pipe(duplex=False)
-                of = name, assignments, student, memory, send
+                of = name, assignments, student, boxed, memory, send
                 worker = context.Process(target=_work, args=of)
                 worker.start()
                 send.close()
@@ -173,7 +174,9 @@ def _received(result: Connection) -> dict[str, Any]:
         return {"refused": "its process ended, or took too much memory"}
 
 
-def _work(name: str, assignments: Path, student: str, memory: int, send: Connection) -> None:
+def _work(
+    name: str, assignments: Path, student: str, boxed: bool, memory: int, send: Connection
+) -> None:
     """Grade a submission in this process, under limits and with nothing printed."""
     with open(os.devnull, "r+b") as nowhere:
         for stream in (0, 1, 2):
@@ -183,15 +186,16 @@ def _work(name: str, assignments: Path, student: str, memory: int, send: Connect
 
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     try:
-        found = grade_one(name, assignments, student)
+        found = grade_one(name, assignments, student, boxed)
     except Exception as error:  # told, and the others are graded
         found = {"refused": f"{type(error).__name__}: {error}"}
     send.send(found)
 
 
-def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
+def grade_one(name: str, folder: Path, student: str, boxed: bool) -> dict[str, Any]:
     """Grade one submission in this process."""
     config = course_config(name, folder)
+    config.BoxedExecute.boxed = boxed
     config.CourseDirectory.student_id = glob.escape(student)
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)

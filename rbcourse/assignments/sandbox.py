@@ -103,5 +103,5 @@ def put_in_box(manager: Any, folder: Path) -> None:
     spec = manager.kernel_spec
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()
-    spec.argv = [*box(folder), *spec.argv]
+    spec.argv = [*box(folder), sys.executable, *spec.argv[1:]]
     spec.interrupt_mode = "message"  # a signal would end the box
