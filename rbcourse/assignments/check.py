@@ -151,9 +151,9 @@ def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
 
 
 def _not_graded(notebook: NotebookNode) -> list[str]:
-    """Say what a machine will not grade: it could be meant to deceive the tests."""
+    """Say what a machine will not grade, or not alone: it could be meant to deceive the tests."""
     return [
-        f"{name_cell(notebook.cells, at)}, line {line} {what}: not graded so, change it"
+        f"{name_cell(notebook.cells, at)}, line {line} {what}: change it, or a person has to look"
         for at, line, what in find_in_cells(notebook.cells)
     ]
 

@@ -76,10 +76,14 @@ class BoundedClient(NotebookClient):
             self._room = {False: PRINTED, True: DISPLAYED}
         kind, content = msg["msg_type"], msg["content"]
         if kind == "error":
-            content["evalue"] = content["evalue"][:5000]
-            content["traceback"] = [line[:5000] for line in content["traceback"][-50:]]
+            content["ename"], content["evalue"] = (
+                str(content[k])[:5000] for k in ("ename", "evalue")
+            )
+            content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
-            content.get("data", {}).pop(WIDGET, None)  # it lives with its kernel
+            if kind in DISPLAYS:  # a widget lives with its kernel
+                data = content["data"].items()
+                content["data"] = {k: v for k, v in data if isinstance(v, str) and k != WIDGET}
             size = len(content["text"]) if kind == "stream" else len(json.dumps(content["data"]))
             room = min(self._room[kind != "stream"], self._left)
             if size > room:

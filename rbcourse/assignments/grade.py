@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import sys
+import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from multiprocessing import get_context
@@ -139,32 +140,35 @@ def _graded(
     context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
     context.set_forkserver_preload(["rbcourse.assignments.grade"])
     boxed = not sandbox.missing()
-    waiting, running = students[::-1], dict[Connection, tuple[str, Any, float]]()
+    waiting, running = students[::-1], dict[Connection, tuple[str, Any, Any, float]]()
     try:
         while waiting or running:
             while waiting and len(running) < workers:
                 student = waiting.pop()
                 result, send = context.Pipe(duplex=False)
-                of = name, assignments, student, boxed, memory, send
+                folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+                of = name, assignments, student, boxed, memory, folder.name, send
                 worker = context.Process(target=_work, args=of)
                 worker.start()
                 send.close()
-                running[result] = student, worker, time.monotonic() + seconds
+                running[result] = student, worker, folder, time.monotonic() + seconds
             left = min(until for *_, until in running.values()) - time.monotonic()
             ready: list[Any] = wait(list(running), max(left, 0))
             late = [c for c, (*_, until) in running.items() if until <= time.monotonic()]
             for result in dict.fromkeys(ready + late):
-                student, worker, _ = running.pop(result)
+                student, worker, folder, _ = running.pop(result)
                 found = {"refused": f"not done after {seconds:g} s"}
                 if result in ready:
                     found = _received(result)
                 worker.kill()
                 worker.join()
                 result.close()
+                folder.cleanup()
                 yield student, found, [other for other, *_ in running.values()]
     finally:
-        for _, worker, _ in running.values():
+        for _, worker, folder, _ in running.values():
             worker.kill()
+            folder.cleanup()
 
 
 def _received(result: Connection) -> dict[str, Any]:
@@ -175,12 +179,19 @@ def _received(result: Connection) -> dict[str, Any]:
 
 
 def _work(
-    name: str, assignments: Path, student: str, boxed: bool, memory: int, send: Connection
+    name: str,
+    assignments: Path,
+    student: str,
+    boxed: bool,
+    memory: int,
+    folder: str,
+    send: Connection,
 ) -> None:
     """Grade a submission in this process, under limits and with nothing printed."""
     with open(os.devnull, "r+b") as nowhere:
         for stream in (0, 1, 2):
             os.dup2(nowhere.fileno(), stream)
+    tempfile.tempdir = folder  # which is deleted, also when this process is ended
     if sys.platform == "linux":  # others have the limit, and do not keep it
         import resource
 
@@ -286,7 +297,7 @@ def _row(
     name = course.assignment_id
     if "refused" in found:
         _withdraw(gradebook, Path(course.root), name, student)
-        return {"remarks": f"refused: {found['refused']}"}
+        return {"remarks": f"refused: {_tidy(found['refused'])}"}
     submission = gradebook.find_submission_notebook(name, name, student)
     order = [cell.name for cell in submission.notebook.source_cells]
     grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))
@@ -302,7 +313,13 @@ def _row(
     row["maximum"] = f"{submission.max_score:g}"
     row["by hand"] = " ".join(to_do)
     row["late"] = f"{late / 3600:.1f} h" if late else ""
-    return row | {"remarks": "; ".join(found["remarks"])}
+    return row | {"remarks": "; ".join(map(_tidy, found["remarks"]))}
+
+
+def _tidy(words: str) -> str:
+    """Return a remark, which may hold what a student wrote, as a short line that can be printed."""
+    words = "".join(letter if letter.isprintable() else "?" for letter in words)
+    return words if len(words) <= 300 else f"{words[:300]}…"
 
 
 def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:

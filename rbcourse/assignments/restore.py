@@ -144,13 +144,15 @@ def _put_back(cells: list[NotebookNode], at: int, wanted: NotebookNode) -> list[
     old, new = marks_of(wanted), marks_of(cell)
     changes = [f"was made a {cell.cell_type} cell"] * (cell.cell_type != wanted.cell_type)
     if old.get("points") != new.get("points"):
-        changes.append(f"has other points ({new.get('points')}, not {old.get('points')})")
+        changes.append(f"has other points than {old.get('points')}")
     if any(old.get(key) != new.get(key) for key in {*old, *new} - {"points", "cell_type"}):
         changes.append("has other marks for grading")
     if any(cell.metadata.get(k) != wanted.metadata.get(k) for k in ("editable", "deletable")):
         changes.append("was unlocked")
     if is_answer(wanted):
         kept.source = cell.source
+        if cell.get("attachments") and kept.cell_type == "markdown":
+            kept.attachments = cell.attachments
     elif cell.source != wanted.source:
         changes.insert(0, "was changed")
     cells[at] = kept

@@ -26,13 +26,15 @@ MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq"}
 # an object that equals everything passes every test
 METHODS = {f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "bool", "array_ufunc")}
 METHODS |= {"__array_function__"}
+HISTORY = {"In", "_ih", "_i", "_ii", "_iii"}  # what was run, hidden tests included
 # magics and help that do no harm; of those that run code only their names are left out
 MAGICS = re.compile(
     r"(\A\s*%%(?:time|capture)\b[ \t\w-]*$|^[ \t]*%time(?:it)?\b(?:[ \t]+-\w+[ \t]*\d*)*[ \t]*"
     r"|\A\s*%%timeit\b(?:[ \t]+-\w+[ \t]*\d*)*[ \t]*)"
-    r"|^[ \t]*(?:%(?:matplotlib|precision|autoreload)\b[ \t\w.-]*|%load_ext[ \t]+autoreload"
+    r"|^[ \t]*(?:%(?:matplotlib|precision|autoreload|whos?|pwd)\b[ \t\w.-]*"
+    r"|%load_ext[ \t]+autoreload"
     r"|%config[ \t]+InlineBackend\.\w+[ \t]*=[ \t]*[\[{]?['\"]\w+['\"][\]}]?"
-    r"|\?{0,2}[\w.]+\?{1,2})[ \t]*$",
+    r"|\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+)[ \t]*$",
     re.MULTILINE,
 )
 CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
@@ -49,7 +51,8 @@ def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
     code = {at: cell for at, cell in enumerate(cells) if cell.cell_type == "code"}
     trees = {at: _parsed(cell.source) for at, cell in code.items()}
     own = [at for at, cell in code.items() if is_answer(cell) or not grade_id(cell)]
-    relied = _relied_on(tree for at, tree in trees.items() if at not in own)
+    names, attributes = _relied_on(tree for at, tree in trees.items() if at not in own)
+    bound = {name for at in own for _, name in _rebound(trees[at])}
     imported: set[str] = set()
     found = []
     for at, tree in trees.items():
@@ -57,11 +60,11 @@ def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
         for node in nodes:
             _learn(node, imported)
         if at in own:
-            bound = [(line, name) for line, name in _rebound(tree) if name in relied]
-            said = {(line, f"gives {name} another meaning") for line, name in bound}
+            rebound = [(line, name) for line, name in _rebound(tree) if name in names]
+            said = {(line, f"gives {name} another meaning") for line, name in rebound}
             for node in nodes:
                 line = getattr(node, "lineno", 0)
-                said |= {(line, what) for what in _suspicious(node, relied, imported)}
+                said |= {(line, what) for what in _suspicious(node, attributes, imported, bound)}
             found += [(at, *what) for what in sorted(said)]
     return found
 
@@ -78,9 +81,9 @@ def _parsed(source: str) -> ast.Module:
     return ast.Module([], [])
 
 
-def _relied_on(trees: Iterable[ast.Module]) -> set[str]:
-    """Return the names that students may not give a new meaning, attributes among them."""
-    relied: set[str] = set()
+def _relied_on(trees: Iterable[ast.Module]) -> tuple[set[str], set[str]]:
+    """Return the names, and the attributes, that students may not give a new meaning."""
+    relied, attributes = set[str](), set[str]()
     for node in (node for tree in trees for node in ast.walk(tree)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             relied |= {_bound(alias) for alias in node.names}
@@ -89,8 +92,8 @@ def _relied_on(trees: Iterable[ast.Module]) -> set[str]:
         elif isinstance(node, ast.Name) and hasattr(builtins, node.id):
             relied.add(node.id)
         elif isinstance(node, ast.Attribute):
-            relied.add(node.attr)
-    return relied - {"*"}
+            attributes.add(node.attr)
+    return relied - {"*"}, attributes | METHODS | ATTRIBUTES
 
 
 def _bound(alias: ast.alias) -> str:
@@ -133,28 +136,34 @@ def _rebound(tree: ast.Module) -> Iterator[tuple[int, str]]:
             todo += ast.iter_child_nodes(node)
 
 
-def _suspicious(node: ast.AST, relied: set[str], imported: set[str]) -> Iterator[str]:
+def _suspicious(
+    node: ast.AST, relied: set[str], imported: set[str], bound: set[str]
+) -> Iterator[str]:
     if isinstance(node, ast.Attribute):
         own = _root(node) == "self"  # of an object that the student describes
         if isinstance(node.ctx, ast.Load):
             yield from [f"uses {node.attr}"] * (node.attr in ATTRIBUTES)
-        elif _root(node) in imported or (node.attr in relied | ATTRIBUTES and not own):
+        elif _root(node) in imported or (node.attr in relied and not own):
             yield f"replaces {ast.unparse(node)}"
     elif isinstance(node, ast.Name) and node.id in NAMES:
         yield "uses a magic or a shell" if node.id == "get_ipython" else f"uses {node.id}"
+    elif isinstance(node, ast.Name) and node.id in HISTORY - bound:
+        yield f"reads {node.id}, what was run"
+    elif isinstance(node, ast.Constant) and node.value in (ATTRIBUTES | METHODS) - {"modules"}:
+        yield f"names {node.value}"
     elif isinstance(node, ast.Call):
         called, given = ast.unparse(node.func), node.args
         if called in ("setattr", "delattr", "vars") and _root((given or [node])[0]) in imported:
             yield f"replaces parts of {ast.unparse(given[0])}"
         if called in ("setattr", "delattr", "getattr") and len(given) > 1:
             name = given[1].value if isinstance(given[1], ast.Constant) else None
-            if name is None or name in ATTRIBUTES or (called != "getattr" and name in relied):
+            if name is None or (called != "getattr" and name in relied):
                 yield f"uses {called} with {ast.unparse(given[1])}"
     elif isinstance(node, ast.Import | ast.ImportFrom):
         place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
         dark = (_dark(place + alias.name) for alias in node.names)
         yield from (f"imports {name}" for name in dark if name)
-    elif isinstance(node, ast.FunctionDef) and node.name in METHODS:
+    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name in METHODS:
         yield f"defines {node.name}"
 
 
@@ -162,4 +171,5 @@ def _dark(name: str) -> str:
     """Return the part of the name of an import that leads round what can be read in the code."""
     parts = name.split(".")
     dark = [part for part in (parts[0], parts[-1]) if part in MODULES | NAMES | ATTRIBUTES]
-    return dark[0] if dark and not name.startswith("IPython.display") else ""
+    harmless = name.startswith(("IPython.display", "IPython.core.display"))
+    return dark[0] if dark and not harmless else ""

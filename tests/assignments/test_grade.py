@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 from textwrap import dedent
 
@@ -70,6 +71,7 @@ print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt
 """
 LOUD = """
 import sys
+import tempfile
 from IPython.display import HTML, display
 display(HTML("<p>" * 10**7))
 try:
@@ -275,11 +277,15 @@ def test_a_cell_that_cannot_be_stopped_is_refused(tmp_path, template):
     assert course.rows()["ann"]["remarks"] == f"refused: {why}"
 
 
-def test_a_submission_that_takes_too_long_is_ended(tmp_path, template):
-    course = Class(tmp_path, template)
+def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(
+    tmp_path, template, monkeypatch
+):
+    course, places = Class(tmp_path, template), Path(tempfile.mkdtemp())
+    monkeypatch.setattr(tempfile, "tempdir", str(places))
     course.submit("ann", half="import time\nwhile True:\n    time.sleep(9)")
     grade("ps0", tmp_path, seconds=1)
     assert course.rows()["ann"]["remarks"] == "refused: not done after 1 s"
+    places.rmdir()
 
 
 def test_the_commands_of_nbgrader_are_set_in_the_same_way():

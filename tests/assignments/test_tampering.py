@@ -8,6 +8,7 @@ from rbcourse.assignments.tampering import find_in_cells
 LOCKED = [
     "import math, numpy as np\nfrom rbcourse import marking\ndef helper(): pass",
     "assert all(isinstance(v, float) for v in np.ravel(answer(2))) and P.accepts(answer)",
+    "assert math.isclose(1, 1)",
 ]
 
 
@@ -56,6 +57,10 @@ def found(source, locked=LOCKED):
         ("import sys\nsys.setprofile(None)", "uses setprofile"),
         ("getattr(x, 'mod' + 'ules')", "uses getattr with 'mod' + 'ules'"),
         ("setattr(P, 'accepts', print)", "uses setattr with 'accepts'"),
+        ("print(In[-1])", "reads In, what was run"),
+        ("class Yes(int): pass\nYes.__eq__ = print", "replaces Yes.__eq__"),
+        ("type('Y', (), {'__eq__': print})", "names __eq__"),
+        ("class Yes:\n    async def __eq__(self, other): pass", "defines __eq__"),
         ("class Yes:\n    def __eq__(self, other):\n        return True", "defines __eq__"),
     ],
 )
@@ -83,6 +88,10 @@ def test_what_replaces_the_means_of_the_tests_is_found(source, what):
         "np.random.seed(0)\nnp.set_printoptions(precision=3)",
         "from IPython.display import HTML, display",
         "import IPython.display as ipd",
+        "from IPython.core.display import HTML, display",
+        "In = 3\nprint(In)",
+        "?np.eye\n%who",
+        "def isclose(a, b):\n    return abs(a - b) < 1e-9",
         "from IPython import display",
         "from ipywidgets import interact\ninteract(print, x=(0, 1))",
         "from tqdm.auto import tqdm\nfor i in tqdm(range(3)): pass",

@@ -8,6 +8,7 @@ import re
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
@@ -24,6 +25,9 @@ from rbcourse.assignments import sandbox
 from rbcourse.assignments.grade import grade, grade_all
 
 SQUARE = ANSWERS["square-answer"]
+PIXEL = (
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+A8AAQUBAScY42YAAAAASUVORK5CYII="
+)
 HIDDEN = ["assert square(-3) == 9", "assert math.isclose(half, 0.5)"]
 SLEEP = f"9{os.getpid():08d}"  # a number of seconds that nobody else sleeps
 SECRET = "the-token-of-the-teacher"
@@ -51,6 +55,10 @@ HONEST = {
     "pools": "from concurrent.futures import ThreadPoolExecutor\n"
     "print(list(ThreadPoolExecutor(4).map(abs, range(9))))",
     "warns": "import warnings\nwarnings.warn('old')",
+    "asyncs": "import asyncio\nawait asyncio.sleep(0)\nprint(1)",
+    "pool": "from multiprocessing import Pool\nwith Pool(2) as pool:\n    pool.map(abs, range(9))",
+    "odd outputs": "odd = {'text/plain': {'a': 1}, 'application/x-odd': [float('inf')]}\n"
+    "display(odd, raw=True)",
     "reloads": "%load_ext autoreload\n%autoreload 2",
 }
 # What they try fails, and they say what they got; the points are those of their answers.
@@ -99,9 +107,9 @@ LOUD = {
     "    metadata={'filenames': {'image/png': 'https://evil.example/x.png'}})",
 }
 TELLS = """
-import base64
+import base64, linecache
 def square(x):
-    code = In[-1]
+    code = "".join("".join(entry[2]) for entry in list(linecache.cache.values()))
     for text in (code, code[::-1], base64.b64encode(code.encode()).decode()):
         print(text)
     try:
@@ -127,10 +135,9 @@ TRICKS = {
     "an alias": ("m = [math][0]\nm.isclose = print", "line 2 replaces m.isclose"),
     "locals": ("locals()['math'] = None", "line 1 uses locals"),
     "globals": ("globals()['math'] = None", "line 1 uses globals"),
-    "equal to all": (
-        "class Yes(int):\n    def __eq__(self, other):\n        return True",
-        "line 2 defines __eq__",
-    ),
+    "equal to all": ("class Y(int): pass\nY.__eq__ = print", "line 2 replaces Y.__eq__"),
+    "equal by name": ("type('Y', (), {'__eq__': print})", "line 1 names __eq__"),
+    "reads what was run": ("print(In[-1])", "line 1 reads In, what was run"),
     "code in a text": ("exec('import math; math.isclose = print')", "line 1 uses exec"),
     "import by name": ("__import__('builtins').abs = print", "line 1 uses __import__"),
     "a module": ("import sys\nsys.modules['math'] = None", "line 2 uses modules"),
@@ -159,6 +166,11 @@ def change_tests(notebook):
         found.metadata.nbgrader.points = 100
 
 
+def forge_remarks(notebook):
+    cell(notebook, "half-test").metadata.nbgrader.points = "1\nann: graded, 6 of 6\x1b[2J" * 9**5
+    cell(notebook, "title").source = "# \x1b[2J" + "x" * 9**5
+
+
 def drop_tests(notebook):
     notebook.cells = notebook.cells[:3]
 
@@ -166,8 +178,10 @@ def drop_tests(notebook):
 def write_words(notebook):
     cell(notebook, "words-answer").source = (
         "<script>alert(7)</script> [x](javascript:alert(8)) ![x](https://evil.example/x.png)\n"
-        '<a href="https://evil.example">y</a> <img src=x onerror=alert(9)> $a < b$'
+        '<a href="https://evil.example">y</a> <img src=x onerror=alert(9)> $a < b$\n\n'
+        r"$\href{https://evil.example}{x}$ ![pasted](attachment:a.png) ![gone](attachment:b.png)"
     )
+    cell(notebook, "words-answer").attachments = {"a.png": {"image/png": PIXEL}}
     notebook.cells.append(new_markdown_cell("<svg onload=alert(10)>"))
 
 
@@ -188,6 +202,10 @@ def hand_in_all(course, port):
         course.submit(name, half=f"{code}\nhalf = 1")
     course.submit("tells", square=TELLS)
     course.submit("writes words", write_words)
+    course.submit("forges remarks", forge_remarks)
+    course.submit(
+        "is equal", square="class Y(int):\n    def __eq__(self, other):\n        return True"
+    )
     course.submit("loops", half=loops(course.begin))
     course.submit("floods", half=f"{course.begin}\nwhile True: print('x' * 9**4)  # endless")
     course.submit("takes memory", half="x = bytearray(3 * 10**9)")
@@ -229,7 +247,11 @@ def course(tmp_path_factory, template, monkeypatch_module):
         threading.Thread(target=lambda ear=ear: asked.append(ear.accept()), daemon=True).start()
     hand_in_all(course, server.getsockname()[1])
     course.before = state(course.folder)
+    places = Path(tempfile.mkdtemp())
+    monkeypatch_module.setattr(tempfile, "tempdir", str(places))
     grade("ps0", course.folder, seconds=120)
+    monkeypatch_module.setattr(tempfile, "tempdir", None)
+    places.rmdir()  # nothing is left there
     assert not asked
     return course
 
@@ -290,6 +312,8 @@ def test_ways_round_the_tests_are_named(course, rows, student):
         ("takes memory", "2", "0", "cell 5, answer of “A tiny set”: takes too much memory"),
         ("prints", "2", "1", "cell 5, answer of “A tiny set”: the output is too large"),
         ("raises", "0", "1", ""),
+        ("forges remarks", "2", "1", "cell 1, locked cell of “A tiny set” was changed; it is put"),
+        ("is equal", "0", "1", "cell 3, answer of “A tiny set”, line 2 defines __eq__: look at it"),
         ("returns points", "2", "0", ""),
         ("changes tests", "2", "0", "cell 4, test of “A tiny set” was changed and has other"),
         ("drops tests", "0", "0", "cell 4, test of “A tiny set” was missing; it is put back"),
@@ -310,6 +334,8 @@ def test_each_has_its_points_and_a_clear_line(rows, student, square, half, remar
     assert points(rows[student]) == (square, half), rows[student]
     assert rows[student]["remarks"].startswith(remark), rows[student]
     assert bool(remark) == bool(rows[student]["remarks"])
+    assert rows[student]["remarks"].isprintable()
+    assert len(rows[student]["remarks"]) < 700
 
 
 def test_nothing_outside_is_changed(course, rows):
@@ -335,7 +361,11 @@ def test_pages_hold_nothing_of_students_that_runs_or_loads(course):
         loaded = re.findall(r"\s(?:src|href)=\"([^\"]*)\"", tags)
         assert all(address.startswith(("data:image/", "#")) for address in loaded), student
     assert ">A tiny set</h1>" in pages(course)["writes words"]
-    assert "$a &lt; b$" in pages(course)["writes words"]
+    words = pages(course)["writes words"]
+    assert "$a &lt; b$" in words
+    assert PIXEL in words
+    assert r"$\text{https://evil.example}{x}$" in words
+    assert "gone (attachment:b.png is missing)" in words
 
 
 def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(course):
