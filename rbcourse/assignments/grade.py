@@ -163,12 +163,21 @@ def _graded(
                 worker.kill()
                 worker.join()
                 result.close()
-                folder.cleanup()
+                _delete(folder)
                 yield student, found, [other for other, *_ in running.values()]
     finally:
         for _, worker, folder, _ in running.values():
             worker.kill()
-            folder.cleanup()
+            _delete(folder)
+
+
+def _delete(folder: Any) -> None:
+    """Delete a folder in which a kernel that was ended may still write."""
+    for _ in range(50):
+        folder.cleanup()
+        if not os.path.exists(folder.name):
+            break
+        time.sleep(0.1)
 
 
 def _received(result: Connection) -> dict[str, Any]:

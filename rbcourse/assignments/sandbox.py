@@ -71,14 +71,11 @@ def box(folder: Path) -> list[str]:
     words += ["--new-session", "--cap-drop", "ALL", "--unsetenv", "JPY_PARENT_PID"]
     for power in ("SETUID", "SETGID", "DAC_READ_SEARCH"):  # until it becomes nobody
         words += ["--cap-add", f"CAP_{power}"] * is_root
-    for parent in [
-        *sorted(seen)[1:],
-        "/etc",
-    ]:  # without this they are as closed as they are outside
-        words += ["--dir", parent]
-    words += [*bound, "--proc", "/proc", "--dev", "/dev"]
+    words += ["--dir", "/etc", *bound, "--proc", "/proc", "--dev", "/dev"]
     for path in ("/tmp", "/dev/shm"):  # in memory they would have no limit
         words += ["--bind", str(folder / "tmp"), path]
+    for parent in sorted(seen)[1:]:  # without this they are as closed as they are outside
+        words += ["--dir", parent]
     for path in python:
         words += ["--ro-bind", path, path]
     words += ["--bind", str(folder), str(folder), "--chdir", str(folder / "work")]
