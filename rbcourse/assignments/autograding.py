@@ -36,6 +36,7 @@ UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.
 TAGS = {"b", "blockquote", "br", "code", "dd", "del", "div", "dl", "dt", "em", "hr", "i", "img"}
 TAGS |= {"h1", "h2", "h3", "h4", "h5", "h6", "li", "ol", "p", "pre", "s", "span", "strong", "ul"}
 TAGS |= {"sub", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr"}
+LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
@@ -93,7 +94,7 @@ def inert_html(content: object) -> str:
     '<p>x</p><img>&lt;script&gt;1&lt;/script&gt;'
     """
     inert = bleach.clean(str(content), TAGS, _is_inert, protocols={"data"})
-    return str(inert).replace(r"\href", r"\text")  # a link of MathJax
+    return LINK.sub(r"\\text", str(inert))
 
 
 def _is_inert(tag: str, name: str, value: str) -> bool:
@@ -178,15 +179,15 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
     ) -> tuple[NotebookNode, dict[str, Any]]:
         """Run all cells; errors are among the outputs."""
         remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
-        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            self.folder = Path(folder)
+        self.folder = Path(tempfile.mkdtemp())
+        try:
             sandbox.prepare(self.folder)
             self._copy_given_files(resources["nbgrader"]["assignment"])
             resources["metadata"]["path"] = str(self.folder / "work")
-            try:
-                nb, resources = nbgrader.Execute.preprocess(self, nb, resources, km)
-            finally:
-                resources["metadata"]["path"] = path
+            nb, resources = nbgrader.Execute.preprocess(self, nb, resources, km)
+        finally:
+            resources["metadata"]["path"] = path
+            sandbox.delete(self.folder)
         nb.metadata.pop("widgets", None)
         long = f"stopped after {self.timeout} s"
         remarks += [f"{name_cell(nb.cells, at)}: {long}" for at in self.slow]
@@ -199,9 +200,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
                 output.metadata = NotebookNode()
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
-                    output.data["text/latex"] = output.data["text/latex"].replace(
-                        "\\href", "\\text"
-                    )
+                    output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
         nb.metadata["remarks"] = remarks
         return nb, resources
 

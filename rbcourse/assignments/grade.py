@@ -140,14 +140,14 @@ def _graded(
     context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
     context.set_forkserver_preload(["rbcourse.assignments.grade"])
     boxed = not sandbox.missing()
-    waiting, running = students[::-1], dict[Connection, tuple[str, Any, Any, float]]()
+    waiting, running = students[::-1], dict[Connection, tuple[str, Any, str, float]]()
     try:
         while waiting or running:
             while waiting and len(running) < workers:
                 student = waiting.pop()
                 result, send = context.Pipe(duplex=False)
-                folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-                of = name, assignments, student, boxed, memory, folder.name, send
+                folder = tempfile.mkdtemp()
+                of = name, assignments, student, boxed, memory, folder, send
                 worker = context.Process(target=_work, args=of)
                 worker.start()
                 send.close()
@@ -171,11 +171,11 @@ def _graded(
             _delete(folder)
 
 
-def _delete(folder: Any) -> None:
+def _delete(folder: str) -> None:
     """Delete a folder in which a kernel that was ended may still write."""
     for _ in range(50):
-        folder.cleanup()
-        if not os.path.exists(folder.name):
+        sandbox.delete(Path(folder))
+        if not os.path.exists(folder):
             break
         time.sleep(0.1)
 
@@ -216,11 +216,14 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> dict[str, A
     """Grade one submission in this process."""
     config = course_config(name, folder)
     config.BoxedExecute.boxed = boxed
-    config.CourseDirectory.student_id = glob.escape(student)
+    config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)
     try:
-        check_submission(folder / "submitted" / student / name, name)
+        if glob.escape(student) != student:  # nbgrader would take it for a pattern
+            raise RefusedError("the name of the folder holds [, * or ?: give it another")
+        given = {path.name for path in find_set(name, folder).iterdir()}
+        check_submission(folder / "submitted" / student / name, name, given)
         done = run_step(Autograde, config)
         if not done["success"]:
             raise RefusedError(last_line(done))
@@ -242,14 +245,21 @@ def _words(path: Path) -> dict[str, str]:
     return {grade_id(cell): cell.source for cell in words}
 
 
-def check_submission(folder: Path, name: str) -> None:
-    """Refuse what is no notebook of the right name, or is not written as nbgrader reads it."""
+def check_submission(folder: Path, name: str, given: set[str]) -> None:
+    """Refuse what is no notebook of the right name, not as nbgrader reads it, or not alone.
+
+    nbgrader copies what lies beside it, and follows links; files of the set may lie there.
+    """
     wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
     path = folder / wanted
     if wanted not in there:
         raise RefusedError(f"there is no {wanted}, but {', '.join(there) or 'nothing'}")
-    if any(place.is_symlink() for place in (path, folder, folder.parent)):
-        raise RefusedError(f"{wanted} is a link")
+    if any(place.is_symlink() for place in (folder, folder.parent, *folder.rglob("*"))):
+        raise RefusedError(f"{wanted}, or what is beside it, is a link")
+    if others := sorted(set(there) - given - {wanted, "timestamp.txt"}):
+        raise RefusedError(f"there is more than {wanted}: take away {', '.join(others)}")
+    if not path.is_file():
+        raise RefusedError(f"{wanted} is a folder")
     if path.stat().st_size > LARGEST:
         raise RefusedError(f"{wanted} has more than {LARGEST:,} bytes")
     content = path.read_bytes()

@@ -51,6 +51,15 @@ def prepare(folder: Path) -> None:
         shutil.copy(fonts, folder / "matplotlib")
 
 
+def delete(folder: Path) -> None:
+    """Delete a folder, whatever a kernel left there: locked, deep, or links to elsewhere."""
+    if os.name == "nt":
+        shutil.rmtree(folder, ignore_errors=True)
+        return
+    for words in (["chmod", "-R", "u+rwX"], ["rm", "-rf"]):
+        subprocess.run([*words, "--", str(folder)], capture_output=True)
+
+
 def environment(folder: Path) -> dict[str, str]:
     """Return the environment variables of the kernel: none of them is anybody's secret."""
     own = dict.fromkeys(("HOME", "USERPROFILE", "IPYTHONDIR"), str(folder))

@@ -15,14 +15,25 @@ from nbformat import NotebookNode
 from rbcourse.assignments.restore import grade_id, is_answer
 
 # each leads round what can be read in the code
-NAMES = {"exec", "eval", "globals", "locals", "__import__", "__builtins__", "get_ipython"}
+NAMES = {
+    "exec",
+    "eval",
+    "compile",
+    "globals",
+    "locals",
+    "__import__",
+    "__builtins__",
+    "get_ipython",
+}
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
 ATTRIBUTES |= {"__setattr__", "__delattr__", "__globals__", "__closure__", "__subclasses__"}
 ATTRIBUTES |= {"__builtins__", "__wrapped__", "__self__", "__bases__", "__mro__"}
+ATTRIBUTES |= {"attrgetter", "methodcaller"}
 MODULES = {"builtins", "ctypes", "gc", "importlib", "inspect", "IPython", "ipykernel", "pkgutil"}
-MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq"}
+MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq", "jupyter_client", "pickle"}
+MODULES |= {"code", "codeop", "cProfile", "profile"}
 # an object that equals everything passes every test
 METHODS = {f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "bool", "array_ufunc")}
 METHODS |= {"__array_function__"}
@@ -59,11 +70,14 @@ def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
         nodes = list(ast.walk(tree))
         for node in nodes:
             _learn(node, imported)
+        called = {node.func for node in nodes if isinstance(node, ast.Call)}
         if at in own:
             rebound = [(line, name) for line, name in _rebound(tree) if name in names]
             said = {(line, f"gives {name} another meaning") for line, name in rebound}
             for node in nodes:
                 line = getattr(node, "lineno", 0)
+                if getattr(node, "id", "") in ("setattr", "delattr", "vars") and node not in called:
+                    said.add((line, f"renames {ast.unparse(node)}"))
                 said |= {(line, what) for what in _suspicious(node, attributes, imported, bound)}
             found += [(at, *what) for what in sorted(said)]
     return found
@@ -132,7 +146,13 @@ def _rebound(tree: ast.Module) -> Iterator[tuple[int, str]]:
                     yield node.lineno, alias.asname
         elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
             yield node.lineno, node.id
-        elif not isinstance(node, ast.Lambda | ast.comprehension):
+        elif isinstance(node, ast.MatchAs | ast.MatchStar):
+            yield node.lineno, node.name or ""
+            todo += ast.iter_child_nodes(node)
+        elif isinstance(node, ast.comprehension):  # its own names end with it
+            inner = [part for part in ast.walk(node) if isinstance(part, ast.NamedExpr)]
+            yield from ((part.lineno, part.target.id) for part in inner)
+        elif not isinstance(node, ast.Lambda):
             todo += ast.iter_child_nodes(node)
 
 
@@ -149,16 +169,21 @@ def _suspicious(
         yield "uses a magic or a shell" if node.id == "get_ipython" else f"uses {node.id}"
     elif isinstance(node, ast.Name) and node.id in HISTORY - bound:
         yield f"reads {node.id}, what was run"
+    elif isinstance(node, ast.Name) and node.id in METHODS:
+        yield f"defines {node.id}"
     elif isinstance(node, ast.Constant) and node.value in (ATTRIBUTES | METHODS) - {"modules"}:
         yield f"names {node.value}"
     elif isinstance(node, ast.Call):
         called, given = ast.unparse(node.func), node.args
         if called in ("setattr", "delattr", "vars") and _root((given or [node])[0]) in imported:
             yield f"replaces parts of {ast.unparse(given[0])}"
-        if called in ("setattr", "delattr", "getattr") and len(given) > 1:
-            name = given[1].value if isinstance(given[1], ast.Constant) else None
+        if called == "vars" and not given:
+            yield "uses vars"
+        if called in ("setattr", "delattr", "getattr"):
+            second = given[1] if len(given) > 1 else None
+            name = second.value if isinstance(second, ast.Constant) else None
             if name is None or (called != "getattr" and name in relied):
-                yield f"uses {called} with {ast.unparse(given[1])}"
+                yield f"uses {called} with {ast.unparse(second) if second else 'stars'}"
     elif isinstance(node, ast.Import | ast.ImportFrom):
         place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
         dark = (_dark(place + alias.name) for alias in node.names)

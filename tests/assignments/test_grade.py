@@ -60,12 +60,13 @@ def strip_metadata(notebook):
 
 
 NOSY = """
-import os, sys
+import linecache, os
 def square(x):
+    cells = "".join("".join(entry[2]) for entry in list(linecache.cache.values()))
     with open("seen.txt", "a") as file:
-        print(x, In[-1], file=file)
-    print(In, x)
-    raise AssertionError(In[-1])
+        print(x, cells, file=file)
+    print(cells, x)
+    raise AssertionError(cells)
 ### BEGIN HIDDEN TESTS
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """

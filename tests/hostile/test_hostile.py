@@ -95,6 +95,8 @@ LOUD = {
     "except OSError as error:\n    print(error)",
     "tells the environment": "import os\nprint(dict(os.environ))",
     "prints": "print('x' * 3_000_000)",
+    "digs": "import os\nfor _ in range(3000):\n    os.mkdir('d')\n    os.chdir('d')",
+    "locks": "import os\nos.mkdir('a')\nos.symlink('COURSE/source', 'a/b')\nos.chmod('a', 0)",
     "page": "from IPython.display import HTML, Javascript, SVG, display\n"
     "display(HTML('<script>alert(1)</script><img src=x onerror=alert(2)>'\n"
     '\'<a href="javascript:alert(3)">x</a><iframe src="https://evil.example"></iframe>\'\n'
@@ -179,7 +181,8 @@ def write_words(notebook):
     cell(notebook, "words-answer").source = (
         "<script>alert(7)</script> [x](javascript:alert(8)) ![x](https://evil.example/x.png)\n"
         '<a href="https://evil.example">y</a> <img src=x onerror=alert(9)> $a < b$\n\n'
-        r"$\href{https://evil.example}{x}$ ![pasted](attachment:a.png) ![gone](attachment:b.png)"
+        r"$\href{https://evil.example}{x}$ $&#92;href{https://evil.example}{y}$ "
+        "![pasted](attachment:a.png) ![gone](attachment:b.png)"
     )
     cell(notebook, "words-answer").attachments = {"a.png": {"image/png": PIXEL}}
     notebook.cells.append(new_markdown_cell("<svg onload=alert(10)>"))
@@ -228,6 +231,9 @@ def hand_in_all(course, port):
     course.submit_bytes("half a file", text.encode()[:999])
     course.submit_bytes("deep", b'{"cells": ' + b"[" * 10**5)
     course.submit_bytes("long", b" " * 31_000_000)
+    course.submit("[ab]*")
+    course.submit("more files")
+    course.submit_bytes("more files", b"<script>", "feedback.html")
     place = course.folder / "submitted" / "a link" / "ps0"
     place.mkdir(parents=True)
     (place / "ps0.ipynb").symlink_to(course.folder / "source" / "ps0" / "ps0.ipynb")
@@ -327,7 +333,9 @@ def test_ways_round_the_tests_are_named(course, rows, student):
         ("half a file", "", "", "refused: ps0.ipynb is damaged or no notebook"),
         ("deep", "", "", "refused: ps0.ipynb is damaged or no notebook"),
         ("long", "", "", "refused: ps0.ipynb has more than 30,000,000 bytes"),
-        ("a link", "", "", "refused: ps0.ipynb is a link"),
+        ("a link", "", "", "refused: ps0.ipynb, or what is beside it, is a link"),
+        ("[ab]*", "", "", "refused: the name of the folder holds [, * or ?: give it another"),
+        ("more files", "", "", "refused: there is more than ps0.ipynb: take away feedback.html"),
     ],
 )
 def test_each_has_its_points_and_a_clear_line(rows, student, square, half, remark):
@@ -365,6 +373,7 @@ def test_pages_hold_nothing_of_students_that_runs_or_loads(course):
     assert "$a &lt; b$" in words
     assert PIXEL in words
     assert r"$\text{https://evil.example}{x}$" in words
+    assert r"\href" not in words
     assert "gone (attachment:b.png is missing)" in words
 
 
