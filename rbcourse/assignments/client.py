@@ -1,14 +1,13 @@
 """Run a notebook of a student: time and output are bounded, and no error is lost."""
 
 import json
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from nbclient import NotebookClient
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
-from traitlets import Bool, Integer
+from traitlets import Integer
 
 from rbcourse.course.notebooks import kernel_address
 
@@ -33,7 +32,6 @@ class BoundedClient(NotebookClient):
         The indices of the cells that took too long, and of which not all output is kept.
     """
 
-    store_widget_state = Bool(True)  # without it nbclient fails at a widget that holds outputs
     iopub_timeout = Integer(STOP_SECONDS).tag(config=True)
 
     def __init__(self, *args: Any, **settings: Any) -> None:
@@ -98,9 +96,10 @@ class BoundedClient(NotebookClient):
     def handle_comm_msg(
         self, outs: list[NotebookNode], msg: dict[str, Any], cell_index: int
     ) -> None:
-        """Follow a widget; what nbclient does not know of widgets does not stop a run."""
-        with suppress(AssertionError, AttributeError, LookupError, TypeError):
-            super().handle_comm_msg(outs, msg, cell_index)
+        """Follow no widget: what an Output holds stands in its cell, and nothing is sent back.
+
+        What nbclient sends back for an Output can keep it from seeing the reply of the cell.
+        """
 
     def on_cell_executed(
         self, cell: NotebookNode, cell_index: int, execute_reply: dict[str, Any]

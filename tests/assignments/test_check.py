@@ -378,3 +378,11 @@ def test_a_hint_speaks_for_itself():
     hint = {"ename": "NotYet", "evalue": "x and y are swapped.", "traceback": []}
     cell = new_code_cell("1", outputs=[nbformat.v4.new_output("error", **hint)])
     assert check._error(cell) == "x and y are swapped."
+
+
+def test_what_an_output_widget_holds_stands_in_its_cell(handout, capsys):
+    code = "from ipywidgets import Output\nhalf = 0.5\nwith Output():\n    print('inside')"
+    edited(handout, lambda notebook: None, **{"half-answer": code})
+    check.check(handout / "ps0.ipynb")
+    assert "2 of 2 visible tests passed" in capsys.readouterr().out
+    assert cell_of(submitted(handout), "half-answer").outputs[0].text == "inside\n"
