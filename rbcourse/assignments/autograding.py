@@ -188,7 +188,6 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         finally:
             resources["metadata"]["path"] = path
             sandbox.delete(self.folder)
-        nb.metadata.pop("widgets", None)
         long = f"stopped after {self.timeout} s"
         remarks += [f"{name_cell(nb.cells, at)}: {long}" for at in self.slow]
         remarks += [f"{name_cell(nb.cells, at)}: {CUT}" for at in self.cut]

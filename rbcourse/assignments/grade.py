@@ -122,9 +122,8 @@ def run_step(converter: Any, config: Config) -> dict[str, Any]:
 def _points(gradebook: Any) -> dict[str, Any]:
     """Return the points of each student, as a sorted list of rows."""
     points: dict[str, Any] = {}
-    for student, *row in sorted(
-        map(tuple, gradebook.db.connection().exec_driver_sql(POINTS)), key=str
-    ):
+    rows = gradebook.db.connection().exec_driver_sql(POINTS)
+    for student, *row in sorted(map(tuple, rows), key=str):
         points.setdefault(student, []).append(row)
     return points
 
@@ -299,6 +298,8 @@ def gives_away(page: str, secrets: Iterable[str]) -> bool:
     Examples
     --------
     >>> gives_away("72-==)3-(ebuc", ["cube(-3)==-27"])
+    True
+    >>> gives_away("x Y3ViZSgtMykgPT0gLTI3", ["cube(-3)==-27"])
     True
     """
     shown = squeezed(page)

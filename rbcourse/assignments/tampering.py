@@ -15,16 +15,8 @@ from nbformat import NotebookNode
 from rbcourse.assignments.restore import grade_id, is_answer
 
 # each leads round what can be read in the code
-NAMES = {
-    "exec",
-    "eval",
-    "compile",
-    "globals",
-    "locals",
-    "__import__",
-    "__builtins__",
-    "get_ipython",
-}
+NAMES = {"exec", "eval", "compile", "globals", "locals", "__import__", "__builtins__"}
+NAMES |= {"get_ipython"}
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
