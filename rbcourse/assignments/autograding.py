@@ -22,7 +22,6 @@ from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from nbgrader import preprocessors as nbgrader
-from nbgrader.utils import find_all_files
 from traitlets import Bool, default
 from traitlets.config import Config
 
@@ -54,8 +53,6 @@ def configure(config: Config) -> None:
     config.Autograde.sanitize_preprocessors = [
         RestoreCells,
         nbgrader.OverwriteKernelspec,
-        nbgrader.OverwriteCells,  # which adds the hidden tests
-        RefuseTampering,
         nbgrader.CheckCellMetadata,
     ]
     config.Autograde.autograde_preprocessors = [
@@ -75,7 +72,6 @@ def configure(config: Config) -> None:
         nbgrader.ClearMarkScheme,
         nbgrader.ClearOutput,
         BoxedExecute,
-        NoteUnseen,
         CSSHTMLHeaderPreprocessor,
     ]
     # in the feedback and in the formgrader
@@ -122,8 +118,8 @@ def inert_markdown(context: Any, source: str) -> str:
     return inert_html(MarkdownWithMath(renderer=renderer).render(source))
 
 
-class RestoreCells(nbgrader.NbGraderPreprocessor):
-    """Restore the cells that students must not change."""
+class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
+    """Restore the cells that students must not change; refuse what overrides what tests rely on."""
 
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any]
@@ -133,30 +129,22 @@ class RestoreCells(nbgrader.NbGraderPreprocessor):
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
         try:
-            first, *more = restore(nb, original) or [""]
+            remarks = restore(nb, original)
         except ValueError as error:
             raise RefusedError(str(error)) from error
+        if len(remarks) > 2:
+            remarks[1:] = [f"and {len(remarks) - 1} more changes"]
         for cell in nb.cells:
             if is_answer(cell) or not marks_of(cell):  # what looks like a region stops nbgrader
                 regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
                 cell.source = re.sub(regions, r"\1-\2", cell.source)
-        remarks = [first] * bool(first) + [f"and {len(more)} more changes"] * bool(more)
-        nb.metadata = NotebookNode({"remarks": remarks})
-        return nb, resources
-
-
-class RefuseTampering(nbgrader.NbGraderPreprocessor):
-    """Refuse code that overrides what the tests, also the hidden ones, rely on, or remark on it."""
-
-    def preprocess(
-        self, nb: NotebookNode, resources: dict[str, Any]
-    ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Raise a RefusedError at the first line of that kind."""
+        nb, resources = super().preprocess(nb, resources)
         for at, line, what in find_in_cells(nb.cells):
             where = f"{name_cell(nb.cells, at)}, line {line} {what}"
             if not what.startswith("defines "):  # as classes do, in earnest
                 raise RefusedError(f"{where}: grade by hand")
-            nb.metadata["remarks"].append(f"{where}: look at it")
+            remarks.append(f"{where}: look at it")
+        nb.metadata = NotebookNode({"remarks": remarks})
         return nb, resources
 
 
@@ -179,38 +167,36 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
     ) -> tuple[NotebookNode, dict[str, Any]]:
         """Run all cells; errors are among the outputs."""
         remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
+        course, name = self.converter.coursedir, resources["nbgrader"]["assignment"]
+        source = course.format_path(course.source_directory, ".", name)
         self.folder = Path(tempfile.mkdtemp())
+        work = self.folder / "work"
         try:
+            # the files of the set; those of the student could pass for modules of the tests
+            shutil.copytree(source, work, ignore=shutil.ignore_patterns("*.ipynb", *course.ignore))
             sandbox.prepare(self.folder)
-            self._copy_given_files(resources["nbgrader"]["assignment"])
-            resources["metadata"]["path"] = str(self.folder / "work")
+            resources["metadata"]["path"] = str(work)
             nb, resources = nbgrader.Execute.preprocess(self, nb, resources, km)
         finally:
             resources["metadata"]["path"] = path
             sandbox.delete(self.folder)
-        long = f"stopped after {self.timeout} s"
-        remarks += [f"{name_cell(nb.cells, at)}: {long}" for at in self.slow]
-        remarks += [f"{name_cell(nb.cells, at)}: {CUT}" for at in self.cut]
         for at, cell in enumerate(nb.cells):
             outputs = cell.get("outputs", [])
-            if any(output.get("ename") == "MemoryError" for output in outputs):
-                remarks.append(f"{name_cell(nb.cells, at)}: takes too much memory")
+            errors = {output.get("ename") for output in outputs} - {None}
+            what = [f"stopped after {self.timeout} s"] * (at in self.slow)
+            what += [CUT] * (at in self.cut)
+            what += ["takes too much memory"] * ("MemoryError" in errors)
+            remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in what]
             for output in (output for output in outputs if "data" in output):
                 output.metadata = NotebookNode()
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
                     output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
+            marks = marks_of(cell)  # in the feedback with scores
+            if is_test(cell) and marks["points"] and not marks.get("score", True) and not errors:
+                outputs.append(new_output("stream", name="stdout", text=UNSEEN))
         nb.metadata["remarks"] = remarks
         return nb, resources
-
-    def _copy_given_files(self, assignment: str) -> None:
-        """Copy the files of the set; those of the student could pass for modules of the tests."""
-        course = self.converter.coursedir
-        source = course.format_path(course.source_directory, ".", assignment)
-        for file in find_all_files(source, [*course.ignore, "*.ipynb"]):
-            target = self.folder / "work" / os.path.relpath(file, source)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(file, target)
 
     def create_kernel_manager(self) -> Any:
         """Return a manager of a kernel in a box."""
@@ -234,17 +220,3 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             raise RefusedError(f"Python ended in or before {where}: grade by hand") from error
         except CellTimeoutError as error:
             raise RefusedError(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error
-
-
-class NoteUnseen(nbgrader.NbGraderPreprocessor):
-    """Say where tests fail that the feedback does not show."""
-
-    def preprocess_cell(
-        self, cell: NotebookNode, resources: dict[str, Any], index: int
-    ) -> tuple[NotebookNode, dict[str, Any]]:
-        """Add a line to the outputs of a test cell without points whose visible part passes."""
-        marks, outputs = marks_of(cell), cell.get("outputs", [])
-        unseen = is_test(cell) and marks["points"] and not marks["score"]
-        if unseen and not any(output.output_type == "error" for output in outputs):
-            outputs.append(new_output("stream", name="stdout", text=UNSEEN))
-        return cell, resources

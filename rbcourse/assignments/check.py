@@ -18,7 +18,7 @@ import nbformat
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 
-from rbcourse.assignments.client import CUT, SLOW, BoundedClient
+from rbcourse.assignments.client import CUT, BoundedClient
 from rbcourse.assignments.restore import (
     grade_id,
     is_answer,
@@ -34,7 +34,6 @@ from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
 
 CELL_SECONDS = 60
-COPIED_BYTES = 50_000_000
 LARGE_BYTES = 20_000_000
 
 
@@ -44,9 +43,13 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
     What is found is printed. The file of the student is only read; the file to submit has the
     locked cells as in the original.
     """
-    notebook = _read(path)
+    if not path.exists():
+        raise ValueError(f"{path} is missing: there is no such file")
+    if path.suffix != ".ipynb":
+        raise ValueError(f"{path.name} is no notebook; give the file that ends with .ipynb")
+    notebook = read_notebook(path.read_bytes(), path.name)
     original = original or _find_original(path)
-    wanted = _read(original)
+    wanted = read_notebook(original.read_bytes(), original.name)
     saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     print(f"checking {path.name}, last saved {saved}", flush=True)
     if path.name != original.name:
@@ -55,14 +58,22 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
     _list(restore(notebook, wanted))
     if len(notebook.cells) != number:
         print("cells are counted in the file to submit")
-    notebook.metadata.kernelspec = dict(KERNEL)
-    _list(_not_graded(notebook))
-    _list(_run(notebook, path.parent, seconds) + _failures(notebook))
+    for at, line, what in find_in_cells(notebook.cells):  # it could be meant to deceive the tests
+        where = f"{name_cell(notebook.cells, at)}, line {line}"
+        _list([f"{where} {what}: change it, or a person has to look"])
+    notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as work,
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own,
+    ):
+        _list(_copy_files(path.parent, Path(work)))
+        _list(_run(notebook, work, own, seconds))
     passed = _print_problems(notebook, wanted)
-    target = path.parent / "to_submit" / original.name
-    _write(notebook, target)
-    if target.stat().st_size > LARGE_BYTES:
-        size = f"{target.stat().st_size / 1e6:.0f} MB"
+    nbformat.validate(notebook)
+    content = (nbformat.writes(notebook) + "\n").encode()
+    target = write_whole(path.parent / "to_submit" / original.name, content)
+    if len(content) > LARGE_BYTES:
+        size = f"{len(content) / 1e6:.0f} MB"
         _list([f"the file has {size}: are there pictures in its text? Make them smaller"])
     print(
         f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run when it is graded; "
@@ -74,14 +85,6 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
 def _list(remarks: list[str]) -> None:
     for what in remarks:
         print(f"- {what}", flush=True)
-
-
-def _read(path: Path) -> NotebookNode:
-    if not path.exists():
-        raise ValueError(f"{path} is missing: there is no such file")
-    if path.suffix != ".ipynb":
-        raise ValueError(f"{path.name} is no notebook; give the file that ends with .ipynb")
-    return read_notebook(path.read_bytes(), path.name)
 
 
 def _find_original(path: Path) -> Path:
@@ -97,6 +100,20 @@ def _find_original(path: Path) -> Path:
     return notebooks[0]
 
 
+def _copy_files(folder: Path, work: Path) -> list[str]:
+    """Copy what lies beside the notebook, not what lies in folders: that may be a whole disk."""
+    remarks = []
+    for file in sorted(folder.iterdir()):
+        if file.is_file() and file.suffix not in (".whl", ".zip"):
+            try:
+                if file.stat().st_size > LARGE_BYTES:
+                    raise OSError("too large")
+                shutil.copyfile(file, work / file.name)
+            except OSError as error:
+                remarks.append(f"{file.name} cannot be copied for the run: {error}")
+    return remarks
+
+
 class _Client(BoundedClient):
     """A client that tells where it is, and ends a run in which two cells took too long."""
 
@@ -109,68 +126,41 @@ class _Client(BoundedClient):
         print(f"\rrunning cell {self.at + 1} of {len(self.nb.cells)} ", end="", flush=True)
 
 
-def _run(notebook: NotebookNode, folder: Path, seconds: int) -> list[str]:
-    """Run all cells in a copy of the folder; say what did not go well."""
-    with (
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as work,
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own,
-    ):
-        remarks = _copy_files(folder, Path(work))
-        log = logging.getLogger(__name__)
-        log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
-        path = {"metadata": {"path": work}}
-        client = _Client(notebook, log=log, kernel_name=KERNEL["name"], resources=path)
-        client.timeout, client.folder = seconds, Path(own)
-        try:
-            client.create_kernel_manager()
-            client.start_new_kernel(env={**os.environ, "IPYTHONDIR": own})
-            client.start_new_kernel_client()
-        except (OSError, RuntimeError, KeyError) as error:
-            raise ValueError(
-                f"Python could not be started for the notebook ({error}); install what "
-                "requirements.txt of the handout lists"
-            ) from error
-        try:
-            client.execute()
-        except DeadKernelError:
-            notebook.cells[client.at].execution_count = None
-            remarks.append(
-                f"the kernel died in cell {client.at + 1}: it called exit, or used up the memory; "
-                "the cells after it were not run"
-            )
-        except CellTimeoutError:
-            notebook.cells[client.at].execution_count = None
-            first = client.at + 1 + (client.at in client.slow)
-            if first <= len(notebook.cells):
-                remarks.append(f"cells from {first} on were not run")
-        print(flush=True)
-    cells = notebook.cells
+def _run(notebook: NotebookNode, work: str, own: str, seconds: int) -> list[str]:
+    """Run all cells; say what did not go well, except in a problem."""
+    log = logging.getLogger(__name__)
+    log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
+    path, remarks, cells = {"metadata": {"path": work}}, [], notebook.cells
+    client = _Client(notebook, log=log, kernel_name=KERNEL["name"], resources=path)
+    client.timeout, client.folder = seconds, Path(own)
+    try:
+        client.create_kernel_manager()
+        client.start_new_kernel(env={**os.environ, "IPYTHONDIR": own})
+        client.start_new_kernel_client()
+    except (OSError, RuntimeError, KeyError) as error:
+        raise ValueError(
+            f"Python could not be started for the notebook ({error}); install what "
+            "requirements.txt of the handout lists"
+        ) from error
+    try:
+        client.execute()
+    except DeadKernelError:
+        cells[client.at].execution_count = None
+        remarks.append(
+            f"the kernel died in cell {client.at + 1}: it called exit, or used up the memory; "
+            "the cells after it were not run"
+        )
+    except CellTimeoutError:
+        cells[client.at].execution_count = None
+        first = client.at + 1 + (client.at in client.slow)
+        remarks += [f"cells from {first} on were not run"] * (first <= len(cells))
+    print(flush=True)
     long = f"took longer than {seconds} s and was stopped"
     remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
-    return remarks + [f"{name_cell(cells, at)}: {CUT}" for at in client.cut]
-
-
-def _not_graded(notebook: NotebookNode) -> list[str]:
-    """Say what a machine will not grade, or not alone: it could be meant to deceive the tests."""
-    return [
-        f"{name_cell(notebook.cells, at)}, line {line} {what}: change it, or a person has to look"
-        for at, line, what in find_in_cells(notebook.cells)
-    ]
-
-
-def _copy_files(folder: Path, work: Path) -> list[str]:
-    """Copy what lies beside the notebook, not what lies in folders: that may be a whole disk."""
-    remarks, left = [], COPIED_BYTES
-    for file in sorted(folder.iterdir()):
-        if file.is_file() and file.suffix not in (".whl", ".zip"):
-            try:
-                size = file.stat().st_size
-                if size > left:
-                    raise OSError("too large")
-                shutil.copyfile(file, work / file.name)
-                left -= size
-            except OSError as error:
-                remarks.append(f"{file.name} cannot be copied for the run: {error}")
+    remarks += [f"{name_cell(cells, at)}: {CUT}" for at in client.cut]
+    for at, cell in enumerate(cells):
+        if _error(cell) and not (is_test(cell) or is_answer(cell) or at in client.slow):
+            remarks.append(f"{name_cell(cells, at)} fails: {_error(cell)}")
     return remarks
 
 
@@ -179,21 +169,9 @@ def _error(cell: NotebookNode) -> str:
     errors = [o for o in cell.get("outputs", []) if o.output_type == "error"]
     if not errors:
         return ""
-    lines = [line for line in errors[-1].evalue.splitlines() if line.strip()]
-    words = re.sub(r"\x1b\[[0-9;]*m", "", lines[-1].strip() if lines else "")[:200]
-    if words and errors[-1].ename == "NotYet":  # a hint, which speaks for itself
-        return words
-    return f"{errors[-1].ename}: {words}" if words else str(errors[-1].ename)
-
-
-def _failures(notebook: NotebookNode) -> list[str]:
-    """Name the cells that fail and belong to no problem; those that took too long are named."""
-    return [
-        f"{name_cell(notebook.cells, at)} fails: {_error(cell)}"
-        for at, cell in enumerate(notebook.cells)
-        if _error(cell) and not _error(cell).endswith(SLOW) and not is_test(cell)
-        if not is_answer(cell)
-    ]
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
+    hint = lines[-1] and errors[-1].ename == "NotYet"  # it speaks for itself
+    return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
 
 
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
@@ -202,37 +180,30 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered = [], True
     for at, cell in enumerate(notebook.cells):
-        error, status, said = _error(cell), "", ""
+        error, found = _error(cell), ("", "")
         if is_answer(cell):
             answered = cell.source.strip() not in ("", empty[grade_id(cell)])
             if not answered:
-                status, said = "empty", "is not answered yet"
+                found = "empty", "is not answered yet"
             elif error:
-                status, said = "FAILED", error
+                found = "FAILED", error
             elif marks_of(cell).get("grade"):
-                status, said = "words", "is graded by a person"
+                found = "words", "is graded by a person"
         elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
-            status, said = "hidden", "has hidden tests only"
+            found = "hidden", "has hidden tests only"
         elif is_test(cell):
             error = error or ("" if cell.execution_count else "it was not run to its end")
             passed.append(not error)
-            status = "passed" if not error else "FAILED" * answered
-            said = error * answered
-        if status:
-            words = f"cell {at + 1} {said}" if said else ""
-            problems.setdefault(title_of(notebook.cells, at), []).append((status, words))
-    for title, found in problems.items():
-        order = ("FAILED", "empty", "passed", "words", "hidden")
-        words = "; ".join(said for _, said in found if said)
-        status = min((status for status, _ in found), key=order.index)
+            found = ("FAILED" * answered, error * answered) if error else ("passed", "")
+        if found[0]:
+            words = f"cell {at + 1} {found[1]}" if found[1] else ""
+            problems.setdefault(title_of(notebook.cells, at), []).append((found[0], words))
+    order = ("FAILED", "empty", "passed", "words", "hidden")
+    for title, all_found in problems.items():
+        words = "; ".join(said for _, said in all_found if said)
+        status = min((status for status, _ in all_found), key=order.index)
         print(f"{status}  {title}" + f": {words}" * bool(words))
     return passed
-
-
-def _write(notebook: NotebookNode, target: Path) -> None:
-    notebook.metadata.pop("widgets", None)
-    nbformat.validate(notebook)
-    write_whole(target, (nbformat.writes(notebook) + "\n").encode())
 
 
 def _check_with_course(path: Path, assignments: Path) -> None:

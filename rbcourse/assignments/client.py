@@ -48,7 +48,7 @@ class BoundedClient(NotebookClient):
         super().reset_execution_trackers()
         self.slow: list[int] = []
         self.cut: list[int] = []
-        self._at, self._left, self._room = -1, ALL_OUTPUT, dict[bool, int]()
+        self._at, self._left, self._room = -1, ALL_OUTPUT, dict[str, int]()
 
     def create_kernel_manager(self) -> Any:
         """Return a manager of a kernel that listens in the folder."""
@@ -71,25 +71,24 @@ class BoundedClient(NotebookClient):
         """Add an output to its cell, unless the cell has too many."""
         if cell_index != self._at:
             self._at, self.raise_on_iopub_timeout = cell_index, False
-            self._room = {False: PRINTED, True: DISPLAYED}
+            self._room = {"stream": PRINTED, "data": DISPLAYED}
         kind, content = msg["msg_type"], msg["content"]
         if kind == "error":
-            content["ename"], content["evalue"] = (
-                str(content[k])[:5000] for k in ("ename", "evalue")
-            )
+            content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
-            if kind in DISPLAYS:  # a widget lives with its kernel
+            if kind != "stream":  # a widget lives with its kernel
                 data = content["data"].items()
                 content["data"] = {k: v for k, v in data if isinstance(v, str) and k != WIDGET}
-            size = len(content["text"]) if kind == "stream" else len(json.dumps(content["data"]))
-            room = min(self._room[kind != "stream"], self._left)
+                kind = "data"
+            size = len(content["text"] if kind == "stream" else json.dumps(content["data"]))
+            room = min(self._room[kind], self._left)
             if size > room:
                 self.cut += [cell_index] * (cell_index not in self.cut)
-                if kind != "stream" or not room:
+                if kind == "data" or not room:
                     return None
                 content["text"], size = content["text"][:room], room
-            self._room[kind != "stream"] -= size
+            self._room[kind] -= size
             self._left -= size
         return super().process_message(msg, cell, cell_index)
 

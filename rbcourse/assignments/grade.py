@@ -1,18 +1,16 @@
 """Grade problem sets: each submission on its own, with feedback and a table of the points."""
 
 import argparse
-import base64
 import glob
-import html
 import os
-import re
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +23,7 @@ from traitlets.config import Config
 
 from rbcourse.assignments import sandbox
 from rbcourse.assignments.autograding import RefusedError, configure
-from rbcourse.assignments.handout import find_set, last_line, quiet_log, read_config, secret_lines
+from rbcourse.assignments.handout import find_set, last_line, quiet_log, read_config
 from rbcourse.assignments.restore import grade_id, is_answer, marks_of, read_notebook
 from rbcourse.assignments.writing import write_csv
 
@@ -75,26 +73,32 @@ def grade(
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
-    rows: dict[str, dict[str, Any]] = {}
     with Gradebook(course.db_url) as gradebook:
-        known = _points(gradebook)
-    for student, found, meanwhile in _graded(name, assignments, students, seconds, memory, workers):
-        with Gradebook(course.db_url) as gradebook:
-            now, at_work = _points(gradebook), {student, *meanwhile}
-            for other in sorted({*known, *now} - at_work):
-                if known.get(other) != now.get(other):
-                    raise ValueError(
-                        f"The points of {other} changed while {' and '.join(sorted(at_work))} was "
-                        f"graded. gradebook.before-{name}.db holds what they were"
-                    )
-            try:
-                rows[student] = _row(gradebook, course, student, found)
-            except MissingEntry as error:
-                rows[student] = {"remarks": f"not graded: {error}"}
-            known = now | {student: _points(gradebook).get(student)}
-        print(f"{student}: {_summary(rows[student])}", flush=True)
-    boxed = "no" if sandbox.missing() else "yes"
-    first = {"set": name, "boxed": boxed}
+        known, rows = _points(gradebook), dict[str, dict[str, Any]]()
+    pool = ThreadPoolExecutor(workers)
+    try:
+        works = {
+            pool.submit(_grade_apart, name, assignments, student, seconds, memory): student
+            for student in students
+        }
+        for work in as_completed(works):
+            student = works.pop(work)
+            with Gradebook(course.db_url) as gradebook:
+                now = _points(gradebook)
+                begun = {works[other] for other in works if other.running() or other.done()}
+                at_work = sorted({student, *begun})
+                for other in sorted({*known, *now} - set(at_work)):
+                    if known.get(other) != now.get(other):
+                        raise ValueError(
+                            f"The points of {other} changed while {' and '.join(at_work)} was "
+                            f"graded. gradebook.before-{name}.db holds what they were"
+                        )
+                rows[student] = _row(gradebook, course, student, work.result())
+                known = now | {student: _points(gradebook).get(student)}
+            print(f"{student}: {_summary(rows[student])}", flush=True)
+    finally:
+        pool.shutdown(cancel_futures=True)
+    first = {"set": name, "boxed": "no" if sandbox.missing() else "yes"}
     write_csv(table, [{"student": student} | first | rows[student] for student in students])
     return table
 
@@ -128,62 +132,36 @@ def _points(gradebook: Any) -> dict[str, Any]:
     return points
 
 
-def _graded(
-    name: str, assignments: Path, students: list[str], seconds: float, memory: int, workers: int
-) -> Iterator[tuple[str, dict[str, Any], list[str]]]:
-    """Grade submissions, each in a process of its own; with each, yield who is at work besides.
+def _grade_apart(
+    name: str, assignments: Path, student: str, seconds: float, memory: int
+) -> dict[str, Any]:
+    """Grade a submission in a process of its own, which is ended when it takes too long.
 
-    A process that takes too long is ended, and with it, where there is a box, all that it started.
+    With it, where there is a box, all ends that it started.
     """
     # on Linux it is copied from one that has loaded nbgrader, which takes seconds
     context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
     context.set_forkserver_preload(["rbcourse.assignments.grade"])
-    boxed = not sandbox.missing()
-    waiting, running = students[::-1], dict[Connection, tuple[str, Any, str, float]]()
+    result, send = context.Pipe(duplex=False)
+    folder, boxed = tempfile.mkdtemp(), not sandbox.missing()
+    of = name, assignments, student, boxed, memory, folder, send
+    worker = context.Process(target=_work, args=of)
+    worker.start()
+    send.close()
     try:
-        while waiting or running:
-            while waiting and len(running) < workers:
-                student = waiting.pop()
-                result, send = context.Pipe(duplex=False)
-                folder = tempfile.mkdtemp()
-                of = name, assignments, student, boxed, memory, folder, send
-                worker = context.Process(target=_work, args=of)
-                worker.start()
-                send.close()
-                running[result] = student, worker, folder, time.monotonic() + seconds
-            left = min(until for *_, until in running.values()) - time.monotonic()
-            ready: list[Any] = wait(list(running), max(left, 0))
-            late = [c for c, (*_, until) in running.items() if until <= time.monotonic()]
-            for result in dict.fromkeys(ready + late):
-                student, worker, folder, _ = running.pop(result)
-                found = {"refused": f"not done after {seconds:g} s"}
-                if result in ready:
-                    found = _received(result)
-                worker.kill()
-                worker.join()
-                result.close()
-                _delete(folder)
-                yield student, found, [other for other, *_ in running.values()]
-    finally:
-        for _, worker, folder, _ in running.values():
-            worker.kill()
-            _delete(folder)
-
-
-def _delete(folder: str) -> None:
-    """Delete a folder in which a kernel that was ended may still write."""
-    for _ in range(50):
-        sandbox.delete(Path(folder))
-        if not os.path.exists(folder):
-            break
-        time.sleep(0.1)
-
-
-def _received(result: Connection) -> dict[str, Any]:
-    try:
-        return dict(result.recv())
+        if result.poll(seconds):
+            return dict(result.recv())
+        return {"refused": f"not done after {seconds:g} s"}
     except EOFError:
         return {"refused": "its process ended, or took too much memory"}
+    finally:
+        worker.kill()
+        worker.join()
+        for _ in range(50):  # a kernel that is ended may still write
+            sandbox.delete(Path(folder))
+            if not os.path.exists(folder):
+                break
+            time.sleep(0.1)
 
 
 def _work(
@@ -232,7 +210,10 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> dict[str, A
     now = _words(graded)
     new = [key for key in now if key in before and now[key] != before[key]]
     remarks += [f"{key} is another answer than when it was graded before" for key in new]
-    return {"remarks": remarks + _give_feedback(name, folder, student, config)}
+    done = run_step(GenerateFeedback, config)
+    if not done["success"]:
+        remarks.append(f"no feedback: {last_line(done)}")
+    return {"remarks": remarks}
 
 
 def _words(path: Path) -> dict[str, str]:
@@ -268,46 +249,6 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
         raise RefusedError(str(error)) from error
     if content.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
         raise RefusedError(f"{wanted} is not plain UTF-8: collect it again, or save it in Jupyter")
-
-
-def _give_feedback(name: str, folder: Path, student: str, config: Config) -> list[str]:
-    """Write the feedback; return what is to be said of it."""
-    done = run_step(GenerateFeedback, config)
-    if not done["success"]:
-        return [f"no feedback: {last_line(done)}"]
-    path = folder / "feedback" / student / name / f"{name}.html"
-    page = html.unescape(re.sub(r"<[^>]*>", "", path.read_text("utf-8")))
-    own = nbformat.read(folder / "submitted" / student / name / f"{name}.ipynb", as_version=4)
-    source = nbformat.read(find_set(name, folder) / f"{name}.ipynb", as_version=4)
-    written = squeezed("".join(cell.source for cell in own.cells))
-    secrets = map(squeezed, secret_lines(source, solutions=False))
-    if gives_away(page, [secret for secret in secrets if secret not in written]):
-        path.unlink()
-        return ["no feedback: it would show hidden tests or the mark scheme; look at the outputs"]
-    return []
-
-
-def squeezed(words: str) -> str:
-    """Return a text without its white space."""
-    return re.sub(r"\s+", "", words)
-
-
-def gives_away(page: str, secrets: Iterable[str]) -> bool:
-    """Return whether a text holds one of some squeezed texts: plain, reversed or in base64.
-
-    Examples
-    --------
-    >>> gives_away("72-==)3-(ebuc", ["cube(-3)==-27"])
-    True
-    >>> gives_away("x Y3ViZSgtMykgPT0gLTI3", ["cube(-3)==-27"])
-    True
-    """
-    shown = squeezed(page)
-    runs = re.findall(r"[A-Za-z0-9+/]{16,}", shown)
-    parts = [run[start:] for run in (*runs, *(run[::-1] for run in runs)) for start in range(4)]
-    decoded = (base64.b64decode(part[: len(part) // 4 * 4]) for part in parts)
-    texts = [shown, *(squeezed(code.decode("utf-8", "ignore")) for code in decoded)]
-    return any(secret in words or secret[::-1] in words for secret in secrets for words in texts)
 
 
 def _row(

@@ -34,10 +34,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
     if not content.strip():
         raise ValueError(f"{name} is empty; open it in JupyterLab and save it, or start anew")
     if content.startswith((b"%PDF", b"PK")):
-        raise ValueError(
-            f"{name} is no notebook, but a PDF or an archive under another name; hand in the "
-            "notebook itself"
-        )
+        raise ValueError(f"{name} is no notebook, but a PDF or an archive; hand in the notebook")
     try:
         text = decode(content)
         if MERGE.search(text):
@@ -107,14 +104,13 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     cells of the student; these lose their metadata, which could keep them from being run.
     """
     cells, wanted = notebook.cells, {grade_id(c): c for c in original.cells if grade_id(c)}
-    ids = {grade_id(cell) for cell in cells} - {""}
-    if len(ids & set(wanted)) <= len(ids - set(wanted)):
+    last = {grade_id(cell): at for at, cell in enumerate(cells) if grade_id(cell)}
+    if len(last.keys() & wanted.keys()) <= len(last.keys() - wanted.keys()):
         raise ValueError(
             "the cells are not those of this problem set; check that this is the right file, and "
             "that it is the notebook handed out, not a new one"
         )
     remarks = []
-    last = {grade_id(cell): at for at, cell in enumerate(cells)}
     for at, cell in enumerate(cells):
         name = grade_id(cell)
         if name in wanted and last[name] == at:
@@ -124,13 +120,19 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
             counts = f"is there again as cell {last[name] + 1}, which counts"
             remarks.append(f"{name_cell(cells, at)}: {counts}")
         cell.metadata = NotebookNode()
-    remarks += _add_missing(cells, original.cells)
-    there = [grade_id(cell) for cell in cells if grade_id(cell)]
-    if there != list(wanted):
+    above = -1
+    for name, missing in wanted.items():
+        there = [grade_id(cell) for cell in cells]
+        if name not in there:
+            cells.insert(above + 1, copy.deepcopy(missing))
+            remarks.append(f"{name_cell(cells, above + 1)} was missing; it is put back")
+            there.insert(above + 1, name)
+        above = there.index(name)
+    if [grade_id(cell) for cell in cells if grade_id(cell)] != list(wanted):
         remarks.append("cells are not in the order of the original; they are run in yours")
-    used: set[str] = set()
+    used = {""}
     for cell in cells:
-        if cell.get("id") in used | {None}:
+        if cell.get("id", "") in used:
             cell.id = uuid.uuid4().hex[:8]
         used.add(cell.id)
         if cell.cell_type == "code":
@@ -140,13 +142,10 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
 
 
 def _put_back(cells: list[NotebookNode], at: int, wanted: NotebookNode) -> list[str]:
-    cell, kept = cells[at], _copy(wanted)
-    old, new = marks_of(wanted), marks_of(cell)
+    cell, kept = cells[at], copy.deepcopy(wanted)
     changes = [f"was made a {cell.cell_type} cell"] * (cell.cell_type != wanted.cell_type)
-    if old.get("points") != new.get("points"):
-        changes.append(f"has other points than {old.get('points')}")
-    if any(old.get(key) != new.get(key) for key in {*old, *new} - {"points", "cell_type"}):
-        changes.append("has other marks for grading")
+    own, given = ({**marks_of(c), "cell_type": ""} for c in (cell, wanted))
+    changes += ["has other points or marks"] * (own != given)
     if any(cell.metadata.get(k) != wanted.metadata.get(k) for k in ("editable", "deletable")):
         changes.append("was unlocked")
     if is_answer(wanted):
@@ -157,20 +156,3 @@ def _put_back(cells: list[NotebookNode], at: int, wanted: NotebookNode) -> list[
         changes.insert(0, "was changed")
     cells[at] = kept
     return [f"{name_cell(cells, at)} {' and '.join(changes)}; it is put back"] if changes else []
-
-
-def _copy(cell: NotebookNode) -> NotebookNode:
-    return nbformat.from_dict(copy.deepcopy(dict(cell)))
-
-
-def _add_missing(cells: list[NotebookNode], original: list[NotebookNode]) -> list[str]:
-    remarks, before = [], ""
-    for wanted in original:
-        name = grade_id(wanted)
-        there = [grade_id(cell) for cell in cells]
-        if name and name not in there:
-            at = there.index(before) + 1 if before else 0
-            cells.insert(at, _copy(wanted))
-            remarks.append(f"{name_cell(cells, at)} was missing; it is put back")
-        before = name or before
-    return remarks

@@ -166,7 +166,7 @@ def test_points_and_remarks(rows, student, square, half, remarks):
         ("dies", "Python ended in or before cell 5, answer of “A tiny set”: grade by hand"),
         ("stripped", "the cells are not those of this problem set"),
         ("other set", "the cells are not those of this problem set"),
-        ("pdf", "ps0.ipynb is no notebook, but a PDF or an archive under another name"),
+        ("pdf", "ps0.ipynb is no notebook, but a PDF or an archive; hand in the notebook"),
         ("broken", "ps0.ipynb is damaged or no notebook ("),
         ("empty", "ps0.ipynb is empty"),
         ("wrong name", "there is no ps0.ipynb, but PS0.ipynb"),
