@@ -98,13 +98,13 @@ def main():
     elif known.task == "check":
         run("-m", "rbcourse.assignments.check", known.file)
     elif known.task == "handout":
-        run("-m", "rbcourse.assignments.handout", known.set, *["--solutions"] * known.solutions)
+        run("-m", "rbcourse.assignments", "handout", known.set, *["--solutions"] * known.solutions)
     elif known.task == "collect":
         due = ["--due", known.due] if known.due else []
-        run("-m", "rbcourse.assignments.collect", known.folder, *due)
+        run("-m", "rbcourse.assignments", "collect", known.folder, *due)
     elif known.task == "grade":
         box = ["--require-box"] * known.require_box
-        run("-m", "rbcourse.assignments.grade", *(known.sets + box))
+        run("-m", "rbcourse.assignments", "grade", *(known.sets + box))
     elif known.task == "hostile":
         install_package("bwrap", "bubblewrap")
         test_in(VENV, "tests/hostile", *further)

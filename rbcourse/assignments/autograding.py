@@ -50,17 +50,14 @@ def configure(config: Config) -> None:
     if not shutil.which("alembic"):
         tools = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
         os.environ["PATH"] = os.pathsep.join(tools)
-    config.Autograde.sanitize_preprocessors = [
-        RestoreCells,
-        nbgrader.OverwriteKernelspec,
-        nbgrader.CheckCellMetadata,
-    ]
+    end = nbgrader.CheckCellMetadata
+    config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
     config.Autograde.autograde_preprocessors = [
         BoxedExecute,
         nbgrader.IgnorePattern,
         nbgrader.SaveAutoGrades,
         nbgrader.AssignLatePenalties,
-        nbgrader.CheckCellMetadata,
+        end,
     ]
     # nbgrader gives no points where anything is written to stderr, be it a mere warning
     config.IgnorePattern.enabled = True
@@ -157,17 +154,13 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
     def _default_boxed(self) -> bool:
         return not sandbox.missing()
 
-    @property
-    def converter(self) -> Any:
-        """The step of nbgrader that this is a part of."""
-        return getattr(self.parent, "parent", None)
-
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any], km: Any = None
     ) -> tuple[NotebookNode, dict[str, Any]]:
         """Run all cells; errors are among the outputs."""
         remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
-        course, name = self.converter.coursedir, resources["nbgrader"]["assignment"]
+        step: Any = self.parent
+        course, name = step.parent.coursedir, resources["nbgrader"]["assignment"]
         source = course.format_path(course.source_directory, ".", name)
         self.folder = Path(tempfile.mkdtemp())
         work = self.folder / "work"

@@ -12,6 +12,7 @@ import shutil
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from pathlib import Path
 
 import nbformat
@@ -66,7 +67,11 @@ def check(path: Path, original: Path | None = None, seconds: int = CELL_SECONDS)
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as work,
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own,
     ):
-        _list(_copy_files(path.parent, Path(work)))
+        for file in (file for file in path.parent.iterdir() if file.is_file()):
+            if file.stat().st_size > LARGE_BYTES:
+                _list([f"{file.name} is large; it is not there in the run"])
+            elif file.suffix not in (".whl", ".zip"):
+                shutil.copy(file, work)
         _list(_run(notebook, work, own, seconds))
     passed = _print_problems(notebook, wanted)
     nbformat.validate(notebook)
@@ -89,29 +94,13 @@ def _list(remarks: list[str]) -> None:
 
 def _find_original(path: Path) -> Path:
     folder = path.parent / "original"
-    if (folder / path.name).is_file():
-        return folder / path.name
-    notebooks = sorted(folder.glob("*.ipynb"))
-    if len(notebooks) != 1:
+    same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
+    if len(same) != 1:
         raise ValueError(
             f"{folder / path.name} is missing; unpack the handout again, put {path.name} into "
             "its folder, and check it there"
         )
-    return notebooks[0]
-
-
-def _copy_files(folder: Path, work: Path) -> list[str]:
-    """Copy what lies beside the notebook, not what lies in folders: that may be a whole disk."""
-    remarks = []
-    for file in sorted(folder.iterdir()):
-        if file.is_file() and file.suffix not in (".whl", ".zip"):
-            try:
-                if file.stat().st_size > LARGE_BYTES:
-                    raise OSError("too large")
-                shutil.copyfile(file, work / file.name)
-            except OSError as error:
-                remarks.append(f"{file.name} cannot be copied for the run: {error}")
-    return remarks
+    return same[0]
 
 
 class _Client(BoundedClient):
@@ -130,7 +119,7 @@ def _run(notebook: NotebookNode, work: str, own: str, seconds: int) -> list[str]
     """Run all cells; say what did not go well, except in a problem."""
     log = logging.getLogger(__name__)
     log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
-    path, remarks, cells = {"metadata": {"path": work}}, [], notebook.cells
+    path, cells, remarks = {"metadata": {"path": work}}, notebook.cells, []
     client = _Client(notebook, log=log, kernel_name=KERNEL["name"], resources=path)
     client.timeout, client.folder = seconds, Path(own)
     try:
@@ -144,16 +133,12 @@ def _run(notebook: NotebookNode, work: str, own: str, seconds: int) -> list[str]
         ) from error
     try:
         client.execute()
-    except DeadKernelError:
+    except (DeadKernelError, CellTimeoutError) as error:
+        if isinstance(error, DeadKernelError):
+            died = f"the kernel died in cell {client.at + 1}: it called exit, or used up the memory"
+            remarks.append(died)
         cells[client.at].execution_count = None
-        remarks.append(
-            f"the kernel died in cell {client.at + 1}: it called exit, or used up the memory; "
-            "the cells after it were not run"
-        )
-    except CellTimeoutError:
-        cells[client.at].execution_count = None
-        first = client.at + 1 + (client.at in client.slow)
-        remarks += [f"cells from {first} on were not run"] * (first <= len(cells))
+        remarks.append(f"the cells after cell {client.at + 1} were not run")
     print(flush=True)
     long = f"took longer than {seconds} s and was stopped"
     remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
@@ -177,32 +162,32 @@ def _error(cell: NotebookNode) -> str:
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
     """Print a line a problem, under its title; return which of the visible tests passed."""
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
-    problems: dict[str, list[tuple[str, str]]] = {}
+    problems = defaultdict[str, list[tuple[str, str]]](list)
     passed, answered = [], True
     for at, cell in enumerate(notebook.cells):
-        error, found = _error(cell), ("", "")
+        error, found = _error(cell), problems[title_of(notebook.cells, at)]
+        where = f"cell {at + 1}"
         if is_answer(cell):
             answered = cell.source.strip() not in ("", empty[grade_id(cell)])
             if not answered:
-                found = "empty", "is not answered yet"
+                found.append(("empty", f"{where} is not answered yet"))
             elif error:
-                found = "FAILED", error
+                found.append(("FAILED", f"{where} {error}"))
             elif marks_of(cell).get("grade"):
-                found = "words", "is graded by a person"
+                found.append(("words", f"{where} is graded by a person"))
         elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
-            found = "hidden", "has hidden tests only"
+            found.append(("hidden", f"{where} has hidden tests only"))
         elif is_test(cell):
             error = error or ("" if cell.execution_count else "it was not run to its end")
             passed.append(not error)
-            found = ("FAILED" * answered, error * answered) if error else ("passed", "")
-        if found[0]:
-            words = f"cell {at + 1} {found[1]}" if found[1] else ""
-            problems.setdefault(title_of(notebook.cells, at), []).append((found[0], words))
+            if answered or not error:
+                found.append(("FAILED", f"{where} {error}") if error else ("passed", ""))
     order = ("FAILED", "empty", "passed", "words", "hidden")
-    for title, all_found in problems.items():
-        words = "; ".join(said for _, said in all_found if said)
-        status = min((status for status, _ in all_found), key=order.index)
-        print(f"{status}  {title}" + f": {words}" * bool(words))
+    for title, found in problems.items():
+        if found:
+            words = "; ".join(said for _, said in found if said)
+            status = min((status for status, _ in found), key=order.index)
+            print(f"{status}  {title}" + f": {words}" * bool(words))
     return passed
 
 

@@ -12,11 +12,10 @@ from traitlets import Integer
 from rbcourse.course.notebooks import kernel_address
 
 STOP_SECONDS = 20  # that an interrupted cell may take to stop
-PRINTED = 100_000  # characters that a cell may print
-DISPLAYED = 2_000_000  # characters of its pictures and pages
+PRINTED, DISPLAYED = 100_000, 2_000_000  # characters of a cell: in print, and of pictures and pages
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
-SLOW = "the cell took too long"
+SLOW = {"ename": "TimeoutError", "evalue": "the cell took too long", "traceback": []}
 CUT = "the output is too large; what is too much is left out"
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -24,30 +23,24 @@ WIDGET = "application/vnd.jupyter.widget-view+json"
 class BoundedClient(NotebookClient):
     """A client for a notebook whose cells may loop, flood or die.
 
-    Its kernel keeps what it keeps in `folder`, which is to be set before it starts.
-
-    Attributes
-    ----------
-    slow, cut : list of int
-        The indices of the cells that took too long, and of which not all output is kept.
+    Its kernel keeps what it keeps in `folder`, which is to be set before it starts. `slow` and
+    `cut` are the indices of the cells that took too long, and of which not all output is kept.
     """
 
     iopub_timeout = Integer(STOP_SECONDS).tag(config=True)
+    folder = Path()
 
     def __init__(self, *args: Any, **settings: Any) -> None:
         super().__init__(*args, **settings)
-        self.error_on_timeout = {"ename": "TimeoutError", "evalue": SLOW, "traceback": [SLOW]}
+        self.error_on_timeout, self.shutdown_kernel = SLOW, "immediate"
         self.extra_arguments = ["--log-level=CRITICAL"]
-        self.shutdown_kernel = "immediate"
         self.allow_errors = self.interrupt_on_timeout = self.coalesce_streams = True
         self.record_timing = False
-        self.folder = Path()
 
     def reset_execution_trackers(self) -> None:
         """Begin to count."""
         super().reset_execution_trackers()
-        self.slow: list[int] = []
-        self.cut: list[int] = []
+        self.slow, self.cut = list[int](), list[int]()
         self._at, self._left, self._room = -1, ALL_OUTPUT, dict[str, int]()
 
     def create_kernel_manager(self) -> Any:
@@ -106,11 +99,10 @@ class BoundedClient(NotebookClient):
         """Keep the error that the reply names: without it a test would seem to pass."""
         reply = execute_reply["content"]
         if reply["status"] != "ok":
-            kept = [out for out in cell.outputs if out.output_type != "execute_result"]
+            cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]
             empty = {"ename": "Error", "evalue": "it was not run", "traceback": []}
             error = {key: reply.get(key, value) for key, value in empty.items()}
-            if not any(out.get("ename") == error["ename"] for out in kept):
-                kept.append(new_output("error", **error))
-            cell.outputs = kept
+            if not any(out.get("ename") == error["ename"] for out in cell.outputs):
+                cell.outputs.append(new_output("error", **error))
         if cell_index in self.cut:
             cell.outputs.append(new_output("stream", name="stdout", text=f"\n({CUT})\n"))

@@ -5,12 +5,10 @@ Canvas give. The date of a file in a download is often that of the download: one
 the due date shows that the file was in time, and a later one shows nothing.
 """
 
-import argparse
 import contextlib
 import csv
 import io
 import re
-import sys
 import unicodedata
 import zipfile
 import zlib
@@ -36,8 +34,6 @@ JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_St
 FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
 # RuntimeError is raised for a password, NotImplementedError, one of them, for a method
 BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
-LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
-LISTS += ["not on the roster", "missing"]
 Rows = list[tuple[str, str, str]]
 
 
@@ -88,7 +84,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
             rows += _tell_late(best, f"{who}, {name}", due)
     for name, students in there.items() if roster else ():
         ids = {row["id"]: row for row in roster}
-        rows += [("not on the roster", who, students[who]) for who in students.keys() - ids]
+        rows += [("not on the roster", who, students[who]) for who in sorted(students.keys() - ids)]
         for who in [who for who in ids if not (submitted / who / name / f"{name}.ipynb").exists()]:
             words = f"{ids[who].get('first_name', '')} {ids[who].get('last_name', '')}".strip()
             rows.append(("missing", f"{who}, {name}", words))
@@ -144,14 +140,14 @@ def _look(label: str, name: str, stream: IO[bytes], date: datetime, rows: Rows) 
 def _look_into(
     archive: zipfile.ZipFile, label: str, name: str, date: datetime, rows: Rows
 ) -> Iterator[Upload]:
-    entries = {_shown(e.filename): e for e in archive.infolist() if not e.is_dir()}
+    entries = [(_shown(e.filename), e) for e in archive.infolist() if not e.is_dir()]
     # the name of a whole download may look like that of an upload
-    owned = any(MOODLE.fullmatch(inner) or CANVAS.fullmatch(inner) for inner in entries)
+    owned = any(MOODLE.fullmatch(inner) or CANVAS.fullmatch(inner) for inner, _ in entries)
     upload = bool(MOODLE.fullmatch(name) or (CANVAS.fullmatch(name) and not owned))
-    size = sum(entry.file_size for entry in entries.values())
+    size = sum(entry.file_size for _, entry in entries)
     if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
         raise ValueError("it holds a zip, or too much; unpack it by hand")
-    for inner, entry in entries.items():
+    for inner, entry in entries:
         wanted, content = inner.lower().endswith((".ipynb", ".zip")), b""
         try:
             if wanted and entry.file_size > FILE_BYTES:
@@ -260,25 +256,3 @@ def _tell_late(upload: Upload, who: str, due: datetime | None) -> Rows:
         why = f"dated {upload.date}, which may be the download; look in Moodle"
         return [("late", who, f"perhaps: {why}")]
     return []
-
-
-def main() -> None:
-    """Collect a folder: ``python -m rbcourse.assignments.collect FOLDER``, in the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.collect")
-    parser.add_argument("folder", type=Path, help="with what was downloaded from Moodle and Canvas")
-    parser.add_argument("--due", type=datetime.fromisoformat, help='"2026-12-01 23:59"')
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
-        sys.stdout.reconfigure(errors="replace")
-    known = parser.parse_args()
-    try:
-        rows = collect(known.folder, Path("notebooks/assignments"), known.due)
-    except (OSError, ValueError) as error:
-        sys.exit(str(error))
-    for kind in LISTS:
-        own = [f"  {what}: {why}" for name, what, why in rows if name == kind]
-        if own or kind == "collected":
-            print(f"{kind}: {len(own)}", *own, sep="\n")
-
-
-if __name__ == "__main__":
-    main()

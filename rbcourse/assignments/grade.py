@@ -1,8 +1,9 @@
 """Grade problem sets: each submission on its own, with feedback and a table of the points."""
 
-import argparse
 import glob
+import logging
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -23,23 +24,13 @@ from traitlets.config import Config
 
 from rbcourse.assignments import sandbox
 from rbcourse.assignments.autograding import RefusedError, configure
-from rbcourse.assignments.handout import find_set, last_line, quiet_log, read_config
+from rbcourse.assignments.handout import find_set, read_config
 from rbcourse.assignments.restore import grade_id, is_answer, marks_of, read_notebook
 from rbcourse.assignments.writing import write_csv
 
 SECONDS = 600  # for a student, all in all
 MEMORY = 1_500_000_000  # bytes, for each process of a student
 LARGEST = 30_000_000  # bytes of a notebook
-POINTS = """
-SELECT student_id, submitted_assignment.assignment_id, cell_id, auto_score, manual_score,
-extra_credit FROM grade JOIN submitted_notebook ON submitted_notebook.id = grade.notebook_id
-JOIN submitted_assignment ON submitted_assignment.id = submitted_notebook.assignment_id
-"""
-
-
-def sets_submitted(assignments: Path) -> list[str]:
-    """Return the problem sets of which there are submissions."""
-    return sorted({path.name for path in assignments.glob("submitted/*/*/")})
 
 
 def grade(
@@ -116,20 +107,28 @@ def course_config(name: str, assignments: Path) -> Config:
 
 
 def run_step(converter: Any, config: Config) -> dict[str, Any]:
-    """Run a step of nbgrader, over what it made before."""
-    course = CourseDirectory(config=config)
-    step = converter(course, config=config, log=quiet_log("steps"))
+    """Run a step of nbgrader, over what it made before, and print nothing."""
+    log = logging.getLogger(__name__)
+    log.propagate, log.handlers = False, [logging.NullHandler()]
+    step = converter(CourseDirectory(config=config), config=config, log=log)
     step.force = True
     return capture_log(step)
 
 
+def last_line(done: dict[str, str]) -> str:
+    """Return what went wrong in a run of nbgrader, as one line."""
+    raised = re.findall(r"^ *([\w.]+(?:Error|Exception|Entry)): (.*)$", done.get("log", ""), re.M)
+    refused = [what for kind, what in raised if kind.endswith("RefusedError")]
+    lines = refused or [what for _, what in raised] or done["error"].strip().splitlines()[-1:]
+    return lines[0]
+
+
 def _points(gradebook: Any) -> dict[str, Any]:
-    """Return the points of each student, as a sorted list of rows."""
-    points: dict[str, Any] = {}
-    rows = gradebook.db.connection().exec_driver_sql(POINTS)
-    for student, *row in sorted(map(tuple, rows), key=str):
-        points.setdefault(student, []).append(row)
-    return points
+    """Return the points of each student in each set."""
+    return {
+        student.id: sorted((of.assignment.name, of.score) for of in student.submissions)
+        for student in gradebook.students
+    }
 
 
 def _grade_apart(
@@ -143,9 +142,8 @@ def _grade_apart(
     context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
     context.set_forkserver_preload(["rbcourse.assignments.grade"])
     result, send = context.Pipe(duplex=False)
-    folder, boxed = tempfile.mkdtemp(), not sandbox.missing()
-    of = name, assignments, student, boxed, memory, folder, send
-    worker = context.Process(target=_work, args=of)
+    folder, of = tempfile.mkdtemp(), (name, assignments, student, not sandbox.missing())
+    worker = context.Process(target=_work, args=(send, folder, memory, of))
     worker.start()
     send.close()
     try:
@@ -164,15 +162,7 @@ def _grade_apart(
             time.sleep(0.1)
 
 
-def _work(
-    name: str,
-    assignments: Path,
-    student: str,
-    boxed: bool,
-    memory: int,
-    folder: str,
-    send: Connection,
-) -> None:
+def _work(send: Connection, folder: str, memory: int, of: tuple[str, Path, str, bool]) -> None:
     """Grade a submission in this process, under limits and with nothing printed."""
     with open(os.devnull, "r+b") as nowhere:
         for stream in (0, 1, 2):
@@ -183,7 +173,9 @@ def _work(
 
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     try:
-        found = grade_one(name, assignments, student, boxed)
+        found = grade_one(*of)
+    except RefusedError as error:
+        found = {"refused": str(error)}
     except Exception as error:  # told, and the others are graded
         found = {"refused": f"{type(error).__name__}: {error}"}
     send.send(found)
@@ -196,20 +188,17 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> dict[str, A
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)
-    try:
-        if glob.escape(student) != student:  # nbgrader would take it for a pattern
-            raise RefusedError("the name of the folder holds [, * or ?: give it another")
-        given = {path.name for path in find_set(name, folder).iterdir()}
-        check_submission(folder / "submitted" / student / name, name, given)
-        done = run_step(Autograde, config)
-        if not done["success"]:
-            raise RefusedError(last_line(done))
-    except RefusedError as error:
-        return {"refused": str(error)}
+    if glob.escape(student) != student:  # nbgrader would take it for a pattern
+        raise RefusedError("the name of the folder holds [, * or ?: give it another")
+    given = {path.name for path in find_set(name, folder).iterdir()}
+    check_submission(folder / "submitted" / student / name, name, given)
+    done = run_step(Autograde, config)
+    if not done["success"]:
+        raise RefusedError(last_line(done))
     remarks = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
-    now = _words(graded)
-    new = [key for key in now if key in before and now[key] != before[key]]
-    remarks += [f"{key} is another answer than when it was graded before" for key in new]
+    for key, words in _words(graded).items():
+        if words != before.get(key, words):
+            remarks.append(f"{key} is another answer than when it was graded before")
     done = run_step(GenerateFeedback, config)
     if not done["success"]:
         remarks.append(f"no feedback: {last_line(done)}")
@@ -218,9 +207,7 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> dict[str, A
 
 def _words(path: Path) -> dict[str, str]:
     """Return the answers that a human grades, as they were graded last."""
-    if not path.exists():
-        return {}
-    cells = nbformat.read(path, as_version=4).cells
+    cells = nbformat.read(path, as_version=4).cells if path.exists() else []
     words = (cell for cell in cells if is_answer(cell) and marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}
 
@@ -238,8 +225,6 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
         raise RefusedError(f"{wanted}, or what is beside it, is a link")
     if others := sorted(set(there) - given - {wanted, "timestamp.txt"}):
         raise RefusedError(f"there is more than {wanted}: take away {', '.join(others)}")
-    if not path.is_file():
-        raise RefusedError(f"{wanted} is a folder")
     if path.stat().st_size > LARGEST:
         raise RefusedError(f"{wanted} has more than {LARGEST:,} bytes")
     content = path.read_bytes()
@@ -306,8 +291,8 @@ def _summary(row: dict[str, Any]) -> str:
 
 
 def grade_all(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:
-    """Grade sets one after the other."""
-    chosen = list(names) or sets_submitted(assignments)
+    """Grade sets, or all of which there are submissions, one after the other."""
+    chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:
         raise ValueError("There are no submissions: submitted/STUDENT/ps1/ps1.ipynb")
     if why := sandbox.missing():
@@ -320,19 +305,3 @@ def grade_all(names: Iterable[str], assignments: Path, require_box: bool = False
         tables.append(grade(name, assignments))
         print(tables[-1])
     return tables
-
-
-def main() -> None:
-    """Grade from the command line: ``python -m rbcourse.assignments.grade ps1``, in the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.grade")
-    parser.add_argument("sets", nargs="*", metavar="set", help="as ps1; all that are submitted")
-    parser.add_argument("--require-box", action="store_true", help="refuse to grade without a box")
-    known = parser.parse_args()
-    try:
-        grade_all(known.sets, Path("notebooks", "assignments"), known.require_box)
-    except (OSError, ValueError) as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()

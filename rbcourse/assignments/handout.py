@@ -1,30 +1,33 @@
 """Pack a problem set for students: the notebook, the package, and a page on how to begin."""
 
-import argparse
+import copy
 import io
-import json
-import logging
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import nbformat
-from nbclient.exceptions import CellExecutionError
 from nbformat import NotebookNode
-from nbgrader.converters import GenerateAssignment
-from nbgrader.coursedir import CourseDirectory
-from nbgrader.preprocessors import ClearHiddenTests, ClearMarkScheme
-from nbgrader.utils import capture_log
+from nbgrader.nbgraderformat import ValidationError
+from nbgrader.preprocessors import (
+    CheckCellMetadata,
+    ClearHiddenTests,
+    ClearMarkScheme,
+    ClearOutput,
+    ClearSolutions,
+    ComputeChecksums,
+    LockCells,
+)
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
 from rbcourse.assignments.client import BoundedClient
-from rbcourse.assignments.restore import grade_id, is_answer
+from rbcourse.assignments.restore import is_answer
 from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
 
@@ -38,6 +41,10 @@ LEFTOVER = re.compile(
 REGION = re.compile(
     r"BEGIN (SOLUTION|HIDDEN TESTS|MARK SCHEME).*?\n(.*?)^[^\n]*END \1", re.M | re.S
 )
+
+
+STEPS = [LockCells, ClearSolutions, ClearOutput, CheckCellMetadata, ClearHiddenTests]
+STEPS += [ClearMarkScheme, ComputeChecksums]
 
 
 def find_set(name: str, assignments: Path) -> Path:
@@ -63,102 +70,54 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
     Neither the gradebook nor the folder of releases is touched.
     """
     source, config = find_set(name, assignments), read_config(assignments)
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(source, Path(folder, "source", name))
-        # nbgrader looks for nothing outside, and writes nowhere else
-        config.CourseDirectory.root = os.path.realpath(folder)
-        config.CourseDirectory.source_directory = "source"
-        config.CourseDirectory.assignment_id = name
-        config.GenerateAssignment.no_database = True
-        config.SaveCells.enabled = False
-        maker = GenerateAssignment(
-            CourseDirectory(config=config), config=config, log=quiet_log("release")
-        )
-        done = capture_log(maker)
-        if not done["success"]:
-            raise ValueError(f"{name} cannot be released: {last_line(done)}")
-        made = Path(folder, "release", name)
-        files = {
-            path.relative_to(made).as_posix(): path.read_bytes()
-            for path in sorted(made.rglob("*"))
-            if path.is_file()
-        }
-    _refuse_leaks(name, nbformat.read(source / f"{name}.ipynb", as_version=4), files)
+    given = nbformat.read(source / f"{name}.ipynb", as_version=4)
+    notebook, about = copy.deepcopy(given), dict[str, Any]()
+    try:
+        for step in STEPS:
+            notebook, about = step(config=config).preprocess(notebook, about)
+    except (RuntimeError, ValidationError) as error:
+        raise ValueError(f"{name} cannot be released: {error}") from error
+    paths = sorted(path for path in source.rglob("*") if path.is_file())
+    files = {path.relative_to(source).as_posix(): path.read_bytes() for path in paths}
+    files[f"{name}.ipynb"] = (nbformat.writes(notebook) + "\n").encode()
+    _refuse_leaks(name, given, files)
     return files
-
-
-def quiet_log(name: str) -> logging.Logger:
-    """Return a log for nbgrader that is printed nowhere."""
-    log = logging.getLogger(f"{__name__}.{name}")
-    log.propagate = False
-    log.addHandler(logging.NullHandler())
-    return log
-
-
-def last_line(done: dict[str, str]) -> str:
-    """Return what went wrong in a run of nbgrader, as one line."""
-    raised = re.findall(r"^ *([\w.]+(?:Error|Exception|Entry)): (.*)$", done.get("log", ""), re.M)
-    refused = [what for kind, what in raised if kind.endswith("RefusedError")]
-    lines = refused or [what for _, what in raised] or done["error"].strip().splitlines()[-1:]
-    return lines[0]
 
 
 def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> None:
     """Raise a ValueError if a file contains solutions, hidden tests or mark schemes."""
-    released = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
-    for cell in released.cells:
-        left = LEFTOVER.search(cell.source)
-        fault = f"{left[0].strip()!r} is left over" if left else ""
-        if cell.get("outputs") or cell.get("execution_count"):
-            fault = "outputs are left"
-        elif cell.get("attachments") and is_answer(cell):
-            fault = "nbgrader leaves the attachment of an answer there"
-        if fault:
-            raise ValueError(f"{name}, cell {grade_id(cell) or cell.get('id')}: {fault}")
-    secrets = [*map(re.escape, secret_lines(source)), LEFTOVER.pattern]
+    secrets = _secret_lines(source)
     for path, content in files.items():
-        text = content.decode("utf-8", errors="replace")
-        if path.endswith(".ipynb"):
-            if path != f"{name}.ipynb":
-                raise ValueError(f"{name}: {path} is a second notebook; a set has one")
-            text = "\n".join(_strings(json.loads(text)))
-        if shown := re.search("|".join(secrets), text, LEFTOVER.flags):
-            raise ValueError(f"{name}: {path} gives away {shown[0]!r}")
+        texts = [content.decode("utf-8", errors="replace")]
+        if path == f"{name}.ipynb":
+            cells = nbformat.reads(texts[0], as_version=4).cells
+            texts = [cell.source for cell in cells] + [str(cell.metadata) for cell in cells]
+            if any(cell.get("attachments") and is_answer(cell) for cell in cells):
+                raise ValueError(f"{name}: nbgrader leaves the attachment of an answer there")
+        elif path.endswith(".ipynb"):
+            raise ValueError(f"{name}: {path} is a second notebook; a set has one")
+        for text in texts:
+            if shown := [
+                *(secret for secret in secrets if secret in text),
+                *LEFTOVER.findall(text),
+            ]:
+                raise ValueError(f"{name}: {path} gives away {shown[0]!r}")
 
 
-def secret_lines(notebook: NotebookNode, *, solutions: bool = True) -> list[str]:
+def _secret_lines(notebook: NotebookNode) -> list[str]:
     """Return the lines inside the regions that nbgrader removes, except short and common ones."""
-    inside: set[str] = set()
-    for cell in notebook.cells:
-        for kind, region in REGION.findall(cell.source):
-            if solutions or kind != "SOLUTION" or cell.cell_type == "markdown":
-                inside |= {line.strip() for line in region.splitlines()}
-    texts = [REGION.sub("", cell.source) for cell in notebook.cells]
-    outside = {line.strip() for text in texts for line in text.splitlines()}
-    return sorted(
-        line
-        for line in inside - outside
-        if len(line) >= 12 and not line.startswith(("import ", "from ", "raise "))
-    )
-
-
-def _strings(value: object) -> list[str]:
-    if isinstance(value, dict):
-        return [text for pair in value.items() for part in pair for text in _strings(part)]
-    if isinstance(value, list):
-        return [text for part in value for text in _strings(part)]
-    return [value] if isinstance(value, str) else []
+    texts = [cell.source for cell in notebook.cells]
+    outside = {line.strip() for text in texts for line in REGION.sub("", text).splitlines()}
+    regions = [region for text in texts for _, region in REGION.findall(text)]
+    inside = {line.strip() for region in regions for line in region.splitlines()} - outside
+    common = ("import ", "from ", "raise ")
+    return sorted(line for line in inside if len(line) >= 12 and not line.startswith(common))
 
 
 def student_requirements(environment: str, wheel: str) -> str:
     """Return the requirements of the students."""
-    pins = dict(
-        re.findall(r"^(([\w-]+)==\S+)", line)[0][::-1]
-        for line in environment.splitlines()
-        if "==" in line
-    )
-    missing = [name for name in NEEDED if name not in pins]
-    if missing:
+    pins = {line.partition("==")[0]: line for line in environment.split() if "==" in line}
+    if missing := [name for name in NEEDED if name not in pins]:
         raise ValueError(f"environment.txt has no pin for {', '.join(missing)}")
     return "".join(f"{line}\n" for line in [*(pins[name] for name in NEEDED), f"./{wheel}"])
 
@@ -190,10 +149,8 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
         "README.txt": readme.format(name=name).replace("\n", "\r\n").encode("ascii"),
         wheel: content,
     }
-    if files.keys() & own.keys():
-        raise ValueError(
-            f"{name}: {min(files.keys() & own.keys())} is a name that the handout needs"
-        )
+    if taken := files.keys() & own.keys():
+        raise ValueError(f"{name}: {min(taken)} is a name that the handout needs")
     packed = io.BytesIO()
     with ZipFile(packed, "w") as archive:
         for path, data in sorted({**files, **own}.items()):
@@ -222,22 +179,3 @@ def make_solutions(name: str, assignments: Path) -> Path:
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     target = assignments / "handouts" / f"{name}-solutions.ipynb"
     return write_whole(target, (nbformat.writes(notebook) + "\n").encode())
-
-
-def main() -> None:
-    """Make a handout from the command line, in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.handout")
-    parser.add_argument("set", help="its name: ps1")
-    parser.add_argument("--solutions", action="store_true", help="the model answers")
-    known, assignments = parser.parse_args(), Path("notebooks", "assignments")
-    try:
-        if known.solutions:
-            print(make_solutions(known.set, assignments))
-        else:
-            print(make_handout(known.set, assignments, Path()))
-    except (OSError, ValueError, CellExecutionError) as error:
-        sys.exit(str(error))
-
-
-if __name__ == "__main__":
-    main()

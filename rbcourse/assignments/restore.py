@@ -35,15 +35,16 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
         raise ValueError(f"{name} is empty; open it in JupyterLab and save it, or start anew")
     if content.startswith((b"%PDF", b"PK")):
         raise ValueError(f"{name} is no notebook, but a PDF or an archive; hand in the notebook")
+    logging.disable()  # nbformat logs and warns of cells without ids, which get them later
     try:
         text = decode(content)
         if MERGE.search(text):
             raise ValueError("merge marks, <<<<<<< and >>>>>>>, are left in it")
-        with warnings.catch_warnings():  # on cells without ids, which get them later
-            warnings.simplefilter("ignore")
-            logging.disable()
+        with warnings.catch_warnings(action="ignore"):
             notebook = nbformat.reads(text, as_version=4)
             nbformat.validate(notebook)
+        if not notebook.cells:
+            raise ValueError("it has no cells")
     except Exception as error:  # whatever nbformat stumbles over
         why = (str(error).splitlines() or [type(error).__name__])[0][:80]
         raise ValueError(
@@ -52,8 +53,6 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
         ) from error
     finally:
         logging.disable(logging.NOTSET)
-    if not notebook.cells:
-        raise ValueError(f"{name} has no cells; open it in JupyterLab and save it again")
     return notebook
 
 
@@ -80,13 +79,9 @@ def is_test(cell: NotebookNode) -> bool:
 
 def title_of(cells: list[NotebookNode], at: int) -> str:
     """Return the last heading above a cell, or in it, that is not the student's."""
-    titles = [
-        match[1].strip()
-        for cell in cells[: at + 1]
-        if cell.cell_type == "markdown" and grade_id(cell) and not is_answer(cell)
-        for match in re.finditer(r"^#+\s+(.+)", cell.source, re.MULTILINE)
-    ]
-    return titles[-1] if titles else ""
+    given = [c for c in cells[: at + 1] if c.cell_type == "markdown" and not is_answer(c)]
+    text = "\n".join(cell.source for cell in given if grade_id(cell))
+    return (re.findall(r"^#+\s+(.+?)\s*$", text, re.MULTILINE) or [""])[-1]
 
 
 def name_cell(cells: list[NotebookNode], at: int) -> str:

@@ -3,7 +3,6 @@
 Only what a function names is looked at: that tells an honest student what is not meant.
 """
 
-import functools
 import linecache
 import sys
 import textwrap
@@ -11,11 +10,9 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from itertools import chain
-from types import CodeType, FunctionType, MethodType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-TOOLS = {"__main__", "builtins", "numpy", "matplotlib", "mpl_toolkits", "IPython", "ipywidgets"}
-TOOLS |= {"anywidget", "traitlets", "tqdm"}
 LIBRARIES = {"rbcourse", "scipy", "sympy", "pytransform3d", "jax", "torch", "quaternion"}
 
 
@@ -53,57 +50,33 @@ def _trouble(error: Exception) -> str:
     return f"Your function stops{where}: {type(error).__name__}: {error}"
 
 
-def _root(name: str | None) -> str:
-    return (name or "").partition(".")[0]
-
-
-def _is_tool(module: str | None) -> bool:
-    return _root(module) in TOOLS or _root(module) in sys.stdlib_module_names
-
-
 def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
-    """Yield what a function refers to that is neither the student's own nor a tool."""
-    waiting, known = [function], set[int]()
-    while waiting:
-        value = waiting.pop()
-        if id(value) in known:
-            continue
-        known.add(id(value))
-        if isinstance(value, functools.partial):
-            waiting += [value.func, *value.args]
-        elif isinstance(value, MethodType):
-            waiting += [value.__func__, value.__self__]
-        elif isinstance(value, FunctionType) and value.__module__ == "__main__":
-            waiting += _referred_to(value)
-        elif isinstance(value, ModuleType):
-            yield from [] if _is_tool(value.__name__) else [value.__name__]
-        else:
-            named = value if isinstance(value, FunctionType | type) else type(value)
-            module, name = _root(named.__module__), getattr(value, "__name__", named.__name__)
-            if not _is_tool(module) and not (module == "rbcourse" and name in allowed):
-                yield f"{module}.{name}"
+    """Yield what a function refers to, itself or by the student's other functions, of libraries.
 
-
-def _referred_to(function: FunctionType) -> Iterator[Any]:
-    """Yield the defaults of a function, and what its global and enclosed names stand for.
-
-    The names of a function do not tell where they stand: of a module that is no tool all is taken
-    that has one of them.
+    The names of a function do not tell where they stand: of a module all is taken that has one.
     """
-    yield from function.__defaults__ or ()
-    yield from (function.__kwdefaults__ or {}).values()
-    with suppress(ValueError):  # an enclosed name that has no value yet
-        yield from (cell.cell_contents for cell in function.__closure__ or ())
-    names = _names(function.__code__)
-    for name in names:
-        value = function.__globals__.get(name)
-        if name not in function.__globals__ and _root(name) in LIBRARIES:  # imported inside
-            value = sys.modules.get(name) or ModuleType(name)
-        if isinstance(value, ModuleType) and not _is_tool(value.__name__):
-            used = [getattr(value, inner) for inner in names if hasattr(value, inner)]
-            yield from used or [value]
-        else:
-            yield value
+    permitted = [("rbcourse", name) for name in allowed]
+    waiting, known = [(function, list[str]())], set[tuple[Any, ...]]()
+    while waiting:
+        value, names = waiting.pop()
+        key, found = (id(value), *names), list[Any]()
+        module = getattr(value, "__module__", None) or type(value).__module__
+        name = getattr(value, "__name__", type(value).__name__)
+        if key in known:
+            continue
+        if isinstance(value, FunctionType) and module == "__main__":
+            names = _names(value.__code__)
+            # imported inside, a name is not among the globals
+            found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
+            found += value.__defaults__ or ()
+            with suppress(ValueError):  # an enclosed name that has no value yet
+                found += [cell.cell_contents for cell in value.__closure__ or ()]
+        elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
+            found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
+        elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:
+            yield f"{own}.{name}"
+        known.add(key)
+        waiting += [(inner, names) for inner in found]
 
 
 def _names(code: CodeType) -> list[str]:

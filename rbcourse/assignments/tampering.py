@@ -8,6 +8,7 @@ import ast
 import builtins
 import re
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
@@ -15,8 +16,8 @@ from nbformat import NotebookNode
 from rbcourse.assignments.restore import grade_id, is_answer
 
 # each leads round what can be read in the code
-NAMES = {"exec", "eval", "compile", "globals", "locals", "__import__", "__builtins__"}
-NAMES |= {"get_ipython"}
+NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
+NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # what was run, tests too
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
@@ -29,15 +30,11 @@ MODULES |= {"code", "codeop", "cProfile", "profile"}
 # an object that equals everything passes every test
 METHODS = {f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "bool", "array_ufunc")}
 METHODS |= {"__array_function__"}
-HISTORY = {"In", "_ih", "_i", "_ii", "_iii"}  # what was run, hidden tests included
 # magics and help that do no harm; of those that run code only their names are left out
 MAGICS = re.compile(
-    r"(\A\s*%%(?:time|capture)\b[ \t\w-]*$|^[ \t]*%time(?:it)?\b(?:[ \t]+-\w+[ \t]*\d*)*[ \t]*"
-    r"|\A\s*%%timeit\b(?:[ \t]+-\w+[ \t]*\d*)*[ \t]*)"
-    r"|^[ \t]*(?:%(?:matplotlib|precision|autoreload|whos?|pwd)\b[ \t\w.-]*"
-    r"|%load_ext[ \t]+autoreload"
-    r"|%config[ \t]+InlineBackend\.\w+[ \t]*=[ \t]*[\[{]?['\"]\w+['\"][\]}]?"
-    r"|\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+)[ \t]*$",
+    r"(^%%capture\b[ \w-]*$|^[ \t]*%%?time(?:it)?\b(?: +-[nr] *\d+)*)"
+    r"|^[ \t]*(?:%(?:matplotlib|precision|(?:load_ext +)?autoreload)\b[ \w.-]*"
+    r"|%config +InlineBackend\.\w+ *=[\w'\"{}\[\], -]*|\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+) *$",
     re.MULTILINE,
 )
 CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
@@ -55,22 +52,19 @@ def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
     trees = {at: _parsed(cell.source) for at, cell in code.items()}
     own = [at for at, cell in code.items() if is_answer(cell) or not grade_id(cell)]
     names, attributes = _relied_on(tree for at, tree in trees.items() if at not in own)
-    bound = {name for at in own for _, name in _rebound(trees[at])}
-    imported: set[str] = set()
-    found = []
+    imported, found = set[str](), []
     for at, tree in trees.items():
-        nodes = list(ast.walk(tree))
-        for node in nodes:
-            _learn(node, imported)
-        called = {node.func for node in nodes if isinstance(node, ast.Call)}
+        for node in ast.walk(tree):  # names of modules, and of what is in them
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                imported |= {_bound(alias) for alias in node.names}
+            elif isinstance(node, ast.Assign) and _root(node.value) in imported:
+                imported |= {target.id for target in node.targets if isinstance(target, ast.Name)}
         if at in own:
-            rebound = [(line, name) for line, name in _rebound(tree) if name in names]
+            rebound = [(line, name) for line, name in _bindings(tree) if name in names]
             said = {(line, f"gives {name} another meaning") for line, name in rebound}
-            for node in nodes:
-                line = getattr(node, "lineno", 0)
-                if getattr(node, "id", "") in ("setattr", "delattr", "vars") and node not in called:
-                    said.add((line, f"renames {ast.unparse(node)}"))
-                said |= {(line, what) for what in _suspicious(node, attributes, imported, bound)}
+            for node in ast.walk(tree):
+                for what in _suspicious(node, attributes, imported):
+                    said.add((getattr(node, "lineno", 0), what))
             found += [(at, *what) for what in sorted(said)]
     return found
 
@@ -89,7 +83,7 @@ def _parsed(source: str) -> ast.Module:
 
 def _relied_on(trees: Iterable[ast.Module]) -> tuple[set[str], set[str]]:
     """Return the names, and the attributes, that students may not give a new meaning."""
-    relied, attributes = set[str](), set[str]()
+    relied, attributes = set[str](), METHODS | ATTRIBUTES
     for node in (node for tree in trees for node in ast.walk(tree)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             relied |= {_bound(alias) for alias in node.names}
@@ -98,20 +92,12 @@ def _relied_on(trees: Iterable[ast.Module]) -> tuple[set[str], set[str]]:
         elif isinstance(node, ast.Name) and hasattr(builtins, node.id):
             relied.add(node.id)
         elif isinstance(node, ast.Attribute):
-            attributes.add(node.attr)
-    return relied - {"*"}, attributes | METHODS | ATTRIBUTES
+            attributes |= {node.attr}
+    return relied - {"*"}, attributes
 
 
 def _bound(alias: ast.alias) -> str:
     return alias.asname or alias.name.split(".")[0]
-
-
-def _learn(node: ast.AST, imported: set[str]) -> None:
-    """Add the names that a statement binds to a module or to what is in one."""
-    if isinstance(node, ast.Import | ast.ImportFrom):
-        imported |= {_bound(alias) for alias in node.names}
-    elif isinstance(node, ast.Assign) and _root(node.value) in imported:
-        imported |= {target.id for target in node.targets if isinstance(target, ast.Name)}
 
 
 def _root(node: ast.AST) -> str:
@@ -121,36 +107,31 @@ def _root(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _rebound(tree: ast.Module) -> Iterator[tuple[int, str]]:
+def _bindings(tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Yield the names that the notebook binds, except imports under customary names."""
-    todo: list[ast.AST] = list(tree.body)
+    todo: list[tuple[Any, bool]] = [(tree, False)]
     while todo:
-        node = todo.pop()
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            yield node.lineno, node.name
-            changed = (inner for inner in ast.walk(node) if isinstance(inner, ast.Global))
-            yield from ((inner.lineno, name) for inner in changed for name in inner.names)
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
-            for alias in node.names:
-                usual = CUSTOMARY.get(alias.asname or "", alias.asname)
-                if alias.asname and usual not in (alias.name, place + alias.name):
-                    yield node.lineno, alias.asname
-        elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
-            yield node.lineno, node.id
-        elif isinstance(node, ast.MatchAs | ast.MatchStar):
-            yield node.lineno, node.name or ""
-            todo += ast.iter_child_nodes(node)
-        elif isinstance(node, ast.comprehension):  # its own names end with it
-            inner = [part for part in ast.walk(node) if isinstance(part, ast.NamedExpr)]
-            yield from ((part.lineno, part.target.id) for part in inner)
-        elif not isinstance(node, ast.Lambda):
-            todo += ast.iter_child_nodes(node)
+        node, local = todo.pop()
+        # of definitions, and in match
+        names: list[str | None] = [] if local else [getattr(node, "name", None)]
+        if isinstance(node, ast.Name):
+            names = [node.id] * (not local and not isinstance(node.ctx, ast.Load))
+        elif isinstance(node, ast.NamedExpr):  # also in a comprehension
+            names = [node.target.id]
+        elif isinstance(node, ast.Global):
+            names = node.names
+        elif isinstance(node, ast.alias) and not local:
+            usual = CUSTOMARY.get(node.asname or "", node.asname or "").rpartition(".")[2]
+            names = [node.asname] * (usual != node.name.rpartition(".")[2])
+        yield from ((getattr(node, "lineno", 0), name) for name in names if name)
+        local |= isinstance(
+            node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef
+        )
+        local |= isinstance(node, ast.comprehension)
+        todo += [(child, local) for child in ast.iter_child_nodes(node)]
 
 
-def _suspicious(
-    node: ast.AST, relied: set[str], imported: set[str], bound: set[str]
-) -> Iterator[str]:
+def _suspicious(node: Any, relied: set[str], imported: set[str]) -> Iterator[str]:
     if isinstance(node, ast.Attribute):
         own = _root(node) == "self"  # of an object that the student describes
         if isinstance(node.ctx, ast.Load):
@@ -159,34 +140,16 @@ def _suspicious(
             yield f"replaces {ast.unparse(node)}"
     elif isinstance(node, ast.Name) and node.id in NAMES:
         yield "uses a magic or a shell" if node.id == "get_ipython" else f"uses {node.id}"
-    elif isinstance(node, ast.Name) and node.id in HISTORY - bound:
-        yield f"reads {node.id}, what was run"
-    elif isinstance(node, ast.Name) and node.id in METHODS:
-        yield f"defines {node.id}"
+    elif (name := getattr(node, "id", getattr(node, "name", ""))) in METHODS:
+        yield f"defines {name}"
+    elif isinstance(node, ast.Call) and getattr(node.func, "id", "") == "getattr":
+        if [type(name) for name in node.args[1:2]] != [ast.Constant]:
+            yield f"uses {ast.unparse(node)}"
     elif isinstance(node, ast.Constant) and node.value in (ATTRIBUTES | METHODS) - {"modules"}:
         yield f"names {node.value}"
-    elif isinstance(node, ast.Call):
-        called, given = ast.unparse(node.func), node.args
-        if called in ("setattr", "delattr", "vars") and _root((given or [node])[0]) in imported:
-            yield f"replaces parts of {ast.unparse(given[0])}"
-        if called == "vars" and not given:
-            yield "uses vars"
-        if called in ("setattr", "delattr", "getattr"):
-            second = given[1] if len(given) > 1 else None
-            name = second.value if isinstance(second, ast.Constant) else None
-            if name is None or (called != "getattr" and name in relied):
-                yield f"uses {called} with {ast.unparse(second) if second else 'stars'}"
     elif isinstance(node, ast.Import | ast.ImportFrom):
         place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
-        dark = (_dark(place + alias.name) for alias in node.names)
-        yield from (f"imports {name}" for name in dark if name)
-    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name in METHODS:
-        yield f"defines {node.name}"
-
-
-def _dark(name: str) -> str:
-    """Return the part of the name of an import that leads round what can be read in the code."""
-    parts = name.split(".")
-    dark = [part for part in (parts[0], parts[-1]) if part in MODULES | NAMES | ATTRIBUTES]
-    harmless = name.startswith(("IPython.display", "IPython.core.display"))
-    return dark[0] if dark and not harmless else ""
+        for parts in ((place + alias.name).split(".") for alias in node.names):
+            dark = {parts[0], parts[-1]} & (MODULES | NAMES | ATTRIBUTES)
+            harmless = parts[:2] == ["IPython", "display"] or parts[1:3] == ["core", "display"]
+            yield from () if harmless else (f"imports {name}" for name in sorted(dark))

@@ -15,7 +15,8 @@ from nbgrader.utils import parse_utc
 from tiny import MODULE
 from tiny_set import write_tiny_set
 
-from rbcourse.assignments.collect import collect, main
+from rbcourse.assignments.__main__ import main
+from rbcourse.assignments.collect import collect
 from rbcourse.assignments.writing import quoted
 
 DAY = (2026, 11, 20, 12, 0, 0)
@@ -377,7 +378,7 @@ def test_the_command_prints_each_list(course):
     (folder / "downloads" / "Ö X_1_assignsubmission_file_ps1.ipynb").write_bytes(answered(course))
     (folder / "downloads" / "notes.txt").write_bytes(b"")
     done = subprocess.run(
-        [*MODULE, "rbcourse.assignments.collect", "downloads", "--due", "2000-01-01 12:00"],
+        [*MODULE, "rbcourse.assignments", "collect", "downloads", "--due", "2000-01-01 12:00"],
         cwd=folder,
         capture_output=True,
         encoding="ascii",
@@ -389,6 +390,6 @@ def test_the_command_prints_each_list(course):
 
 
 def test_a_folder_that_is_none_is_named(course, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["collection", "nowhere"])
+    monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
     with pytest.raises(SystemExit, match="nowhere: there is no such folder"):
         main()

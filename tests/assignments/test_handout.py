@@ -133,9 +133,9 @@ def solution_without_end(notebook):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (hidden_test_mistyped, "square-test: '### BEGIN HIDEN TESTS' is left over"),
-        (mark_scheme_outside, "words-question: 'Mark scheme' is left over"),
-        (attachment_of_an_answer, "words-answer: nbgrader leaves the attachment"),
+        (hidden_test_mistyped, "ps0.ipynb gives away '### BEGIN HIDEN TESTS'"),
+        (mark_scheme_outside, "ps0.ipynb gives away 'Mark scheme'"),
+        (attachment_of_an_answer, "nbgrader leaves the attachment"),
         (solution_in_metadata, r"ps0.ipynb gives away 'def square\(x\):'"),
         (solution_without_end, "cannot be released: no end solution statement found"),
     ],
@@ -162,7 +162,7 @@ def test_an_unknown_set_and_a_folder_without_sets_are_told_in_a_line(course, tmp
     with pytest.raises(ValueError, match="no problem set ps9; there are: ps0"):
         release("ps9", course)
     (tmp_path / "source" / "ps1").mkdir(parents=True)
-    command = [sys.executable, "-m", "rbcourse.assignments.handout", "ps1"]
+    command = [sys.executable, "-m", "rbcourse.assignments", "handout", "ps1"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
     assert done.stderr.splitlines() == [

@@ -26,7 +26,6 @@ BORROWED = {
     "def helper(w): return exp_so3(w)\ndef answer(w): return helper(w)",
     "by way of NumPy": "import numpy as np, rbcourse\n"
     "def answer(w): return np.apply_along_axis(rbcourse.exp_so3, 0, w)",
-    "as a partial": "import functools, rbcourse\nanswer = functools.partial(rbcourse.exp_so3)",
     "in a closure": "import rbcourse\ndef make(f):\n    return lambda w: f(w)\n"
     "answer = make(rbcourse.exp_so3)",
     "from the problem": "from rbcourse.assignments.problems.rotations import TURN_ABOUT\n"

@@ -87,6 +87,17 @@ SNEAKS = {
     "mounts": "import subprocess\n"
     "subprocess.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
+# The kernel of Linux keeps keys beyond a process, and a machine inside another asks it by a socket.
+SNEAKS["keeps a key"] = """
+import platform
+import numpy
+ctypes = numpy.ctypeslib.ctypes
+libc = ctypes.CDLL(None, use_errno=True)
+number = {"x86_64": 248, "aarch64": 217}[platform.machine()]
+if libc.syscall(number, b"user", b"note", b"hidden", 6, -4) < 0:
+    raise OSError(ctypes.get_errno(), "no key is kept")
+"""
+SNEAKS["asks the machine outside"] = "import socket\nsocket.socket(40, socket.SOCK_STREAM)"
 # These do what they want, in the box; the points are those of their answers.
 LOUD = {
     "leaves daemons": "import subprocess\nfor _ in range(50):\n"
@@ -139,12 +150,12 @@ TRICKS = {
     "globals": ("globals()['math'] = None", "line 1 uses globals"),
     "equal to all": ("class Y(int): pass\nY.__eq__ = print", "line 2 replaces Y.__eq__"),
     "equal by name": ("type('Y', (), {'__eq__': print})", "line 1 names __eq__"),
-    "reads what was run": ("print(In[-1])", "line 1 reads In, what was run"),
+    "reads what was run": ("print(In[-1])", "line 1 uses In"),
     "code in a text": ("exec('import math; math.isclose = print')", "line 1 uses exec"),
     "import by name": ("__import__('builtins').abs = print", "line 1 uses __import__"),
     "a module": ("import sys\nsys.modules['math'] = None", "line 2 uses modules"),
-    "setattr": ("setattr(math, 'isclose', print)", "line 1 replaces parts of math"),
-    "a computed name": ("getattr(math, 'is' + 'close')", "line 1 uses getattr with"),
+    "setattr": ("setattr(math, 'isclose', print)", "line 1 uses setattr"),
+    "a computed name": ("getattr(math, 'is' + 'close')", "line 1 uses getattr(math"),
     "frames": ("def f():\n    yield\nf().gi_frame.f_back", "line 3 uses f_back"),
     "garbage": ("import gc", "line 1 imports gc"),
     "a shell": ("!ls", "line 1 uses a magic or a shell"),
