@@ -113,7 +113,7 @@ def _bindings(tree: ast.Module) -> Iterator[tuple[int, str]]:
     while todo:
         node, local = todo.pop()
         # of definitions, and in match
-        names: list[str | None] = [] if local else [getattr(node, "name", None)]
+        names: list[Any] = [] if local else [getattr(node, "name", None)]
         if isinstance(node, ast.Name):
             names = [node.id] * (not local and not isinstance(node.ctx, ast.Load))
         elif isinstance(node, ast.NamedExpr):  # also in a comprehension
