@@ -116,3 +116,56 @@ def test_the_figures_in_a_lesson_are_the_stored_ones(path):
     assert len(shown) == len(re.findall(r"<figcaption>\w+: \.", text))
     for picture, name in shown:
         assert base64.b64decode(picture) == (STORED / f"{name}.png").read_bytes()
+
+
+CITED = re.compile(r"\[([A-Za-z]+\d{4}(?:; [A-Za-z]+\d{4})*)\]")
+WORKS = dict(
+    re.findall(
+        r"@\w+\{(\w+),\n(.*?)\n\}",
+        (ROOT / "notebooks/REFERENCES.bib").read_text("utf-8"),
+        re.DOTALL,
+    )
+)
+
+
+def cited_and_listed(path):
+    """The keys in the text of a lesson, and the lines below its heading "References"."""
+    texts = [c.source for c in nbformat.read(path, as_version=4).cells if c.cell_type == "markdown"]
+    lists = [text for text in texts if text.startswith("## References")]
+    keys = [
+        group.split("; ") for text in texts if text not in lists for group in CITED.findall(text)
+    ]
+    return {key for group in keys for key in group}, "".join(lists).splitlines()[2:]
+
+
+def plain(words):
+    """A field of BibTeX without its commands and braces."""
+    return re.sub(r"\\['v]|[{}]", "", words.replace(r"\'e", "é"))
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_what_a_lesson_cites_is_listed_at_its_end_as_in_the_references(path):
+    keys, lines = cited_and_listed(path)
+    assert [re.match(r"- \[(\w+)\]", line)[1] for line in lines] == sorted(keys)
+    for line in lines:
+        work = dict(re.findall(r"^  (\w+) = \{(.*)\},?$", WORKS[line[3 : line.index("]")]], re.M))
+        assert f"*{plain(work['title'])}*" in line
+        assert line.endswith(f", {work['year']}.")
+        for author in work["author"].split(" and "):
+            family = plain(author.partition(",")[0])
+            assert family.replace("Zefran", "Žefran") in line
+
+
+def test_every_work_in_the_references_is_cited():
+    assert set().union(*(cited_and_listed(path)[0] for path in LESSONS)) == set(WORKS)
+
+
+@pytest.mark.parametrize("path", LESSONS[1:], ids=lambda path: path.stem)
+def test_there_are_two_questions_for_each_objective(path):
+    head = nbformat.read(path, as_version=4).cells[0].source
+    wanted = re.findall(r"^- (.*)[.;]$", head, re.MULTILINE)
+    name = path.stem.replace("_", " ", 1)
+    page = (ROOT / "notebooks" / "QUESTIONS.md").read_text("utf-8")
+    (part,) = re.findall(rf"^## {name}\n(.*?)(?=^## |\Z)", page, re.MULTILINE | re.DOTALL)
+    asked = re.findall(r"^### (.*)\n1\. .+\n2\. .+\n#### Answers\n1\. .+\n2\. .+$", part, re.M)
+    assert asked == wanted

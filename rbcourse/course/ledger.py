@@ -50,7 +50,7 @@ def collect(root: Path) -> dict[str, Entry]:
     """Return where each entry and each misprint is to be found.
 
     Functions come from the References of their docstrings, constants from what stands below them,
-    tests from their marks ``source``, lessons from the keys in their headings.
+    tests from their marks ``source``, lessons from the keys in small type below their headings.
     """
     found = {key: Entry() for key in [*SOURCES["entries"], *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
@@ -95,10 +95,10 @@ def _headings(root: Path) -> Iterator[tuple[str, str]]:
     for path in lesson_paths(root / "notebooks"):
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.cell_type == "markdown" and cell.source.startswith("#"):
-                heading = cell.source.splitlines()[0]
+                heading, *below = cell.source.splitlines()
                 number = re.match(r"## (\d+) ·", heading)
-                place = number[1] if number else heading.lstrip("# ").partition(" (")[0]
-                yield f"{path.name}, {place}", heading
+                keys = [line for line in below[1:2] if line.startswith("<small>")]
+                yield f"{path.name}, {number[1] if number else heading.lstrip('# ')}", "".join(keys)
 
 
 def render(found: dict[str, Entry]) -> str:

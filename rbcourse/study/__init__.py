@@ -1,1 +1,1 @@
-"""How near closed forms are to the optimum: the atlas of lesson 11."""
+"""How near closed forms are to the optimum: the atlas of lesson 12."""
