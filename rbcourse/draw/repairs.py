@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
@@ -20,13 +21,6 @@ Repair = Callable[[Array], Array]
 
 _REPAIRS = {"nearest rotation": project_so, "Gram–Schmidt": orthonormalize_gram_schmidt}
 _COLOURS = {"nearest rotation": COLOURS["projection"], "Gram–Schmidt": COLOURS["z"]}
-_LETTER = np.array(
-    [
-        *([0, 0], [0.2, 0], [0.2, 0.4], [0.5, 0.4], [0.5, 0.6], [0.2, 0.6], [0.2, 0.8]),
-        *([0.6, 0.8], [0.6, 1], [0, 1], [0, 0]),
-    ]
-)
-"""The outline of an F, which no turn makes of its mirror image."""
 
 
 def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> Table:
@@ -85,63 +79,61 @@ def describe_drift(data: Table) -> str:
     )
 
 
-def letters(matrices: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the images of the outline of a letter F, shape (points, 2), under 2 × 2 matrices."""
-    return {name: (M @ _LETTER.T).T for name, M in matrices.items()}
+def column_table(matrices: Mapping[str, Array]) -> Table:
+    """Return x and y of the two columns of each 2 × 2 matrix, a row for each column, as a table."""
+    return {
+        f"{name} {axis} [1]": row
+        for name, M in matrices.items()
+        for axis, row in zip("xy", M, strict=True)
+    }
 
 
-def letter_table(images: Mapping[str, Array]) -> Table:
-    """Return x and y of the letter, then of each of its `letters`, as a table."""
-    table = {"x [1]": _LETTER[:, 0], "y [1]": _LETTER[:, 1]}
-    for name, image in images.items():
-        table |= {f"{name} x [1]": image[:, 0], f"{name} y [1]": image[:, 1]}
-    return table
+def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> list[Any]:
+    """Draw the columns of 2 × 2 matrices as arrows, each matrix on its own axes.
 
-
-def draw_letters(axes: Sequence[Axes], images: Mapping[str, Array]) -> list[Any]:
-    """Draw the images of a letter under matrices, each on its own axes.
-
-    The first matrix is the given one; its image is repeated behind the others, whose titles say how
-    far their matrix is from it (BK Prop. 2, RR 1.4).
+    The first matrix is the given one. Its arrows are repeated in grey behind those of the others,
+    and a dotted line joins each tip with its grey one. The titles say what the two lines come to,
+    the root of the sum of their squares: the Frobenius distance (BK Prop. 2, RR 1.4).
     """
-    artists: list[Any] = []
-    for k, (ax, (name, image)) in enumerate(zip(axes, images.items(), strict=True)):
-        behind = images[next(iter(images))] if k else _LETTER
-        artists += ax.fill(*behind.T, color="0.88")
-        colour = COLOURS["y"] if _turned(image) else COLOURS["x"]
-        artists += ax.fill(*image.T, fill=False, edgecolor=colour, lw=2)
-        title = f"{name}\ndistance {_distance(image, images):.2f}" if k else name
-        ax.set(aspect="equal", title=title, xlabel="x")
+    given, *others = matrices.values()
+    edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
+    artists = [_draw_arrows(axes[0], given, [COLOURS["x"], COLOURS["y"]])]
+    for ax, M in zip(axes[1:], others, strict=True):
+        artists.append(_draw_arrows(ax, given, ["0.7"]))
+        artists.append(_draw_arrows(ax, M, [COLOURS["x"], COLOURS["y"]]))
+        artists += ax.plot(*np.stack([given, M], axis=1), color="black", ls=":", zorder=4)
+    for ax, (name, M) in zip(axes, matrices.items(), strict=True):
+        ax.add_patch(Circle((0, 0), 1, fill=False, color="0.8", lw=1))
+        missed = "" if M is given else f", misses {np.linalg.norm(M - given):.2f}"
+        ax.set(aspect="equal", title=f"{name}\n{_sense(M)}{missed}", xlabel="x")
+        ax.set(xlim=(-edge, edge), ylim=(-edge, edge), xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes[0].set_ylabel("y")
+    (x, y), second = given.T[0] / 2, given.T[1]
+    axes[0].text(x, y, "first", color=COLOURS["x"], ha="right", va="bottom")
+    axes[0].text(second[0], second[1], " second", color=COLOURS["y"], va="top")
     return artists
 
 
-def describe_letters(images: Mapping[str, Array]) -> str:
-    """Return in words what `draw_letters` shows."""
-    (first, given), *others = images.items()
-    said = [
-        f"{name}: a {'turned' if _turned(image) else 'mirrored'} letter, at the distance "
-        f"{_distance(image, images):.2f} from {first}"
-        for name, image in others
-    ]
-    what = "turned" if _turned(given) else "mirrored"
+def describe_columns(matrices: Mapping[str, Array]) -> str:
+    """Return in words what `draw_columns` shows."""
+    (first, given), *others = matrices.items()
+    said = [f"{name} {_sense(M)}, {np.linalg.norm(M - given):.2f} away" for name, M in others]
     return (
-        f"A letter F; {first} makes a {what} and distorted one of it. Beside it: {'; '.join(said)}."
+        f"The columns of {first} as arrows, the first orange, the second green; then those of "
+        f"{', '.join(matrices).removeprefix(f'{first}, ')}, with {first}'s behind in grey. "
+        f"{first} {_sense(given)}. {'; '.join(said)}, by the root of the sum of the squares of "
+        "the two dotted lines from tip to tip."
     )
 
 
-def _distance(image: Array, images: Mapping[str, Array]) -> float:
-    """Return the Frobenius distance of the matrix of an image to that of the first image."""
-    apart = np.linalg.lstsq(_LETTER, image - next(iter(images.values())))[0]
-    return float(np.linalg.norm(apart))
+def _draw_arrows(ax: Axes, M: Array, colours: Sequence[str]) -> Any:
+    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.025, "zorder": 3}
+    return ax.quiver([0, 0], [0, 0], *M, color=colours, **style)
 
 
-def _turned(image: Array) -> bool:
-    """Tell whether the outline still runs round the letter the same way."""
-    x, y = image.T
-    ox, oy = _LETTER.T
-    area, before = (np.sum(a[:-1] * b[1:] - a[1:] * b[:-1]) for a, b in ((x, y), (ox, oy)))
-    return bool(area * before > 0)
+def _sense(M: Array) -> str:
+    """Tell what a matrix does: one that mirrors has its second column to the right of the first."""
+    return "turns" if np.linalg.det(M) > 0 else "mirrors"
 
 
 def shadows(M: Array) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""How matrices drift, and where repairs take letters and matrices."""
+"""How matrices drift, and where repairs take their columns and shadows."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -51,24 +51,27 @@ def test_the_drift_is_drawn_and_described():
 
 
 @pytest.mark.source("BK Prop. 2", "RR 1.4")
-def test_letters_are_the_images_and_mirrors_are_told_from_turns():
-    matrices = {"M": np.diag([2.0, -1]), "turned": rb.project_so([[0, -2], [3, 0]])}
-    images = repairs.letters(matrices)
-    data = repairs.letter_table(images)
-    letter = np.stack([data["x [1]"], data["y [1]"]])
-    assert np.array_equal([data["M x [1]"], data["M y [1]"]], matrices["M"] @ letter)
-    off = np.linalg.norm(matrices["turned"] - matrices["M"])
-    fig, axes = plt.subplots(1, 2)
-    behind, given, under, turned = repairs.draw_letters(axes, images)
-    assert np.array_equal(behind.get_xy()[: letter.shape[1]], letter.T)
-    assert np.array_equal(given.get_xy()[: letter.shape[1]], (matrices["M"] @ letter).T)
-    assert np.array_equal(under.get_xy(), given.get_xy())
-    assert given.get_edgecolor() != turned.get_edgecolor()
-    assert [ax.get_title() for ax in axes] == ["M", f"turned\ndistance {off:.2f}"]
-    plt.close(fig)
-    said = repairs.describe_letters(images)
-    assert "M makes a mirrored and distorted one" in said
-    assert f"turned: a turned letter, at the distance {off:.2f} from M" in said
+def test_columns_are_arrows_with_what_they_miss(axes):
+    over, turned = np.array([[2.0, 0.5], [0, -1]]), rb.project_so([[0, -2], [3, 0]])
+    matrices = {"M": over, "turned": turned}
+    data = repairs.column_table(matrices)
+    assert list(data) == ["M x [1]", "M y [1]", "turned x [1]", "turned y [1]"]
+    given, behind, before, *misses = repairs.draw_columns(axes, matrices)
+    for arrows, name in ((given, "M"), (behind, "M"), (before, "turned")):
+        assert np.array_equal([arrows.U, arrows.V], [data[f"{name} {axis} [1]"] for axis in "xy"])
+        assert np.all(arrows.get_offsets() == 0)
+    assert np.array_equal(given.get_facecolors(), before.get_facecolors())
+    assert not np.array_equal(given.get_facecolors(), behind.get_facecolors())
+    ends = np.array([line.get_xydata() for line in misses])
+    assert np.array_equal(ends[:, 0], over.T)
+    assert np.array_equal(ends[:, 1], turned.T)
+    missed = np.sqrt(np.sum((ends[:, 1] - ends[:, 0]) ** 2))
+    assert axes[0].get_title() == "M\nmirrors"
+    assert axes[1].get_title() == f"turned\nturns, misses {missed:.2f}"
+    assert np.abs(ends).max() < min(ax.get_xlim()[1] for ax in axes)
+    said = repairs.describe_columns(matrices)
+    assert "then those of turned, with M's behind in grey. M mirrors." in said
+    assert f"turned turns, {missed:.2f} away" in said
 
 
 @pytest.fixture
