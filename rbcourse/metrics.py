@@ -328,18 +328,18 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     Parameters
     ----------
     G : array_like, shape (..., 3, 3)
-        Symmetric and positive definite, each eigenvalue less than the sum of the other two.
+        Symmetric, each eigenvalue at most the sum of the other two, to a few eps of the largest.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Symmetric and positive definite.
+        Symmetric, without negative eigenvalues, to a few eps of the largest.
 
     Raises
     ------
     ValueError
         If `G` is not finite, not of that shape, not symmetric, or its eigenvalues, the principal
-        moments of inertia, do not satisfy the triangle inequality strictly.
+        moments of inertia, do not satisfy the triangle inequality.
 
     See Also
     --------
@@ -347,9 +347,10 @@ def weight_from_inertia(G: ArrayLike) -> Array:
 
     Notes
     -----
-    Every solid body satisfies the inequality. A flat one reaches equality: its W is singular, and
-    tr(XᵀY W) no metric on the matrices. A G that violates it belongs to no body, and no positive
-    definite W induces it.
+    Every body satisfies the inequality, because each eigenvalue of W is ∫ x² dm along an axis. A
+    flat body reaches equality: the eigenvalue across it is 0, and W has rank 2. A rod without
+    thickness has the moments 0, I, I, and a W of rank 1. A G that violates the inequality belongs
+    to no body, and no W without negative eigenvalues induces it.
 
     References
     ----------
@@ -361,16 +362,18 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     array([[2.5, 0. , 0. ],
            [0. , 1.5, 0. ],
            [0. , 0. , 0.5]])
+    >>> weight_from_inertia(np.diag([1.0, 2, 3])).diagonal()  # a flat body
+    array([2., 1., 0.])
     """
     G = as_symmetric("G", G, 3)
     moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
-    refused = ~(slack > 16 * EPS * np.abs(moments).max(axis=-1))
+    refused = slack < -16 * EPS * np.abs(moments).max(axis=-1)
     if refused.any():
         least, middle, largest = np.linalg.eigvalsh(G[refused][0])
         raise ValueError(
             f"{first_index('G', refused)} has the principal moments {least:.6g}, {middle:.6g}, "
-            f"{largest:.6g}; each must be less than the sum of the other two"
+            f"{largest:.6g}; each must be at most the sum of the other two"
         )
     return _trace_times_identity(G / 2) - G
 

@@ -148,15 +148,16 @@ def project_so(M: ArrayLike) -> Array:
 
 
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
-    """Return the rotation nearest to M in the norm √tr(XᵀX W): `project_so` of M W.
+    """Return the rotation R with the least √tr(XᵀX W), X = M − R: `project_so` of M W.
 
     Parameters
     ----------
     M : array_like, shape (..., n, n)
         Any matrices, singular and reflected ones too.
     W : array_like, shape (..., n, n)
-        Weights: symmetric, to 1e-12 of the largest entry, and positive definite. Those of a body
-        are ∫ p pᵀ dm over its points p, body frame.
+        Weights: symmetric, to 1e-12 of the largest entry, and without negative eigenvalues, to a
+        few eps of the largest. Those of a body are ∫ p pᵀ dm over its points p, body frame; of a
+        flat body they are singular.
 
     Returns
     -------
@@ -170,7 +171,7 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     ------
     ValueError
         If an argument is not finite, not of that shape, the two do not fit, or `W` is not
-        symmetric or, to rounding, not positive definite.
+        symmetric or has a negative eigenvalue.
 
     See Also
     --------
@@ -180,7 +181,9 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     -----
     On SO(3), tr(XᵀY W) induces the left-invariant metric G = tr(W) I − W: the inertia of the body.
 
-    Singular set: that of `project_so`, for the matrix M W.
+    Singular set: that of `project_so`, for the matrix M W. A W of rank n − 1, as of a flat body,
+    determines the rotation wherever M keeps that rank. One of rank n − 2 or less never does: a rod
+    without thickness may be turned about itself, and one of the nearest rotations is returned.
 
     References
     ----------
@@ -198,9 +201,9 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     check_broadcast(M=(M, 2), W=(W, 2))
     W = scaled(W)
     sizes = np.linalg.eigvalsh(W)
-    refused = ~(sizes[..., 0] > W.shape[-1] * EPS * sizes[..., -1])
+    refused = sizes[..., 0] < -16 * W.shape[-1] * EPS * np.abs(sizes).max(axis=-1)
     if refused.any():
-        raise ValueError(f"{first_index('W', refused)} is not positive definite")
+        raise ValueError(f"{first_index('W', refused)} has a negative eigenvalue")
     return nearest(scaled(M) @ W)[0]
 
 

@@ -24,17 +24,21 @@ def test_the_weighted_trace_induces_an_inertia():
 
 @pytest.mark.source("BK 3")
 def test_which_inertias_a_weight_reaches():
-    for slack in (0.1, 1e-12):
-        turned = R[0] @ np.diag([2, 3, 5 - slack]) @ R[0].T
-        least = np.linalg.eigvalsh(rb.metrics.weight_from_inertia(turned))[0]
-        assert least == pytest.approx(slack / 2, abs=40 * EPS)
-    for moments in ([1, 2, 3], [1, 2, 4], [0, 1, 1], [-1, 5, 5], [0, 0, 0]):
-        G = R[0] @ np.diag(moments) @ R[0].T
+    for moments in ([2, 3, 4.9], [2, 3, 5 - 1e-12], [1, 2, 3], [1, 1, 2], [0, 1, 1], [0, 0, 0]):
+        for G in R @ np.diag(moments) @ np.swapaxes(R, -1, -2):
+            W = rb.metrics.weight_from_inertia(G)
+            least = np.linalg.eigvalsh(W)[0]
+            assert least == pytest.approx((moments[0] + moments[1] - moments[2]) / 2, abs=40 * EPS)
+            assert np.abs(np.trace(W) * np.eye(3) - W - G).max() < 40 * EPS
+            rb.project_so_weighted(np.eye(3), W)  # is taken
+    assert np.array_equal(rb.metrics.weight_from_inertia(np.diag([1, 2, 3])), np.diag([2, 1, 0]))
+    for moments in ([1, 2, 3 + 1e-13], [1, 2, 4], [-1, 5, 5], [-1e-13, 1, 1], [-2, -2, -2]):
         with pytest.raises(ValueError, match="has the principal moments"):
-            rb.metrics.weight_from_inertia(G)
-        assert np.linalg.eigvalsh(np.trace(G) / 2 * np.eye(3) - G)[0] < 1e-15
-    with pytest.raises(ValueError, match=r"G\[1\] has the principal moments 1, 2, 3; each must"):
-        rb.metrics.weight_from_inertia([np.eye(3), np.diag([1, 2, 3])])
+            rb.metrics.weight_from_inertia(R[0] @ np.diag(moments) @ R[0].T)
+    with pytest.raises(
+        ValueError, match=r"G\[1\] has the principal moments 1, 2, 4; each must be at"
+    ):
+        rb.metrics.weight_from_inertia([np.eye(3), np.diag([1, 2, 4])])
 
 
 def test_no_inertia_is_too_large_or_too_small():
