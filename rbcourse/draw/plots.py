@@ -67,12 +67,11 @@ def draw_family(ax: Axes, data: Table) -> list[Any]:
     BK Fig. 2, BK Fig. 3.
     """
     (_, parameter), (x_name, x), (y_name, y) = _columns(data)
-    rows = _shown_rows(parameter)
-    colours = plt.get_cmap("viridis")(np.linspace(0.85, 0, len(rows)))
-    lines = [
-        ax.plot(x[row], y[row], color=colour, ls=dash, label=pi_fraction(parameter[row, 0]))[0]
-        for row, colour, dash in zip(rows, colours, _DASHES, strict=False)
-    ]
+    lines = []
+    for row, dash in zip(_shown_rows(parameter), _DASHES, strict=False):
+        angle = parameter[row, 0]
+        look = {"color": _angle_colour(angle), "ls": dash, "label": pi_fraction(angle)}
+        lines += ax.plot(x[row], y[row], **look)
     ax.set(xlabel=_label(x_name), ylabel=_label(y_name), xlim=(x.min(), x.max()))
     ax.legend(title="angle a (rad)", loc="center left", bbox_to_anchor=(1, 0.5))
     return lines
@@ -81,12 +80,12 @@ def draw_family(ax: Axes, data: Table) -> list[Any]:
 def draw_surface(ax: Any, data: Table) -> list[Any]:
     """Draw a table (parameter, abscissa, value) as a surface over abscissa and parameter.
 
-    BK Fig. 2, BK Fig. 3.
+    An angle has the colour of its curve in `draw_family` (BK Fig. 2, BK Fig. 3).
     """
     (p_name, parameter), (x_name, x), (y_name, y) = _columns(data)
-    surface = ax.plot_surface(
-        x, parameter, y, cmap="viridis_r", rcount=24, ccount=34, lw=0.3, edgecolor="white"
-    )
+    colours = _angle_colour(parameter)
+    look = {"facecolors": colours, "shade": False, "lw": 0.3, "edgecolor": "white"}
+    surface = ax.plot_surface(x, parameter, y, rcount=24, ccount=34, **look)
     ax.set(xlabel=_label(x_name), xticks=[0, 0.5, 1])
     ax.set_ylabel(_label(p_name), labelpad=8)
     ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
@@ -450,6 +449,10 @@ def _columns(data: Table) -> list[tuple[str, Array]]:
 def _label(column: str) -> str:
     name = column.split(" [")[0]
     return LABELS.get(name, name)
+
+
+def _angle_colour(angle: ArrayLike) -> Any:
+    return plt.get_cmap("viridis_r")(np.asarray(angle) / np.pi)
 
 
 def _shown_rows(parameter: Array) -> list[int]:

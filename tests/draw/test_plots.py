@@ -79,6 +79,15 @@ def test_a_surface_spans_the_table(ax3d, family):
         assert points[:, axis].max() == family[column].max()
 
 
+def test_an_angle_has_one_colour_on_the_curves_and_on_the_surface(ax, ax3d, family):
+    (surface,) = plots.draw_surface(ax3d, family)
+    starts = np.array([np.asarray(face)[:, 1].min() for face in surface._faces])
+    for line, row in zip(plots.draw_family(ax, family)[:-1], [3, 7, 11, 15, 19], strict=True):
+        faces = surface._facecolor3d[starts == family["angle [rad]"][row, 0]]
+        assert len(faces) == 4
+        assert np.array_equal(faces, np.tile(line.get_color(), (4, 1)))
+
+
 def test_a_family_is_described_by_its_numbers(family):
     said = plots.describe_family(family)
     assert "for 22 angles" in said
