@@ -112,8 +112,8 @@ def test_every_stored_figure_is_drawn_by_a_lesson():
 def test_the_figures_in_a_lesson_are_the_stored_ones(path):
     """All whose captions name files; what an exercise shows may have none."""
     text = path.read_text("utf-8")
-    shown = re.findall(BASE64 + r".{0,30}<figcaption>(\w+):", text)
-    assert len(shown) == len(re.findall(r"<figcaption>\w+: \.", text))
+    shown = re.findall(BASE64 + r".{0,30}<figcaption>[^<]* <small>(\w+)\.", text)
+    assert len(shown) == len(re.findall(r"<small>\w+\.(?:png|gif), ", text))
     for picture, name in shown:
         assert base64.b64decode(picture) == (STORED / f"{name}.png").read_bytes()
 

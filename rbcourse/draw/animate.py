@@ -15,13 +15,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.draw.save import Table, csv_text, figures_folder, save_figure
+from rbcourse.draw.save import Table, caption, csv_text, figures_folder, save_figure
 
 Update = Callable[[int], Sequence[Any]]
 
 _PLAYER = Template("""\
 <figure><img id="$name" style="max-width: 100%" alt="$alt" src="$still"/>\
-<figcaption>$caption</figcaption>
+$caption
 <div hidden><button aria-label="play or pause">▶</button>
 <input type="range" min="0" max="$last" value="$shown" aria-label="time" style="width: 60%"/></div>
 <script>
@@ -60,8 +60,8 @@ class Animation:
         Which of them is shown before it plays.
     seconds : float
         How long it takes.
-    caption : str, optional
-        What the player says below; the name by default.
+    files : str, optional
+        Where it is saved, for the caption.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Animation:
     pictures: tuple[Image.Image, ...]
     still: int
     seconds: float
-    caption: str = ""
+    files: str = ""
 
     def __repr__(self) -> str:
         """Return the name and the description."""
@@ -83,7 +83,7 @@ class Animation:
         ]
         return _PLAYER.substitute(
             name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
-            caption=self.caption or self.name,
+            caption=caption(self.alt, self.files),
             alt=html.escape(self.alt),
             still=sources[self.still // 2],
             shown=self.still // 2,
@@ -137,7 +137,7 @@ def save_animation(
     folder = figures_folder()
     animation.save(folder / f"{name}.gif")
     (folder / f"{name}.png").write_bytes(_png(animation.pictures[animation.still]))
-    return replace(animation, caption=f"{name}: .gif, .png, .pdf, .csv")
+    return replace(animation, files=f"{name}.gif, .png, .pdf, .csv")
 
 
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:

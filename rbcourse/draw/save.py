@@ -9,6 +9,7 @@ import csv
 import html
 import io
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,8 +62,21 @@ class Picture:
         return (
             f'<figure><img style="max-width: 100%" alt="{html.escape(self.alt)}" '
             f'src="data:image/png;base64,{source}"/>'
-            f"<figcaption>{self.name}: .png, .pdf, .csv</figcaption></figure>"
+            f"{caption(self.alt, f'{self.name}.png, .pdf, .csv')}</figure>"
         )
+
+
+def caption(alt: str, files: str = "") -> str:
+    """Return the caption of a picture: the first sentence of its description, and its files.
+
+    Examples
+    --------
+    >>> caption("A turn by 1.5 rad, e.g. Euler's. M is grey.", "turn.png, .csv")
+    "<figcaption>A turn by 1.5 rad, e.g. Euler's. <small>turn.png, .csv</small></figcaption>"
+    """
+    sentence, *_ = re.split(r"(?<=\.)(?<!e\.g\.)(?<!i\.e\.)(?<!cf\.)(?<!vs\.) (?=[A-Z])", alt)
+    small = f" <small>{files}</small>" if files else ""
+    return f"<figcaption>{html.escape(sentence, quote=False)}{small}</figcaption>"
 
 
 def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:

@@ -153,6 +153,8 @@ def test_the_player_has_all_it_needs(tmp_path, monkeypatch):
     assert not re.search(r"https?:|src=\"(?!data:)", page)
     assert 'alt="a &quot;cube&quot;"' in page
     assert page.count("data:image/png;base64,") == 1 + 6  # the still, and every second frame
+    files = "<small>cube.gif, .png, .pdf, .csv</small>"
+    assert f'<figcaption>a "cube" {files}</figcaption>' in page
     assert 'max="5"' in page
     assert "setInterval(step, 500)" in page
     assert "<div hidden>" in page  # no dead buttons where scripts do not run

@@ -76,6 +76,21 @@ def test_a_picture_says_what_is_to_be_seen(tmp_path, monkeypatch):
     assert 'alt="from &quot;0&quot; to &lt;1&gt;"' in picture._repr_html_()
 
 
+@pytest.mark.parametrize(
+    ("alt", "sentence"),
+    [
+        ("One of two. The other.", "One of two."),
+        ("By 0.5 to 1. Then more. And more.", "By 0.5 to 1."),
+        ("A cubic, cf. Figure 5, of 2. order. No more.", "A cubic, cf. Figure 5, of 2. order."),
+        ("A < B: no end", "A &lt; B: no end"),
+    ],
+)
+def test_the_caption_is_the_first_sentence_and_the_files(tmp_path, monkeypatch, alt, sentence):
+    picture = saved(tmp_path, monkeypatch, alt)
+    said = f"<figcaption>{sentence} <small>line.png, .pdf, .csv</small></figcaption></figure>"
+    assert picture._repr_html_().endswith(said)
+
+
 def test_columns_of_different_shapes_are_refused_and_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
     fig, _ = plt.subplots()
