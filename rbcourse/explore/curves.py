@@ -8,6 +8,7 @@ import numpy as np
 from rbcourse._numerics import Array
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
+from rbcourse.draw.spheres import AZIMUTH, ELEVATION, EYE
 from rbcourse.explore.explorer import (
     Explorer,
     choice,
@@ -31,6 +32,7 @@ _MOMENTS = 0.5 / 12 * (_EDGES @ _EDGES - _EDGES**2)
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
 _SPINS = {"axis 1": 0, "axis 2": 1, "axis 3": 2}
+_SEEN_FIRST = np.array([0.8, 0.8, 1])  # at the start one looks at the ends with a number
 
 
 def theta_explorer() -> Explorer:
@@ -160,21 +162,22 @@ def screw_explorer() -> Explorer:
 def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
-    Its angular momentum is upright and stays. Controls: the ``axis`` that it spins about; how far
-    it is ``off`` that axis, in degrees; the time ``t`` in s, which plays, and starts again when
-    another axis is chosen (BK (8), BK 2.4).
+    Its axes stick out of it on both sides, one end with a number; it hides what is behind it. Its
+    angular momentum is upright and stays. Controls: the ``axis`` that it spins about; how far it is
+    ``off`` that axis, in degrees; the time ``t`` in s, which plays, and starts again when another
+    axis is chosen (BK (8), BK 2.4).
     """
     with look():
         fig = new_figure()
         ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)
+        ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
         side = fig.add_axes((0.6, 0.19, 0.37, 0.6))
         side.set(xlim=(0, 8), ylim=(-4.4, 4.4), xlabel="time t (s)", ylabel="ω (rad/s)")
         side.set_xticks([0, 2, 4, 6, 8])
-        artists: dict[str, Any] = {"book": draw_box(ax, np.eye(4), _EDGES)}
+        artists = _ends_of_axes(ax, "behind")
+        artists |= {"book": draw_box(ax, np.eye(4), _EDGES)} | _ends_of_axes(ax, "before")
         for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True), start=1):
             style = {"color": COLOURS[axis], "ls": dash}
-            artists[f"axis {i}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
-            artists[f"number {i}"] = ax.text(0, 0, 0, str(i), ha="center", va="center")
             artists[f"w{i}"] = new_line(side, **style, label=f"ω{'₁₂₃'[i - 1]}")
         artists["now"] = side.axvline(0, color="black", lw=1.5)
         side.legend(
@@ -195,9 +198,13 @@ def flip_explorer() -> Explorer:
         k = round(t / 8 * (len(_SPIN_TIMES) - 1))
         move_box(artists["book"], pose_from_components(R[k], np.zeros(3)), _EDGES)
         for i in range(3):
-            reach = [_EDGES[i] / 2, _EDGES[i] / 2 + 0.05]
-            artists[f"axis {i + 1}"].set_data_3d(*np.outer(R[k, :, i], reach))
-            artists[f"number {i + 1}"].set_position_3d((_EDGES[i] / 2 + 0.065) * R[k, :, i])
+            reach = _EDGES[i] / 2 + np.array([0, 0.055])
+            near = 1 if R[k, :, i] @ EYE > 0 else -1
+            for place, end in {"before": near, "behind": -near}.items():
+                artists[f"axis {i + 1} {place}"].set_data_3d(*np.outer(end * R[k, :, i], reach))
+                number = artists[f"number {i + 1} {place}"]
+                number.set_position_3d((_EDGES[i] / 2 + 0.072) * R[k, :, i])
+                number.set_visible(end > 0)
             artists[f"w{i + 1}"].set_data(_SPIN_TIMES[: k + 1], w[: k + 1, i])
         artists["now"].set_xdata([t, t])
         times_over = np.count_nonzero(np.diff(w[: k + 1, _SPINS[axis]] > 0))
@@ -211,6 +218,16 @@ def flip_explorer() -> Explorer:
     return Explorer("A book that spins", fig, artists, controls, show, plays="t", seconds=8)
 
 
+def _ends_of_axes(ax: Any, place: str) -> dict[str, Any]:
+    """Draw one end of each axis of the book, with its number: those before it, or behind it."""
+    ends: dict[str, Any] = {}
+    for number, axis in zip("123", "xyz", strict=True):
+        ends[f"axis {number} {place}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
+        style = {"ha": "center", "va": "center"}
+        ends[f"number {number} {place}"] = ax.text(0, 0, 0, number, **style)
+    return ends
+
+
 @lru_cache(maxsize=1)
 def _spins() -> tuple[Array, Array]:
     """Return orientations and angular velocities by time, axis and angle off it.
@@ -221,8 +238,8 @@ def _spins() -> tuple[Array, Array]:
     main = np.eye(3)[:, None]
     w0 = 4 * (np.cos(tilt) * main + np.sin(tilt) * (1 - main) / np.sqrt(2))
     L = _MOMENTS * w0 / np.linalg.norm(_MOMENTS * w0, axis=-1, keepdims=True)
-    across = np.cross(L, [0, 0, 1])
-    sine = np.linalg.norm(across, axis=-1, keepdims=True)
-    angle = np.arctan2(sine, L[..., 2:])
-    upright = exp_so3(angle * across / np.where(sine > 0, sine, 1))  # the momentum upwards
+    ahead = _SEEN_FIRST - (L @ _SEEN_FIRST)[..., None] * L
+    ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+    body = np.stack([ahead, np.cross(L, ahead), L], axis=-2)
+    upright = exp_so3([0, 0, AZIMUTH]) @ body  # the momentum upwards
     return geodesic_flow(np.diag(_MOMENTS), upright, w0, _SPIN_TIMES)
