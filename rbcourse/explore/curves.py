@@ -68,7 +68,7 @@ def theta_explorer() -> Explorer:
         fig.legend(handles=handles, loc="lower left", handlelength=1, bbox_to_anchor=(0, -0.01))
         side.legend(loc="upper left", handlelength=1.4)
     controls = {
-        "angle": slider("‖ω₀‖ (°)", 30.0, 1.0, 179.0, 1.0),
+        "angle": slider("‖ω₀‖ (°)", 120.0, 1.0, 179.0, 1.0),
         "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 

@@ -61,6 +61,13 @@ def test_curves_dots_and_chord(line):
         assert np.abs(points(line.artists["ray"]) - [[0, 0], shadow]).max() < 1e-14
 
 
+def test_at_first_both_curves_are_seen_and_no_angle_of_a_poll(line):
+    line.restart()
+    one, other = (points(line.artists[name])[:, 1] for name in ("theta", "f"))
+    assert np.abs(one - other).max() > 0.15  # of the height of the axes
+    assert line.values["angle"] not in (90, 150)
+
+
 def turned(one, other):
     """The angle from one direction to another, clockwise."""
     return -np.angle(complex(*other) / complex(*one))
