@@ -281,12 +281,13 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
     """Draw a book in its first orientation, with a pin in its middle axis; return what turns it.
 
     R are its orientations at the times t, such that the angular momentum is vertical, as a line
-    says; `edges` are its edges along its axes, in m, the pin along the second. ``update(i)`` turns
-    the book to orientation i and returns the artists that move.
+    through its centre says; `edges` are its edges along its axes, in m, the pin along the second.
+    ``update(i)`` turns the book to orientation i and returns the artists that move.
     """
     poses, edges = join(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
-    ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
+    line = {"color": "0.75", "lw": 1.5}
+    behind, before = (ax.plot([], [], [], zorder=z, **line)[0] for z in (0, 3))
     label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
     ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
@@ -303,8 +304,15 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
         ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
         pin.set_data_3d(*ends.T)
         clock.set_text(f"t = {t[i]:.1f}")
+        steep = np.abs(R[i, 2]) / edges  # the line leaves the book where this is largest
+        face = R[i, :, steep.argmax()]
+        near = 1 if face[2] * (face @ EYE) > 0 else -1
+        heights = near * np.array([0.5 / steep.max(), 1.2 * reach])
+        before.set_data_3d([0, 0], [0, 0], heights)
+        behind.set_data_3d([0, 0], [0, 0], -heights)
         away = R[i, :, 1] @ EYE < 0  # the pin leaves the book on its far side
-        return [clock, pin, book] if away else [clock, book, pin]
+        pin.set_zorder(0 if away else 3)  # that of the book is between them
+        return [clock, behind, pin, book, before] if away else [clock, behind, book, before, pin]
 
     return update
 

@@ -193,10 +193,8 @@ def test_the_book_turns_and_its_pin_with_it(space, turning):
     flat = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * edges / 2
     for i in (0, 40, 100, 120, 130, 160):
         artists = update(i)
-        (pin,) = [artist for artist in artists if hasattr(artist, "get_data_3d")]
-        e, a = np.radians([space.elev, space.azim])
-        eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        assert (artists[-1] is pin) == (turns[i, 1, :, 1] @ eye > 0)  # in front, drawn last
+        lines = [artist for artist in artists if hasattr(artist, "get_data_3d")]
+        (pin,) = [line for line in lines if line.get_marker() == "o"]
         (book,) = [artist for artist in artists if hasattr(artist, "_faces")]
         (clock,) = [artist for artist in artists if hasattr(artist, "get_text")]
         assert clock.get_text() == f"t = {TIMES[i]:.1f}"
@@ -206,6 +204,33 @@ def test_the_book_turns_and_its_pin_with_it(space, turning):
         assert np.abs(foot - edges[1] / 2 * turns[i, 1, :, 1]).max() < 1e-14
         assert np.abs(np.cross(tip, foot)).max() < 1e-14
         assert tip @ foot > foot @ foot
+        reach = 1.2 * np.linalg.norm(edges) / 2
+        momentum = [np.transpose(line.get_data_3d()) for line in lines if line is not pin]
+        assert sorted(tip[2] for _, tip in momentum) == pytest.approx([-reach, reach])
+        for foot, tip in momentum:
+            assert foot[0] == foot[1] == tip[0] == tip[1] == 0
+            assert np.abs(foot @ turns[i, 1] / (edges / 2)).max() == pytest.approx(1)  # on a face
+
+
+def test_the_book_hides_what_is_behind_it_and_nothing_else(space, turning):
+    """Along the line of sight, in the frame of the book, where it is |x| < half its edges."""
+    edges = np.array([2.0, 1, 0.5])
+    turns = turning[0][:, 1]
+    update = spheres.moving_book(space, TIMES, turns, edges)
+    e, a = np.radians([space.elev, space.azim])
+    eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    for i in range(0, 481, 10):
+        artists = update(i)
+        space.figure.canvas.draw()
+        (book,) = [artist for artist in artists if hasattr(artist, "_faces")]
+        for line in [artist for artist in artists if hasattr(artist, "get_data_3d")]:
+            sign = 1 if artists.index(line) > artists.index(book) else -1
+            assert (line.get_zorder() - book.get_zorder()) * sign > 0  # as the PDF has it
+            foot, tip = np.transpose(line.get_data_3d()) @ turns[i]
+            for share in (0.01, 0.3, 0.6, 1):
+                ray = sign * np.linspace(0, 4, 1001)[:, None] * (eye @ turns[i])
+                seen = foot + share * (tip - foot) + ray
+                assert not (np.abs(seen) < edges / 2 * (1 - 1e-9)).all(axis=1).any()
 
 
 def test_the_description_of_the_book_says_when_it_turns_over():
