@@ -4,110 +4,107 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
+from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from rbcourse._numerics import Array
 from rbcourse.draw.save import COLOURS, Table
-from rbcourse.study.atlas import CELLS, FAMILIES, FASTEST, WAYS
+from rbcourse.study.atlas import CELLS, FASTEST, WAYS
 
-_LEAST, _MOST = 1e-4, 1e2
-_CONTOURS = {0.01: ":", 0.1: "--", 1.0: "-"}
+_TENTH = 0.1
+_LEVELS = [1e-4, 1e-3, 0.01, _TENTH, 1.0, 10.0, 100.0]
 _LOOKS: dict[str, tuple[str, str]] = {
-    "projection": ("projection", "o-"),
-    "exponential": ("x", "s--"),
-    "Bézier": ("z", "^-"),
-    "cumulative": ("y", "v--"),
-    "quaternion": ("screw", "D-."),
-    "Cayley": ("reference", "x:"),
+    "projection": ("projection", "o"),
+    "exponential": ("x", "s"),
+    "Bézier": ("z", "^"),
+    "cumulative": ("y", "v"),
+    "quaternion": ("screw", "D"),
+    "Cayley": ("reference", "x"),
 }
 
 
-def draw_atlas(fig: Figure, data: Table, quantile: str) -> list[Any]:
-    """Draw a heat map for each closed form and each family, with contours at 1, 10 and 100 %.
+def of_family(data: Table, family: str) -> dict[str, Array]:
+    """Return the rows of a table that belong to a family.
 
-    BK 1, BK 7.
+    Examples
+    --------
+    >>> of_family({"family": ["along", "across"], "x [1]": [1, 2]}, "across")["x [1]"]
+    array([2])
     """
-    fig.set_layout_engine("none")
-    room = {
-        "left": 0.085,
-        "right": 0.88,
-        "bottom": 0.16,
-        "top": 0.93,
-        "wspace": 0.13,
-        "hspace": 0.12,
-    }
-    axes = fig.subplots(len(FAMILIES), len(WAYS), sharex=True, sharey=True, gridspec_kw=room)
+    chosen = np.asarray(data["family"]) == family
+    return {name: np.asarray(column)[chosen] for name, column in data.items()}
+
+
+def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> list[Any]:
+    """Draw for a family a heat map of each closed form: a colour for each power of ten.
+
+    A dashed line runs at 10 %. `data` is what `rbcourse.study.atlas.cell_table` gives; its
+    `quantile` is named beside the colours (BK 1, BK 7).
+    """
+    axes = fig.subplots(2, 3, sharex=True, sharey=True)
     turns, speeds = (np.linspace(0, end, CELLS + 1) for end in (180, FASTEST))
-    norm = LogNorm(_LEAST, _MOST)
-    maps = []
-    for row, family in zip(axes, FAMILIES, strict=True):
-        for ax, way in zip(row, WAYS, strict=True):
-            here = np.asarray(data["family"]) == family
-            excess = np.asarray(data[f"{way} excess [1]"])[here].reshape(CELLS, CELLS)
-            excess = np.clip(excess, _LEAST / 10, None)
-            maps.append(ax.pcolormesh(turns, speeds, excess.T, norm=norm, cmap="viridis_r"))
-            _draw_contours(ax, turns, speeds, excess)
-            ax.set(xticks=[0, 60, 120], yticks=[0, 3, 6, 9])
-            if family == FAMILIES[0]:
-                ax.set_title(way)
-        row[0].set_ylabel(f"{family}\nend velocity (rad)")
-    fig.text(0.085, 0.04, "displacement (°)")
-    bar = fig.colorbar(maps[0], cax=fig.add_axes((0.9, 0.16, 0.015, 0.77)), extend="both")
-    bar.set_label(f"cost / optimum − 1, {quantile}")
-    handles = [
-        Line2D([], [], color="black", lw=1.2, ls=dash, label=f"{100 * level:g} %")
-        for level, dash in _CONTOURS.items()
-    ]
-    fig.legend(handles=handles, loc="lower right", bbox_to_anchor=(0.89, -0.01), ncols=3)
+    x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
+    colours: Any = {"norm": BoundaryNorm(_LEVELS, 256, extend="both"), "cmap": "viridis_r"}
+    line: Any = {"linestyles": "--", "linewidths": 2.5, "colors": "black"}
+    cells, maps = of_family(data, family), []
+    for ax, way in zip(axes.flat, WAYS, strict=True):
+        excess = cells[f"{way} excess [1]"].reshape(CELLS, CELLS).T
+        maps.append(ax.pcolormesh(turns, speeds, excess, **colours))
+        if np.nanmin(excess) < _TENTH < np.nanmax(excess):
+            powers = np.log10(np.maximum(excess, min(_LEVELS)))
+            ax.contour(x, y, powers, [np.log10(_TENTH)], **line)
+        ax.set(title=way, xticks=[0, 60, 120, 180], yticks=[0, 3, 6, 9])
+    fig.supxlabel("displacement (°)", fontsize="medium")
+    fig.supylabel(f"end velocity, {family} the axis (rad)", fontsize="medium")
+    bar = fig.colorbar(maps[0], ax=axes, aspect=15, label=f"cost / optimum − 1, {quantile}")
+    bar.set_ticks(_LEVELS, labels=_percents(_LEVELS))
+    bar.ax.axhline(_TENTH, color="black", lw=2.5, ls="--")
     return maps
 
 
-def _draw_contours(ax: Axes, turns: Array, speeds: Array, excess: Array) -> None:
-    for level, dash in _CONTOURS.items():
-        if np.nanmin(excess) < level < np.nanmax(excess):
-            x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
-            style: Any = {"colors": "black", "linestyles": dash, "linewidths": 1.2}
-            ax.contour(x, y, np.log10(excess.T), [np.log10(level)], **style)
+def _percents(levels: list[float]) -> list[str]:
+    return [f"{100 * level:,g} %" for level in levels]
 
 
-def describe_atlas(data: Table, quantile: str) -> str:
+def describe_atlas(data: Table, family: str, quantile: str) -> str:
     """Return in words what `draw_atlas` shows."""
-    said = "; ".join(f"{way} {_shares(data, way)}" for way in WAYS)
+    cells = of_family(data, family)
+    said = "; ".join(f"{way} {_shares(cells, way)}" for way in WAYS)
     return (
-        f"Heat maps of the cost over the optimum minus 1, {quantile}, for six closed forms, over "
-        "the displacement from 0 to 180 degrees and the end velocity from 0 to 9 rad, along the "
-        f"axis of the displacement and across. Share of the cells below 1, 10 and 100 %: {said}."
+        f"What six closed forms cost above the optimum, {quantile}, where the end velocities are "
+        f"{family} the axis of the displacement. A heat map each: to the right the displacement "
+        "grows from 0 to 180 degrees, and upwards the end velocity from 0 to 9 rad. Share of the "
+        f"cells below 1, 10 and 100 %, in percent: {said}."
     )
 
 
 def _shares(data: Table, way: str) -> str:
     excess = np.asarray(data[f"{way} excess [1]"])
-    return ", ".join(f"{100 * np.mean(excess < level):.0f}" for level in _CONTOURS)
+    return ", ".join(f"{100 * np.mean(excess < level):.0f}" for level in (0.01, 0.1, 1))
 
 
 def draw_growth(ax: Axes, data: Table) -> list[Any]:
-    """Draw, on logarithmic axes, the median excess of each closed form over the excursion.
+    """Draw, on logarithmic axes, the excess of each closed form over the excursion.
 
-    BK 1, BK 7.
+    The medians have marks; thin and dashed is the 90 % quantile. Return the medians, then those
+    (BK 1, BK 7).
     """
     size = np.asarray(data["size [rad]"])
-    lines = []
-    for k, (way, (colour, mark)) in enumerate(_LOOKS.items()):
+    medians, highs = [], []
+    for way, (colour, mark) in _LOOKS.items():
         median, high = (np.asarray(data[f"{way} {q} excess [1]"]) for q in ("median", "90 %"))
-        x = size * 1.03 ** (k - 2.5)
-        lines += ax.plot(x, median, mark, color=COLOURS[colour], label=way)
-        ax.vlines(x, median, high, color=COLOURS[colour], lw=1)
+        style: Any = {"color": COLOURS[colour]}
+        medians += ax.plot(size, median, "-", marker=mark, ms=8, label=way, **style)
+        highs += ax.plot(size, high, "--", lw=1, **style)
     ax.set(xscale="log", yscale="log", xlabel="size s of the excursion (rad)")
     ax.set_xticks(size, [f"{s:g}" for s in size], minor=False)
     ax.minorticks_off()
+    hundredfold = [1e-6, *_LEVELS[::2]]
+    ax.set_yticks(hundredfold, _percents(hundredfold))
     ax.set_ylabel("cost / optimum − 1")
-    for level in _CONTOURS:
-        ax.axhline(level, color="0.8", lw=1, zorder=0)
-        ax.text(0.01, level, f"{100 * level:g} %", va="bottom", transform=ax.get_yaxis_transform())
+    ax.plot([], [], "--", lw=1, color="black", label="90 % quantile")
     ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
-    return lines
+    return [*medians, *highs]
 
 
 def describe_growth(data: Table) -> str:
@@ -118,9 +115,10 @@ def describe_growth(data: Table) -> str:
         for way, values in ((w, np.asarray(data[f"{w} median excess [1]"])) for w in WAYS)
     )
     return (
-        "Median of the cost over the optimum minus 1, for six closed forms, over the size of the "
-        f"excursion from {size[0]:g} to {size[-1]:g} rad, on logarithmic axes, with bars up to the "
-        f"90 % quantile: {said}."
+        "What six closed forms cost above the optimum over the size of the excursion, the median "
+        "and the 90 % quantile, on logarithmic axes. While the size grows from "
+        f"{size[0]:g} to {size[-1]:g} rad, the median of the cost over the optimum minus 1 grows: "
+        f"{said}."
     )
 
 

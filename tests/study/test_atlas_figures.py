@@ -3,7 +3,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import LogNorm
 
 from rbcourse.study import atlas, atlas_figures
 
@@ -27,57 +26,62 @@ MARGINS = {
 
 @pytest.fixture
 def fig():
-    fig = plt.figure(figsize=(9, 4.8))
+    fig = plt.figure(figsize=(9, 6))
     yield fig
     plt.close(fig)
 
 
-def test_each_cell_has_its_colour(fig):
-    maps = atlas_figures.draw_atlas(fig, CELLS, "median")
-    assert len(maps) == 12
-    for k, drawn in enumerate(maps):
-        way, family = list(atlas.WAYS)[k % 6], atlas.FAMILIES[k // 6]
+@pytest.mark.parametrize("family", atlas.FAMILIES)
+def test_each_cell_has_its_colour(fig, family):
+    maps = atlas_figures.draw_atlas(fig, CELLS, family, "median")
+    assert len(maps) == 6
+    for drawn, way in zip(maps, atlas.WAYS, strict=True):
         wanted = CELLS[f"{way} excess [1]"][CELLS["family"] == family].reshape(10, 10)
-        assert drawn.axes.get_title() == (way if k < 6 else "")
-        assert np.array_equal(drawn.get_array(), np.clip(wanted, 1e-5, None).T)
-        assert isinstance(drawn.norm, LogNorm)
-        assert (drawn.norm.vmin, drawn.norm.vmax) == (1e-4, 1e2)
+        assert drawn.axes.get_title() == way
+        assert np.array_equal(drawn.get_array(), wanted.T)
+        assert drawn.norm.boundaries == pytest.approx(10.0 ** np.arange(-4, 3))
         edges = np.asarray(drawn.get_coordinates())
         assert edges[0, :, 0] == pytest.approx(np.arange(0, 181, 18))
         assert edges[:, 0, 1] == pytest.approx(np.arange(0, 9.1, 0.9))
     fig.canvas.draw()
+    bar = fig.axes[-1]
+    assert bar.get_yticks()[2:5] == pytest.approx([0.01, 0.1, 1])
+    assert [text.get_text() for text in bar.get_yticklabels()][2:5] == ["1 %", "10 %", "100 %"]
+    assert "median" in bar.get_ylabel()
+    assert fig.get_supylabel() == f"end velocity, {family} the axis (rad)"
 
 
-def test_contours_are_where_the_excess_is_1_10_and_100_percent(fig):
+def test_the_line_is_where_the_excess_is_10_percent(fig):
     slope = np.repeat(np.linspace(-3, 1, 10), 10)  # over the displacement, in powers of ten
     table = CELLS | {f"{way} excess [1]": np.tile(10.0**slope, 2) for way in atlas.WAYS}
-    ax = atlas_figures.draw_atlas(fig, table, "median")[0].axes
-    lines = [
-        np.concatenate(c.get_paths()[0].to_polygons(closed_only=False)) for c in ax.collections[1:]
-    ]
-    places = np.interp([-2, -1, 0], np.linspace(-3, 1, 10), np.arange(9, 180, 18))
-    assert [line[:, 0].mean() for line in lines] == pytest.approx(places)
+    ax = atlas_figures.draw_atlas(fig, table, "along", "median")[0].axes
+    _, line = ax.collections
+    drawn = np.concatenate(line.get_paths()[0].to_polygons(closed_only=False))
+    assert drawn[:, 0] == pytest.approx(
+        np.interp(-1, np.linspace(-3, 1, 10), np.arange(9, 180, 18))
+    )
 
 
 def test_the_shares_are_told():
-    said = atlas_figures.describe_atlas(CELLS, "median")
-    x = CELLS["projection excess [1]"]
+    said = atlas_figures.describe_atlas(CELLS, "across", "median")
+    x = CELLS["projection excess [1]"][100:]
     shares = ", ".join(f"{100 * np.mean(x < level):.0f}" for level in (0.01, 0.1, 1))
     assert f"projection {shares};" in said
     assert "Bézier 100, 100, 100;" in said
+    assert "across the axis" in said
 
 
-def test_medians_are_lines_and_bars_reach_the_90_percent_quantile(fig):
-    ax = fig.subplots()
-    lines = atlas_figures.draw_growth(ax, GROWTH)
-    for line, way, bars in zip(lines, atlas.WAYS, ax.collections, strict=True):
-        assert line.get_label() == way
-        assert np.array_equal(line.get_ydata(), GROWTH[f"{way} median excess [1]"])
-        assert np.abs(line.get_xdata() / SIZES - 1).max() < 0.1  # side by side
-        ends = [bar[:, 1] for bar in bars.get_segments()]
-        assert np.transpose(ends)[1] == pytest.approx(GROWTH[f"{way} 90 % excess [1]"])
-    looks = {(line.get_color(), line.get_marker()) for line in lines}
-    assert len(looks) == len(lines)
+def test_medians_and_90_percent_quantiles_are_lines_at_their_sizes(fig):
+    lines = atlas_figures.draw_growth(fig.subplots(), GROWTH)
+    for kind, drawn in (("median", lines[:6]), ("90 %", lines[6:])):
+        for line, way in zip(drawn, atlas.WAYS, strict=True):
+            assert np.array_equal(line.get_xdata(), SIZES)
+            assert np.array_equal(line.get_ydata(), GROWTH[f"{way} {kind} excess [1]"])
+    medians, highs = lines[:6], lines[6:]
+    assert [line.get_label() for line in medians] == list(atlas.WAYS)
+    assert [line.get_color() for line in medians] == [line.get_color() for line in highs]
+    assert len({line.get_color() for line in medians}) == 6
+    assert len({line.get_marker() for line in medians}) == 6
     assert "projection from 3.9e-06 to 8.1e-02" in atlas_figures.describe_growth(GROWTH)
 
 
