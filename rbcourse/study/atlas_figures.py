@@ -1,5 +1,6 @@
 """Still figures of the atlas: heat maps, quantiles over the excursion, excess over the margin."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,13 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "cumulative": ("y", "v"),
     "quaternion": ("screw", "D"),
     "Cayley": ("reference", "x"),
+}
+_MARGINS = {
+    "projection": (
+        "least sum of the two\nsmallest singular values (rotation: 2)",
+        [0.01, 0.1, 1, 2],
+    ),
+    "quaternion": ("least norm\nof the cubic (rotation: 1)", [0.5, 1]),
 }
 
 
@@ -63,7 +71,7 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> list[Any
 
 
 def _percents(levels: list[float]) -> list[str]:
-    return [f"{100 * level:,g} %" for level in levels]
+    return [f"{100 * level:,.9g} %" for level in levels]
 
 
 def describe_atlas(data: Table, family: str, quantile: str) -> str:
@@ -122,29 +130,49 @@ def describe_growth(data: Table) -> str:
     )
 
 
-def draw_margins(ax: Axes, data: Table) -> list[Any]:
-    """Draw the excess of the projections, of matrices and of quaternions, over their margins."""
-    dots = []
-    for way, mark in {"projection": ".", "quaternion": "+"}.items():
-        style: Any = {"color": COLOURS[_LOOKS[way][0]], "alpha": 0.5, "ms": 4, "label": way}
-        dots += ax.plot(*_margins(data, way), mark, rasterized=True, **style)
+def draw_margins(axes: Sequence[Axes], data: Table) -> list[Any]:
+    """Draw the excess over the margin: of projections left, of cubics of quaternions right.
+
+    The first family in the column "family" becomes dots, up to two others large black marks, the
+    same in both panels. Return them for each panel, and a line of slope −3 beside the projections.
+    """
+    marks: list[Any] = []
+    families = list(dict.fromkeys(np.asarray(data["family"])))
+    for ax, (way, (name, ticks)) in zip(axes, _MARGINS.items(), strict=True):
+        for family, mark in zip(families, ".*D", strict=False):
+            style: Any = {"color": "black", "mec": "white", "ms": 17 if mark == "*" else 9}
+            if family == families[0]:
+                style = {"color": COLOURS[_LOOKS[way][0]], "alpha": 0.6, "rasterized": True}
+            points = _margins(of_family(data, family), way)
+            marks += ax.plot(*points, mark, label=family, **style)
+        ax.set(xscale="log", yscale="log", title=way, xlabel=f"margin: {name}")
+        ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+        ax.minorticks_off()
     x = np.array([0.02, 0.7])
-    line = ax.plot(x, x**-3, color=COLOURS["reference"], lw=1, label="slope −3")
-    ax.set(xscale="log", yscale="log", xlabel="margin", ylabel="cost / optimum − 1")
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
-    return [*dots, *line]
+    line = axes[0].plot(x, x**-3, color=COLOURS["reference"], lw=1.5, label="slope −3")
+    hundredfold = [*_LEVELS[2::2], 1e4, 1e6]
+    axes[0].set_yticks(hundredfold, _percents(hundredfold))
+    axes[0].set_ylabel("cost / optimum − 1")
+    axes[0].legend(loc="lower left")
+    return [*marks, *line]
 
 
 def describe_margins(data: Table) -> str:
     """Return in words what `draw_margins` shows."""
-    margin, excess = _margins(data, "projection")
+    first, *others = dict.fromkeys(np.asarray(data["family"]))
+    margin, excess = _margins(of_family(data, first), "projection")
     low, high = (np.nanmedian(excess[x]) for x in (margin < 0.2, margin > 1))
     least = _margins(data, "quaternion")[0].min()
+    said = ""
+    for family in others:
+        pairs = zip(*_margins(of_family(data, family), "projection"), strict=True)
+        said += f" {family}: {', '.join(f'{100 * y:.0f} % at {x:.3f}' for x, y in pairs)}."
     return (
-        "The cost over the optimum minus 1 over the margin, a dot for each problem, on logarithmic "
-        f"axes. Of the projection the median is {low:.1e} where the margin is below 0.2, and "
-        f"{high:.1e} where it is above 1; beside the dots runs a line of slope minus three. The "
-        f"margin of the quaternions is {least:.1f} or more."
+        "A small margin condemns, a large one certifies nothing: the cost over the optimum minus 1 "
+        "over the margin, a dot for each problem, on logarithmic axes. Of the projection the "
+        f"median is {low:.1e} where the margin is below 0.2, and {high:.1e} where it is above 1; "
+        f"beside the dots runs a line of slope minus three.{said} The least margin of the "
+        f"quaternions is {least:.2f}."
     )
 
 
