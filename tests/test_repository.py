@@ -331,7 +331,7 @@ def test_what_a_command_said_last_is_kept_when_it_fails():
 
 
 def test_the_last_lesson_cites_what_the_citation_file_has():
-    shown = re.sub(r"[{}]", "", read("notebooks/12_take_it_away.ipynb"))
+    shown = re.sub(r"[{}]", "", read("notebooks/14_take_it_away.ipynb"))
     both, _ = read("CITATION.cff").split("- type: report")
     said = dict(re.findall(r"^\W*([a-z-]+): (.*)$", both, re.MULTILINE))
     for name in ("version", "family-names", "given-names", "volume", "issue", "start", "year"):
