@@ -170,10 +170,10 @@ def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = 
     said = []
     for name, q in postures.items():
         x, y = _columns(_joints(q, lengths))
-        said.append(f"{name}: they point to {_degrees(np.arctan2(y, x))} degrees")
+        said.append(f"{name}, to {_degrees(np.arctan2(y, x))} degrees")
     return (
         "An arm, with an arrow at its tip for each joint: how fast the tip goes when only the "
-        f"motor of that joint runs, at half its length. {'; '.join(said)}."
+        f"motor of that joint runs, at half its length. The arrows point, {'; '.join(said)}."
     )
 
 

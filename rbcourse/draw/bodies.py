@@ -98,7 +98,7 @@ def set_space(ax: Any, places: Array, side: float) -> None:
 def describe_cube_motion(poses: Array) -> str:
     """Return in words what `draw_cube_motion` shows."""
     steps = np.degrees(angle_between(poses[:-1, :3, :3], poses[1:, :3, :3]))
-    ends = " to ".join("(" + ", ".join(f"{x:g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
+    ends = " to ".join("(" + ", ".join(f"{x:.3g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
     return (
         f"A cube with a square on one face, at {len(poses)} times on its way from {ends} m, its "
         f"centre starred. From one to the next it turns by "
@@ -149,8 +149,8 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
         steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1)
         lengths.append(f"{name} {steps.sum():.2f} m")
     return (
-        "The paths of the origin of a frame in several motions from one pose, and the frame at the "
-        f"ends. Lengths of the paths: {', '.join(lengths)}."
+        "The paths of a frame's origin from one pose, and the frame at their ends: "
+        f"{'; '.join(ways)}. Lengths of the paths: {'; '.join(lengths)}."
     )
 
 
@@ -181,7 +181,7 @@ def moving_cubes(
 def describe_moving_cubes(t: Array, motions: Mapping[str, Array]) -> str:
     """Return in words what `moving_cubes` shows; the poses are those of the times t."""
     (first, poses), *others = motions.items()
-    said = f"Cubes with a square on one face move side by side: {', '.join(motions)}."
+    said = f"Cubes with a square on one face move side by side: {'; '.join(motions)}."
     for name, other in others:
         apart = np.degrees(angle_between(poses[:, :3, :3], other[:, :3, :3]))
         said += (
@@ -252,7 +252,7 @@ def describe_turns(names: Sequence[str], R: Array) -> str:
         f"{name}: x {_heading(x)}, y {_heading(y)}, z {_heading(z)}"
         for name, (x, y, z) in zip(names, np.swapaxes(R, -1, -2), strict=True)
     ]
-    return f"A box with its axes in several orientations. Where they point: {'; '.join(said)}."
+    return f"A box with its axes: {'; '.join(names)}. Where they point: {'; '.join(said)}."
 
 
 def _heading(direction: Array) -> str:

@@ -146,12 +146,16 @@ def describe_compared(panels: Mapping[str, Mapping[str, Array]]) -> str:
         one, other = (path[:, :2] for path in paths.values())
         apart = in_words(np.linalg.norm(one - other, axis=1).max(), extent_of(one))
         said.append(f"{title}: {' and '.join(paths)}, the centres apart by {apart} m at most")
-    return f"Rectangles on two ways each. {'; '.join(said)}."
+    return (
+        f"A rectangle on two ways beside each other, the second dashed: {'; '.join(panels)}. "
+        f"The ways of each pair: {'; '.join(said)}."
+    )
 
 
 def describe_routes(paths: Mapping[str, Array]) -> str:
     """Return in words how rectangles go, with the names of their ways."""
-    return " ".join(f"{name}: {describe_route(path)}" for name, path in paths.items())
+    said = " ".join(f"{name}: {describe_route(path)}" for name, path in paths.items())
+    return f"A rectangle on its way from start to goal: {'; '.join(paths)}. In turn, {said}"
 
 
 def _placed(pose: Array, length: float) -> tuple[Array, Array]:

@@ -107,7 +107,7 @@ def describe_family(data: Table) -> str:
     times = ", ".join(f"{value:g}" for value in x[0, at])
     return (
         f"{_label(y_name)} over the time t, for {len(parameter)} angles a, as a surface and as "
-        f"curves. At the times {times} {'; '.join(ends)}."
+        f"curves, a colour for each angle. At the times {times} {'; '.join(ends)}."
     )
 
 
@@ -200,8 +200,9 @@ def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> s
             f"{speed[-1]:.2f} at the end"
         )
     return (
-        "Left, a sphere with the paths of one point under two motions, marked at equal times; "
-        f"right, the angular speeds in rad per unit time. Between the marks {'; '.join(said)}."
+        f"The paths of one point on a sphere, {' and '.join(_MOTIONS)}, marked at equal times, and "
+        "beside them the angular speeds over time. Speeds are in rad per unit time. Between the "
+        f"marks {'; '.join(said)}."
     )
 
 
@@ -294,8 +295,8 @@ def describe_coordinates(data: Table) -> str:
     apart = np.linalg.norm(best - near, axis=0)
     start, end = (", ".join(f"{x:.3g}" for x in best[:, k].round(9) + 0.0) for k in (0, -1))
     said = (
-        "Two paths in the space of exponential coordinates, the optimum and the projection, "
-        f"marked at equal times; the coordinates over time; and by how much they differ. "
+        "The optimum and the projection in exponential coordinates: their paths, marked at equal "
+        "times, the coordinates over time, and by how much they differ. "
         f"Both run from ({start}) to ({end}) rad. "
     )
     if apart.max() < 1e-9:
@@ -331,9 +332,9 @@ def describe_excess(data: Table) -> str:
         for name, excess in families
     )
     return (
-        "What the projection costs above the optimum, as a share, over the size of the excursion "
-        f"from {np.min(scale):g} to {np.max(scale):g}, on logarithmic axes: {ends}. All follow a "
-        "line of slope four where they are small."
+        "What the projection costs above the optimum, as a share, over the size of the excursion, "
+        f"on logarithmic axes. From size {np.min(scale):g} to {np.max(scale):g} it goes: {ends}. "
+        "All follow a line of slope four where they are small."
     )
 
 
@@ -386,15 +387,19 @@ def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> list[A
 def describe_profiles(data: Table, knots: ArrayLike) -> str:
     """Say how large each column of such a drawing becomes, and when."""
     t = np.asarray(data[_TIME])
-    parts = []
+    parts, labels = [], []
     for name, values in _profiles(data):
         label, unit = name.removesuffix("]").split(" [")
+        labels.append(f"{label} ({unit})")
         scale, largest = np.abs(values).max(), int(np.argmax(np.round(values, 9)))
         low = f"from {in_words(values.min(), scale)} " if values.min() < -0.01 * scale else ""
         parts.append(f"{label} {low}up to {in_words(values[largest], scale)} {unit}")
         parts[-1] += f" at {in_words(t[largest], t[-1])} s"
     when = ", ".join(in_words(knot, t[-1]) for knot in np.asarray(knots))
-    return f"Over time: {'; '.join(parts)}. The poses are reached at {when} s."
+    return (
+        f"Over time, with dotted lines where poses are reached: {', '.join(labels)}. "
+        f"They go: {'; '.join(parts)}. The poses are reached at {when} s."
+    )
 
 
 def _profiles(data: Table) -> list[tuple[str, Any]]:
@@ -435,7 +440,10 @@ def describe_angles(data: Table) -> str:
             f"{name}: β goes to {extreme:.0f} degrees, and the middle half of α's change takes "
             f"{100 * (late - early):.1f} % of the time"
         )
-    return f"ZYX angles of steadily turning bodies over time. {'; '.join(said)}."
+    return (
+        f"ZYX angles over time of bodies that turn steadily: {'; '.join(_motions(data))}. "
+        f"In turn, {'; '.join(said)}."
+    )
 
 
 def _motions(data: Table) -> list[str]:

@@ -228,4 +228,7 @@ def describe_frames(data: Table) -> str:
         else f"{name} finds {angle[0]:.1f} degrees in every frame"
         for name, angle in found.items()
     ]
-    return f"The rotation found, over the angle of the body frame: {'; '.join(ranges)}."
+    return (
+        "The angle of the rotation that two repairs find, over the angle by which the body frame "
+        f"is turned. Of the two, {'; '.join(ranges)}."
+    )

@@ -179,8 +179,9 @@ def describe_histograms(bins: Bins) -> str:
             off = np.abs(density * np.diff(edges) - np.diff(law(edges))).sum() / 2
             said.append(f"{label.split(' (')[0]}, {name}: {100 * off:.0f} %")
     return (
-        "Histograms of random rotations beside the law of uniform ones. The share of the draws "
-        f"that lies in the wrong bins: {'; '.join(said)}."
+        "Histograms of random rotations, of their angles and of the heights of two images, beside "
+        "the law of uniform ones. The share of the draws that lies in the wrong bins: "
+        f"{'; '.join(said)}."
     )
 
 
@@ -214,7 +215,7 @@ def describe_spins(spins: Mapping[str, Array]) -> str:
         said.append(f"{name}: it changes its sign {flips} times" if flips else f"{name}: it stays")
     return (
         "The three components of the angular velocity of a free body over time, for spins that "
-        f"start about one axis, nearly. What becomes of the largest component: {'; '.join(said)}."
+        f"start nearly about one axis. What becomes of the largest component: {'; '.join(said)}."
     )
 
 

@@ -87,7 +87,7 @@ def test_the_arrows_at_the_tip_are_the_columns_of_the_jacobian(axes, q):
     assert [arrow.get_label() for arrow in arrows] == [f"motor {i} runs" for i in range(len(q))]
     said = arm.describe_tip_velocities({"here": np.array(q)}, lengths)
     first = np.degrees(np.arctan2(J[1, 0], J[0, 0]))
-    assert f"here: they point to {first:.0f}" in said
+    assert f"The arrows point, here, to {first:.0f}" in said
 
 
 def assert_reach_is_seen(ax):

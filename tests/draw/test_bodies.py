@@ -114,7 +114,7 @@ def test_descriptions_give_numbers():
     assert "at 6 times on its way from (0, 0, 0) to (4, 5, 3) m" in said
     assert ", ".join([f"{angle / 5:.0f}"] * 5) in said
     same = {"one": MOTIONS["screw"], "two": MOTIONS["screw"]}
-    assert "side by side: one, two." in bodies.describe_moving_cubes(TIMES, same)
+    assert "side by side: one; two." in bodies.describe_moving_cubes(TIMES, same)
     assert "one and two agree at all times." in bodies.describe_moving_cubes(TIMES, same)
     t = np.linspace(0, 1, 6)
     bump = 4 * t * (1 - t) ** 2  # most at 1/3, of the six times at 0.4

@@ -87,9 +87,9 @@ def test_two_ways_are_compared(ax):
     way = plane.draw_compared(ax, pair, 1, shown=[1])[3]
     assert np.abs(np.transpose(way.get_data()) - raised[:, :2]).max() < 1e-14
     said = plane.describe_compared({"here": pair})
-    assert (
-        said
-        == "Rectangles on two ways each. here: one and other, the centres apart by 2 m at most."
+    assert said == (
+        "A rectangle on two ways beside each other, the second dashed: here. "
+        "The ways of each pair: here: one and other, the centres apart by 2 m at most."
     )
 
 
@@ -101,7 +101,9 @@ def test_the_description_says_from_where_to_where_and_how_it_turns():
     still = plane.describe_route(np.array([[1, -0.001, -0.004], [1, -0.001, 0]]))
     assert "from (1, 0) m, heading 0 degrees" in still
     assert "it turns by less than a degree." in still
-    assert plane.describe_routes({"one": PATH}) == f"one: {said}"
+    both = plane.describe_routes({"one": PATH, "two": PATH})
+    assert both.startswith("A rectangle on its way from start to goal: one; two. In turn, one: ")
+    assert both.endswith(f"one: {said} two: {said}")
 
 
 def test_a_rectangle_of_a_drawing_is_that_of_its_matrix(ax):

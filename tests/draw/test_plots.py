@@ -222,7 +222,8 @@ def test_each_column_has_its_axes_and_the_knots_their_lines():
 
 def test_what_is_said():
     assert plots.describe_profiles(PROFILES, [0, 1.5]) == (
-        "Over time: speed up to 2.5 m/s at 1 s; turn up to 1 rad/s at 0 s. "
+        "Over time, with dotted lines where poses are reached: speed (m/s), turn (rad/s). "
+        "They go: speed up to 2.5 m/s at 1 s; turn up to 1 rad/s at 0 s. "
         "The poses are reached at 0, 1.5 s."
     )
 
