@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Arc
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
@@ -112,9 +112,9 @@ def describe_family(data: Table) -> str:
 
 
 def draw_chord(ax: Axes, data: Table) -> list[Any]:
-    """Draw equal steps along a chord of the unit circle, and the rays that project them."""
+    """Draw equal steps along a chord of the upper unit circle, and the rays that project them."""
     t, x, y, arc_x, arc_y = (np.asarray(column) for column in data.values())
-    circle = Circle((0, 0), 1, fill=False, color=COLOURS["reference"], lw=1)
+    circle = Arc((0, 0), 2, 2, theta1=0, theta2=180, color=COLOURS["reference"], lw=1)
     ax.add_patch(circle)
     rays = ax.plot(
         [np.zeros_like(x), arc_x], [np.zeros_like(y), arc_y], color=COLOURS["reference"], lw=0.8
@@ -128,9 +128,9 @@ def draw_chord(ax: Axes, data: Table) -> list[Any]:
         ms=8,
         label="their projections on the circle",
     )
-    for k, offset in ((0, (-14, -22)), (len(x) // 2, (2, 9)), (-1, (-14, -24))):
+    for k, offset in ((0, (-16, -22)), (len(x) // 2, (8, 8)), (-1, (-54, -4))):
         ax.annotate(f"t = {t[k]:g}", (x[k], y[k]), offset, textcoords="offset points")
-    ax.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.12, 1.12))
+    ax.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.16, 1.08))
     ax.set(xlabel="real part", ylabel="imaginary part")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
     return [circle, *rays, *chord, *arc]

@@ -98,9 +98,12 @@ def test_the_chord_shows_its_cuts_and_their_projections(ax):
     z = np.array([1, 0.5 + 0.5j, 1j])
     arc = z / np.abs(z)
     table = dict(zip("txyab", [[0, 0.5, 1], z.real, z.imag, arc.real, arc.imag], strict=True))
-    *_, chord, projections = plots.draw_chord(ax, table)
+    circle, *_, chord, projections = plots.draw_chord(ax, table)
     assert np.array_equal(chord.get_xydata(), np.array([z.real, z.imag]).T)
     assert np.array_equal(projections.get_xydata(), np.array([arc.real, arc.imag]).T)
+    for artist in (circle, projections, *ax.texts):
+        box = artist.get_window_extent()
+        assert np.array_equal(box.corners(), np.clip(box.corners(), *ax.bbox.corners()[[0, 3]]))
     said = plots.describe_chord(table)
     assert "over 90 degrees, cut into 2 equal steps" in said
 
