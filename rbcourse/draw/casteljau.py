@@ -1,0 +1,135 @@
+"""De Casteljau's construction as it moves: straight legs in the plane, geodesics on SO(3)."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.curves import check_ends, geodesic_so3
+from rbcourse.draw.save import COLOURS
+from rbcourse.draw.spheres import draw_sphere
+from rbcourse.so3 import angle_between, exp_so3
+
+_SHARES = np.linspace(0, 1, 33)  # where a leg is drawn
+_LOOKS = ("0.7", 2), ("0.45", 2), (COLOURS["optimum"], 3)
+"""Colour and width of the legs between the points of each level."""
+_NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v", "B₂v", "R₁v"]}
+
+
+def casteljau_table(
+    t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
+) -> dict[str, Array]:
+    """Return the points of `moving_casteljau` as a table: level 0 the given ones, 3 the curve.
+
+    Examples
+    --------
+    >>> ends = np.eye(3), np.eye(3), [0, 0, 1], [0, 0, 1]
+    >>> table = casteljau_table(np.array([0.5]), [[0, 0], [1, 1], [2, 1], [3, 0]], ends, [1, 0, 0])
+    >>> float(table["plane level 3 point 0 y [1]"][0])
+    0.75
+    """
+    return {"t [1]": t} | {
+        f"{name} level {k} point {j} {axis} [1]": column
+        for name, (levels, _) in _constructions(t, points, ends, v).items()
+        for k, level in enumerate(levels)
+        for j, point in enumerate(np.moveaxis(level, 1, 0))
+        for axis, column in zip("xyz", point.T, strict=False)
+    }
+
+
+def moving_casteljau(
+    axes: Sequence[Any], t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
+) -> Callable[[int], list[Any]]:
+    """Draw control points and the legs between them; return what divides the legs.
+
+    In the plane, on the first axes, the control points are four, shape (4, 2). On SO(3), on the
+    second ones, in space, they are those of `bezier_so3` for the `ends` R0, R1, w0, w1, and shown
+    by the images of v on the unit sphere; choose v such that all are in front. ``update(i)`` shows
+    the points at the share t[i] of all legs, the legs between these, and so on, to the one point
+    that draws the curve. It returns the artists that move: a text; then for each axes the legs of
+    two levels, the curve so far, and that point.
+    """
+    plane, sphere = axes
+    plane.set(title="in the plane", aspect="equal", adjustable="datalim", xmargin=0.15)
+    plane.set_axis_off()
+    draw_sphere(sphere)
+    sphere.set_title("on SO(3), images of v")
+    panels = []
+    for ax, (name, (levels, legs)) in zip(
+        axes, _constructions(t, points, ends, v).items(), strict=True
+    ):
+        lines: list[Any] = []
+        for leg, (colour, width) in zip(legs, _LOOKS, strict=True):
+            style: Any = {"color": colour, "lw": width, "ms": 8, "zorder": 3 + len(lines)}
+            corners = [*range(0, leg.shape[1], len(_SHARES)), leg.shape[1] - 1]
+            lines += ax.plot(*leg[0].T, "o-", markevery=corners, **style)
+        given = levels[0][0]
+        outward = given - given.mean(axis=0)
+        outward *= 0.12 * np.ptp(given) / np.linalg.norm(outward, axis=-1, keepdims=True)
+        for word, place in zip(_NAMES[name], given + outward, strict=True):
+            ax.text(*place, word, ha="center", va="center", zorder=9)
+        lines += ax.plot(*levels[3][0].T, color=COLOURS["z"], lw=4, zorder=7)
+        lines += ax.plot(*levels[3][0].T, "o", color=COLOURS["optimum"], ms=12, zorder=8)
+        panels.append((levels[3][:, 0], legs[1:], lines[1:]))
+    clock = plane.text(0.02, 0.02, "", transform=plane.transAxes)
+
+    def update(i: int) -> list[Any]:
+        clock.set_text(f"t = {t[i]:.2f}")
+        for drawn, legs, artists in panels:
+            shown = *(leg[i] for leg in legs), drawn[: i + 1], drawn[i : i + 1]
+            for artist, places in zip(artists, shown, strict=True):
+                flat = places.shape[-1] == 2
+                (artist.set_data if flat else artist.set_data_3d)(*places.T)
+        return [clock, *(artist for *_, artists in panels for artist in artists)]
+
+    return update
+
+
+def describe_casteljau(ends: Sequence[ArrayLike]) -> str:
+    """Return in words what `moving_casteljau` shows."""
+    B = _controls(ends)
+    legs = ", ".join(f"{x:.0f}" for x in np.degrees(angle_between(B[:-1], B[1:])))
+    return (
+        "De Casteljau's construction divides straight legs in the plane, and geodesics on SO(3), "
+        "in the same ratio. Four control points have three legs; the points that divide these have "
+        "two, the points that divide those have one, and the point that divides it draws the "
+        "curve. On the right the rotations are shown by the images of a vector v on the unit "
+        "sphere; B₁ is R₀ exp(ω₀/3), and B₂ is R₁ exp(−ω₁/3). From one control rotation to the "
+        f"next are {legs} degrees."
+    )
+
+
+def _controls(ends: Sequence[ArrayLike]) -> Array:
+    R0, R1, w0, w1 = check_ends(*ends)
+    return np.stack([R0, R0 @ exp_so3(w0 / 3), R1 @ exp_so3(-w1 / 3), R1])
+
+
+def _constructions(
+    t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
+) -> dict[str, tuple[list[Array], list[Array]]]:
+    levels, legs = _construct(t, _controls(ends), _on_geodesic)
+    images = [R @ np.asarray(v) for R in levels], [R @ np.asarray(v) for R in legs]
+    return {"plane": _construct(t, np.asarray(points), _on_line), "sphere": images}
+
+
+def _construct(
+    t: Array, points: Array, between: Callable[[Array, Array, Array], Array]
+) -> tuple[list[Array], list[Array]]:
+    """Return the points of each level, shape (times, 4 − k, ...), and the legs between them."""
+    levels, legs = [np.broadcast_to(points, t.shape + points.shape)], []
+    while levels[-1].shape[1] > 1:
+        first, last = levels[-1][:, :-1], levels[-1][:, 1:]
+        all_along = [between(first, last, np.full_like(t, s)) for s in _SHARES]
+        legs.append(np.stack(all_along, axis=2).reshape(len(t), -1, *points.shape[1:]))
+        levels.append(between(first, last, t))
+    return levels, legs
+
+
+def _on_line(first: Array, last: Array, t: Array) -> Array:
+    return first + t[:, None, None] * (last - first)
+
+
+def _on_geodesic(first: Array, last: Array, t: Array) -> Array:
+    return geodesic_so3(first, last).at_own_times(np.tile(t[:, None], first.shape[1]))
