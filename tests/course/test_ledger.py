@@ -82,7 +82,7 @@ def course(tmp_path):
     test = mark + '\n@pytest.mark.parametrize("key", ["BK (3)"])\ndef test_turn():\n    pass\n'
     test += '@pytest.mark.source("BK (3)")\ndef not_a_test():\n    pass\n'
     (tmp_path / "tests/test_so3.py").write_text(test, "utf-8")
-    cells = [new_markdown_cell("## 3 · Turns (BK (2))\n\nBK (3)"), new_markdown_cell("BK (4)")]
+    cells = [new_markdown_cell("## 3 · Turns\n\n<small>BK (2)</small>\n\nBK (3)"), new_markdown_cell("BK (4)")]
     nbformat.write(new_notebook(cells=cells), tmp_path / "notebooks/03_turns.ipynb")
     return tmp_path
 
@@ -101,7 +101,7 @@ def test_what_is_collected(course):
 
 
 def test_an_unknown_key_is_named(course):
-    cell = new_markdown_cell("## 1 · Turns (BK (99))")
+    cell = new_markdown_cell("## 1 · Turns\n\n<small>BK (99)</small>")
     nbformat.write(new_notebook(cells=[cell]), course / "notebooks/03_turns.ipynb")
     with pytest.raises(ValueError, match=r"03_turns\.ipynb, 1: BK \(99\) is no entry"):
         ledger.collect(course)
