@@ -55,7 +55,7 @@ def moving_casteljau(
     plane.set(title="in the plane", aspect="equal", adjustable="datalim", xmargin=0.15)
     plane.set_axis_off()
     draw_sphere(sphere)
-    sphere.set_title("on SO(3), images of v")
+    sphere.set_title("on SO(3), images of v", pad=18)
     panels = []
     for ax, (name, (levels, legs)) in zip(
         axes, _constructions(t, points, ends, v).items(), strict=True
