@@ -26,7 +26,6 @@ SHARES = {
     r"lesson01_straight, .* by the corner .*": 0,  # the corner's way is drawn, not the centre's
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames at the ends only
     r"lesson12_(median|ninety)_\w+, (displacement|end velocity) \[rad\]": 0,  # where a cell is
-    r"lesson12_(median|ninety)_\w+, .* excess \[1\]": 0.85,  # colours end at 0.01 % and 10⁴
 }
 
 
