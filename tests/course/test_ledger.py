@@ -82,7 +82,10 @@ def course(tmp_path):
     test = mark + '\n@pytest.mark.parametrize("key", ["BK (3)"])\ndef test_turn():\n    pass\n'
     test += '@pytest.mark.source("BK (3)")\ndef not_a_test():\n    pass\n'
     (tmp_path / "tests/test_so3.py").write_text(test, "utf-8")
-    cells = [new_markdown_cell("## 3 · Turns\n\n<small>BK (2)</small>\n\nBK (3)"), new_markdown_cell("BK (4)")]
+    cells = [
+        new_markdown_cell("## 3 · Turns\n\n<small>BK (2)</small>\n\nBK (3)"),
+        new_markdown_cell("BK (4)"),
+    ]
     nbformat.write(new_notebook(cells=cells), tmp_path / "notebooks/03_turns.ipynb")
     return tmp_path
 
