@@ -177,7 +177,7 @@ def random_explorer() -> Explorer:
         )
     controls = {
         "sampler": choice("sampler", list(_SAMPLERS)),
-        "number": slider("rotations", 100.0, 20.0, _MOST, 20.0),
+        "number": slider("rotations", 40.0, 20.0, _MOST, 20.0),
         "seed": slider("seed", 0.0, 0.0, 20.0, 1.0),
     }
 
