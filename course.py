@@ -154,23 +154,48 @@ def test_in(venv, *words):
 
 
 def open_lab(edit, further):
-    """Open JupyterLab; a root user need not be told what he is."""
+    """Open JupyterLab on lesson 00; a root user need not be told what he is."""
     if not edit:
         run("-m", "rbcourse.course.notebooks", "copy")
-    keep_lab_quiet()
-    words = ["--ServerApp.root_dir=%s" % (ROOT / ("notebooks" if edit else "work"))]
+    folder = "notebooks" if edit else "work"
+    words = ["--ServerApp.root_dir=%s" % ROOT, "--log-level=ERROR"]
+    words.append("--LabApp.default_url=/lab/tree/%s/00_start_here.ipynb" % folder)
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         words.append("--allow-root")
-    run("-m", "jupyterlab", *(words + further))
+    os.environ["JUPYTER_CONFIG_PATH"] = str(set_up_lab())
+    print("JupyterLab opens in the browser. Stop it here, with Ctrl-C.", flush=True)
+    # of what its own extensions use, not of what kernels run
+    run("-W", "ignore::DeprecationWarning", "-m", "jupyterlab", *(words + further))
 
 
-def keep_lab_quiet():
-    """Tell JupyterLab to ask for no news."""
-    settings = VENV / "share" / "jupyter" / "lab" / "settings"
-    settings.mkdir(parents=True, exist_ok=True)
+def set_up_lab():
+    """Tell JupyterLab to ask for no news and to show names in full; return its configuration.
+
+    That leaves out nbgrader, whose menus are for teachers, and encrypts what kernels send.
+    """
     quiet = {"fetchNews": "false", "checkForUpdates": False}
-    overrides = {"@jupyterlab/apputils-extension:notification": quiet}
-    (settings / "overrides.json").write_text(json.dumps(overrides))
+    plain = {"showLastModifiedColumn": False}
+    overrides = {
+        "@jupyterlab/apputils-extension:notification": quiet,
+        "@jupyterlab/filebrowser-extension:browser": plain,
+    }
+    write_json(VENV / "share" / "jupyter" / "lab" / "settings" / "overrides.json", overrides)
+    configuration = VENV / "share" / "rbcourse"
+    without = {"disabledExtensions": {"@jupyter/nbgrader": True}}
+    write_json(configuration / "labconfig" / "page_config.json", without)
+    parts = "formgrader", "validate_assignment", "assignment_list", "course_list"
+    off = {"nbgrader.server_extensions." + part: False for part in parts}
+    server = {"jpserver_extensions": off}
+    settings = {"ServerApp": server, "LabApp": {"log_level": "ERROR"}}
+    settings["KernelManager"] = {"transport_encryption": "auto"}
+    write_json(configuration / "jupyter_server_config.json", settings)
+    return configuration
+
+
+def write_json(path, content):
+    """Write a file, and the folders that it is in."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content))
 
 
 def look_in_browser(further):
@@ -178,7 +203,7 @@ def look_in_browser(further):
     set_up_extra("browser")
     os.environ["CHROMIUM"] = find_chromium()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    keep_lab_quiet()
+    set_up_lab()
     run("-m", "pytest", "-n", "auto", "--dist", "worksteal", "tests/browser", *further)
 
 

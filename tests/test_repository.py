@@ -1,5 +1,7 @@
 """The files round the package agree with each other, and the package works without them."""
 
+import importlib.metadata
+import json
 import os
 import re
 import subprocess
@@ -322,6 +324,30 @@ def test_bench_goes_on_without_what_does_not_install(setting_up, monkeypatch, ca
     assert ran == [("-m", "benchmarks")] * 2
     assert len(done) == 4 - missing  # what is there is not installed again
     assert capsys.readouterr().out.count("no such package\nThe run goes on") == 2 * missing
+
+
+@pytest.mark.parametrize(("edit", "folder"), [(False, "work"), (True, "notebooks")])
+def test_lab_opens_the_first_lesson_and_has_nothing_of_teachers(
+    edit, folder, tmp_path, monkeypatch
+):
+    module, ran = course_module(), []
+    monkeypatch.setattr(module, "VENV", tmp_path)
+    monkeypatch.setattr(module, "run", lambda *given: ran.append(list(given)))
+    monkeypatch.setenv("JUPYTER_CONFIG_PATH", "")
+    module.open_lab(edit, ["--no-browser"])
+    assert ([*ran[0][:2], "copy"] == ran[0]) is not edit
+    address = f"/lab/tree/{folder}/00_start_here.ipynb"
+    assert f"--LabApp.default_url={address}" in ran[-1]
+    assert (ROOT / address.removeprefix("/lab/tree/").replace("work", "notebooks")).is_file()
+    assert ran[-1][-1] == "--no-browser"
+    configuration = Path(os.environ["JUPYTER_CONFIG_PATH"])
+    page = json.loads((configuration / "labconfig" / "page_config.json").read_text())
+    assert page["disabledExtensions"]["@jupyter/nbgrader"]
+    server = json.loads((configuration / "jupyter_server_config.json").read_text())
+    extensions = importlib.metadata.distribution("nbgrader").locate_file("nbgrader")
+    off = server["ServerApp"]["jpserver_extensions"]
+    there = {path.name for path in Path(extensions, "server_extensions").glob("[a-z]*")}
+    assert {name.rpartition(".")[2] for name in off} == there
 
 
 def test_what_a_command_said_last_is_kept_when_it_fails():

@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import json
 import os
+import platform
 import re
 import shutil
 import sys
@@ -21,6 +22,19 @@ from nbformat import NotebookNode
 from nbformat.sign import NotebookNotary
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+# what JupyterLab writes into a notebook that it opens, and marks as changed if it was not there
+OPENED = {
+    "kernelspec": {**KERNEL, "display_name": "Python 3 (ipykernel)"},
+    "language_info": {
+        "codemirror_mode": {"name": "ipython", "version": 3},
+        "file_extension": ".py",
+        "mimetype": "text/x-python",
+        "name": "python",
+        "nbconvert_exporter": "python",
+        "pygments_lexer": "ipython3",
+        "version": platform.python_version(),
+    },
+}
 
 
 def lesson_paths(folder: Path) -> list[Path]:
@@ -136,10 +150,12 @@ def copy_lessons(lessons: Path, work: Path) -> None:
             last, now = copied.get(path.name), [_digest(lesson), _digest(_cells(lesson))]
             if target.exists() and last and last[0] == now[0]:
                 continue
-            if not _left_alone(target, lesson, last):
+            notebook.metadata.update(OPENED)
+            copy = (nbformat.writes(notebook) + "\n").encode()
+            if not _left_alone(target, copy, last):
                 target = next(p for p in _numbered(target) if not p.exists())
                 print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
-            target.write_bytes(lesson)
+            target.write_bytes(copy)
             try:
                 notary.sign(notebook)
             except OSError as error:

@@ -29,6 +29,8 @@ def test_lessons_are_whole_as_they_are_stored(home, lab, page):
             seen |= pictures
             if faults or stored <= seen:
                 break
+        if page.evaluate("opened.context.model.dirty"):
+            faults |= {"it is marked as changed"}
         if not stored or faults or stored != seen:
             wrong[path.stem] = faults | (stored ^ seen)
         page.evaluate("opened.dispose()")
