@@ -13,7 +13,7 @@ SMALL = """(least) => {
   const walker = document.createTreeWalker(document.querySelector("#rendered_cells"), 4);
   while (walker.nextNode()) {
     const text = walker.currentNode, box = text.parentElement;
-    const apart = ".lecture-code, mjx-container, script, style, sup, sub";
+    const apart = ".lecture-code, mjx-container, script, style, sup, sub, small";
     if (!text.textContent.trim() || box.closest(apart)) continue;
     const printed = box.closest("pre, code, .rbcourse-panel") ? 20 : least;
     if (parseFloat(getComputedStyle(box).fontSize) < printed)

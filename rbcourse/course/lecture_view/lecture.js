@@ -25,8 +25,8 @@ const turnPage = (forward) => {
         distance(heading) - distance(all[i - 1]) < screen / 7),
   );
   const next = forward
-    ? stops.find((heading) => distance(heading) > 2)
-    : stops.findLast((heading) => distance(heading) < -2);
+    ? stops.find((heading) => distance(heading) > screen / 50)
+    : stops.findLast((heading) => distance(heading) < -screen / 50);
   if (!next || Math.abs(distance(next)) > 0.95 * screen) {
     window.scrollBy(0, (forward ? 0.85 : -0.85) * screen);
     return;
