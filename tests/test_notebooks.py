@@ -20,6 +20,7 @@ TAGS = {
     "nbval-check-output",
     "nbval-ignore-output",
     "nbval-skip",
+    "not-in-lectures",
     "parameters",
     "raises-exception",
     "remove-cell",

@@ -1,8 +1,76 @@
 "use strict";
 
+const page = document.documentElement;
+const place = document.createElement("div");
+place.className = "lecture-place";
+document.body.append(place);
+history.scrollRestoration = "manual";
+
+// While cells run the page says how many have run.
+voila_process = (cell, cells) => (place.textContent = `running: ${cell} of ${cells} cells`);
+
+const distance = (heading) => heading.getBoundingClientRect().top - window.innerHeight / 100;
+
+// Headings that are to be seen; a poll that follows the title of its section at once is on the
+// screen with it.
+const findStops = () =>
+  [...document.querySelectorAll("#rendered_cells :is(h1, h2, h3, h4)")].filter(
+    (heading, i, all) =>
+      heading.checkVisibility() &&
+      !(all[i - 1]?.matches("h2") && heading.matches("h3:not(summary *)") &&
+        distance(heading) - distance(all[i - 1]) < window.innerHeight / 7),
+  );
+
+const tellPlace = () => {
+  const stops = findStops();
+  const at = stops.findLastIndex((heading) => distance(heading) < window.innerHeight / 50);
+  place.textContent = `${at + 1} / ${stops.length}`;
+  sessionStorage.setItem("lecture-place", at);
+};
+
+const goTo = (stop) => {
+  stop.scrollIntoView();
+  // Enter now opens an answer, and Tab goes on from here.
+  const focused = stop.closest("summary") ?? stop;
+  if (focused === stop) stop.tabIndex = -1;
+  focused.focus({ preventScroll: true });
+};
+
+// From heading to heading, and through what is longer than a screen.
+const turnPage = (forward) => {
+  const screen = window.innerHeight, stops = findStops();
+  const next = forward
+    ? stops.find((heading) => distance(heading) > screen / 50)
+    : stops.findLast((heading) => distance(heading) < -screen / 50);
+  if (next && Math.abs(distance(next)) <= 0.95 * screen) goTo(next);
+  else if (next?.closest(".lecture-answer")?.previousElementSibling && !forward) goTo(next);
+  else window.scrollBy(0, (forward ? 0.85 : -0.85) * screen);
+};
+
+const toggle = (name) => page.classList.toggle(`lecture-${name}`);
+const turns = { PageDown: true, ArrowRight: true, " ": true, PageUp: false, ArrowLeft: false };
+const others = {
+  b: () => toggle("blank"),
+  d: () => toggle("dark"),
+  f: () => (document.fullscreenElement ? document.exitFullscreen() : page.requestFullscreen()),
+};
+
+// Presenters' remote controls send PageDown and PageUp, and some of them B.
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  if (event.target.closest("input:not([type=range]), textarea, select")) return;
+  const { key } = event, turning = key.startsWith("Page");
+  const control = "input, button, summary, a, [role=slider], [tabindex='0']";
+  if (!turning && key in turns && event.target.closest(control)) return;
+  const act = key in turns ? () => turnPage(turns[key]) : others[key.toLowerCase()];
+  if (!act) return;
+  event.preventDefault();
+  event.stopPropagation();
+  act();
+}, true);
+
 // An error must not go unseen: not far down the page, and not in a folded answer.
-const error = document.querySelector(".lecture-error");
-if (error) {
+const showError = (error) => {
   const stopped = document.createElement("p");
   stopped.className = "lecture-stopped";
   stopped.textContent = "A cell failed: the lesson ends at the red line.";
@@ -10,39 +78,22 @@ if (error) {
   for (let part = error; part; part = part.parentElement) {
     if (part.matches(".lecture-answer")) part.open = true;
   }
-}
-
-// PageDown and PageUp, which presenters' remote controls send, go from heading to heading, and
-// through what is longer than a screen.
-const turnPage = (forward) => {
-  const screen = window.innerHeight;
-  const distance = (heading) => heading.getBoundingClientRect().top - screen / 100;
-  const stops = [...document.querySelectorAll("#rendered_cells :is(h1, h2, h3, h4)")].filter(
-    (heading, i, all) =>
-      heading.checkVisibility() &&
-      // a poll that follows the title of its section at once is on the screen with it
-      !(all[i - 1]?.matches("h2") && heading.matches("h3:not(summary *)") &&
-        distance(heading) - distance(all[i - 1]) < screen / 7),
-  );
-  const next = forward
-    ? stops.find((heading) => distance(heading) > screen / 50)
-    : stops.findLast((heading) => distance(heading) < -screen / 50);
-  if (!next || Math.abs(distance(next)) > 0.95 * screen) {
-    window.scrollBy(0, (forward ? 0.85 : -0.85) * screen);
-    return;
-  }
-  next.scrollIntoView();
-  // Enter now opens an answer, and Tab goes on from here.
-  const focused = next.closest("summary") ?? next;
-  if (focused === next) next.tabIndex = -1;
-  focused.focus({ preventScroll: true });
 };
 
-document.addEventListener("keydown", (event) => {
-  const key = event.key;
-  if (key !== "PageDown" && key !== "PageUp") return;
-  if (event.target.closest("input:not([type=range]), textarea, select")) return;
-  event.preventDefault();
-  event.stopPropagation();
-  turnPage(key === "PageDown");
-}, true);
+const askForPython = async (address) => {
+  const answer = await fetch(address).catch(() => null);
+  page.classList.toggle("lecture-gone", !answer?.ok);
+};
+
+window.addEventListener("load", () => {
+  const error = document.querySelector(".lecture-error");
+  if (error) showError(error);
+  const last = findStops()[sessionStorage.getItem("lecture-place")];
+  if (last) goTo(last);
+  tellPlace();
+  document.addEventListener("scroll", tellPlace);
+  const { baseUrl, kernelId } = JSON.parse(document.querySelector("#jupyter-config-data").text);
+  setInterval(askForPython, 5000, `${baseUrl}api/kernels/${kernelId}${location.search}`);
+});
+
+if (matchMedia("(prefers-color-scheme: dark)").matches) toggle("dark");
