@@ -162,7 +162,8 @@ def open_lab(edit, further):
     words.append("--LabApp.default_url=/lab/tree/%s/00_start_here.ipynb" % folder)
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         words.append("--allow-root")
-    os.environ["JUPYTER_CONFIG_PATH"] = str(set_up_lab())
+    paths = [str(set_up_lab()), os.environ.get("JUPYTER_CONFIG_PATH")]
+    os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
     print("JupyterLab opens in the browser. Stop it here, with Ctrl-C.", flush=True)
     # of what its own extensions use, not of what kernels run
     run("-W", "ignore::DeprecationWarning", "-m", "jupyterlab", *(words + further))

@@ -72,7 +72,8 @@ def test_the_keys_of_a_remote_control_turn_the_pages(show, page):
             break
     steps = [after - before for before, after in pairwise(places)]
     assert len(places) > 20
-    assert max(steps) <= 768  # nothing is passed over
+    # nothing is passed over, but the empty screen below a closed answer
+    assert max(steps) < 1.2 * 768
     assert all(step > 0 for step in steps[:-1])
     for _ in range(60):
         page.keyboard.press("PageUp")

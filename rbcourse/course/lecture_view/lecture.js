@@ -36,14 +36,17 @@ const goTo = (stop) => {
   focused.focus({ preventScroll: true });
 };
 
-// From heading to heading, and through what is longer than a screen.
+const isClosed = (heading) => heading?.closest(".lecture-answer:not([open])");
+
+// From heading to heading, and through what is longer than a screen; below a closed answer there is
+// nothing to scroll through.
 const turnPage = (forward) => {
   const screen = window.innerHeight, stops = findStops();
   const next = forward
     ? stops.find((heading) => distance(heading) > screen / 50)
     : stops.findLast((heading) => distance(heading) < -screen / 50);
-  if (next && Math.abs(distance(next)) <= 0.95 * screen) goTo(next);
-  else if (next?.closest(".lecture-answer")?.previousElementSibling && !forward) goTo(next);
+  const above = forward ? stops.findLast((heading) => distance(heading) <= screen / 50) : next;
+  if (next && (isClosed(above) || Math.abs(distance(next)) <= 0.95 * screen)) goTo(next);
   else window.scrollBy(0, (forward ? 0.85 : -0.85) * screen);
 };
 
