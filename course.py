@@ -56,6 +56,8 @@ def main():
     lecture.add_argument("lesson", help="its number: 01")
     lecture.add_argument("--check", action="store_true", help="try it before class; show nothing")
     lecture.add_argument("--no-browser", action="store_true", help="print the address only")
+    help_ = "phones in the class network vote on polls, at this address of the machine"
+    lecture.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help=help_)
     check = tasks.add_parser("check", help="try a problem set, and write the file to hand in")
     check.add_argument("file", type=os.path.abspath, help="the notebook: ps1.ipynb")
     handout = tasks.add_parser("handout", help="pack a problem set for students")
@@ -94,7 +96,10 @@ def main():
         if known.check:
             run("-m", "rbcourse.course.rehearsal", known.lesson)
         else:
-            run("-m", "rbcourse.course.lecture", known.lesson, *["--no-browser"] * known.no_browser)
+            words = ["--no-browser"] * known.no_browser
+            if known.votes is not None:
+                words += ["--votes", known.votes] if known.votes else ["--votes"]
+            run("-m", "rbcourse.course.lecture", known.lesson, *words)
     elif known.task == "check":
         run("-m", "rbcourse.assignments.check", known.file)
     elif known.task == "handout":

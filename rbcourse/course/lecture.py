@@ -12,16 +12,19 @@ import tempfile
 import threading
 import webbrowser
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import nbformat
+import segno
 from nbformat import NotebookNode
 from tornado.ioloop import IOLoop
 from traitlets.config import Config
 from voila.app import Voila
 
 from rbcourse.course.notebooks import lesson_paths
+from rbcourse.course.votes import Lecturer, Phones, find_address
 
 HOST = "127.0.0.1"
 TEMPLATES = Path(__file__).with_name("lecture_view")
@@ -46,7 +49,7 @@ def mark_sections(notebook: NotebookNode) -> None:
     """Note in the cells' metadata where a folded section opens, and how many close.
 
     A section that is stored collapsed reaches to the next heading of its level or a higher one.
-    The run sheet is folded too: it has the answers, and is not for the class.
+    The run sheet has the answers: the class does not see it, the lecturer's window does.
     """
     cells: list[NotebookNode] = []
     levels: list[int] = []
@@ -55,11 +58,11 @@ def mark_sections(notebook: NotebookNode) -> None:
         while levels and 0 < level <= levels[-1]:
             levels.pop()
             cells[-1].metadata.lecture.closes += 1
-        collapsed = cell.metadata.get("jp-MarkdownHeadingCollapsed", False)
-        folded = level and (collapsed or cell.source.startswith("## Run sheet"))
+        folded = level and cell.metadata.get("jp-MarkdownHeadingCollapsed", False)
         parts = _heading_and_rest(cell) if folded else [cell]
         for part in parts:
-            part.metadata.lecture = NotebookNode(opens=False, closes=0)
+            sheet = cell.source.startswith("## Run sheet")
+            part.metadata.lecture = NotebookNode(opens=False, closes=0, sheet=sheet)
         if folded:
             parts[0].metadata.lecture.opens = True
             levels.append(level)
@@ -83,16 +86,31 @@ def _heading_and_rest(cell: NotebookNode) -> list[NotebookNode]:
     return [first, nbformat.v4.new_markdown_cell(rest)]
 
 
-def _prepare(handler: Any, notebook: NotebookNode, cwd: str) -> NotebookNode:
+def _prepare(votes: str, handler: Any, notebook: NotebookNode, cwd: str) -> NotebookNode:
     """Make a notebook ready to be shown; Voila calls this before it runs it."""
     mark_sections(notebook)
+    if votes:
+        code = segno.make(votes, micro=False).svg_inline(border=2, light="white", omitsize=True)
+        notebook.metadata.lecture_votes = NotebookNode(address=votes, code=code)
     title = re.search(r"^# (.*)", notebook.cells[0].source) if notebook.cells else None
     if title:
         notebook.metadata.title = title[1]
     return notebook
 
 
-def serve(path: Path, begin: Callable[[str], None]) -> None:
+class _Lecture(Voila):  # type: ignore[misc]
+    """Voila, and what the lecturer asks about votes."""
+
+    phones: Phones | None = None
+
+    def init_handlers(self) -> list[Any]:
+        handlers: list[Any] = super().init_handlers()
+        if self.phones:
+            handlers.insert(0, ("/votes", Lecturer, {"ballot": self.phones.ballot}))
+        return handlers
+
+
+def serve(path: Path, begin: Callable[[str], None], phones: Phones | None = None) -> None:
     """Serve a lesson until Ctrl-C, or until the event loop is stopped; then end its kernels.
 
     Nothing of the user's settings is read, and nothing is written but to a temporary folder.
@@ -101,7 +119,7 @@ def serve(path: Path, begin: Callable[[str], None]) -> None:
         _set_environment(Path(folder))
         settings = {
             "VoilaConfiguration": {
-                "prelaunch_hook": _prepare,
+                "prelaunch_hook": partial(_prepare, phones.url if phones else ""),
                 "strip_sources": False,
                 "show_tracebacks": True,
                 "allow_template_override": "NO",
@@ -112,7 +130,7 @@ def serve(path: Path, begin: Callable[[str], None]) -> None:
             "VoilaExporter": {"exclude_input_prompt": True, "exclude_output_prompt": True},
             "VoilaExecutor": {"timeout": 120},
         }
-        app = Voila.instance(
+        app = _Lecture.instance(
             config=Config(settings),
             config_file_paths=[],
             connection_dir_root=folder,
@@ -128,7 +146,14 @@ def serve(path: Path, begin: Callable[[str], None]) -> None:
         app.template_paths.insert(0, str(TEMPLATES))
         loop = IOLoop.current()
         loop.add_callback(lambda: begin(f"http://{HOST}:{app.port}/?token={app.token}"))
-        app.start()
+        if phones:
+            app.phones = phones
+            phones.start()
+        try:
+            app.start()
+        finally:
+            if phones:
+                phones.stop()
 
 
 def _set_environment(folder: Path) -> None:
@@ -159,18 +184,33 @@ def _free_port() -> int:
         return port
 
 
-def present(path: Path, browser: bool) -> None:
+def present(path: Path, browser: bool, phones: Phones | None) -> None:
     """Show a lesson in the browser until Ctrl-C."""
 
     def begin(address: str) -> None:
         print(f"{path.name} is shown at {address}", flush=True)
+        if phones:
+            print(f"Phones vote at {phones.url}", flush=True)
         print("Stop it with Ctrl-C.", flush=True)
         if browser:
             # some browsers return only when they are closed
             threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a script ignores Ctrl-C
-    serve(path, begin)
+    serve(path, begin, phones)
+
+
+def open_votes(address: str) -> Phones | None:
+    """Let phones vote at an address, or at that of this machine in its network, if it has one."""
+    try:
+        address = address or find_address()
+    except OSError:
+        print("No network was found: the class votes by show of hands.", flush=True)
+        return None
+    try:
+        return Phones(address)
+    except (ValueError, OSError) as error:
+        raise ValueError(f"Phones cannot vote at {address}: {error}.") from error
 
 
 def main() -> None:
@@ -178,12 +218,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m rbcourse.course.lecture")
     parser.add_argument("lesson", help="its number: 01")
     parser.add_argument("--no-browser", action="store_true", help="print the address only")
+    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="of this machine")
     words = parser.parse_args()
     try:
         path = find_lesson(words.lesson, Path("notebooks"))
+        phones = None if words.votes is None else open_votes(words.votes)
     except ValueError as error:
         sys.exit(str(error))
-    present(path, browser=not words.no_browser)
+    present(path, not words.no_browser, phones)
 
 
 if __name__ == "__main__":

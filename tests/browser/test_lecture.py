@@ -33,8 +33,8 @@ def show(home, page):
     course, env = home
     with ExitStack() as stack:
 
-        def shown(number):
-            words = ["rbcourse.course.lecture", number, "--no-browser"]
+        def shown(number, *further):
+            words = ["rbcourse.course.lecture", number, "--no-browser", *further]
             address = r"(http://127\.0\.0\.1:\d+/\?token=\w+)"
             page.set_viewport_size({"width": 1024, "height": 768})
             page.goto(stack.enter_context(serving(words, course, env, address))[1])
@@ -119,9 +119,14 @@ def test_letters_grow_with_the_window_and_keys_change_the_look(show, page):
     place = page.locator(".lecture-place")
     told = place.inner_text()
     assert re.fullmatch(r"[2-9] / \d\d", told)
+    where = "() => document.querySelectorAll('#rendered_cells h2')[2].getBoundingClientRect().top"
+    before = page.evaluate(where)
     page.reload()
     wait_for(page.locator(".rbcourse-explorer"))
+    page.locator("mjx-container").first.wait_for()
+    page.wait_for_function(TYPESET)
     expect(place).to_have_text(told)
+    page.wait_for_function(f"Math.abs(({where})() - ({before})) < 3")
 
 
 def test_where_python_has_ended_the_controls_say_so(show, page):
@@ -138,6 +143,48 @@ def test_where_python_has_ended_the_controls_say_so(show, page):
     expect(page.locator(".lecture-gone .rbcourse-explorer")).to_be_visible()
     page.evaluate("window.fetch = asked")
     expect(page.locator(".lecture-gone")).to_have_count(0)
+
+
+def test_the_lecturer_sees_in_a_second_window_what_the_class_does_not(show, page, context):
+    show("06", "--votes", "127.0.0.1")
+    assert not page.get_by_text("planned").count()
+    assert "Run sheet" not in page.inner_text("#rendered_cells")
+    with context.expect_page() as opened:
+        page.keyboard.press("l")
+    lecturer = opened.value
+    while page.evaluate("window.lecture.tell().name") != "Poll 1":
+        lecturer.keyboard.press("PageDown")
+    expect(lecturer.locator("#now")).to_have_text("Poll 1")
+    expect(lecturer.locator("#next")).to_have_text("Next: Answer to poll 1")
+    expect(lecturer.locator("#answer")).to_contain_text("C it is")
+    expect(lecturer.locator("#sheet tr.now td").nth(1)).to_have_text("poll 1")
+    expect(lecturer.locator("#plan")).to_have_text("planned: minute 14 to 21")
+    expect(lecturer.locator("#clock")).to_have_text(re.compile(r"\d+:\d\d"))
+    assert lecturer.locator("#answer math").count()  # formulas, too
+
+    expect(lecturer.locator("#vote")).to_have_text("V opens the vote on a poll.")
+    lecturer.locator("#vote").click()
+    panel = page.locator(".lecture-vote")
+    expect(panel.locator("svg")).to_be_visible()
+    address = panel.locator("p").first.inner_text()
+    for letters in ("B", "AC", "C"):
+        phone = context.browser.new_context().new_page()
+        phone.goto(address)
+        for letter in letters:
+            phone.get_by_role("button", name=letter, exact=True).click()
+        expect(phone.locator("p").first).to_contain_text(f"You voted {letters[-1]}.")
+        phone.context.close()
+    expect(panel).to_contain_text("3 votes")
+    assert page.locator(".lecture-counted").count() == 0
+    page.keyboard.press("v")
+    expect(panel).to_have_count(0)
+    for _ in range(2):
+        counted = page.locator(".lecture-counted")
+        expect(counted).to_have_count(4)
+        counts = counted.evaluate_all("(items) => items.map((item) => item.dataset.count)")
+        assert counts == ["0", "1", "2", "0"]
+        page.reload()
+    lecturer.close()
 
 
 def to_question(page):

@@ -1,46 +1,20 @@
 """The lecture view: the server with a tiny lesson, as the command line starts it."""
 
-import http.client
 import re
 import signal
-import subprocess
 import sys
-from contextlib import contextmanager
 from copy import deepcopy
-from urllib.parse import urlsplit
 
 import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
-from tiny import MODULE, lesson_at
+from tiny import ask, lecture, lesson_at
 
 from rbcourse.course.lecture import find_lesson, main, mark_sections
 
 
 def answer(text):
     return new_markdown_cell(text, metadata={"jp-MarkdownHeadingCollapsed": True})
-
-
-@contextmanager
-def lecture(folder):
-    """The address of a lecture, and the process."""
-    words = [*MODULE, "rbcourse.course.lecture", "1", "--no-browser"]
-    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            yield server.stdout.readline().split()[-1], server
-        finally:
-            server.terminate()
-            server.stdout.read()
-
-
-def get(address, token=True):
-    parts = urlsplit(address)
-    connection = http.client.HTTPConnection(parts.netloc)
-    connection.request("GET", f"{parts.path}?{parts.query}" if token else parts.path)
-    response = connection.getresponse()
-    text = response.read().decode()
-    connection.close()
-    return response.status, text
 
 
 def test_a_lesson_is_found_by_its_number(tmp_path):
@@ -83,8 +57,6 @@ def test_a_folded_section_reaches_to_the_next_heading_of_its_level_or_a_higher_o
     assert sections(answer("## a"), answer("### b"), text) == "{## a {### b text}}"
     assert sections(answer("### a\n\nmore"), text) == "{### a \nmore text}"
     assert sections(new_markdown_cell("### a"), text) == "### a text"
-    sheet = new_markdown_cell("## Run sheet for the lecturer\n\nanswers")
-    assert sections(text, sheet) == "text {## Run sheet for the lecturer \nanswers}"
 
 
 def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
@@ -94,19 +66,20 @@ def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
         answer("### Answer"),
         new_code_cell("import os; print(6 * 7, os.getcwd(), os.environ['RBCOURSE_FIGURES'])"),
         new_markdown_cell("## After"),
+        new_markdown_cell("## Run sheet"),
     )
     with lecture(tmp_path) as (address, server):
         assert address.startswith("http://127.0.0.1:")
-        status, text = get(address, token=False)
+        status, text, _ = ask(address.split("?")[0])
         assert status in (302, 401, 403)
         assert "Tiny" not in text
-        assert get(re.sub("token=.", "token=!", address))[0] in (302, 401, 403)
-        status, text = get(address)
+        assert ask(re.sub("token=.", "token=!", address))[0] in (302, 401, 403)
+        status, text, _ = ask(address)
         assert status == 200
         kernel = re.search(r'"kernelId": "([\w-]+)"', text)[1]
         for what in ("", "/channels"):
             kernels = address.split("?")[0] + f"api/kernels/{kernel}{what}"
-            assert get(kernels, token=False)[0] in (401, 403)
+            assert ask(kernels)[0] in (401, 403)
         server.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
         server.wait()
     folded = text[text.index('<details class="lecture-answer">') : text.index(">After")]
@@ -116,4 +89,7 @@ def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
     assert re.search(r"42 \S+notebooks \S+figures", text)
     assert str(tmp_path / "figures") not in text
     assert "getcwd" not in text  # no code
+    unseen = text[text.index("<div hidden class=lecture-sheet>") :]
+    assert "Run sheet" in unseen
+    assert "After" not in unseen
     assert not re.search(r"<details[^>]* open", text)

@@ -21,15 +21,37 @@ const findStops = () =>
         distance(heading) - distance(all[i - 1]) < window.innerHeight / 7),
   );
 
+const findPlace = (stops) =>
+  stops.findLastIndex((heading) => distance(heading) < window.innerHeight / 50);
+
+// Where the page grows, because formulas are typeset or the window is another, the heading of the
+// place stays where it is.
+let anchor, anchorTop, pageHeight;
+
+const drop = (heading) => {
+  anchor = heading;
+  anchorTop = distance(heading) / window.innerHeight;
+  pageHeight = page.scrollHeight;
+};
+
+const keepPlace = () => {
+  if (!anchor || pageHeight === page.scrollHeight) return;
+  window.scrollBy(0, distance(anchor) - anchorTop * window.innerHeight);
+  drop(anchor);
+};
+
 const tellPlace = () => {
-  const stops = findStops();
-  const at = stops.findLastIndex((heading) => distance(heading) < window.innerHeight / 50);
+  keepPlace();
+  const stops = findStops(), at = findPlace(stops);
   place.textContent = `${at + 1} / ${stops.length}`;
   sessionStorage.setItem("lecture-place", at);
+  if (stops[at]) drop(stops[at]);
 };
 
 const goTo = (stop) => {
   stop.scrollIntoView();
+  drop(stop);
+  tellPlace();
   // Enter now opens an answer, and Tab goes on from here.
   const focused = stop.closest("summary") ?? stop;
   if (focused === stop) stop.tabIndex = -1;
@@ -41,6 +63,7 @@ const isClosed = (heading) => heading?.closest(".lecture-answer:not([open])");
 // From heading to heading, and through what is longer than a screen; below a closed answer there is
 // nothing to scroll through.
 const turnPage = (forward) => {
+  sessionStorage["lecture-start"] ??= Date.now();
   const screen = window.innerHeight, stops = findStops();
   const next = forward
     ? stops.find((heading) => distance(heading) > screen / 50)
@@ -50,12 +73,42 @@ const turnPage = (forward) => {
   else window.scrollBy(0, (forward ? 0.85 : -0.85) * screen);
 };
 
+// The last poll that was reached, and its answer.
+const findPoll = (stops) => {
+  const poll = stops.slice(0, findPlace(stops) + 1).findLast((stop) => /^Poll \d/.test(stop.innerText));
+  if (!poll) return {};
+  const name = poll.innerText.trim();
+  const answer = [...document.querySelectorAll(".lecture-answer")].find(
+    (each) => each.querySelector("summary").innerText.trim() === `Answer to ${name.toLowerCase()}`,
+  );
+  return { poll, name, answer };
+};
+
+// The lecturer's window asks for this, and passes on the keys that are pressed in it.
+window.lecture = {
+  tell: () => {
+    const stops = findStops(), at = findPlace(stops);
+    return { stops, at, ...findPoll(stops), vote: window.vote?.words() };
+  },
+  press: (key) => (key in turns ? () => turnPage(turns[key]) : others[key.toLowerCase()])?.(),
+};
+
+const openLecturer = () => {
+  const lecturer = window.open("", "lecturer", "popup,width=900,height=900");
+  if (!lecturer) place.textContent = "The browser has blocked the lecturer's window.";
+  if (!lecturer || lecturer.document.title) return;
+  lecturer.document.write(document.querySelector("#lecturer").innerHTML);
+  lecturer.document.close();
+};
+
 const toggle = (name) => page.classList.toggle(`lecture-${name}`);
 const turns = { PageDown: true, ArrowRight: true, " ": true, PageUp: false, ArrowLeft: false };
 const others = {
   b: () => toggle("blank"),
   d: () => toggle("dark"),
   f: () => (document.fullscreenElement ? document.exitFullscreen() : page.requestFullscreen()),
+  l: openLecturer,
+  v: () => window.vote?.turn(),
 };
 
 // Presenters' remote controls send PageDown and PageUp, and some of them B.
@@ -65,11 +118,10 @@ document.addEventListener("keydown", (event) => {
   const { key } = event, turning = key.startsWith("Page");
   const control = "input, button, summary, a, [role=slider], [tabindex='0']";
   if (!turning && key in turns && event.target.closest(control)) return;
-  const act = key in turns ? () => turnPage(turns[key]) : others[key.toLowerCase()];
-  if (!act) return;
+  if (!(key in turns || key.toLowerCase() in others)) return;
   event.preventDefault();
   event.stopPropagation();
-  act();
+  window.lecture.press(key);
 }, true);
 
 // An error must not go unseen: not far down the page, and not in a folded answer.
@@ -95,8 +147,11 @@ window.addEventListener("load", () => {
   if (last) goTo(last);
   tellPlace();
   document.addEventListener("scroll", tellPlace);
+  new ResizeObserver(keepPlace).observe(document.querySelector("#rendered_cells > div"));
   const { baseUrl, kernelId } = JSON.parse(document.querySelector("#jupyter-config-data").text);
   setInterval(askForPython, 5000, `${baseUrl}api/kernels/${kernelId}${location.search}`);
+  const end = `${baseUrl}voila/api/shutdown/${kernelId}${location.search}`;
+  window.addEventListener("pagehide", () => navigator.sendBeacon(end));
 });
 
 if (matchMedia("(prefers-color-scheme: dark)").matches) toggle("dark");
