@@ -26,7 +26,7 @@ LIBRARIES = {
     "explore": {"anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "study": {"IPython", "matplotlib"},
     "report": {"matplotlib"},
-    "course": {"nbclient", "nbformat", "tornado", "traitlets", "voila"},
+    "course": {"jupyter_server", "nbclient", "nbformat", "segno", "tornado", "traitlets", "voila"},
     "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}
     | {"nbformat", "nbgrader", "traitlets"},
 }
