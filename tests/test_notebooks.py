@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 LESSONS = notebooks.lesson_paths(ROOT / "notebooks")
 STORED = ROOT / "figures"
 TAGS = {
+    "half-in-lectures",
     "hide-input",
     "hide-output",
     "nbval-check-output",

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.draw.save import Table, caption, csv_text, figures_folder, save_figure
+from rbcourse.draw.save import Table, caption, csv_text, figures_folder, png, save_figure
 
 Update = Callable[[int], Sequence[Any]]
 
@@ -78,7 +78,7 @@ class Animation:
     def _repr_html_(self) -> str:
         """Return a player of its own: a still picture where scripts do not run."""
         sources = [
-            "data:image/png;base64," + base64.b64encode(_png(picture)).decode()
+            "data:image/png;base64," + base64.b64encode(png(picture)).decode()
             for picture in self.pictures[self.still % 2 :: 2]
         ]
         return _PLAYER.substitute(
@@ -136,7 +136,7 @@ def save_animation(
     save_figure(fig, name, data, alt)
     folder = figures_folder()
     animation.save(folder / f"{name}.gif")
-    (folder / f"{name}.png").write_bytes(_png(animation.pictures[animation.still]))
+    (folder / f"{name}.png").write_bytes(png(animation.pictures[animation.still]))
     return replace(animation, files=f"{name}.gif, .png, .pdf, .csv")
 
 
@@ -201,10 +201,4 @@ def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
     durations = [int(10 * step) for step in np.diff(ends)]
     first, *others = pictures
     first.save(content, "gif", save_all=True, append_images=others, duration=durations, loop=0)
-    return content.getvalue()
-
-
-def _png(picture: Image.Image) -> bytes:
-    content = io.BytesIO()
-    picture.save(content, "png")
     return content.getvalue()

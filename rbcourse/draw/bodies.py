@@ -85,12 +85,13 @@ def set_space(ax: Any, places: Array, side: float) -> None:
     """Fit the axes to a cube at these places, shape (times, 3), with equal units."""
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set(xlabel="x (m)", ylabel="y (m)")
+    ax.set_xlabel("x (m)", labelpad=9)
+    ax.set_ylabel("y (m)", labelpad=9)
     ax.zaxis.set_rotate_label(False)
     ax.set_zlabel("z (m)", rotation=90)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_major_locator(MultipleLocator(4))
-    ax.set_box_aspect(high - low, zoom=0.97)
+    ax.set_box_aspect(high - low, zoom=0.93)
     ax.set_proj_type("ortho")  # in perspective the square can sink into its face
     ax.view_init(elev=18, azim=-22)  # never behind the square of BK Fig. 5
 

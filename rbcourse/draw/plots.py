@@ -86,8 +86,9 @@ def draw_surface(ax: Any, data: Table) -> list[Any]:
     colours = _angle_colour(parameter)
     look = {"facecolors": colours, "shade": False, "lw": 0.3, "edgecolor": "white"}
     surface = ax.plot_surface(x, parameter, y, rcount=24, ccount=34, **look)
-    ax.set(xlabel=_label(x_name), xticks=[0, 0.5, 1])
-    ax.set_ylabel(_label(p_name), labelpad=8)
+    ax.set(xticks=[0, 0.5, 1])
+    ax.set_xlabel(_label(x_name), labelpad=7)
+    ax.set_ylabel(_label(p_name), labelpad=13)
     ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
     ax.text2D(0.06, 0.88, _label(y_name), transform=ax.transAxes)
     ax.view_init(elev=24, azim=-128)
@@ -243,8 +244,8 @@ def draw_coordinate_paths(ax: Any, data: Table) -> list[Any]:
     start, end = _coordinates(data, "optimum")[:, [0, -1]].T
     ax.text(*start, "   t = 0", va="top")
     ax.text(*end, "t = 1   ", va="bottom", ha="right")
-    ax.set_xlabel("σ₁ (rad)", labelpad=8)
-    ax.set_ylabel("σ₂ (rad)", labelpad=8)
+    ax.set_xlabel("σ₁ (rad)", labelpad=11)
+    ax.set_ylabel("σ₂ (rad)", labelpad=11)
     ax.zaxis.set_rotate_label(False)
     ax.set_zlabel("σ₃ (rad)", rotation=90)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):

@@ -19,6 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
+from PIL import Image
 
 Table = Mapping[str, ArrayLike]
 
@@ -46,7 +47,7 @@ class Picture:
     alt : str
         Alternative text: what the figure shows.
     png : bytes
-        The picture.
+        The picture, twice as fine as it is shown: sharp on fine screens.
     """
 
     name: str
@@ -59,8 +60,9 @@ class Picture:
 
     def _repr_html_(self) -> str:
         source = base64.b64encode(self.png).decode()
+        width = Image.open(io.BytesIO(self.png)).width // 2
         return (
-            f'<figure><img style="max-width: 100%" alt="{html.escape(self.alt)}" '
+            f'<figure><img width="{width}" style="max-width: 100%" alt="{html.escape(self.alt)}" '
             f'src="data:image/png;base64,{source}"/>'
             f"{caption(self.alt, f'{self.name}.png, .pdf, .csv')}</figure>"
         )
@@ -83,16 +85,26 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
     """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
 
     The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, or else
-    to ``figures`` in the current folder. The same input gives the same bytes.
+    to ``figures`` in the current folder. The same input gives the same bytes. The PNG has 256
+    colours, which nobody misses and which make it a third as large.
     """
     save_table(name, data)
     folder = figures_folder()
-    picture = io.BytesIO()
-    fig.savefig(picture, format="png", metadata={"Software": None})
+    drawn = io.BytesIO()
+    fig.savefig(drawn, format="png")
     fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
     plt.close(fig)
-    (folder / f"{name}.png").write_bytes(picture.getvalue())
-    return Picture(name, alt, picture.getvalue())
+    colours = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    picture = png(colours)
+    (folder / f"{name}.png").write_bytes(picture)
+    return Picture(name, alt, picture)
+
+
+def png(picture: Image.Image) -> bytes:
+    """Return a picture as a PNG."""
+    content = io.BytesIO()
+    picture.save(content, "png", optimize=True)
+    return content.getvalue()
 
 
 def save_table(name: str, data: Table) -> None:

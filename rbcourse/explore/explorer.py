@@ -70,9 +70,12 @@ export default {
     begin();
     model.on("change:png", draw);
     draw();
+    image.addEventListener("load", () => {
+      const zoom = Math.max(1, image.clientWidth / image.width);
+      model.set("density", window.devicePixelRatio * zoom);
+      model.save_changes();
+    }, { once: true });
     el.append(image);
-    model.set("density", window.devicePixelRatio);
-    model.save_changes();
     return () => {
       model.off("change:png", draw);
       observer.disconnect();
@@ -284,7 +287,7 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
         max=high,
         step=step,
         readout_format=f".{digits}f",
-        style={"description_width": "7.5em"},
+        style={"description_width": "8.5em"},
         layout={"width": "auto"},
     )
 
@@ -294,13 +297,13 @@ def choice(label: str, options: Any) -> Any:
     return ipywidgets.ToggleButtons(
         options=options,
         description=label,
-        style={"description_width": "7.5em", "button_width": "auto"},
+        style={"description_width": "8.5em", "button_width": "auto"},
     )
 
 
 def menu(label: str, options: Any) -> Any:
     """Return a menu of which one line is chosen, the first to begin with: for many options."""
-    style = {"description_width": "7.5em"}
+    style = {"description_width": "8.5em"}
     return ipywidgets.Dropdown(
         options=options, description=label, style=style, layout={"width": "auto"}
     )

@@ -30,7 +30,7 @@ def minimum_acceleration_explorer() -> Explorer:
 
     From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
     `acceleration_cost`. Controls: the ``rival``, the projection or one of the others; the ``size``
-    s; and ``k`` in rad, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig. 4).
+    s; and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig. 4).
     """
     with look():
         fig = new_figure()
@@ -47,8 +47,8 @@ def minimum_acceleration_explorer() -> Explorer:
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
         "rival": menu("closed form", list(CLOSED_FORMS)),
-        "size": slider("size s", 1.0, 0.05, 1.5, 0.05),
-        "k": slider("k (rad)", 1.0, -6.0, 6.0, 0.25),
+        "size": slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
+        "k": slider("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
     }
 
     def show(rival: str, size: float, k: float) -> dict[str, str]:
@@ -67,8 +67,8 @@ def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: two cubes on their ways, the optimum and the projection.
 
     The ends are the paper's, except three that can be changed; the goal is pale. Controls: the
-    ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad; ``rise``, that
-    of the velocity at the end in m; and the time ``t``, which plays (BK 6.3, BK (14), BK Fig. 5).
+    ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad per unit
+    time; ``rise``, that of the velocity at the end in m per unit time; and the time ``t``, which plays (BK 6.3, BK (14), BK Fig. 5).
     """
     with look():
         fig = new_figure()
@@ -88,9 +88,9 @@ def cube_explorer() -> Explorer:
             artists[way] = draw_box(ax, np.eye(4), _SIDE)
             fig.text(left + 0.25, 0.94, way, ha="center")
     controls = {
-        "turn": slider("turn", 1.0, 0.0, 1.15, 0.05),
-        "spin": slider("ω₃(1) (rad)", 1.0, -6.0, 6.0, 0.25),
-        "rise": slider("ḋ₃(1) (m)", 3.0, -20.0, 20.0, 1.0),
+        "turn": slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
+        "spin": slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),
+        "rise": slider("ḋ₃(1) (m/time)", 3.0, -20.0, 20.0, 1.0),
         "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 

@@ -50,7 +50,7 @@ def chain_explorer() -> Explorer:
     """Return an explorer of a box on its way through four poses.
 
     Controls: the ``leg``, a curve with its name; ``share``, the velocities at the two poses between
-    as a share of Bessel's, for which geodesics do not ask; the ``duration`` of the whole in s; and
+    as a share of Bessel's, of which geodesics have no need; the ``duration`` of the whole in s; and
     the time ``t`` in [0, 1], as a share of it, which plays (BK 6.3).
     """
     with look():
@@ -74,13 +74,14 @@ def chain_explorer() -> Explorer:
         ax.set_xlabel("time (s)")
     controls = {
         "leg": menu("joined by", list(LEGS)),
-        "share": slider("× Bessel's", 1.0, 0.0, 1.5, 0.1),
+        "share": slider("× Bessel's ω, v", 1.0, 0.0, 1.5, 0.1),
         "duration": slider("duration (s)", 6.0, 4.0, _LONGEST, 0.5),
         "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(leg: str, share: float, duration: float, t: float) -> dict[str, str]:
         motion = four_poses(leg, share, duration)
+        controls["share"].disabled = leg == "geodesics"
         times, now = np.linspace(0, duration, _SAMPLES), t * duration
         artists["way"].set_data_3d(*motion(times)[:, :3, 3].T)
         move_box(artists["box"], motion(now), _EDGES)

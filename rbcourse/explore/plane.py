@@ -14,7 +14,7 @@ from rbcourse.planar import propagate_planar
 
 _STEPS = 80
 _LASTS = 2.0  # each command, in s
-_BODY = 0.9
+_BODY = 1.3
 _FRAMES = {"world": (COLOURS["z"], "#D6E6F2", "-"), "body": (COLOURS["x"], "none", "--")}
 _START, _GOAL = (-20.0, 110.0), (130.0, -60.0)
 

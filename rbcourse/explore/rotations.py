@@ -112,7 +112,7 @@ def projection_explorer() -> Explorer:
         "e12": slider("y leans", 0.8, -1.0, 1.0, 0.05),
         "e23": slider("z leans", 0.0, -1.0, 1.0, 0.05),
         "e33": slider("z stretched", 0.0, -2.0, 1.0, 0.05),
-        "pull": slider("pull", 0.0, 0.0, 1.0, 0.01),
+        "pull": slider("pull (0 to 1)", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(e12: float, e23: float, e33: float, pull: float) -> dict[str, str]:

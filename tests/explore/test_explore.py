@@ -28,10 +28,11 @@ def test_it_shows_something_before_it_is_touched(explorer):
     assert not explorer.play.playing
 
 
-WITHOUT_UNIT = {"time t", "seed", "rotations", "pull", "y leans", "z leans", "z stretched"} | {
-    "size s",
-    "turn",
-    "× Bessel's",
+WITHOUT_UNIT = {"time t", "seed", "rotations", "y leans", "z leans", "z stretched"} | {
+    "pull (0 to 1)",
+    "size s (1: paper's)",
+    "turn (1: paper's)",
+    "× Bessel's ω, v",
 }
 
 
@@ -39,7 +40,7 @@ def test_every_label_has_its_unit(explorer):
     for control in explorer.controls.values():
         label = control.description
         if isinstance(control, ipywidgets.FloatSlider) and label not in WITHOUT_UNIT:
-            assert re.search(r"\((°|°/s|m|m/s|rad|s)\)$", label), label
+            assert re.search(r"\((°|°/s|m|m/s|m/time|rad/time|s)\)$", label), label
 
 
 def test_the_keyboard_reaches_every_control(explorer):
