@@ -287,7 +287,7 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
         max=high,
         step=step,
         readout_format=f".{digits}f",
-        style={"description_width": "8.5em"},
+        style={"description_width": "9.5em"},
         layout={"width": "auto"},
     )
 
@@ -297,13 +297,13 @@ def choice(label: str, options: Any) -> Any:
     return ipywidgets.ToggleButtons(
         options=options,
         description=label,
-        style={"description_width": "8.5em", "button_width": "auto"},
+        style={"description_width": "9.5em", "button_width": "auto"},
     )
 
 
 def menu(label: str, options: Any) -> Any:
     """Return a menu of which one line is chosen, the first to begin with: for many options."""
-    style = {"description_width": "8.5em"}
+    style = {"description_width": "9.5em"}
     return ipywidgets.Dropdown(
         options=options, description=label, style=style, layout={"width": "auto"}
     )

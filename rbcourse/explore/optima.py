@@ -30,7 +30,8 @@ def minimum_acceleration_explorer() -> Explorer:
 
     From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
     `acceleration_cost`. Controls: the ``rival``, the projection or one of the others; the ``size``
-    s; and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig. 4).
+    s; and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK
+    Fig. 4).
     """
     with look():
         fig = new_figure()
@@ -67,8 +68,9 @@ def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: two cubes on their ways, the optimum and the projection.
 
     The ends are the paper's, except three that can be changed; the goal is pale. Controls: the
-    ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad per unit
-    time; ``rise``, that of the velocity at the end in m per unit time; and the time ``t``, which plays (BK 6.3, BK (14), BK Fig. 5).
+    ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad per unit time;
+    ``rise``, that of the velocity at the end in m per unit time; and the time ``t``, which plays
+    (BK 6.3, BK (14), BK Fig. 5).
     """
     with look():
         fig = new_figure()

@@ -29,7 +29,7 @@ def planar_explorer() -> Explorer:
     with look():
         fig = new_figure()
         ax = fig.add_axes((0.12, 0.15, 0.87, 0.73))
-        ax.set(xlim=(-7.3, 7.3), ylim=(-4.6, 4.6), xlabel="x (m)", ylabel="y (m)")
+        ax.set(xlim=(-7.75, 7.75), ylim=(-4.9, 4.9), xlabel="x (m)", ylabel="y (m)")
         ax.set_aspect("equal")
         artists: dict[str, Any] = {}
         for frame, (colour, fill, ls) in _FRAMES.items():

@@ -89,7 +89,7 @@ def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
     assert re.search(r"42 \S+notebooks \S+figures", text)
     assert str(tmp_path / "figures") not in text
     assert "getcwd" not in text  # no code
-    unseen = text[text.index("<div hidden class="lecture-sheet">") :]
+    unseen = text[text.index('<div hidden class="lecture-sheet">') :]
     assert "Run sheet" in unseen
     assert "After" not in unseen
     assert not re.search(r"<details[^>]* open", text)
