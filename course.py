@@ -31,6 +31,10 @@ VENV = ROOT / ".venv"
 UV = shutil.which("uv")
 TOO_NEW = sys.version_info >= (3, 13)  # for the oldest releases
 TESTED = ("lessons", "grading", "test")  # the extras whose ranges are tested
+DARK = """[data-jp-theme-light="false"] :is(.jp-OutputArea figure, .rbcourse-explorer) img {
+  filter: invert(0.93) hue-rotate(180deg);
+}
+"""
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
 
 
@@ -177,7 +181,8 @@ def open_lab(edit, further):
 def set_up_lab():
     """Tell JupyterLab to ask for no news and to show names in full; return its configuration.
 
-    That leaves out nbgrader, whose menus are for teachers, and encrypts what kernels send.
+    That leaves out nbgrader, whose menus are for teachers, encrypts what kernels send, and makes
+    pictures dark in a dark theme.
     """
     quiet = {"fetchNews": "false", "checkForUpdates": False}
     plain = {"showLastModifiedColumn": False}
@@ -192,7 +197,11 @@ def set_up_lab():
     parts = "formgrader", "validate_assignment", "assignment_list", "course_list"
     off = {"nbgrader.server_extensions." + part: False for part in parts}
     server = {"jpserver_extensions": off}
-    settings = {"ServerApp": server, "LabApp": {"log_level": "ERROR"}}
+    style = configuration / "custom" / "custom.css"
+    style.parent.mkdir(parents=True, exist_ok=True)
+    style.write_text(DARK)
+    server["tornado_settings"] = {"static_custom_path": [str(style.parent)]}
+    settings = {"ServerApp": server, "LabApp": {"log_level": "ERROR", "custom_css": True}}
     settings["KernelManager"] = {"transport_encryption": "auto"}
     write_json(configuration / "jupyter_server_config.json", settings)
     return configuration

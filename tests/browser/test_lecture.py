@@ -87,9 +87,8 @@ def test_the_keys_of_a_remote_control_turn_the_pages(show, page):
     assert unseen == []  # everything was whole on some page
     for _ in range(60):
         page.keyboard.press("PageUp")
-    assert page.evaluate("scrollY") == 0
-    while page.evaluate("window.lecture.tell().name") != "Poll 2":
-        page.keyboard.press("PageDown")
+    assert page.evaluate("scrollY") < 20
+    to_poll("Poll 2", page, page)
     page.keyboard.press("Enter")
     answer = page.locator(".lecture-answer").nth(1)
     assert answer.evaluate("(answer) => answer.open")
@@ -119,7 +118,7 @@ def test_a_closed_answer_shows_nothing_of_what_follows(show, page):
                 answer.getBoundingClientRect().bottom : 1e9;
         })"""
     )
-    assert len(gaps) > 5
+    assert len(gaps) > 3
     assert min(gaps) >= height
     assert page.locator(".jp-InputArea .highlight:visible").count() == 0  # no code
     assert "def geodesic_so3" not in page.inner_text("#rendered_cells")
@@ -173,10 +172,9 @@ def test_the_lecturer_sees_in_a_second_window_what_the_class_does_not(show, page
     with context.expect_page() as opened:
         page.keyboard.press("l")
     lecturer = opened.value
-    while page.evaluate("window.lecture.tell().name") != "Poll 1":
-        lecturer.keyboard.press("PageDown")
+    to_poll("Poll 1", page, lecturer)
     expect(lecturer.locator("#now")).to_have_text("Poll 1")
-    expect(lecturer.locator("#next")).to_have_text("Next: Answer to poll 1")
+    expect(lecturer.locator("#next")).to_have_text("Next: 6 · Why: a chord and its arc")
     expect(lecturer.locator("#answer")).to_contain_text("C it is")
     expect(lecturer.locator("#sheet tr.now td").nth(1)).to_have_text("poll 1")
     expect(lecturer.locator("#plan")).to_have_text("planned: minute 14 to 21")
@@ -206,6 +204,15 @@ def test_the_lecturer_sees_in_a_second_window_what_the_class_does_not(show, page
         assert counts == ["0", "1", "2", "0"]
         page.reload()
     lecturer.close()
+
+
+def to_poll(name, page, window):
+    """Turn the pages, with the keys of a window, until a poll is there."""
+    for _ in range(60):
+        if page.evaluate("window.lecture.tell().name") == name:
+            return
+        window.keyboard.press("PageDown")
+    raise AssertionError(f"{name} was not reached")
 
 
 def to_question(page):

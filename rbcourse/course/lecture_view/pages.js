@@ -17,37 +17,43 @@ const pages = (() => {
   const margin = () => screen() / 100;
 
   // What stays in one piece: a heading, a paragraph, a row of a table, a figure, an explorer.
-  const findBlocks = () =>
+  const everything = () =>
     [...document.querySelectorAll(
-      `#rendered_cells :is(.jp-MarkdownOutput > :not(table), .jp-MarkdownOutput tr,
-        .jp-OutputArea-output, .lecture-vote)`,
-    )].filter((block) => block.getBoundingClientRect().height && block.checkVisibility());
+      "#rendered_cells :is(.jp-MarkdownOutput > :not(table), .jp-MarkdownOutput tr, .jp-OutputArea-output)",
+    )];
+  const findBlocks = () =>
+    everything().filter((block) => block.getBoundingClientRect().height && block.checkVisibility());
 
   const isHeading = (block) => /^H[1-4]$/.test(block.tagName);
 
-  // Headings that follow each other at once share a page, and an answer begins below its question.
+  // Headings that follow each other at once share a page, an answer begins below its question, and a
+  // part of a section below its first lines, where it has room to its end.
   const findPages = () => {
-    const found = [];
-    let before = null;
-    for (const block of findBlocks()) {
-      const box = block.getBoundingClientRect();
-      const top = box.top + window.scrollY, bottom = box.bottom + window.scrollY;
+    const found = [], blocks = findBlocks();
+    const topOf = (block) => block.getBoundingClientRect().top + window.scrollY;
+    const bottomOf = (block) => block.getBoundingClientRect().bottom + window.scrollY;
+    for (const [i, block] of blocks.entries()) {
+      const top = topOf(block), bottom = bottomOf(block);
       const heading = isHeading(block);
       const answer = block.closest("summary");
-      const below = answer && block.matches("h3, h4");
-      const begins = heading && !below && !(before && isHeading(before));
       let last = found.at(-1);
-      const room = last && bottom - last.top < screen() - margin();
-      if (begins || !room) {
-        last = { block, top, heading: last?.heading };
+      const fits = (end) => last && end - last.top < screen() - margin();
+      const part = block.matches("h3, h4") && last?.block.matches("h2");
+      const next = blocks.findIndex((other, k) => k > i && isHeading(other));
+      const below =
+        (answer && block.matches("h3, h4")) ||
+        (i && isHeading(blocks[i - 1])) ||
+        (part && top - last.top < 0.3 * screen() && fits(bottomOf(blocks.at(next - 1))));
+      const begins = heading && !below;
+      if (begins || !fits(bottom)) {
+        last = { block, top, headings: [] };
         found.push(last);
-        for (let part = top + 0.85 * screen(); part < bottom - 0.15 * screen(); part += 0.85 * screen()) {
-          found.push({ ...last, top: part });
+        const step = 0.85 * screen();
+        for (let more = top + step; more < bottom - 0.15 * screen(); more += step) {
+          found.push({ block, top: more, headings: [] });
         }
       }
-      if (heading) last.focus = answer ?? block;
-      if (heading && last.block === block) last.heading = block;
-      before = block;
+      if (heading) last.headings.push(block);
     }
     return found;
   };
@@ -79,14 +85,14 @@ const pages = (() => {
     if (all[at]) sessionStorage.setItem("lecture-place", everything().indexOf(all[at].block));
   };
 
-  const everything = () => [...document.querySelectorAll("#rendered_cells *")];
-
   const goTo = (one, all) => {
     show(one, all);
-    if (!one.focus) return;
+    const heading = one.headings.at(-1);
+    if (!heading) return;
     // Enter now opens an answer, and Tab goes on from here.
-    if (!one.focus.matches("summary")) one.focus.tabIndex = -1;
-    one.focus.focus({ preventScroll: true });
+    const focused = heading.closest("summary") ?? heading;
+    if (focused === heading) heading.tabIndex = -1;
+    focused.focus({ preventScroll: true });
   };
 
   const keep = () => {
@@ -124,14 +130,14 @@ const pages = (() => {
     new ResizeObserver(keep).observe(document.querySelector("#rendered_cells > div"));
   };
 
-  // Headings of all pages, the one of the place, and the poll that was reached last.
+  // The headings of each page, which page is shown, and the poll that was reached last.
   const where = () => {
-    const all = findPages(), at = findPlace(all), end = all[at + 1]?.top ?? Infinity;
-    const headings = all.map((one) => one.heading?.innerText.trim() ?? "");
-    const poll = findBlocks().findLast(
-      (block) =>
-        isHeading(block) && /^Poll \d/.test(block.innerText) &&
-        block.getBoundingClientRect().top + window.scrollY < end,
+    const all = findPages(), at = findPlace(all);
+    const reached = all.slice(0, at + 1).flatMap((one) => one.headings);
+    const poll = reached.findLast((heading) => /^Poll \d/.test(heading.innerText));
+    const named = (heading) => !heading.closest("summary");
+    const headings = all.map(
+      (one) => one.headings.filter(named).map((heading) => heading.innerText.trim()),
     );
     return { headings, at, poll };
   };
