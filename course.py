@@ -201,6 +201,7 @@ def set_up_lab():
     style.parent.mkdir(parents=True, exist_ok=True)
     style.write_text(DARK)
     server["tornado_settings"] = {"static_custom_path": [str(style.parent)]}
+    server["answer_yes"] = True  # so that Ctrl-C ends it at once
     settings = {"ServerApp": server, "LabApp": {"log_level": "ERROR", "custom_css": True}}
     settings["KernelManager"] = {"transport_encryption": "auto"}
     write_json(configuration / "jupyter_server_config.json", settings)

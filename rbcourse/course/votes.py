@@ -1,5 +1,6 @@
 """Votes on a poll, from telephones in the class network: anonymous, and nothing is kept."""
 
+import errno
 import ipaddress
 import secrets
 import socket
@@ -15,6 +16,8 @@ from tornado.web import Application, HTTPError, RequestHandler, authenticated
 
 TEMPLATES = Path(__file__).with_name("lecture_view")
 PORT = 8000
+MOST = 500
+"""How many phones, and how many connections at once, there may be."""
 
 
 class Ballot:
@@ -22,10 +25,10 @@ class Ballot:
 
     Attributes
     ----------
-    number : int
-        How many votes have been opened.
+    key : str
+        A random name of the vote that was opened last.
     poll : str
-        The name of the poll that was opened last.
+        Its poll.
     letters : str
         Its options, ``"ABCD"``.
     open : bool
@@ -33,7 +36,7 @@ class Ballot:
     """
 
     def __init__(self) -> None:
-        self.number = 0
+        self.key = ""
         self.poll = ""
         self.letters = ""
         self.open = False
@@ -46,33 +49,46 @@ class Ballot:
             raise ValueError(f"The vote on {self.poll} is open; close it first.")
         if not 2 <= options <= 26:
             raise ValueError(f"A poll has 2 to 26 options, not {options}.")
-        self.number += 1
+        self.key = secrets.token_hex(8)
         self.poll = poll
         self.letters = string.ascii_uppercase[:options]
         self.open = True
 
+    def admit(self) -> str:
+        """Return a random name for a phone, good until the vote is closed."""
+        if len(self._votes) == MOST:
+            raise ValueError(f"{MOST} phones are here already.")
+        phone = secrets.token_hex(16)
+        self._votes[phone] = ""
+        return phone
+
+    def knows(self, phone: str) -> bool:
+        """Return whether this is the name of a phone in this vote."""
+        return phone in self._votes
+
     def vote(self, phone: str, letter: str) -> None:
-        """Take the vote of a phone, in place of its last one."""
-        if not self.open:
-            raise ValueError("No vote is open.")
+        """Take the vote of a phone that was admitted, in place of its last one."""
         if letter not in tuple(self.letters):
             raise ValueError(f"The options are {', '.join(self.letters)}.")
+        if not self.knows(phone):
+            raise ValueError("This phone was not admitted to this vote.")
         self._votes[phone] = letter
 
     def vote_of(self, phone: str) -> str:
-        """Return the vote of a phone in this poll; ``""`` if there is none."""
+        """Return the last vote of a phone; ``""`` if there is none."""
         return self._votes.get(phone, "")
 
     def close(self) -> None:
-        """Close the vote, count it, and forget who voted for what."""
-        self._counts = Counter(self._votes.values())
-        self._votes.clear()
-        self.open = False
+        """Close the vote, if it is open, count it, and forget who voted for what."""
+        if self.open:
+            self._counts = Counter(filter(None, self._votes.values()))
+            self._votes.clear()
+            self.open = False
 
     def state(self) -> dict[str, Any]:
-        """Return what the lecturer may know: the counts only after the vote has closed."""
+        """Return what is shown: how many have voted, and for what when the vote is closed."""
         counts = [] if self.open else [self._counts[letter] for letter in self.letters]
-        voters = len(self._votes) if self.open else sum(counts)
+        voters = sum(map(bool, self._votes.values())) if self.open else sum(counts)
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
 
 
@@ -91,11 +107,11 @@ class Lecturer(APIHandler):
     @authenticated
     def post(self) -> None:
         """Open the vote on a poll, ``{"poll": "Poll 1", "options": 4}``, or close it, ``{}``."""
-        words = json_decode(self.request.body)
-        if words:
-            self.ballot.begin(words["poll"], words["options"])
-        else:
-            self.ballot.close()
+        asked = json_decode(self.request.body)
+        try:
+            self.ballot.begin(asked["poll"], asked["options"]) if asked else self.ballot.close()
+        except ValueError as error:
+            raise HTTPError(409, str(error)) from error
         self.get()
 
 
@@ -110,38 +126,58 @@ class Phone(RequestHandler):
         self.ballot = ballot
 
     def set_default_headers(self) -> None:
-        """Let the page ask this server only, and nobody store it."""
-        self.set_header("Content-Security-Policy", "default-src 'self' 'unsafe-inline'")
+        """Let the page ask this server only, and nobody store or frame it."""
+        here = "default-src 'self' 'unsafe-inline'; form-action 'self'; frame-ancestors 'none'"
+        self.set_header("Content-Security-Policy", here)
         self.set_header("Cache-Control", "no-store")
         self.set_header("Referrer-Policy", "no-referrer")
 
     @property
-    def _cookie(self) -> str:
-        return f"vote-{self.ballot.number}"
+    def phone(self) -> str:
+        """The name of the phone in this vote, if it has one."""
+        return self.get_cookie(f"vote-{self.ballot.key}", "") or ""
 
-    def get(self, path: str) -> None:
+    def get(self) -> None:
         """Show the options, or that there is nothing to vote on."""
         ballot = self.ballot
-        state = f"{ballot.number} {ballot.open}"
-        if path == "state":
-            self.finish(state)
-            return
-        phone = self.get_cookie(self._cookie)
-        if ballot.open and not phone:
-            self.set_cookie(self._cookie, secrets.token_urlsafe(), httponly=True, samesite="Strict")
-        choice = ballot.vote_of(phone) if phone else ""
-        self.render("phone.html", ballot=ballot, choice=choice, state=state)
+        if ballot.open and not ballot.knows(self.phone):
+            try:
+                phone = ballot.admit()
+            except ValueError as error:
+                raise HTTPError(503, reason=str(error)) from error
+            self.set_cookie(f"vote-{ballot.key}", phone, httponly=True, samesite="Strict")
+        self.render("phone.html", ballot=ballot, choice=ballot.vote_of(self.phone))
 
-    def post(self, path: str) -> None:
-        """Take a vote, and show the page again."""
-        phone = self.get_cookie(self._cookie)
-        if self.ballot.open and not phone:
-            raise HTTPError(403, reason="Voting needs cookies, and the page opened before")
-        try:
-            self.ballot.vote(phone or "", self.get_body_argument("choice"))
-        except ValueError as error:
-            raise HTTPError(409, reason=str(error)) from error
+    def post(self) -> None:
+        """Take a vote, and show the page again; a vote that comes too late is not taken."""
+        if self.ballot.knows(self.phone):
+            try:
+                self.ballot.vote(self.phone, self.get_body_argument("choice"))
+            except ValueError as error:
+                raise HTTPError(400, reason=str(error)) from error
         self.redirect("/", status=303)
+
+
+class State(RequestHandler):
+    """Which vote is open: a page that was made for another one loads again."""
+
+    def initialize(self, ballot: Ballot) -> None:
+        """Keep the ballot."""
+        self.ballot = ballot
+
+    def get(self) -> None:
+        """Answer with the key of the vote, nothing if it is closed."""
+        self.finish(self.ballot.key if self.ballot.open else "")
+
+
+class _Server(HTTPServer):
+    """A server that closes what comes when it has enough connections."""
+
+    def handle_stream(self, stream: Any, address: Any) -> None:
+        if len(self._connections) < MOST:
+            super().handle_stream(stream, address)
+        else:
+            stream.close()
 
 
 def find_address() -> str:
@@ -172,21 +208,26 @@ class Phones:
     """
 
     def __init__(self, address: str) -> None:
-        if ipaddress.IPv4Address(address).is_unspecified:
-            raise ValueError("it is every address of this machine; name one")
+        there = ipaddress.IPv4Address(address)
+        if there.is_unspecified or there.is_multicast or there.is_reserved:
+            raise ValueError("it is not the address of one machine")
         try:
             self._socket = socket.create_server((address, PORT))
-        except OSError:
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
             self._socket = socket.create_server((address, 0))
         self._socket.setblocking(False)
         self.url = f"http://{address}:{self._socket.getsockname()[1]}"
         self.ballot = Ballot()
         application = Application(
-            [(r"/(state|)", Phone, {"ballot": self.ballot})],
+            [(r"/", Phone, {"ballot": self.ballot}), (r"/state", State, {"ballot": self.ballot})],
             template_path=str(TEMPLATES),
             log_function=lambda handler: None,  # who asks is not written down
         )
-        self._server = HTTPServer(application, max_body_size=1000, idle_connection_timeout=60)
+        self._server = _Server(
+            application, max_body_size=1000, body_timeout=5, idle_connection_timeout=10
+        )
 
     def start(self) -> None:
         """Answer phones, on the event loop that runs."""

@@ -39,7 +39,7 @@ def theta_explorer() -> Explorer:
     """Return an explorer of the straight line and its shadow: θ(t), and its inverse f(t).
 
     On the left the circle of the rotations between the two ends, with the chord; on the right θ and
-    f over time. Controls: the ``angle`` ‖ω₀‖ in degrees, and the time ``t``, which plays (BK Prop.
+    f over time. Controls: the ``angle`` a in degrees, and the time ``t``, which plays (BK Prop.
     6, BK (15), BK (16), BK Cor. 1, BK Cor. 2, BK Fig. 2, BK Fig. 3).
     """
     with look():
@@ -68,7 +68,7 @@ def theta_explorer() -> Explorer:
         fig.legend(handles=handles, loc="lower left", handlelength=1, bbox_to_anchor=(0, -0.01))
         side.legend(loc="upper left", handlelength=1.4)
     controls = {
-        "angle": slider("‖ω₀‖ (°)", 120.0, 1.0, 179.0, 1.0),
+        "angle": slider("angle a (°)", 120.0, 1.0, 179.0, 1.0),
         "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
@@ -95,9 +95,9 @@ def theta_explorer() -> Explorer:
             artists[f"{name} now"].set_data([t], [curve(t, a)])
         return {
             "θ(t)": f"{theta(t, a):.3f}",
-            "its speed": f"{theta(t, a, 1):.3f}",
+            "dθ/dt": f"{theta(t, a, 1):.3f}",
             "f(t)": f"{f(t, a):.3f}",
-            "length of the line": f"{line_singular_value(t, a):.3f}",
+            "s(t), of the line": f"{line_singular_value(t, a):.3f}",
         }
 
     return Explorer("The line and its shadow", fig, artists, controls, show, plays="t")

@@ -49,7 +49,7 @@ def rotation_explorer() -> Explorer:
             name: new_line(ax, ls="--", color=COLOURS[axis], lw=1.5, label=f"{name}'s axis")
             for name, axis in looks.items()
         }
-        artists["axis"] = new_line(ax, ls=":", color="black", lw=3, label="axis of it all")
+        artists["axis"] = new_line(ax, ls=":", color="black", lw=3, label="one axis for all")
         artists |= _axes_of(ax, "body", ls="-", lw=3.5)
         _legend(fig, [artists[name] for name in (*looks, "axis")])
     controls = {

@@ -201,7 +201,7 @@ def test_the_lecturer_sees_in_a_second_window_what_the_class_does_not(show, page
         counted = page.locator(".lecture-counted")
         expect(counted).to_have_count(4)
         counts = counted.evaluate_all("(items) => items.map((item) => item.dataset.count)")
-        assert counts == ["0", "1", "2", "0"]
+        assert counts == ["0 · 0%", "1 · 33%", "2 · 67%", "0 · 0%"]
         page.reload()
     lecturer.close()
 

@@ -1,7 +1,7 @@
 "use strict";
 
 // While cells run the page says how many have run.
-voila_process = (cell, cells) => (pages.place.textContent = `running: ${cell} of ${cells} cells`);
+voila_process = (cell, cells) => pages.say(`running: ${cell} of ${cells} cells; formulas come last`);
 
 const findAnswer = (poll) =>
   [...document.querySelectorAll(".lecture-answer")].find(
@@ -12,14 +12,14 @@ const findAnswer = (poll) =>
 window.lecture = {
   tell: () => {
     const { headings, at, poll } = pages.where(), name = poll?.innerText.trim();
-    return { headings, at, poll, name, answer: poll && findAnswer(name), vote: window.vote?.words() };
+    return { headings, at, poll, name, answer: poll && findAnswer(name), vote: window.vote?.sentence() };
   },
   press: (key) => (key in turns ? () => pages.turn(turns[key]) : others[key.toLowerCase()])?.(),
 };
 
 const openLecturer = () => {
   const lecturer = window.open("", "lecturer", "popup,width=900,height=900");
-  if (!lecturer) pages.place.textContent = "The browser has blocked the lecturer's window.";
+  if (!lecturer) pages.say("The browser has blocked the lecturer's window.");
   if (!lecturer || lecturer.document.title) return;
   lecturer.document.write(document.querySelector("#lecturer").innerHTML);
   lecturer.document.close();
@@ -28,6 +28,8 @@ const openLecturer = () => {
 const toggle = (name) => page.classList.toggle(`lecture-${name}`);
 const turns = { PageDown: true, ArrowRight: true, " ": true, PageUp: false, ArrowLeft: false };
 const others = {
+  home: () => pages.goTo(0),
+  end: () => pages.goTo(-1),
   b: () => toggle("blank"),
   d: () => toggle("dark"),
   f: () => (document.fullscreenElement ? document.exitFullscreen() : page.requestFullscreen()),
@@ -45,7 +47,7 @@ document.addEventListener("keydown", (event) => {
   if (!(key in turns || key.toLowerCase() in others)) return;
   event.preventDefault();
   event.stopPropagation();
-  window.lecture.press(key);
+  if (!event.repeat) window.lecture.press(key);
 }, true);
 
 // An error must not go unseen: not far down the page, and not in a folded answer.

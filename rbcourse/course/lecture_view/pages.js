@@ -85,7 +85,8 @@ const pages = (() => {
     if (all[at]) sessionStorage.setItem("lecture-place", everything().indexOf(all[at].block));
   };
 
-  const goTo = (one, all) => {
+  const goTo = (at, all = findPages()) => {
+    const one = all.at(at);
     show(one, all);
     const heading = one.headings.at(-1);
     if (!heading) return;
@@ -116,24 +117,26 @@ const pages = (() => {
     sessionStorage["lecture-start"] ??= Date.now();
     const all = findPages();
     const next = forward
-      ? all.find((one) => distance(one) > screen() / 50)
-      : all.findLast((one) => distance(one) < -screen() / 50);
-    if (next) goTo(next, all);
+      ? all.findIndex((one) => distance(one) > screen() / 50)
+      : all.findLastIndex((one) => distance(one) < -screen() / 50);
+    if (next >= 0) goTo(next, all);
   };
 
   const begin = () => {
     const all = findPages();
     const before = everything()[sessionStorage.getItem("lecture-place")];
-    const last = before && all.findLast((one) => !(one.block.compareDocumentPosition(before) & 2));
-    goTo(last ?? all[0], all);
+    const known = (one) => before && !(one.block.compareDocumentPosition(before) & 2);
+    goTo(Math.max(0, all.findLastIndex(known)), all);
     document.addEventListener("scroll", scrolled);
     new ResizeObserver(keep).observe(document.querySelector("#rendered_cells > div"));
   };
 
-  // The headings of each page, which page is shown, and the poll that was reached last.
-  const where = () => {
+  const say = (words) => (place.textContent = words);
+
+  // The headings of each page, which page is shown, and the poll that was reached last, or is here.
+  const where = (here = false) => {
     const all = findPages(), at = findPlace(all);
-    const reached = all.slice(0, at + 1).flatMap((one) => one.headings);
+    const reached = all.slice(here ? at : 0, at + 1).flatMap((one) => one.headings);
     const poll = reached.findLast((heading) => /^Poll \d/.test(heading.innerText));
     const named = (heading) => !heading.closest("summary");
     const headings = all.map(
@@ -142,5 +145,5 @@ const pages = (() => {
     return { headings, at, poll };
   };
 
-  return { place, begin, turn, where };
+  return { say, begin, goTo, turn, where };
 })();
