@@ -149,11 +149,7 @@ def serve(path: Path, begin: Callable[[str], None], phones: Phones | None = None
         if phones:
             app.phones = phones
             phones.start()
-        try:
-            app.start()
-        finally:
-            if phones:
-                phones.stop()
+        app.start()
 
 
 def _set_environment(folder: Path) -> None:

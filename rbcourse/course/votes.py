@@ -1,6 +1,5 @@
 """Votes on a poll, from telephones in the class network: anonymous, and nothing is kept."""
 
-import errno
 import ipaddress
 import secrets
 import socket
@@ -213,9 +212,7 @@ class Phones:
             raise ValueError("it is not the address of one machine")
         try:
             self._socket = socket.create_server((address, PORT))
-        except OSError as error:
-            if error.errno != errno.EADDRINUSE:
-                raise
+        except OSError:
             self._socket = socket.create_server((address, 0))
         self._socket.setblocking(False)
         self.url = f"http://{address}:{self._socket.getsockname()[1]}"
@@ -230,9 +227,5 @@ class Phones:
         )
 
     def start(self) -> None:
-        """Answer phones, on the event loop that runs."""
+        """Answer phones, on the event loop that runs, until the process ends."""
         self._server.add_socket(self._socket)
-
-    def stop(self) -> None:
-        """Close the port."""
-        self._server.stop()
