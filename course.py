@@ -31,7 +31,7 @@ VENV = ROOT / ".venv"
 UV = shutil.which("uv")
 TOO_NEW = sys.version_info >= (3, 13)  # for the oldest releases
 TESTED = ("lessons", "grading", "test")  # the extras whose ranges are tested
-DARK = """[data-jp-theme-light="false"] :is(.jp-OutputArea figure, .rbcourse-explorer) img {
+DARK = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img, canvas) {
   filter: invert(0.93) hue-rotate(180deg);
 }
 """

@@ -23,7 +23,7 @@ MAY_IMPORT = {  # the rooms, beside the core and itself, that a room may import
 LIBRARIES = {
     "core": {"numpy", "scipy"},
     "draw": {"PIL", "matplotlib", "mpl_toolkits"},
-    "explore": {"anywidget", "ipywidgets", "matplotlib", "traitlets"},
+    "explore": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "study": {"IPython", "matplotlib"},
     "report": {"matplotlib"},
     "course": {"jupyter_server", "nbclient", "nbformat", "segno", "tornado", "traitlets", "voila"},

@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import json
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,31 +16,54 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.draw.save import Table, caption, csv_text, figures_folder, png, save_figure
+from rbcourse.draw.display import ENGINE, Display
+from rbcourse.draw.save import (
+    Table,
+    caption,
+    csv_text,
+    few_colours,
+    figures_folder,
+    png,
+    save_figure,
+)
 
 Update = Callable[[int], Sequence[Any]]
 
 _PLAYER = Template("""\
-<figure><img id="$name" style="max-width: 100%" alt="$alt" src="$still"/>\
+<figure><img id="$name" width="$width" style="max-width: 100%" alt="$alt" src="$still"/>\
 $caption
 <div hidden><button aria-label="play or pause">▶</button>
 <input type="range" min="0" max="$last" value="$shown" aria-label="time" style="width: 60%"/></div>
 <script>
-document.querySelectorAll("#$name").forEach((image) => {
+document.querySelectorAll("#$name").forEach(async (image) => {
   const panel = image.parentNode.querySelector("div");
-  if (!panel || !panel.hidden) return;
-  const frames = [$frames], [button, slider] = panel.children;
+  if (!panel || image.matches("[data-read]") || !window.DecompressionStream) return;
+  image.dataset.read = true;
+  $engine
+  const { states, back } = await rbcourseDisplay.load("$states", "$background");
+  const canvas = document.createElement("canvas"), [button, slider] = panel.children;
+  canvas.style.cssText = "display: block; width: $width" + "px; max-width: 100%";
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", image.alt);
+  const show = () => {
+    rbcourseDisplay.draw(canvas, back, [$width, $height], $styles, states[slider.value]);
+    slider.setAttribute("aria-valuetext", `$${Math.round((100 * slider.value) / slider.max)} %`);
+  };
+  const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const step = calm ? Math.ceil(states.length / 5) : 1;
   let timer = null;
-  const show = () => { image.src = frames[slider.value]; };
   const pause = () => { clearInterval(timer); timer = null; button.textContent = "▶"; };
-  const step = () => { slider.value = (+slider.value + 1) % frames.length; show(); };
+  const turn = () => { slider.value = (+slider.value + step) % states.length; show(); };
   button.onclick = () => {
     if (timer) return pause();
-    timer = setInterval(step, $milliseconds);
+    timer = setInterval(turn, step * $milliseconds);
     button.textContent = "❚❚";
   };
   slider.oninput = () => { pause(); show(); };
+  panel.onkeydown = (event) => event.stopPropagation();  // or JupyterLab takes them
+  image.replaceWith(canvas);
   panel.hidden = false;
+  new ResizeObserver(show).observe(canvas);
 });
 </script></figure>""")
 
@@ -55,9 +79,13 @@ class Animation:
     alt : str
         Alternative text: what the animation shows.
     pictures : tuple of Image
-        Its frames. The player shows every second one.
+        Its frames, for the GIF.
+    display : Display
+        Its frames, for the player.
+    background, shown : bytes
+        PNGs, twice as fine as they are shown: what does not move; and the still.
     still : int
-        Which of them is shown before it plays.
+        Which frame is shown before it plays.
     seconds : float
         How long it takes.
     files : str, optional
@@ -67,6 +95,9 @@ class Animation:
     name: str
     alt: str
     pictures: tuple[Image.Image, ...]
+    display: Display
+    background: bytes
+    shown: bytes
     still: int
     seconds: float
     files: str = ""
@@ -77,19 +108,21 @@ class Animation:
 
     def _repr_html_(self) -> str:
         """Return a player of its own: a still picture where scripts do not run."""
-        sources = [
-            "data:image/png;base64," + base64.b64encode(png(picture)).decode()
-            for picture in self.pictures[self.still % 2 :: 2]
-        ]
+        width, height = (round(size) for size in self.display.get_canvas_width_height())
         return _PLAYER.substitute(
             name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
             caption=caption(self.alt, self.files),
             alt=html.escape(self.alt),
-            still=sources[self.still // 2],
-            shown=self.still // 2,
-            last=len(sources) - 1,
-            frames=", ".join(f'"{source}"' for source in sources),
-            milliseconds=round(1000 * self.seconds / len(sources)),
+            width=width,
+            height=height,
+            still=_url("image/png", self.shown),
+            background=_url("image/png", self.background),
+            states=_url("application/octet-stream", self.display.pack()),
+            styles=json.dumps(self.display.styles),
+            engine=ENGINE,
+            shown=self.still,
+            last=len(self.pictures) - 1,
+            milliseconds=round(1000 * self.seconds / len(self.pictures)),
         )
 
     def save(self, path: str | Path) -> None:
@@ -112,9 +145,32 @@ def animate(
     if not 0 < frames <= 50 * seconds:
         raise ValueError(f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s")
     pictures = tuple(indexed(render(fig, update, frames)))
-    for artist in update(still % frames):
+    fig.set_layout_engine("none")  # all stays where it is
+    display = Display(fig)
+    for i in range(frames):
+        display.record(update(i))
+    moving = update(still % frames)
+    for artist in moving:
         artist.set_animated(False)
-    return Animation(name, alt, pictures, still % frames, seconds)
+    shown = _draw(fig)
+    seen = [artist.get_visible() for artist in moving]
+    for artist in moving:
+        artist.set_visible(False)
+    background = _draw(fig)
+    for artist, visible in zip(moving, seen, strict=True):
+        artist.set_visible(visible)
+    return Animation(name, alt, pictures, display, background, shown, still % frames, seconds)
+
+
+def _draw(fig: Figure) -> bytes:
+    """Return the figure twice as fine as it is, as a PNG of few colours."""
+    drawn = io.BytesIO()
+    fig.savefig(drawn, format="png", dpi=2 * fig.dpi)
+    return png(few_colours(Image.open(drawn)))
+
+
+def _url(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def save_animation(
@@ -136,7 +192,7 @@ def save_animation(
     save_figure(fig, name, data, alt)
     folder = figures_folder()
     animation.save(folder / f"{name}.gif")
-    (folder / f"{name}.png").write_bytes(png(animation.pictures[animation.still]))
+    (folder / f"{name}.png").write_bytes(animation.shown)
     return replace(animation, files=f"{name}.gif, .png, .pdf, .csv")
 
 

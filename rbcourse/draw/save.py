@@ -22,6 +22,8 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 Table = Mapping[str, ArrayLike]
+SHOWN = 120
+"""Pixels on a page for an inch of a figure."""
 
 COLOURS = {
     "x": "#D55E00",
@@ -47,12 +49,15 @@ class Picture:
     alt : str
         Alternative text: what the figure shows.
     png : bytes
-        The picture, twice as fine as it is shown: sharp on fine screens.
+        The picture, finer than it is shown: sharp on fine screens and on large ones.
+    width : int
+        How wide it is shown, in pixels.
     """
 
     name: str
     alt: str
     png: bytes
+    width: int
 
     def __repr__(self) -> str:
         """Return the name and the description."""
@@ -60,10 +65,9 @@ class Picture:
 
     def _repr_html_(self) -> str:
         source = base64.b64encode(self.png).decode()
-        width = Image.open(io.BytesIO(self.png)).width // 2
         return (
-            f'<figure><img width="{width}" style="max-width: 100%" alt="{html.escape(self.alt)}" '
-            f'src="data:image/png;base64,{source}"/>'
+            f'<figure><img width="{self.width}" style="max-width: 100%" '
+            f'alt="{html.escape(self.alt)}" src="data:image/png;base64,{source}"/>'
             f"{caption(self.alt, f'{self.name}.png, .pdf, .csv')}</figure>"
         )
 
@@ -94,10 +98,14 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
     fig.savefig(drawn, format="png")
     fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
     plt.close(fig)
-    colours = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
-    picture = png(colours)
+    picture = png(few_colours(Image.open(drawn)))
     (folder / f"{name}.png").write_bytes(picture)
-    return Picture(name, alt, picture)
+    return Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
+
+
+def few_colours(picture: Image.Image) -> Image.Image:
+    """Return a picture in 256 colours, without dots in between."""
+    return picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
 
 
 def png(picture: Image.Image) -> bytes:

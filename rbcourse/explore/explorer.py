@@ -14,8 +14,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import traitlets
 from matplotlib.figure import Figure
+from PIL import Image
 
 from rbcourse.draw.animate import painter
+from rbcourse.draw.save import few_colours, png
 
 DPI = 100
 """Pixels per inch of a picture at its own size."""
@@ -207,11 +209,11 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
                 notice = " ".join(str(warning.message) for warning in warned)
             except (ValueError, RuntimeError) as error:
                 shown, notice = [], f"Nothing to show here: {error}"
-        png = io.BytesIO()
-        self._paint(shown).save(png, "png", compress_level=1)
+        drawn = io.BytesIO()
+        self._paint(shown).save(drawn, "png", compress_level=1)
         plain = "; ".join(f"{key}: {' '.join(text.split())}" for key, text in said.items())
         with self.picture.hold_sync():
-            self.picture.png, self.picture.alt = png.getvalue(), f"{self.name}. {plain or notice}"
+            self.picture.png, self.picture.alt = drawn.getvalue(), f"{self.name}. {plain or notice}"
         self.said.value = _table(said)
         self._warn(notice)
 
@@ -233,7 +235,8 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:
         """Return the explorer, and a still of it for readers without a kernel."""
-        source = base64.b64encode(self.picture.png).decode()
+        picture = png(few_colours(Image.open(io.BytesIO(self.picture.png))))
+        source = base64.b64encode(picture).decode()
         still = (
             f'<figure><img style="max-width: 100%" alt="{html.escape(repr(self))}" '
             f'src="data:image/png;base64,{source}"/><figcaption>{html.escape(self.name)}: '

@@ -9,14 +9,14 @@ IDLE = re.compile(r"\| Idle$")
 
 # all pictures and players that are on the page now, and whether something is wrong with them
 SEEN = """() => {
-  const faults = [];
-  for (const image of document.querySelectorAll(".jp-Cell figure img, .rbcourse-explorer img")) {
-    if (image.complete && !image.naturalWidth) faults.push("blank picture: " + image.alt);
-    if (!image.alt) faults.push("picture without description");
-    const panel = image.id && image.parentNode.querySelector("div");
-    if (panel && panel.hidden) faults.push("player without buttons: " + image.id);
-    if (panel && panel.querySelector("button").textContent !== "▶")
-      faults.push("player that starts by itself: " + image.id);
+  const faults = [], parts = ".jp-Cell figure :is(img, canvas), .rbcourse-explorer img";
+  for (const picture of document.querySelectorAll(parts)) {
+    if (picture.complete && !picture.naturalWidth) faults.push("blank picture: " + picture.alt);
+    if (!(picture.alt || picture.ariaLabel)) faults.push("picture without description");
+    const button = picture.parentNode.querySelector("button");
+    if (button && button.parentNode.hidden) faults.push("player without buttons: " + picture.id);
+    if (button && button.textContent !== "▶")
+      faults.push("player that starts by itself: " + picture.ariaLabel);
   }
   const text = document.body.innerText;
   for (const wrong of ["model not found", "Error displaying widget",
@@ -36,8 +36,9 @@ NOTE = """() => {
 }"""
 
 
-PICTURES = """() => [...document.querySelectorAll(".jp-Cell figure img")]
-    .filter((image) => image.complete).map((image) => image.alt)"""
+PICTURES = """() => [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")]
+    .filter((picture) => picture.complete ?? true)
+    .map((picture) => picture.alt ?? picture.ariaLabel)"""
 LOADED = """() => !document.body.innerText.includes("Loading widget")"""
 STARRED = """() => [...document.querySelectorAll(".jp-InputPrompt")]
     .some((prompt) => prompt.textContent.includes("[*]"))"""

@@ -1,0 +1,96 @@
+"""Display lists: unpacked, they are the polygons that were drawn, in their places and colours."""
+
+import zlib
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.patches import Annulus, Rectangle
+
+from rbcourse.draw.display import PARTS, Display
+
+
+@pytest.fixture
+def ax():
+    """Axes from 0 to 1 that fill a figure of 300 by 200 pixels."""
+    fig = plt.figure(figsize=(3, 2), dpi=100, layout="none")
+    axes = fig.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, 1), ylim=(0, 1))
+    yield axes
+    plt.close(fig)
+
+
+def unpacked(display):
+    """The states, each a list of (style, whether it goes on, places in pixels)."""
+    content = zlib.decompress(display.pack())
+    count = int(np.frombuffer(content, "<u4", 1)[0])
+    sizes = np.frombuffer(content, "<u4", count, 4)
+    numbers = np.frombuffer(content, "<i2", offset=4 * (count + 1))
+    assert sizes.sum() == len(numbers)
+    states = []
+    for state in np.split(numbers, np.cumsum(sizes)[:-1]):
+        polygons, i = [], 0
+        while i < len(state):
+            end = i + 2 + 2 * abs(int(state[i + 1]))
+            places = state[i + 2 : end].reshape(-1, 2).cumsum(axis=0) / PARTS
+            polygons.append((display.styles[state[i]], state[i + 1] < 0, places))
+            i = end
+        states.append(polygons)
+    return states
+
+
+def recorded(ax, *artists):
+    display = Display(ax.figure)
+    display.record(artists)
+    return unpacked(display)[0]
+
+
+def test_a_line_is_where_it_is_drawn(ax):
+    (line,) = ax.plot([0, 0.5, 1], [0, 1, 0.25], color="#ff8000", lw=3.6, ls=(0, (2, 1)))
+    ((style, more, places),) = recorded(ax, line)
+    assert np.abs(places - [[0, 200], [150, 0], [300, 150]]).max() <= 0.5 / PARTS
+    fill, stroke, width, dashes, cap, join, box = style
+    assert (fill, stroke, width, cap, join) == (None, "#ff8000ff", 5.0, "butt", "round")
+    assert dashes == (10.0, 5.0)  # in widths of the line
+    assert box == (0, 0, 300, 200)
+    assert not more
+
+
+def test_a_patch_is_filled_with_its_colours(ax):
+    patch = ax.add_patch(Rectangle((0.1, 0.25), 0.5, 0.5, fc=(0, 0, 1, 0.5), ec="black", lw=0))
+    ((style, _, places),) = recorded(ax, patch)
+    corners = {tuple(place) for place in np.round(places)}
+    assert corners == {(30, 150), (180, 150), (180, 50), (30, 50)}
+    assert style[:3] == ["#0000ff80", None, 0]
+
+
+def test_a_hole_belongs_to_what_it_is_in(ax):
+    ring = ax.add_patch(Annulus((0.5, 0.5), 0.4, 0.2))
+    outer, inner = recorded(ax, ring)
+    assert not outer[1]
+    assert inner[1]
+    assert inner[0] == outer[0]
+    assert np.ptp(inner[2][:, 0]) == pytest.approx(300 * 0.4, abs=1)
+    assert np.ptp(outer[2][:, 0]) == pytest.approx(300 * 0.8, abs=1)
+
+
+def test_a_state_is_what_the_artists_are_then_and_none_may_be_empty(ax):
+    (line,) = ax.plot([], [])
+    display = Display(ax.figure)
+    for x in (0.2, np.nan, 0.6):
+        line.set_data([x, x], [0, 1])
+        display.record([line])
+    first, none, last = unpacked(display)
+    assert none == []
+    assert np.abs(first[0][2][:, 0] - 60).max() <= 1
+    assert np.abs(last[0][2][:, 0] - 180).max() <= 1
+    assert first[0][0] == last[0][0]
+    assert len(display.styles) == 1
+
+
+def test_far_places_do_not_come_back_on_the_other_side(ax):
+    patch = ax.add_patch(Rectangle((-1e6, 0), 2e6, 1e6))
+    ((_, _, places),) = recorded(ax, patch)
+    assert places[:, 0].min() < 0
+    assert places[:, 0].max() > 300
+    assert places[:, 1].min() < 0
