@@ -41,7 +41,7 @@ class Display(RendererBase):
     """
 
     def __init__(self, fig: Figure) -> None:
-        super().__init__()  # type: ignore[no-untyped-call]
+        super().__init__()
         self._fig = fig
         self.width, self.height = fig.bbox.size
         self.states: list[NDArray[np.int16]] = []
