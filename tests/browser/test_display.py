@@ -6,6 +6,7 @@ import io
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.patches import Annulus
 from PIL import Image
 
 import rbcourse as rb
@@ -46,11 +47,26 @@ def construction():
     return fig, casteljau.moving_casteljau(axes, TIMES, flat, ends, np.array([1.0, 0, 0]))
 
 
+def rings():
+    """Holes, dashes, corners, and what is cut at the edges of the axes, in a wide picture."""
+    fig, ax = plt.subplots(figsize=(9, 4), dpi=80)
+    ax.set(xlim=(0, 9), ylim=(0, 4))
+    ring = ax.add_patch(Annulus((2, 2), 1.5, 0.9, fc="#0072B2", ec="black", lw=4))
+    (line,) = ax.plot([0, 2, 4, 9], [0, 4, 0, 30], color="#D55E00", ls=(0, (4, 2)), lw=12)
+
+    def update(i):
+        ring.center = 2 + i / 4, 2
+        line.set_xdata([i / 4, 2, 4, 9])
+        return [ring, line]
+
+    return fig, update
+
+
 def pixels(png):
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
 
 
-@pytest.mark.parametrize("make", [cubes, book, points, rectangle, construction])
+@pytest.mark.parametrize("make", [cubes, book, points, rectangle, construction, rings])
 def test_a_player_draws_what_matplotlib_draws(make, page):
     with plt.style.context(["default", "rbcourse.rbcourse"]):
         fig, update = make()
