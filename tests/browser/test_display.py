@@ -51,11 +51,11 @@ def rings():
     """Holes, dashes, corners, and what is cut at the edges of the axes, in a wide picture."""
     fig, ax = plt.subplots(figsize=(9, 4), dpi=80)
     ax.set(xlim=(0, 9), ylim=(0, 4))
-    ring = ax.add_patch(Annulus((2, 2), 1.5, 0.9, fc="#0072B2", ec="black", lw=4))
+    ring = ax.add_patch(Annulus((0, 2), 1.9, 1.2, fc="#0072B2", ec="black", lw=4))
     (line,) = ax.plot([0, 2, 4, 9], [0, 4, 0, 30], color="#D55E00", ls=(0, (4, 2)), lw=12)
 
     def update(i):
-        ring.center = 2 + i / 4, 2
+        ring.center = i / 4, 2
         line.set_xdata([i / 4, 2, 4, 9])
         return [ring, line]
 
