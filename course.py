@@ -181,7 +181,7 @@ def open_lab(edit, further):
 def set_up_lab():
     """Tell JupyterLab to ask for no news and to show names in full; return its configuration.
 
-    That leaves out nbgrader, whose menus are for teachers, encrypts what kernels send, and makes
+    That leaves out nbgrader and Voila, which are for teachers, encrypts what kernels send, and makes
     pictures dark in a dark theme.
     """
     quiet = {"fetchNews": "false", "checkForUpdates": False}
@@ -192,10 +192,12 @@ def set_up_lab():
     }
     write_json(VENV / "share" / "jupyter" / "lab" / "settings" / "overrides.json", overrides)
     configuration = VENV / "share" / "rbcourse"
-    without = {"disabledExtensions": {"@jupyter/nbgrader": True}}
+    teachers = "@jupyter/nbgrader", "@voila-dashboards/jupyterlab-preview"
+    without = {"disabledExtensions": dict.fromkeys(teachers, True)}
     write_json(configuration / "labconfig" / "page_config.json", without)
     parts = "formgrader", "validate_assignment", "assignment_list", "course_list"
     off = {"nbgrader.server_extensions." + part: False for part in parts}
+    off["voila.server_extension"] = False
     server = {"jpserver_extensions": off}
     style = configuration / "custom" / "custom.css"
     style.parent.mkdir(parents=True, exist_ok=True)

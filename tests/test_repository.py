@@ -343,11 +343,16 @@ def test_lab_opens_the_first_lesson_and_has_nothing_of_teachers(
     configuration = Path(os.environ["JUPYTER_CONFIG_PATH"])
     page = json.loads((configuration / "labconfig" / "page_config.json").read_text())
     assert page["disabledExtensions"]["@jupyter/nbgrader"]
+    assert page["disabledExtensions"]["@voila-dashboards/jupyterlab-preview"]
     server = json.loads((configuration / "jupyter_server_config.json").read_text())
     extensions = importlib.metadata.distribution("nbgrader").locate_file("nbgrader")
     off = server["ServerApp"]["jpserver_extensions"]
     there = {path.name for path in Path(extensions, "server_extensions").glob("[a-z]*")}
-    assert {name.rpartition(".")[2] for name in off} == there
+    assert {name.rpartition(".")[2] for name in off} == there | {"server_extension"}
+    assert not any(off.values())
+    assert not off["voila.server_extension"]
+    (styles,) = server["ServerApp"]["tornado_settings"]["static_custom_path"]
+    assert "invert" in Path(styles, "custom.css").read_text()
 
 
 def test_what_a_command_said_last_is_kept_when_it_fails():
