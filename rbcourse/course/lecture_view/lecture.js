@@ -41,9 +41,9 @@ const others = {
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
   if (event.target.closest("input:not([type=range]), textarea, select")) return;
-  const { key } = event, turning = key.startsWith("Page");
+  const { key } = event, letter = key.length === 1 && key !== " ", turning = key.startsWith("Page");
   const control = "input, button, summary, a, [role=slider], [tabindex='0']";
-  if (!turning && key in turns && event.target.closest(control)) return;
+  if (!letter && !turning && event.target.closest(control)) return;  // its own keys
   if (!(key in turns || key.toLowerCase() in others)) return;
   event.preventDefault();
   event.stopPropagation();
