@@ -181,8 +181,8 @@ def open_lab(edit, further):
 def set_up_lab():
     """Tell JupyterLab to ask for no news and to show names in full; return its configuration.
 
-    That leaves out nbgrader and Voila, which are for teachers, encrypts what kernels send, and makes
-    pictures dark in a dark theme.
+    That leaves out nbgrader and Voila, which are for teachers, encrypts what kernels send, and
+    makes pictures dark in a dark theme.
     """
     quiet = {"fetchNews": "false", "checkForUpdates": False}
     plain = {"showLastModifiedColumn": False}
