@@ -135,6 +135,8 @@ def move_every_slider(explorer):
     last = handles.count() - 1
     for i, key in [(last, "End"), *((i, "ArrowRight") for i in range(last))]:
         handle, number = handles.nth(i), explorer.locator(".widget-readout").nth(i)
+        if handle.evaluate("(handle) => Boolean(handle.closest('[disabled]'))"):
+            continue
         now = number.inner_text()
         if handle.get_attribute("aria-valuenow") == handle.get_attribute("aria-valuemax"):
             key = "ArrowLeft"
