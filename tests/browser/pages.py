@@ -14,7 +14,8 @@ SEEN = """() => {
     if (picture.complete && !picture.naturalWidth) faults.push("blank picture: " + picture.alt);
     if (!(picture.alt || picture.ariaLabel)) faults.push("picture without description");
     const button = picture.parentNode.querySelector("button");
-    if (button && button.parentNode.hidden) faults.push("player without buttons: " + picture.id);
+    if (button && button.parentNode.hidden && !picture.dataset.read)
+      faults.push("player without buttons: " + picture.id);
     if (button && button.textContent !== "▶")
       faults.push("player that starts by itself: " + picture.ariaLabel);
   }
@@ -39,7 +40,8 @@ NOTE = """() => {
 PICTURES = """() => [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")]
     .filter((picture) => picture.complete ?? true)
     .map((picture) => picture.alt ?? picture.ariaLabel)"""
-LOADED = """() => !document.body.innerText.includes("Loading widget")"""
+LOADED = """() => !document.body.innerText.includes("Loading widget")
+    && !document.querySelector("img[data-read]")"""  # a player that has not unpacked its states
 STARRED = """() => [...document.querySelectorAll(".jp-InputPrompt")]
     .some((prompt) => prompt.textContent.includes("[*]"))"""
 

@@ -21,13 +21,14 @@ window.vote = (() => {
   };
 
   const show = () => {
-    panel.remove();
     const poll = [...document.querySelectorAll("#rendered_cells h3")].find(
       (heading) => heading.innerText.trim() === state.poll,
     );
+    if (!poll || !state.open) panel.remove();
     if (!poll) return;
     panel.querySelector("output").textContent = number();
-    if (state.open) poll.closest(".jp-Cell").prepend(panel);
+    const cell = poll.closest(".jp-Cell");
+    if (state.open && !cell.contains(panel)) cell.prepend(panel);
     findOptions(poll).forEach((option, i) => {
       const count = state.counts[i] ?? 0, share = `${Math.round((100 * count) / (state.voters || 1))}%`;
       option.classList.toggle("lecture-counted", !state.open);
@@ -36,28 +37,27 @@ window.vote = (() => {
     });
   };
 
-  let busy = false;
-
   const ask = async (body) => {
-    if (busy) return;
-    busy = true;
     const settings = body && { method: "POST", body: JSON.stringify(body) };
     const answer = await fetch(`votes${location.search}`, settings).catch(() => null);
-    busy = false;
-    const said = await answer?.json();
+    const said = await answer?.json().catch(() => null);
     if (!answer?.ok) return pages.say(`The vote: ${said?.message ?? "Python has ended."}`);
-    if (JSON.stringify(said) === JSON.stringify(state)) return;
     state = said;
     show();
   };
 
+  // One request after the other, so that V twice opens and closes.
+  let last = ask();
+  const then = (next) => (last = last.then(next));
+
   const turn = () => {
     const { poll } = pages.where(true);
-    if (state.open) ask({});
-    else if (!poll) pages.say("There is no poll on this page.");
-    else ask({ poll: poll.innerText.trim(), options: findOptions(poll).length });
+    if (state.open) return ask({});
+    if (poll) return ask({ poll: poll.innerText.trim(), options: findOptions(poll).length });
+    pages.say("There is no poll on this page.");
   };
 
-  setInterval(ask, 1000);
-  return { turn, sentence };
+  const watch = () => then(() => ask()).then(() => setTimeout(watch, 1000));
+  watch();
+  return { turn: () => then(turn), sentence };
 })();
