@@ -34,7 +34,7 @@ const others = {
   d: () => toggle("dark"),
   f: () => (document.fullscreenElement ? document.exitFullscreen() : page.requestFullscreen()),
   l: openLecturer,
-  v: () => window.vote?.turn(),
+  v: () => window.vote?.press(),
 };
 
 // Presenters' remote controls send PageDown and PageUp, and some of them B.

@@ -46,10 +46,6 @@ window.vote = (() => {
     show();
   };
 
-  // One request after the other, so that V twice opens and closes.
-  let last = ask();
-  const then = (next) => (last = last.then(next));
-
   const turn = () => {
     const { poll } = pages.where(true);
     if (state.open) return ask({});
@@ -57,7 +53,18 @@ window.vote = (() => {
     pages.say("There is no poll on this page.");
   };
 
+  // One request after the other.
+  let last = Promise.resolve(), turned = -Infinity;
+  const then = (next) => (last = last.then(next));
+
+  // V twice is V once: it would count a vote that nobody had time for.
+  const press = () => {
+    if (performance.now() - turned < 1000) return;
+    turned = performance.now();
+    then(turn);
+  };
+
   const watch = () => then(() => ask()).then(() => setTimeout(watch, 1000));
   watch();
-  return { turn: () => then(turn), sentence };
+  return { press, sentence };
 })();
