@@ -35,6 +35,9 @@ DARK = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img,
   filter: invert(0.93) hue-rotate(180deg);
 }
 """
+STILLS = """from rbcourse.course.notebooks import before_saving
+get_config().ContentsManager.pre_save_hook = before_saving
+"""
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
 
 
@@ -46,7 +49,7 @@ def main():
     """Read the command line, set up what is missing, do the task."""
     parser = argparse.ArgumentParser(prog="course.py", description=__doc__.splitlines()[0])
     tasks = parser.add_subparsers(dest="task", required=True, metavar="TASK")
-    tasks.add_parser("figures", help="run every lesson; rewrite its outputs and figures/")
+    tasks.add_parser("figures", help="run every lesson and explorer; rewrite outputs and figures/")
     test = tasks.add_parser("test", help="run every test, lessons too; further words go to pytest")
     releases = test.add_mutually_exclusive_group()
     for name in ("oldest", "newest"):
@@ -92,6 +95,7 @@ def main():
     set_up()
     if known.task == "figures":
         run("-m", "rbcourse.course.notebooks", "regenerate")
+        run("-m", "rbcourse.explore.recorded", "figures/explorers")
     elif known.task == "test":
         test_in(VENV, *further)
     elif known.task == "lab":
@@ -174,15 +178,16 @@ def open_lab(edit, further):
     paths = [str(set_up_lab()), os.environ.get("JUPYTER_CONFIG_PATH")]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
     print("JupyterLab opens in the browser. Stop it here, with Ctrl-C.", flush=True)
-    # of what its own extensions use, not of what kernels run
-    run("-W", "ignore::DeprecationWarning", "-m", "jupyterlab", *(words + further))
+    # of what its own extensions use, not of what kernels run; it reads its configuration twice
+    quiet = ["-W", "ignore::DeprecationWarning", "-W", "ignore:Overriding existing pre_save_hook"]
+    run(*(quiet + ["-m", "jupyterlab"] + words + further))
 
 
 def set_up_lab():
     """Tell JupyterLab to ask for no news and to show names in full; return its configuration.
 
-    That leaves out nbgrader and Voila, which are for teachers, encrypts what kernels send, and
-    makes pictures dark in a dark theme.
+    That leaves out nbgrader and Voila, which are for teachers, encrypts what kernels send, makes
+    pictures dark in a dark theme, and saves explorers as stills.
     """
     quiet = {"fetchNews": "false", "checkForUpdates": False}
     plain = {"showLastModifiedColumn": False}
@@ -207,6 +212,7 @@ def set_up_lab():
     settings = {"ServerApp": server, "LabApp": {"log_level": "ERROR", "custom_css": True}}
     settings["KernelManager"] = {"transport_encryption": "auto"}
     write_json(configuration / "jupyter_server_config.json", settings)
+    (configuration / "jupyter_server_config.py").write_text(STILLS)
     return configuration
 
 

@@ -1,13 +1,9 @@
 """Each slider of an explorer at 25 places of its range, and pairs of extremes."""
 
-import html
 import re
 from itertools import combinations
 
 import numpy as np
-from PIL import Image
-
-_BLANK = Image.new("RGB", (1, 1))
 
 
 def settings(explorer):
@@ -22,17 +18,12 @@ def settings(explorer):
 
 
 def sweep(explorer, **base):
-    """Put each setting on top of these values; give all values, of those that can be served.
-
-    The artists move, but no picture is made of them: test_explore.py looks at pictures.
-    """
-    first, paint = explorer.values | base, explorer._paint
-    explorer._paint = lambda artists: _BLANK
+    """Put each setting on top of these values; give all values, of those that can be served."""
+    first = explorer.values | base
     for setting in settings(explorer):
         explorer.put(**first | setting)
-        if not explorer.notice.value.startswith('<b role="alert">Nothing'):
+        if not notice(explorer).startswith("Nothing to show"):
             yield explorer.values
-    explorer._paint = paint
 
 
 def points(artist):
@@ -48,18 +39,32 @@ def corners(box):
 
 
 def _range(control):
-    if hasattr(control, "options"):
-        return list(control.options)
-    steps = round((control.max - control.min) / control.step)
-    chosen = np.unique(np.append(np.linspace(0, steps, 24), steps / 2).round())
-    return [control.min + i * control.step for i in chosen[:-1]] + [control.max]
+    if hasattr(control, "step"):
+        steps = round((control.max - control.min) / control.step)
+        values = [control.min + i * control.step for i in range(steps)] + [control.max]
+    else:
+        values = [option[1] if isinstance(option, tuple) else option for option in control.options]
+    last = len(values) - 1
+    return [
+        values[round(i)] for i in np.unique(np.append(np.linspace(0, last, 24), last / 2).round())
+    ]
 
 
 def read_off(explorer):
     """What is to be read, by name, with plain minus signs and spaces."""
-    text = explorer.said.value.replace("−", "-").replace("\u2007", " ")
-    rows = re.findall(r"<tr[^>]*><td[^>]*>(.*?)</td><td[^>]*>(.*?)</td></tr>", text, re.S)
-    return {html.unescape(name): html.unescape(value) for name, value in rows}
+    ((rows, *_),) = explorer.picture.run["texts"]
+    return {name: text.replace("−", "-").replace("\u2007", " ") for name, text in rows}
+
+
+def notice(explorer):
+    """What is to be noted; "" if nothing."""
+    return explorer.picture.run["notice"] or explorer.picture.run["texts"][0][1]
+
+
+def tell(explorer, **message):
+    """Send what the browser sends: the ``index`` of a state, or the ``place`` of a click."""
+    data = {"method": "custom", "content": message}
+    explorer.picture._handle_msg({"content": {"data": data}, "buffers": []})
 
 
 def numbers_in(text):

@@ -49,7 +49,7 @@ def test_fonts_in_documents_are_what_journals_take():
 
 
 def test_every_figure_has_its_files_and_units_in_every_column():
-    names = {file.stem for file in FIGURES.iterdir()}
+    names = {file.stem for file in FIGURES.iterdir() if file.is_file()}
     for name in names:
         files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
         assert files - {".gif"} == {".png", ".pdf", ".csv"} or name == "paper_fig5_costs"

@@ -54,7 +54,8 @@ def test_a_path_is_shown(states, tmp_path):
     assert np.array_equal(np.transpose(way.get_data()), PATH[:states, :2])
     animation.save(tmp_path / "path.gif")
     assert (tmp_path / "path.gif").stat().st_size < 500_000
-    assert "<input" in animation._repr_html_()
+    assert len(animation.states) == states
+    assert "<script>" in animation._repr_html_()
     plt.close(figure)
 
 

@@ -81,14 +81,13 @@ def normalised(notebook: NotebookNode) -> str:
     """Return a notebook as text without what differs from run to run or machine to machine.
 
     Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
-    random ids of 32 hexadecimal digits are numbered in the order of appearance. Of a widget, which
-    lives with its kernel, the still is stored that it gives beside itself.
+    random ids of 32 hexadecimal digits are numbered in the order of appearance.
     """
     notebook.metadata.kernelspec = dict(KERNEL)
     notebook.metadata.language_info = {"name": "python"}
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    keep_stills(notebook)
     for output in (output for cell in cells for output in cell.outputs):
-        output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)
         for texts, key in ((output, "text"), (output.get("data", {}), "text/plain")):
             if key in texts:
                 texts[key] = re.sub(r"0x[0-9a-fA-F]{6,16}", "0x0", texts[key])
@@ -96,6 +95,20 @@ def normalised(notebook: NotebookNode) -> str:
     for cell, ran in zip(cells, _with_numbered_ids([c.outputs for c in cells]), strict=True):
         cell.outputs = ran
     return nbformat.writes(notebook) + "\n"
+
+
+def keep_stills(notebook: Any) -> None:
+    """Drop widgets that have a still beside them: they live with their kernel, the still stays."""
+    for cell in notebook["cells"]:
+        for output in cell.get("outputs", []):
+            if "text/html" in (data := output.get("data", {})):
+                data.pop("application/vnd.jupyter.widget-view+json", None)
+
+
+def before_saving(model: Any, **_: Any) -> None:
+    """Keep the stills of what JupyterLab saves."""
+    if model["type"] == "notebook" and model.get("content"):
+        keep_stills(model["content"])
 
 
 def _with_numbered_ids(ran: list[Any]) -> list[Any]:
@@ -128,8 +141,9 @@ def regenerate(lessons: Path, figures: Path) -> None:
         drawn = {file.name: file for file in Path(folder).iterdir()}
         for name, file in drawn.items():
             shutil.copyfile(file, figures / name)
-        for stale in [file for file in figures.iterdir() if file.name not in drawn]:
-            stale.unlink()
+        for file in [file for file in figures.iterdir() if file.is_file()]:
+            if file.name not in drawn:
+                file.unlink()
     print(f"{len(texts)} lessons, {len(drawn)} files in {figures.name}/")
 
 

@@ -1,14 +1,9 @@
 """Animations: GIFs, and players for notebooks that work without a network."""
 
-import base64
-import html
 import io
-import json
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
@@ -16,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.draw.display import ENGINE, Display
+from rbcourse.draw.display import Display, Player
 from rbcourse.draw.save import (
     Table,
     caption,
@@ -29,101 +24,21 @@ from rbcourse.draw.save import (
 
 Update = Callable[[int], Sequence[Any]]
 
-_PLAYER = Template("""\
-<figure><img id="$name" width="$width" style="max-width: 100%" alt="$alt" src="$still"/>\
-$caption
-<div hidden><button aria-label="play or pause">▶</button>
-<input type="range" min="0" max="$last" value="$shown" aria-label="time" style="width: 60%"/></div>
-<script>
-document.querySelectorAll("#$name").forEach(async (image) => {
-  const panel = image.parentNode.querySelector("div");
-  if (!panel || image.matches("[data-read]") || !window.DecompressionStream) return;
-  image.dataset.read = true;
-  $engine
-  const { states, back } = await rbcourseDisplay.load("$states", "$background");
-  const canvas = document.createElement("canvas"), [button, slider] = panel.children;
-  canvas.style.cssText = "display: block; width: $width" + "px; max-width: 100%";
-  canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", image.alt);
-  const show = () => {
-    rbcourseDisplay.draw(canvas, back, [$width, $height], $styles, states[slider.value]);
-    slider.setAttribute("aria-valuetext", `$${Math.round((100 * slider.value) / slider.max)} %`);
-  };
-  const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const step = calm ? Math.ceil(states.length / 5) : 1;
-  let timer = null;
-  const pause = () => { clearInterval(timer); timer = null; button.textContent = "▶"; };
-  const turn = () => { slider.value = (+slider.value + step) % states.length; show(); };
-  button.onclick = () => {
-    if (timer) return pause();
-    timer = setInterval(turn, step * $milliseconds);
-    button.textContent = "❚❚";
-  };
-  slider.oninput = () => { pause(); show(); };
-  panel.onkeydown = (event) => event.stopPropagation();  // or JupyterLab takes them
-  image.replaceWith(canvas);
-  panel.hidden = false;
-  new ResizeObserver(show).observe(canvas);
-});
-</script></figure>""")
 
-
-@dataclass(frozen=True)
-class Animation:
-    """An animation, as a notebook shows it: a player with its description.
+@dataclass(frozen=True, repr=False)
+class Animation(Player):
+    """A player of a figure over time, and its frames as pictures.
 
     Parameters
     ----------
-    name : str
-        What it is called.
-    alt : str
-        Alternative text: what the animation shows.
     pictures : tuple of Image
-        Its frames, for the GIF.
-    display : Display
-        Its frames, for the player.
-    background, shown : bytes
-        PNGs, twice as fine as they are shown: what does not move; and the still.
-    still : int
-        Which frame is shown before it plays.
+        The frames, for a GIF.
     seconds : float
         How long it takes.
-    files : str, optional
-        Where it is saved, for the caption.
     """
 
-    name: str
-    alt: str
-    pictures: tuple[Image.Image, ...]
-    display: Display
-    background: bytes
-    shown: bytes
-    still: int
-    seconds: float
-    files: str = ""
-
-    def __repr__(self) -> str:
-        """Return the name and the description."""
-        return f"{self.name}: {self.alt}"
-
-    def _repr_html_(self) -> str:
-        """Return a player of its own: a still picture where scripts do not run."""
-        width, height = (round(size) for size in self.display.get_canvas_width_height())
-        return _PLAYER.substitute(
-            name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
-            caption=caption(self.alt, self.files),
-            alt=html.escape(self.alt),
-            width=width,
-            height=height,
-            still=_url("image/png", self.shown),
-            background=_url("image/png", self.background),
-            states=_url("application/octet-stream", self.display.pack()),
-            styles=json.dumps(self.display.styles),
-            engine=ENGINE,
-            shown=self.still,
-            last=len(self.pictures) - 1,
-            milliseconds=round(1000 * self.seconds / len(self.pictures)),
-        )
+    pictures: tuple[Image.Image, ...] = ()
+    seconds: float = 4.0
 
     def save(self, path: str | Path) -> None:
         """Write the animation to a file, as a GIF that starts again when it ends."""
@@ -147,30 +62,25 @@ def animate(
     pictures = tuple(indexed(render(fig, update, frames)))
     fig.set_layout_engine("none")  # all stays where it is
     display = Display(fig)
-    for i in range(frames):
-        display.record(update(i))
+    states = [display.record(update(i)) for i in range(frames)]
     moving = update(still % frames)
+    shown, background = (drawn(fig, moving, artists) for artists in (moving, []))
     for artist in moving:
         artist.set_animated(False)
-    shown = _draw(fig)
-    seen = [artist.get_visible() for artist in moving]
-    for artist in moving:
-        artist.set_visible(False)
-    background = _draw(fig)
-    for artist, visible in zip(moving, seen, strict=True):
-        artist.set_visible(visible)
-    return Animation(name, alt, pictures, display, background, shown, still % frames, seconds)
-
-
-def _draw(fig: Figure) -> bytes:
-    """Return the figure twice as fine as it is, as a PNG of few colours."""
-    drawn = io.BytesIO()
-    fig.savefig(drawn, format="png", dpi=2 * fig.dpi)
-    return png(few_colours(Image.open(drawn)))
-
-
-def _url(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+    shares = [f"{round(100 * i / max(1, frames - 1))} %" for i in range(frames)]
+    return Animation(
+        name,
+        alt,
+        caption(alt),
+        shown,
+        background,
+        display,
+        states,
+        controls=[{"label": "time", "values": shares, "first": still % frames}],
+        milliseconds=round(1000 * seconds / frames),
+        pictures=pictures,
+        seconds=seconds,
+    )
 
 
 def save_animation(
@@ -193,7 +103,7 @@ def save_animation(
     folder = figures_folder()
     animation.save(folder / f"{name}.gif")
     (folder / f"{name}.png").write_bytes(animation.shown)
-    return replace(animation, files=f"{name}.gif, .png, .pdf, .csv")
+    return replace(animation, caption=caption(alt, f"{name}.gif, .png, .pdf, .csv"))
 
 
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
@@ -225,6 +135,16 @@ def painter(fig: Figure, moving: Sequence[Any]) -> Callable[[Sequence[Any]], Ima
         return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
     return paint
+
+
+def drawn(fig: Figure, moving: Sequence[Any], artists: Sequence[Any], zoom: float = 2) -> bytes:
+    """Return a figure with only these of its moving artists, so many times as fine, as a PNG."""
+    before, dpi = fig.canvas, fig.dpi
+    fig.set_dpi(zoom * dpi)
+    picture = painter(fig, moving)(artists)
+    fig.set_dpi(dpi)
+    fig.set_canvas(before)
+    return png(few_colours(picture))
 
 
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:

@@ -1,24 +1,21 @@
-// Draw what display.py has kept. A state is drawn over the picture of what does not move.
+// Draw what display.py has kept, over the picture of what does not move.
 const rbcourseDisplay = {
-  // What the addresses of the states and of the picture hold.
-  async load(states, picture) {
-    const bytes = Uint8Array.from(atob(states.split(",")[1]), (letter) => letter.charCodeAt(0));
-    const back = Object.assign(new Image(), { src: picture });
-    await back.decode();
-    return { states: await rbcourseDisplay.unpack(bytes), back };
-  },
-
-  // All states of bytes that are deflated: an array of numbers each.
-  async unpack(bytes) {
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-    const buffer = await new Response(stream).arrayBuffer();
-    const [count] = new Uint32Array(buffer, 0, 1);
+  // The states of bytes, an array of numbers each.
+  split(bytes) {
+    const { buffer } = bytes.slice(), [count] = new Uint32Array(buffer, 0, 1);
     const sizes = new Uint32Array(buffer, 4, count), numbers = new Int16Array(buffer, 4 * (count + 1));
     let end = 0;
     return [...sizes].map((size) => numbers.subarray(end, (end += size)));
   },
 
-  // `still` is a loaded image; the canvas is as fine as the screen shows it.
+  // The bytes that were deflated and written as base64.
+  async inflate(text) {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  },
+
+  // The canvas is as fine as the screen shows it; `still` is a loaded image.
   draw(canvas, still, [width, height], styles, state) {
     const zoom = (window.devicePixelRatio * (canvas.clientWidth || width)) / width;
     canvas.width = Math.round(width * zoom);
@@ -26,19 +23,22 @@ const rbcourseDisplay = {
     const ink = canvas.getContext("2d");
     ink.scale(zoom, zoom);
     ink.drawImage(still, 0, 0, width, height);
+    const add = (path, steps) => {
+      for (let k = 0, x = 0, y = 0; k < steps.length; k += 2) {
+        x += steps[k] / 8;
+        y += steps[k + 1] / 8;
+        if (k) path.lineTo(x, y);
+        else path.moveTo(x, y);
+      }
+    };
     for (let i = 0; i < state.length; ) {
-      const [fill, stroke, line, dashes, lineCap, lineJoin, clip] = styles[state[i]];
+      const [fill, stroke, line, dashes, lineCap, lineJoin, clip, marker] = styles[state[i]];
       const path = new Path2D();
+      let places;
       do {
-        const end = i + 2 + 2 * Math.abs(state[i + 1]);
-        let x = 0, y = 0;
-        for (let k = i + 2; k < end; k += 2) {
-          x += state[k] / 16;
-          y += state[k + 1] / 16;
-          if (k === i + 2) path.moveTo(x, y);
-          else path.lineTo(x, y);
-        }
-        i = end;
+        places = state.subarray(i + 2, i + 2 + 2 * Math.abs(state[i + 1]));
+        if (!marker.length) add(path, places);
+        i += 2 + places.length;
       } while (state[i + 1] < 0);
       ink.save();
       if (clip.length) {
@@ -47,10 +47,91 @@ const rbcourseDisplay = {
         ink.clip();
       }
       Object.assign(ink, { fillStyle: fill, strokeStyle: stroke, lineWidth: line, lineCap, lineJoin });
-      if (fill) ink.fill(path);
       ink.setLineDash(dashes);
-      if (stroke) ink.stroke(path);
+      marker.forEach((steps) => add(path, steps));
+      for (let k = 0; k < (marker.length ? places.length : 1); k += 2) {
+        if (marker.length) ink.translate(places[k] / 8, places[k + 1] / 8);
+        if (fill) ink.fill(path);
+        if (stroke) ink.stroke(path);
+      }
       ink.restore();
     }
+  },
+
+  // What is said of a state, [[name, text], ...], and what there is to note, as HTML.
+  table(said, notice) {
+    const part = document.createElement("div"), table = document.createElement("table");
+    table.style = "line-height: 1.35";
+    for (const [name, text] of said) {
+      const row = Object.assign(table.insertRow(), { style: "vertical-align: top" });
+      Object.assign(row.insertCell(), { textContent: name, style: "padding-right: 0.8em" });
+      const style = "white-space: pre; font-variant-numeric: tabular-nums";
+      Object.assign(row.insertCell(), { textContent: text, style });
+    }
+    const bold = Object.assign(document.createElement("b"), { role: "alert", textContent: notice });
+    part.append(table, ...(notice ? [bold] : []));
+    return part.innerHTML;
+  },
+
+  // Tell screen readers what is drawn: when they ask, and when nothing has moved for a while.
+  tell(canvas, text) {
+    const style = "position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";
+    canvas.live ??= Object.assign(document.createElement("span"), { role: "status", style });
+    if (canvas.ariaLabel && canvas.ariaLabel !== text) {
+      canvas.after(canvas.live);
+      clearTimeout(canvas.timer);
+      canvas.timer = setTimeout(() => { canvas.live.textContent = text; }, 500);
+    }
+    Object.assign(canvas, { role: "img", ariaLabel: text });
+  },
+
+  // Put a canvas, and controls of its own, in place of a still. The last control plays.
+  async revive(image, { size, styles, background, states, texts, controls, milliseconds }) {
+    if (image.dataset.read || !window.DecompressionStream) return;
+    image.dataset.read = true;
+    const back = Object.assign(new Image(), { src: background });
+    await back.decode();
+    const drawn = rbcourseDisplay.split(await rbcourseDisplay.inflate(states));
+    const said = JSON.parse(new TextDecoder().decode(await rbcourseDisplay.inflate(texts)));
+    const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
+    const width = `width: ${size[0]}px; max-width: 100%`;
+    const canvas = make("canvas", { style: `display: block; ${width}`, role: "img", ariaLabel: image.alt });
+    const panel = make("div", { style: width }), table = make("div", {});
+    const rows = controls.map(({ label, values, first }) => {
+      const row = make("div", { style: "display: flex; gap: 0.6em; margin: 0.3em 0" }), max = values.length - 1;
+      const slider = make("input", { type: "range", max, value: first, ariaLabel: label });
+      const output = make("output", { style: "min-width: 4em; text-align: right" });
+      slider.style = "flex: 1; min-width: 0";
+      row.append(label, slider, output);
+      panel.append(row);
+      return { slider, values, output };
+    });
+    const last = rows.at(-1).slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
+    last.parentNode.prepend(button);
+    panel.append(table);
+    const show = () => {
+      let k = 0;
+      for (const { slider, values, output } of rows) {
+        k = k * values.length + +slider.value;
+        slider.ariaValueText = output.textContent = values[slider.value];
+      }
+      rbcourseDisplay.draw(canvas, back, size, styles, drawn[k]);
+      if (said.length) table.innerHTML = rbcourseDisplay.table(...said[k]);
+      rbcourseDisplay.tell(canvas, said[k]?.[2] ?? image.alt);
+    };
+    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const step = calm ? Math.ceil(+last.max / 5) : 1;
+    let timer = null;
+    const pause = () => { clearInterval(timer); timer = null; button.textContent = "▶"; };
+    button.onclick = () => {
+      if (timer) return pause();
+      timer = setInterval(() => { last.value = last.value === last.max ? 0 : +last.value + step; show(); }, step * milliseconds);
+      button.textContent = "❚❚";
+    };
+    panel.oninput = () => { pause(); show(); };
+    panel.onkeydown = (event) => event.stopPropagation(); // or JupyterLab takes them
+    image.replaceWith(canvas);
+    canvas.after(panel);
+    new ResizeObserver(show).observe(canvas);
   },
 };

@@ -1,8 +1,13 @@
 """Display lists: what moving artists draw, as whole numbers that a canvas in a browser can draw."""
 
+import base64
+import html
+import json
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -12,61 +17,61 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 ENGINE = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
-"""JavaScript: ``rbcourseDisplay.unpack`` and ``rbcourseDisplay.draw``."""
-PARTS = 16
+"""JavaScript: the object ``rbcourseDisplay``, which draws what `Display` has kept."""
+PARTS = 8
 """Of a pixel: in these the places are counted; display.js divides by it."""
 FAR = 16000
 """No place is further; the difference of two is still an int16."""
 
+_FIGURE = Template("""\
+<figure><img id="$name" width="$width" style="max-width: 100%" alt="$alt" src="$still"/>$caption
+<script>{
+$engine
+for (const image of document.querySelectorAll("#$name")) rbcourseDisplay.revive(image, $data);
+}</script></figure>""")
+
 
 class Display(RendererBase):
-    """A renderer of Matplotlib that keeps what is drawn, state by state.
-
-    A state is a sequence of polygons, of each its style, its number of points, and their places in
-    parts of a pixel from the upper left, each as the difference from the one before. A number
-    below 0 is of a polygon that is filled together with the one before it, as a hole perhaps.
+    """A renderer of Matplotlib that returns what is drawn as numbers.
 
     Parameters
     ----------
     fig : Figure
-        The figure; its size in pixels is that of the canvas.
+        The figure, of at most 1500 pixels each way; its size is that of the canvas.
 
     Attributes
     ----------
-    styles : list of list
-        Colour to fill, colour of the line, its width, its dashes, its ends and corners, and the
-        rectangle that is drawn in; what there is not is None or empty. Lengths are in pixels.
-    states : list of ndarray
-        What `record` has kept: int16.
+    size : tuple of int
+        Width and height in pixels.
+    styles : dict of tuple to int
+        The numbers of the styles: of colour to fill, colour of the line, its width, its dashes,
+        its ends and corners, the rectangle that is drawn in, and the marker: polygons as in
+        `record`. What there is not is None or empty. Lengths are in pixels, but for the marker.
     """
 
     def __init__(self, fig: Figure) -> None:
         super().__init__()
         self._fig = fig
-        self.width, self.height = fig.bbox.size
-        self.states: list[NDArray[np.int16]] = []
-        self._styles: dict[tuple[Any, ...], int] = {}
+        self.width, self.height = self.size = tuple(round(x) for x in fig.bbox.size)
+        if max(self.size) > 1500:  # farther places would not fit
+            raise ValueError(f"fig: at most 1500 pixels each way wanted, got {self.size}")
+        self.styles: dict[tuple[Any, ...], int] = {}
         self._drawn: list[NDArray[np.int16]] = []
 
-    @property
-    def styles(self) -> list[list[Any]]:
-        """The styles, in the order of their numbers."""
-        return [list(style) for style in self._styles]
+    def record(self, artists: Iterable[Any]) -> NDArray[np.int16]:
+        """Return what these artists draw.
 
-    def record(self, artists: Iterable[Any]) -> None:
-        """Keep what these artists draw as another state."""
+        A sequence of polygons, of each its style, its number of points, and their places in parts
+        of a pixel from the upper left, each as the difference from the one before. A number below
+        0 is of a polygon that is filled together with the one before it, as a hole perhaps. Where
+        the style has a marker, the marker is drawn at the points.
+        """
         self._drawn = [np.zeros(0, np.int16)]
         for artist in artists:
             if hasattr(artist, "do_3d_projection"):
                 artist.do_3d_projection()
             artist.draw(self)
-        self.states.append(np.concatenate(self._drawn))
-
-    def pack(self) -> bytes:
-        """Return all states: how many there are, their lengths, and what they draw, deflated."""
-        sizes = np.array([len(self.states), *map(len, self.states)], "<u4")
-        numbers = np.concatenate(self.states).astype("<i2")
-        return zlib.compress(sizes.tobytes() + numbers.tobytes(), 9)
+        return np.concatenate(self._drawn)
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         """Return the size in pixels."""
@@ -78,18 +83,33 @@ class Display(RendererBase):
 
     def draw_path(self, gc: Any, path: Any, transform: Any, rgbFace: Any = None) -> None:
         """Keep a path as polygons; Matplotlib calls this for all that it draws."""
-        look = self._style(gc, rgbFace)
-        style = self._styles.setdefault(look, len(self._styles))
         clip = None if rgbFace is not None else (-400, -400, self.width + 400, self.height + 400)
         simple = path.should_simplify and rgbFace is None
         clean = path.cleaned(transform, remove_nans=True, clip=clip, simplify=simple, curves=True)
         clean = type(path)(clean.vertices[:-1], clean.codes[:-1])  # the last one is a stop
         for i, points in enumerate(clean.to_polygons(closed_only=False)):
-            places = PARTS * np.stack([points[:, 0], self.height - points[:, 1]], axis=1)
-            whole = np.clip(np.round(places), -FAR, FAR).astype(int)
-            steps = np.diff(whole, axis=0, prepend=np.zeros((1, 2), int))
-            number = -len(steps) if i and rgbFace is not None else len(steps)
-            self._drawn.append(np.array([style, number, *steps.ravel()], np.int16))
+            number = -len(points) if i and rgbFace is not None else len(points)
+            self._keep(self._style(gc, rgbFace), number, points * [1, -1] + [0, self.height])
+
+    def draw_markers(
+        self,
+        gc: Any,
+        marker_path: Any,
+        marker_trans: Any,
+        path: Any,
+        trans: Any,
+        rgbFace: Any = None,
+    ) -> None:
+        """Keep the marker with the style, and where it is drawn."""
+        points = trans.transform(path.vertices)
+        points = points[np.isfinite(points).all(axis=1)] * [1, -1] + [0, self.height]
+        shape = marker_path.to_polygons(marker_trans, closed_only=False)
+        marker = tuple(tuple(_steps(polygon * [1, -1]).tolist()) for polygon in shape)
+        self._keep((*self._style(gc, rgbFace)[:-1], marker), len(points), points)
+
+    def _keep(self, look: tuple[Any, ...], number: int, points: Any) -> None:
+        style = self.styles.setdefault(look, len(self.styles))
+        self._drawn.append(np.array([style, number, *_steps(points)], np.int16))
 
     def _style(self, gc: Any, face: Any) -> tuple[Any, ...]:
         width = round(self.points_to_pixels(gc.get_linewidth()), 3)
@@ -107,8 +127,87 @@ class Display(RendererBase):
             "square" if gc.get_capstyle() == "projecting" else str(gc.get_capstyle()),
             str(gc.get_joinstyle()),
             tuple(round(float(x), 2) for x in box),
+            (),
         )
 
 
 def _alpha(colour: Any, forced: float | None) -> float:
     return forced if forced is not None else colour[3] if len(colour) > 3 else 1.0
+
+
+def _steps(points: Any) -> NDArray[np.int_]:
+    whole = np.clip(np.round(PARTS * points), -FAR, FAR).astype(int)
+    return np.diff(whole, axis=0, prepend=np.zeros((1, 2), int)).ravel()
+
+
+def joined(states: Sequence[NDArray[np.int16]]) -> bytes:
+    """Return states of `Display.record`: how many, their lengths, and what they draw."""
+    sizes = np.array([len(states), *map(len, states)], "<u4")
+    return sizes.tobytes() + np.concatenate(states).astype("<i2").tobytes()
+
+
+@dataclass(frozen=True)
+class Player:
+    """A figure that its reader moves without Python; where scripts do not run it is a still.
+
+    Parameters
+    ----------
+    name, alt, caption : str
+        What it is called, its description, and its caption as HTML.
+    shown, background : bytes
+        PNGs, twice as fine as they are shown: the still, and what does not move.
+    display : Display
+        What has recorded the states.
+    states : sequence of ndarray
+        One for each combination of the controls, that of the last one running fastest.
+    controls : sequence of dict
+        Of each its ``label``, its ``values`` as texts, and the number of its ``first`` one. The
+        last one plays.
+    milliseconds : int
+        From one state to the next while it plays.
+    texts : sequence, optional
+        Of each state what is to be read: pairs of texts, a notice, and all of it as one line.
+    """
+
+    name: str
+    alt: str
+    caption: str
+    shown: bytes
+    background: bytes
+    display: Display
+    states: Sequence[NDArray[np.int16]]
+    controls: Sequence[dict[str, Any]]
+    milliseconds: int
+    texts: Sequence[Any] = ()
+
+    def __repr__(self) -> str:
+        """Return the name and the description."""
+        return f"{self.name}: {self.alt}"
+
+    def _repr_html_(self) -> str:
+        data = {
+            "size": self.display.size,
+            "styles": list(self.display.styles),
+            "background": _url(self.background),
+            "states": _deflated(joined(self.states)),
+            "texts": _deflated(json.dumps(self.texts, ensure_ascii=False).encode()),
+            "controls": self.controls,
+            "milliseconds": self.milliseconds,
+        }
+        return _FIGURE.substitute(
+            name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
+            width=self.display.width,
+            alt=html.escape(self.alt),
+            still=_url(self.shown),
+            caption=self.caption,
+            engine=ENGINE,
+            data=json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"),
+        )
+
+
+def _deflated(content: bytes) -> str:
+    return base64.b64encode(zlib.compress(content, 9)).decode()
+
+
+def _url(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"

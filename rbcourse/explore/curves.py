@@ -9,16 +9,8 @@ from rbcourse._numerics import Array
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION, EYE
-from rbcourse.explore.explorer import (
-    Explorer,
-    choice,
-    look,
-    new_figure,
-    new_line,
-    new_space,
-    numbers,
-    slider,
-)
+from rbcourse.explore import widgets
+from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.metrics import geodesic_flow
 from rbcourse.motions import geodesic_se3, screw_from_pose, screw_se3
 from rbcourse.projected_line import f, line_singular_value, theta
@@ -68,8 +60,8 @@ def theta_explorer() -> Explorer:
         fig.legend(handles=handles, loc="lower left", handlelength=1, bbox_to_anchor=(0, -0.01))
         side.legend(loc="upper left", handlelength=1.4)
     controls = {
-        "angle": slider("angle a (°)", 120.0, 1.0, 179.0, 1.0),
-        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
+        "angle": widgets.slider("angle a (°)", 120.0, 1.0, 179.0, 1.0),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(angle: float, t: float) -> dict[str, str]:
@@ -128,11 +120,11 @@ def screw_explorer() -> Explorer:
         artists["screw"].set_edgecolor(COLOURS["screw"])
         fig.legend(loc="lower left", ncols=3, handlelength=1.5, columnspacing=1)
     controls = {
-        "angle": slider("turn (°)", 120.0, -180.0, 180.0, 1.0),
-        "tilt": slider("tilt of axis (°)", 0.0, 0.0, 90.0, 1.0),
-        "x": slider("goal x (m)", 2.0, -2.0, 2.0, 0.1),
-        "z": slider("goal z (m)", 0.8, -1.2, 1.2, 0.1),
-        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
+        "angle": widgets.slider("turn (°)", 120.0, -180.0, 180.0, 1.0),
+        "tilt": widgets.slider("tilt of axis (°)", 0.0, 0.0, 90.0, 1.0),
+        "x": widgets.slider("goal x (m)", 2.0, -2.0, 2.0, 0.1),
+        "z": widgets.slider("goal z (m)", 0.8, -1.2, 1.2, 0.1),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(angle: float, tilt: float, x: float, z: float, t: float) -> dict[str, str]:
@@ -188,9 +180,9 @@ def flip_explorer() -> Explorer:
             columnspacing=0.6,
         )
     controls = {
-        "axis": choice("spin about", list(_SPINS)),
-        "off": slider("off axis by (°)", 4.0, 0.0, _OFF_MOST, _OFF_STEP),
-        "t": slider("time t (s)", 0.0, 0.0, 8.0, 0.04),
+        "axis": widgets.choice("spin about", list(_SPINS)),
+        "off": widgets.slider("off axis by (°)", 4.0, 0.0, _OFF_MOST, _OFF_STEP),
+        "t": widgets.stepped("time t (s)", 0.0, 0.0, 8.0, 0.04),
     }
 
     def show(axis: str, off: float, t: float) -> dict[str, str]:

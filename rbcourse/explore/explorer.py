@@ -2,10 +2,12 @@
 
 import base64
 import html
-import io
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import anywidget
@@ -14,102 +16,54 @@ import matplotlib.pyplot as plt
 import numpy as np
 import traitlets
 from matplotlib.figure import Figure
-from PIL import Image
+from numpy.typing import NDArray
 
-from rbcourse.draw.animate import painter
-from rbcourse.draw.save import few_colours, png
+from rbcourse.draw.animate import drawn
+from rbcourse.draw.display import ENGINE, Display, joined
 
 DPI = 100
 """Pixels per inch of a picture at its own size."""
 LABELS = 13.0
 """Size of all letters in the pictures, in points: 18 pixels."""
 
-_SCRIPT = """
-export default {
-  render({ model, el }) {
-    const image = document.createElement("img");
-    image.style.maxWidth = "100%";
-    const draw = () => {
-      const before = image.src;
-      image.src = URL.createObjectURL(new Blob([model.get("png")], { type: "image/png" }));
-      URL.revokeObjectURL(before);
-      image.alt = model.get("alt");
-      image.width = model.get("width");
-    };
-    let clicks = 0;
-    const point = (event) => {
-      if (!(event.buttons & 1)) return;
-      const { left, top, width, height } = image.getBoundingClientRect();
-      const place = [(event.clientX - left) / width, (event.clientY - top) / height];
-      model.set("place", [...place, ++clicks]);  // so that the same place counts again
-      model.save_changes();
-    };
-    if (model.get("clickable")) {
-      image.style.cursor = "crosshair";
-      image.style.touchAction = "none";
-      image.draggable = false;
-      image.addEventListener("pointerdown", point);
-      image.addEventListener("pointermove", point);
-    }
-    // Give buttons and sliders names for screen readers.
-    const name = (panel) => {
-      panel.querySelectorAll(".widget-slider").forEach((slider) => {
-        const label = slider.querySelector(".widget-label")?.textContent ?? "";
-        slider.querySelector(".noUi-handle")?.setAttribute("aria-label", label);
-      });
-      panel.querySelectorAll(".widget-play button").forEach((button, i) => {
-        button.title = ["Play or pause", "Stop"][i] ?? "";
-      });
-    };
-    const observer = new MutationObserver(() => name(panel));
-    let panel = null, timer = 0;
-    const begin = () => {
-      panel = el.closest(".rbcourse-explorer");
-      if (!panel) { timer = setTimeout(begin, 100); return; }
-      name(panel);
-      observer.observe(panel, { childList: true, subtree: true });
-    };
-    begin();
-    model.on("change:png", draw);
-    draw();
-    image.addEventListener("load", () => {
-      const zoom = Math.max(1, image.clientWidth / image.width);
-      model.set("density", window.devicePixelRatio * zoom);
-      model.save_changes();
-    }, { once: true });
-    el.append(image);
-    return () => {
-      model.off("change:png", draw);
-      observer.disconnect();
-      clearTimeout(timer);
-      URL.revokeObjectURL(image.src);
-    };
-  }
-};
-"""
 
+class Canvas(anywidget.AnyWidget):
+    """The picture in the browser, which draws states that it is sent; see canvas.js.
 
-class Picture(anywidget.AnyWidget):
-    """A PNG in the browser, which tells how fine the screen is, and where it is clicked.
-
-    A place is the share of the width from the left, that of the height from the top, and the number
-    of the click.
+    ``made`` stays as it is. A ``run`` are states that follow one another, those of what plays. All
+    of one version have the same values of the other controls; a notice, of a click perhaps, is with
+    the first of a version. The browser sends a message with the ``index`` of a state that it has
+    not got, or with the ``place`` of a click: the share of the width from the left, and of the
+    height from the top.
     """
 
-    _esm = _SCRIPT
-    png = traitlets.Bytes().tag(sync=True)
-    alt = traitlets.Unicode().tag(sync=True)
-    width = traitlets.Int().tag(sync=True)
-    clickable = traitlets.Bool().tag(sync=True)
-    place = traitlets.List(traitlets.Float()).tag(sync=True)
-    density = traitlets.Float(1.0).tag(sync=True)
+    _esm = ENGINE + Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
+    made = traitlets.Dict().tag(sync=True)
+    run = traitlets.Dict().tag(sync=True)
+
+
+@dataclass(frozen=True)
+class State:
+    """What an explorer shows: artists, what they draw, what is to be read, and all as one line."""
+
+    shown: list[Any]
+    drawn: NDArray[np.int16]
+    said: dict[str, str]
+    notice: str
+    line: str
+
+    @property
+    def texts(self) -> list[Any]:
+        """What is to be read, for display.js."""
+        return [list(self.said.items()), self.notice, self.line]
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
     """A picture, its controls, and what is to be read off it.
 
-    What does not move is drawn once. Each change of a control moves the artists, in one picture.
-    What cannot be served is said in the panel; then nothing is drawn that moves.
+    What does not move is drawn once. What plays is drawn by the browser, which asks for the states
+    that it has not got; each change of another control is sent as one state. What cannot be served
+    is said in the panel; then nothing is drawn that moves.
 
     Parameters
     ----------
@@ -126,7 +80,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         returns what is to be read: names, and what is said of them. It may raise a ValueError or a
         RuntimeError, or warn.
     plays : str
-        Which control the play button moves: a slider.
+        Which control the play button moves: one that `widgets.stepped` has made.
     seconds : float, optional
         How long it plays.
     point : callable, optional
@@ -147,30 +101,43 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     ) -> None:
         self.name, self.artists, self.controls = name, dict(artists), dict(controls)
         self._fig, self._show, self._point = fig, show, point
-        self._first = self.values
-        self._resting = False
-        for control in self.controls.values():
-            control.observe(self._follow, "value")
-        width = round(fig.get_figwidth() * DPI)
-        self.picture = Picture(width=width, clickable=point is not None)
-        self.said, self.notice = ipywidgets.HTML(), ipywidgets.HTML()
-        self.play = _play(self.controls[plays], seconds)
+        self.plays, self.time = plays, self.controls[plays]
+        self.steps = [value for _, value in self.time.options]
+        self._first, self._resting, self._version = self.values, False, 0
+        self.display, self.background = Display(fig), self.draw([], zoom=2)
+        self.play = ipywidgets.Play(
+            value=self.time.index,
+            max=len(self.steps) - 1,
+            interval=max(40, round(1000 * seconds / (len(self.steps) - 1))),
+            show_repeat=False,
+        )
         self.reset = ipywidgets.Button(description="Reset", layout={"width": "5em"})
-        buttons = ipywidgets.HBox([self.play, self.reset])
+        self.reset.add_class("rbcourse-reset")
+        said = ipywidgets.HTML()
+        others = [control for control in self.controls.values() if control is not self.time]
+        made = {
+            "size": self.display.size,
+            "background": self.background,
+            "first": self.time.index,
+            "clickable": point is not None,
+            "parts": [part.model_id for part in (self.time, self.play, said, *others)],
+        }
+        self.picture = Canvas(made=made)
         panel = ipywidgets.VBox(
-            [buttons, *self.controls.values(), self.said, self.notice],
+            [ipywidgets.HBox([self.play, self.reset]), *self.controls.values(), said],
             layout={"flex": "1 1 19em", "min_width": "0"},
         )
         panel.add_class("rbcourse-panel")
-        self.picture.layout = {"flex": f"0 1 {width}px", "min_width": "0"}
+        self.picture.layout = {"flex": f"0 1 {self.display.width}px", "min_width": "0"}
         super().__init__(
             [self.picture, panel], layout={"flex_flow": "row wrap", "align_items": "flex-start"}
         )
         self.add_class("rbcourse-explorer")
-        self._prepare()
+        self._follow()
+        for control in others:
+            control.observe(self._follow, "value")
         self.reset.on_click(lambda _: self.restart())
-        self.picture.observe(self._prepare, "density")
-        self.picture.observe(self._pointed, "place")
+        self.picture.on_msg(self._answer)
 
     @property
     def values(self) -> dict[str, Any]:
@@ -178,7 +145,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return {name: control.value for name, control in self.controls.items()}
 
     def put(self, **values: Any) -> None:
-        """Set some of the controls, in their order, and draw once."""
+        """Set some of the controls, in their order, and send once what is shown."""
         self._resting = True
         try:
             for name in [name for name in self.controls if name in values]:
@@ -192,51 +159,67 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         self.play.playing = False
         self.put(**self._first)
 
-    def _prepare(self, _: Any = None) -> None:
-        """Draw what does not move, as finely as the screen shows it."""
-        self._fig.set_dpi(DPI * min(max(self.picture.density, 1.0), 2.0))
-        with look():
-            self._paint = painter(self._fig, list(self.artists.values()))
-        self._follow()
-
-    def _follow(self, _: Any = None) -> None:
-        if self._resting:
-            return
+    def state(self, **values: Any) -> State:
+        """Return what is shown with these values, and the other controls as they are."""
         shown, said, notice = list(self.artists.values()), {}, ""
         with warnings.catch_warnings(record=True, action="always") as warned:
             try:
-                said = dict(self._show(**self.values))
+                said = dict(self._show(**self.values | values))
                 notice = " ".join(str(warning.message) for warning in warned)
             except (ValueError, RuntimeError) as error:
                 shown, notice = [], f"Nothing to show here: {error}"
-        drawn = io.BytesIO()
-        self._paint(shown).save(drawn, "png", compress_level=1)
-        plain = "; ".join(f"{key}: {' '.join(text.split())}" for key, text in said.items())
-        with self.picture.hold_sync():
-            self.picture.png, self.picture.alt = drawn.getvalue(), f"{self.name}. {plain or notice}"
-        self.said.value = _table(said)
-        self._warn(notice)
+        parts = (f"{name}: {' '.join(text.split())}" for name, text in said.items())
+        line = f"{self.name}. {'; '.join(parts) or notice}"
+        return State(shown, self.display.record(shown), said, notice, line)
 
-    def _warn(self, notice: str) -> None:
-        self.notice.value = f'<b role="alert">{html.escape(notice)}</b>' if notice else ""
+    def draw(self, shown: Sequence[Any], zoom: float = 1) -> bytes:
+        """Return these artists as a PNG over what does not move, so many times as fine."""
+        with look():
+            return drawn(self._fig, list(self.artists.values()), shown, zoom)
 
-    def _pointed(self, change: Any) -> None:
-        right, down, _ = change.new
-        x, y = self._fig.bbox.width * right, self._fig.bbox.height * (1 - down)
+    def _follow(self, _: Any = None, notice: str = "") -> None:
+        """Send what is shown now, and what is to be noted until something moves."""
+        if not self._resting:
+            self._version += 1
+            self._push(self.time.index, [self.state()], notice)
+
+    def _answer(self, _: Any, asked: Mapping[str, Any], __: Any) -> None:
+        """Send states for 50 ms, from the one on that is asked for; or go where a click wants."""
+        if "place" in asked:
+            return self._go(*asked["place"])
+        states, end = [], monotonic() + 0.05
+        for value in self.steps[asked["index"] :]:
+            states.append(self.state(**{self.plays: value}))
+            if monotonic() > end:
+                break
+        self._push(asked["index"], states)
+
+    def _go(self, right: float, down: float) -> None:
         assert self._point is not None
         try:
-            self.put(**self._point(x, y))
+            width, height = self.display.size
+            self.put(**self._point(width * right, height * (1 - down)))
         except ValueError as error:
-            self._warn(str(error))
+            self._follow(notice=str(error))
+
+    def _push(self, first: int, states: Sequence[State], notice: str = "") -> None:
+        self.picture.run = {
+            "version": self._version,
+            "number": self.picture.run.get("number", 0) + 1,  # what is equal is not sent
+            "index": first,
+            "states": joined([state.drawn for state in states]),
+            "texts": [state.texts for state in states],
+            "styles": list(self.display.styles),
+            "notice": notice,
+        }
 
     def __repr__(self) -> str:
         """Return the name, and what is to be read."""
-        return self.picture.alt
+        return self.state().line
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:
         """Return the explorer, and a still of it for readers without a kernel."""
-        picture = png(few_colours(Image.open(io.BytesIO(self.picture.png))))
-        source = base64.b64encode(picture).decode()
+        source = base64.b64encode(self.draw(self.state().shown)).decode()
         still = (
             f'<figure><img style="max-width: 100%" alt="{html.escape(repr(self))}" '
             f'src="data:image/png;base64,{source}"/><figcaption>{html.escape(self.name)}: '
@@ -280,70 +263,7 @@ def new_line(ax: Any, **style: Any) -> Any:
     return ax.plot(*[[]] * (3 if ax.name == "3d" else 2), **style)[0]
 
 
-def slider(label: str, value: float, low: float, high: float, step: float) -> Any:
-    """Return a slider; its label ends with the unit, where there is one."""
-    digits = len(f"{step:g}".partition(".")[2])
-    return ipywidgets.FloatSlider(
-        value,
-        description=label,
-        min=low,
-        max=high,
-        step=step,
-        readout_format=f".{digits}f",
-        style={"description_width": "9.5em"},
-        layout={"width": "auto"},
-    )
-
-
-def choice(label: str, options: Any) -> Any:
-    """Return buttons of which one is chosen, the first to begin with."""
-    return ipywidgets.ToggleButtons(
-        options=options,
-        description=label,
-        style={"description_width": "9.5em", "button_width": "auto"},
-    )
-
-
-def menu(label: str, options: Any) -> Any:
-    """Return a menu of which one line is chosen, the first to begin with: for many options."""
-    style = {"description_width": "9.5em"}
-    return ipywidgets.Dropdown(
-        options=options, description=label, style=style, layout={"width": "auto"}
-    )
-
-
 def numbers(values: Any, digits: int) -> str:
     """Return numbers as text, with commas between them, and without a minus before zero."""
     rounded = np.round(np.atleast_1d(values), digits) + 0.0
     return ", ".join(f"{x:.{digits}f}".replace("-", "−") for x in rounded)
-
-
-def _table(said: Mapping[str, str]) -> str:
-    """Return names, and what is said of them, as HTML; lines stay lines."""
-    cells = "".join(
-        f'<tr style="vertical-align: top"><td style="padding-right: 0.8em">{html.escape(name)}</td>'
-        f'<td style="white-space: pre; font-variant-numeric: tabular-nums">{html.escape(text)}</td>'
-        "</tr>"
-        for name, text in said.items()
-    )
-    return f'<table style="line-height: 1.35">{cells}</table>'
-
-
-def _play(control: Any, seconds: float) -> Any:
-    steps = round((control.max - control.min) / control.step)
-    play = ipywidgets.Play(min=0, max=steps, interval=max(40, round(1000 * seconds / steps)))
-    play.show_repeat = False
-
-    def follow(_: Any) -> None:
-        play.value = round((control.value - control.min) / control.step)
-
-    def lead(change: Any) -> None:
-        if play.playing or change.new == play.min:
-            control.value = float(control.min + change.new * control.step)
-        else:  # said before the browser heard that it was stopped
-            follow(change)
-
-    follow(None)
-    control.observe(follow, "value")
-    play.observe(lead, "value")
-    return play

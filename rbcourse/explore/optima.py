@@ -10,7 +10,8 @@ from rbcourse.cost import acceleration_cost_parts
 from rbcourse.curves import Curve
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
-from rbcourse.explore.explorer import Explorer, look, menu, new_figure, new_line, numbers, slider
+from rbcourse.explore import widgets
+from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, numbers
 from rbcourse.motions import minimum_acceleration_se3, projected_cubic_se3
 from rbcourse.optimum import minimum_acceleration_so3
 from rbcourse.rivals import CLOSED_FORMS
@@ -21,7 +22,7 @@ Solved = tuple[dict[str, Curve], dict[str, float]]
 
 _TIMES = np.linspace(0, 1, 61)
 _SIGMA = np.pi / 6 * np.array([1, 2, 3])
-_SIDE = 2.5
+_SIDE = 3.5
 _WAYS = {"optimum": "-", "projection": "--"}
 
 
@@ -47,9 +48,9 @@ def minimum_acceleration_explorer() -> Explorer:
             artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     controls = {
-        "rival": menu("closed form", list(CLOSED_FORMS)),
-        "size": slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
-        "k": slider("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
+        "rival": widgets.menu("closed form", list(CLOSED_FORMS)),
+        "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
+        "k": widgets.stepped("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
     }
 
     def show(rival: str, size: float, k: float) -> dict[str, str]:
@@ -76,11 +77,14 @@ def cube_explorer() -> Explorer:
         fig = new_figure()
         artists: dict[str, Any] = {}
         for way, left in zip(_WAYS, (0.0, 0.5), strict=True):
-            ax: Any = fig.add_axes((left - 0.06, -0.02, 0.62, 0.95), projection="3d")
-            ax.set(xlim=(-3, 11), ylim=(-3, 13), zlim=(-4, 14))
-            ax.set(xticklabels=[], yticklabels=[], zticklabels=[])
-            ax.set_box_aspect((14, 16, 18), zoom=1.0)
-            ax.patch.set_visible(False)  # the two overlap a little
+            ax: Any = fig.add_axes((left - 0.09, -0.05, 0.65, 1.0), projection="3d")
+            ax.set(xlim=(-2, 10), ylim=(-2, 12), zlim=(-2, 15))
+            for name, end in zip("xyz", 5 * np.eye(3), strict=True):
+                ax.plot(*np.outer(end, [0, 1]), color="0.8", lw=1.5, zorder=0)
+                ax.text(*(1.2 * end), name, color="0.5", ha="center", va="center")
+            ax.set_box_aspect((12, 14, 17), zoom=1.04)
+            ax.set_axis_off()
+            ax.patch.set_visible(False)
             ax.set_proj_type("ortho")
             ax.view_init(elev=18, azim=-22)
             style = {"color": "black", "lw": 1, "ls": _WAYS[way]}
@@ -89,11 +93,14 @@ def cube_explorer() -> Explorer:
             artists[f"{way} goal"].set_alpha(0.25)
             artists[way] = draw_box(ax, np.eye(4), _SIDE)
             fig.text(left + 0.25, 0.94, way, ha="center")
+        artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
+        artists["difference"].set(facecolor="none", edgecolor=COLOURS["projection"], lw=1.5)
+        fig.text(0.5, 0.02, "axes: 5 m; pink: where the optimum is now", ha="center")
     controls = {
-        "turn": slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
-        "spin": slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),
-        "rise": slider("ḋ₃(1) (m/time)", 3.0, -20.0, 20.0, 1.0),
-        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
+        "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
+        "spin": widgets.slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),
+        "rise": widgets.slider("ḋ₃(1) (m/time)", 3.0, -20.0, 20.0, 1.0),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(turn: float, spin: float, rise: float, t: float) -> dict[str, str]:
@@ -102,6 +109,7 @@ def cube_explorer() -> Explorer:
             artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
             move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
             move_box(artists[way], curve(t), _SIDE)
+        move_box(artists["difference"], curves["optimum"](t), _SIDE)
         return {**_compared(costs), "apart now": _apart(curves, t)}
 
     return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")

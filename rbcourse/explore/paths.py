@@ -8,16 +8,8 @@ from rbcourse._numerics import Array
 from rbcourse.curves import Curve
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
-from rbcourse.explore.explorer import (
-    Explorer,
-    look,
-    menu,
-    new_figure,
-    new_line,
-    new_space,
-    numbers,
-    slider,
-)
+from rbcourse.explore import widgets
+from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.motions import geodesic_se3, minimum_acceleration_se3, projected_cubic_se3
 from rbcourse.paths import Chain, bessel_velocities, chain
 from rbcourse.projected_cubic import projected_quintic_so3
@@ -55,7 +47,7 @@ def chain_explorer() -> Explorer:
     """
     with look():
         fig = new_figure()
-        space = new_space(fig, (-0.03, 0.0, 0.63, 1.0), 2.05)
+        space = new_space(fig, (-0.08, -0.1, 0.74, 1.2), 2.05)
         artists: dict[str, Any] = {
             "way": new_line(space, color=COLOURS["path"]),
             "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
@@ -73,10 +65,10 @@ def chain_explorer() -> Explorer:
             }
         ax.set_xlabel("time (s)")
     controls = {
-        "leg": menu("joined by", list(LEGS)),
-        "share": slider("× Bessel's ω, v", 1.0, 0.0, 1.5, 0.1),
-        "duration": slider("duration (s)", 6.0, 4.0, _LONGEST, 0.5),
-        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
+        "leg": widgets.menu("joined by", list(LEGS)),
+        "share": widgets.slider("× Bessel's ω, v", 1.0, 0.0, 1.5, 0.1),
+        "duration": widgets.slider("duration (s)", 6.0, 4.0, _LONGEST, 0.5),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(leg: str, share: float, duration: float, t: float) -> dict[str, str]:

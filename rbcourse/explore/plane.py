@@ -9,7 +9,8 @@ from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics, 
 from rbcourse.draw.arm import show_reach
 from rbcourse.draw.plane import draw_body, move_body
 from rbcourse.draw.save import COLOURS
-from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, numbers, slider
+from rbcourse.explore import widgets
+from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, numbers
 from rbcourse.planar import propagate_planar
 
 _STEPS = 80
@@ -41,7 +42,7 @@ def planar_explorer() -> Explorer:
             artists |= {f"{frame} outline": outline, f"{frame} nose": nose}
         fig.legend(loc="upper center", ncols=2)
     controls = {
-        f"{name}{i + 1}": slider(f"{nth} {symbol} ({unit})", first, -high, high, step)
+        f"{name}{i + 1}": widgets.slider(f"{nth} {symbol} ({unit})", first, -high, high, step)
         for i, nth in enumerate(("1st", "2nd"))
         for name, symbol, unit, first, high, step in (
             ("vx", "vx", "m/s", 1.0, 1.0, 0.1),
@@ -63,7 +64,7 @@ def planar_explorer() -> Explorer:
             said[frame] = f"({x_y}) m, heading {heading}°"
         return said
 
-    controls["t"] = slider("time t (s)", 0.0, 0.0, 2 * _LASTS, 2 * _LASTS / _STEPS)
+    controls["t"] = widgets.stepped("time t (s)", 0.0, 0.0, 2 * _LASTS, 2 * _LASTS / _STEPS)
     return Explorer("A plan of two commands", fig, artists, controls, show, plays="t")
 
 
@@ -101,9 +102,9 @@ def arm_explorer() -> Explorer:
         }
         fig.legend(loc="upper right", handlelength=1)
     controls = {
-        "theta0": slider("shoulder θ₀ (°)", _GOAL[0], -180.0, 180.0, 1.0),
-        "theta1": slider("elbow θ₁ (°)", _GOAL[1], -180.0, 180.0, 1.0),
-        "t": slider("time t", 0.0, 0.0, 1.0, 0.01),
+        "theta0": widgets.slider("shoulder θ₀ (°)", _GOAL[0], -180.0, 180.0, 1.0),
+        "theta1": widgets.slider("elbow θ₁ (°)", _GOAL[1], -180.0, 180.0, 1.0),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(theta0: float, theta1: float, t: float) -> dict[str, str]:

@@ -10,16 +10,8 @@ from rbcourse.conversions import matrix_from_zyx, quaternion_from_matrix
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import EYE, PALE, draw_sphere
-from rbcourse.explore.explorer import (
-    Explorer,
-    choice,
-    look,
-    new_figure,
-    new_line,
-    new_space,
-    numbers,
-    slider,
-)
+from rbcourse.explore import widgets
+from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 from rbcourse.sampling import sample_rotation, sample_rotation_naive, uniformity_tests
 from rbcourse.se3 import pose_from_components
@@ -53,9 +45,9 @@ def rotation_explorer() -> Explorer:
         artists |= _axes_of(ax, "body", ls="-", lw=3.5)
         _legend(fig, [artists[name] for name in (*looks, "axis")])
     controls = {
-        "alpha": slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
-        "beta": slider("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
-        "gamma": slider("roll γ (°)", 40.0, -180.0, 180.0, 1.0),
+        "alpha": widgets.slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
+        "beta": widgets.stepped("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
+        "gamma": widgets.slider("roll γ (°)", 40.0, -180.0, 180.0, 1.0),
     }
 
     def show(alpha: float, beta: float, gamma: float) -> dict[str, str]:
@@ -109,10 +101,10 @@ def projection_explorer() -> Explorer:
             artists[f"{name} z"].set_label(name)
         _legend(fig, [artists[f"{name} z"] for name in looks])
     controls = {
-        "e12": slider("y leans", 0.8, -1.0, 1.0, 0.05),
-        "e23": slider("z leans", 0.0, -1.0, 1.0, 0.05),
-        "e33": slider("z stretched", 0.0, -2.0, 1.0, 0.05),
-        "pull": slider("pull (0 to 1)", 0.0, 0.0, 1.0, 0.01),
+        "e12": widgets.slider("y leans", 0.8, -1.0, 1.0, 0.05),
+        "e23": widgets.slider("z leans", 0.0, -1.0, 1.0, 0.05),
+        "e33": widgets.slider("z stretched", 0.0, -2.0, 1.0, 0.05),
+        "pull": widgets.stepped("pull (0 to 1)", 0.0, 0.0, 1.0, 0.01),
     }
 
     def show(e12: float, e23: float, e33: float, pull: float) -> dict[str, str]:
@@ -176,9 +168,9 @@ def random_explorer() -> Explorer:
             np.zeros(20), _BINS, orientation="horizontal", color=COLOURS["projection"], lw=2
         )
     controls = {
-        "sampler": choice("sampler", list(_SAMPLERS)),
-        "number": slider("rotations", 40.0, 20.0, _MOST, 20.0),
-        "seed": slider("seed", 0.0, 0.0, 20.0, 1.0),
+        "sampler": widgets.choice("sampler", list(_SAMPLERS)),
+        "number": widgets.stepped("rotations", 40.0, 20.0, _MOST, 20.0),
+        "seed": widgets.slider("seed", 0.0, 0.0, 20.0, 1.0),
     }
 
     def show(sampler: str, number: float, seed: float) -> dict[str, str]:

@@ -9,13 +9,17 @@ IDLE = re.compile(r"\| Idle$")
 
 # all pictures and players that are on the page now, and whether something is wrong with them
 SEEN = """() => {
-  const faults = [], parts = ".jp-Cell figure :is(img, canvas), .rbcourse-explorer img";
+  const faults = [], parts = ":is(.jp-Cell figure, .rbcourse-explorer) :is(img, canvas)";
   for (const picture of document.querySelectorAll(parts)) {
     if (picture.complete && !picture.naturalWidth) faults.push("blank picture: " + picture.alt);
     if (!(picture.alt || picture.ariaLabel)) faults.push("picture without description");
-    const button = picture.parentNode.querySelector("button");
-    if (button && button.parentNode.hidden && !picture.dataset.read)
-      faults.push("player without buttons: " + picture.id);
+    const figure = picture.closest("figure");
+    if (figure?.querySelector("script") && !figure.querySelector("canvas, img[data-read]"))
+      faults.push("player that cannot be moved: " + picture.id);
+    const slider = figure?.querySelector("input");
+    if (slider && slider.offsetWidth < picture.offsetWidth / 2)
+      faults.push("slider of a player that is short: " + picture.ariaLabel);
+    const button = figure?.querySelector("button");
     if (button && button.textContent !== "▶")
       faults.push("player that starts by itself: " + picture.ariaLabel);
   }
@@ -30,10 +34,8 @@ SEEN = """() => {
 NOTE = """() => {
   window.keys = []; window.pictures = [];
   document.addEventListener("keydown", () => keys.push(performance.now()), true);
-  document.addEventListener("load", (event) => {
-    if (event.target.closest?.(".rbcourse-explorer"))
-      requestAnimationFrame(() => pictures.push(performance.now()));
-  }, true);
+  document.addEventListener("drawn", () =>
+    requestAnimationFrame(() => pictures.push(performance.now())));
 }"""
 
 
@@ -109,7 +111,7 @@ def wait_for(explorer):
     """Wait until an explorer has its picture and its numbers; return it."""
     explorer.locator(".widget-readout", has_text=re.compile(r"\d")).last.wait_for()
     explorer.locator("table").wait_for()
-    expect(explorer.locator("img")).to_have_js_property("complete", True)
+    explorer.get_by_role("img").wait_for()  # a canvas is one when it has been drawn
     return explorer
 
 
@@ -122,27 +124,42 @@ def read(explorer):
     """What an explorer shows: its picture, and what is to be read."""
     return explorer.evaluate(
         """(explorer) => ({
-            picture: explorer.querySelector("img").src,
+            picture: explorer.querySelector("canvas").toDataURL(),
             said: explorer.querySelector("table").innerText,
         })"""
     )
 
 
-def move_every_slider(explorer):
-    """Press a key on each slider: its number follows, and then the picture and the text.
+def move_every_control(explorer):
+    """Move each slider by a key and by the mouse, and choose by both; time is moved first.
 
-    The last one, the time of most explorers, goes to its end first.
+    Numbers follow at once, and then picture and text.
     """
-    before, handles = read(explorer), explorer.locator(".noUi-handle")
-    last = handles.count() - 1
-    for i, key in [(last, "End"), *((i, "ArrowRight") for i in range(last))]:
-        handle, number = handles.nth(i), explorer.locator(".widget-readout").nth(i)
+    before, sliders = read(explorer), explorer.locator(".widget-slider").all()
+    for slider in [sliders[-1], *sliders[:-1]]:
+        handle, number = slider.locator(".noUi-handle"), slider.locator(".widget-readout")
         if handle.evaluate("(handle) => Boolean(handle.closest('[disabled]'))"):
             continue
         now = number.inner_text()
-        if handle.get_attribute("aria-valuenow") == handle.get_attribute("aria-valuemax"):
-            key = "ArrowLeft"
-        handle.press(key)
+        low, high = (float(handle.get_attribute(f"aria-value{end}")) for end in ("min", "max"))
+        right = float(handle.get_attribute("aria-valuenow")) > (low + high) / 2
+        handle.press("Home" if right else "End")
         expect(number).not_to_have_text(now)
-    expect(explorer.locator("img")).not_to_have_attribute("src", before["picture"])
+        now, box = number.inner_text(), slider.locator(".noUi-base").bounding_box()
+        x, y = box["x"] + 0.6 * box["width"], box["y"] + box["height"] / 2
+        explorer.page.mouse.click(x, y)
+        expect(number).not_to_have_text(now)
+    for buttons in explorer.locator(".widget-toggle-buttons").all():
+        first, second = buttons.locator("button").all()[:2]
+        second.press("Enter")
+        expect(second).to_have_class(re.compile("mod-active"))
+        first.click()
+        expect(first).to_have_class(re.compile("mod-active"))
+    for menu in explorer.locator("select").all():
+        now = menu.input_value()
+        menu.press("ArrowDown")
+        expect(menu).not_to_have_value(now)
+        menu.select_option(now)
+        expect(menu).to_have_value(now)
     expect(explorer.locator("table")).not_to_have_text(before["said"], use_inner_text=True)
+    assert read(explorer)["picture"] != before["picture"]

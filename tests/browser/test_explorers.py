@@ -4,7 +4,8 @@ import statistics
 import time
 
 import nbformat
-from pages import IDLE, NOTE, centre, move_every_slider, open_in_lab, run_all, wait_for
+from pages import IDLE, NOTE, centre, move_every_control, open_in_lab, run_all, wait_for
+from pixels import check_alike, shown
 from playwright.sync_api import expect
 
 from rbcourse import explore
@@ -29,18 +30,35 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     page.evaluate(NOTE)
     for name, explorer in zip(explore.__all__, explorers.all(), strict=True):
         centre(explorer)
-        move_every_slider(wait_for(explorer))
+        check_picture(wait_for(explorer), getattr(explore, name)())
+        move_every_control(explorer)
         settle(page)
         handles = explorer.locator(".noUi-handle").all()
         held = handles[SOLVES.get(name, -1)]
         waits = list(follow(page, held)) or [float("nan")]
-        shown, after, late = hold(page, held)
+        count, after, late = hold(page, held)
         row = f"{name.removesuffix('_explorer'):22}{kind(name):4}{statistics.median(waits):7.0f} ms"
-        row += f"{max(waits):7.0f} ms{shown / HELD:8.0f}/s{late:9.0f} ms"
+        row += f"{max(waits):7.0f} ms{count / HELD:8.0f}/s{late:9.0f} ms"
         record_property("speed", row)
-        assert shown, f"{name}: no picture follows the keys"
+        assert count, f"{name}: no picture follows the keys"
         # one on its way, one being drawn, and one of where the slider has come to
         assert after <= 3, f"{name}: keys held down left a backlog"
+
+
+def check_picture(element, explorer):
+    """The canvas, made twice as wide, is Matplotlib's picture."""
+    canvas = element.locator("canvas")
+    style = canvas.get_attribute("style")
+    canvas.evaluate(
+        """async (canvas) => {
+            const drawn = new Promise((done) => canvas.addEventListener("drawn", done));
+            Object.assign(canvas.style, { width: "1120px", maxWidth: "none" });
+            await drawn;
+        }"""
+    )
+    want = explorer.draw(explorer.state().shown, zoom=2)
+    check_alike(shown(canvas), want, explorer.background)
+    canvas.evaluate("(canvas, style) => { canvas.style = style; }", style)
 
 
 def follow(page, handle):

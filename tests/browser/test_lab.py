@@ -77,15 +77,23 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(home, lab, page, pi
     reset.press("Enter")  # while it plays
     expect(time).to_have_text("0.00")
     assert settled(page, time) == "0.00"
-    expect(explorer.locator(".noUi-handle").last).to_have_attribute("aria-label", "time t")
+    handle = explorer.locator(".noUi-handle").last
+    expect(handle).to_have_attribute("aria-label", "time t")
+    handle.press("ArrowRight")
+    expect(handle).to_have_attribute("aria-valuetext", "0.01")
+    handle.press("ArrowLeft")
+    expect(handle).to_have_attribute("aria-valuetext", "0.00")
     expect(play).to_have_attribute("title", "Play or pause")
 
-    image = explorer.locator("img")
-    box = image.bounding_box()
-    image.click(position={"x": 0.3 * box["width"], "y": 0.3 * box["height"]})
+    canvas = explorer.locator("canvas")
+    box = canvas.bounding_box()
+    canvas.click(position={"x": 0.3 * box["width"], "y": 0.3 * box["height"]})
     expect(time).to_have_text("1.00")
-    image.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
-    explorer.get_by_text("from the base wanted").wait_for()
+    canvas.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
+    refused = explorer.get_by_role("alert").get_by_text("from the base wanted")
+    refused.wait_for()
+    page.wait_for_timeout(3000)  # while what plays is prepared
+    assert refused.is_visible()
     assert not page.evaluate(SEEN)
     pictures("lab_02_two_link_arm", lambda: centre(explorer))
 
@@ -98,3 +106,25 @@ def settled(page, text):
         page.wait_for_timeout(1000)
         page.get_by_text(IDLE).wait_for()
     return now
+
+
+def test_without_its_kernel_an_explorer_says_so_and_is_a_still_when_it_is_opened_again(
+    home, lab, page, pictures
+):
+    lesson = home[0] / "work" / "06_geodesics.ipynb"
+    shutil.copy(lesson, lesson.with_stem("ended"))
+    open_in_lab(page, lab("workspaces/ended/tree/ended.ipynb"))
+    run_all(page)
+    explorer = explorer_in_lab(page)
+    page.evaluate("jupyterapp.shell.currentWidget.sessionContext.shutdown()")
+    explorer.locator(".noUi-handle").first.press("ArrowRight")
+    explorer.get_by_role("alert").get_by_text("Python does not answer").wait_for()
+    assert explorer.locator("tr").count() == 0
+    pictures("lab_ended", lambda: centre(explorer))
+    page.evaluate("jupyterapp.shell.currentWidget.context.save()")
+    page.get_by_text("Saving completed").wait_for()
+    open_in_lab(page, lab("workspaces/again/tree/ended.ipynb"))
+    assert not walk(page)[0]
+    still = page.get_by_role("img", name=re.compile(r"^The line and its shadow\. θ\(t\): "))
+    page.set_viewport_size({"width": 1280, "height": 30_000})
+    expect(still).to_have_js_property("tagName", "IMG")

@@ -4,7 +4,7 @@ import re
 from contextlib import ExitStack
 
 import pytest
-from pages import SEEN, move_every_slider, wait_for
+from pages import SEEN, move_every_control, wait_for
 from playwright.sync_api import expect
 from servers import serving
 
@@ -53,7 +53,7 @@ def test_a_lesson_can_be_shown_to_a_class(lesson, show, page, pictures):
     assert page.evaluate("document.documentElement.scrollWidth") <= 1024
     if lesson[:2] != "00":
         look_at_question_and_explorer(page, explorer)
-    move_every_slider(explorer)
+    move_every_control(explorer)
     assert not page.evaluate(SEEN)
     pictures(f"lecture_{lesson}", lambda: to_question(page))
 
@@ -236,9 +236,9 @@ def to_question(page):
 
 def look_at_question_and_explorer(page, explorer):
     assert re.match(r"Poll \d", to_question(page))
-    for part in ("img", ".rbcourse-panel"):
+    for part in ("canvas", ".rbcourse-panel"):
         box = explorer.locator(part).bounding_box()
         assert 0 <= box["x"] <= box["x"] + box["width"] <= 1024
         assert 0 <= box["y"] <= box["y"] + box["height"] <= 768
     # so that letters have 18 px
-    assert explorer.locator("img").bounding_box()["width"] == pytest.approx(560, abs=1)
+    assert explorer.locator("canvas").bounding_box()["width"] == pytest.approx(560, abs=1)

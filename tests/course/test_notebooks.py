@@ -202,3 +202,18 @@ def test_a_copy_that_cannot_be_signed_is_still_a_copy(folders, monkeypatch, caps
         notebooks.copy_lessons(*folders)
     assert [copy.name for copy in folders[1].glob("*.ipynb")] == ["01_plane.ipynb"]
     assert "not marked as trusted: read-only home" in capsys.readouterr().out
+
+
+def test_what_is_saved_keeps_the_stills_of_widgets_and_drops_the_widgets():
+    still = {"text/html": "<img>", "application/vnd.jupyter.widget-view+json": {"model_id": "1"}}
+    alone = {"text/plain": "IntSlider()", "application/vnd.jupyter.widget-view+json": {}}
+    cells = [
+        {"cell_type": "markdown", "source": "text"},
+        {"cell_type": "code", "outputs": [{"data": still}, {"name": "stdout", "text": "1"}]},
+        {"cell_type": "code", "outputs": [{"data": dict(alone)}]},
+    ]
+    notebooks.before_saving({"type": "notebook", "content": {"cells": cells}}, path="a.ipynb")
+    assert cells[1]["outputs"][0]["data"] == {"text/html": "<img>"}
+    assert cells[2]["outputs"][0]["data"] == alone
+    notebooks.before_saving({"type": "file", "content": "text"}, path="a.txt")
+    notebooks.before_saving({"type": "notebook", "content": None}, path="a.ipynb")

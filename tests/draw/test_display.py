@@ -1,13 +1,12 @@
 """Display lists: unpacked, they are the polygons that were drawn, in their places and colours."""
 
-import zlib
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from displays import polygons, split
 from matplotlib.patches import Annulus, Rectangle
 
-from rbcourse.draw.display import PARTS, Display
+from rbcourse.draw.display import PARTS, Display, joined
 
 
 @pytest.fixture
@@ -20,39 +19,21 @@ def ax():
     plt.close(fig)
 
 
-def unpacked(display):
-    """The states, each a list of (style, whether it goes on, places in pixels)."""
-    content = zlib.decompress(display.pack())
-    count = int(np.frombuffer(content, "<u4", 1)[0])
-    sizes = np.frombuffer(content, "<u4", count, 4)
-    numbers = np.frombuffer(content, "<i2", offset=4 * (count + 1))
-    assert sizes.sum() == len(numbers)
-    states = []
-    for state in np.split(numbers, np.cumsum(sizes)[:-1]):
-        polygons, i = [], 0
-        while i < len(state):
-            end = i + 2 + 2 * abs(int(state[i + 1]))
-            places = state[i + 2 : end].reshape(-1, 2).cumsum(axis=0) / PARTS
-            polygons.append((display.styles[state[i]], state[i + 1] < 0, places))
-            i = end
-        states.append(polygons)
-    return states
-
-
 def recorded(ax, *artists):
     display = Display(ax.figure)
-    display.record(artists)
-    return unpacked(display)[0]
+    (state,) = split(joined([display.record(artists)]))
+    return polygons(state, list(display.styles))
 
 
 def test_a_line_is_where_it_is_drawn(ax):
     (line,) = ax.plot([0, 0.5, 1], [0, 1, 0.25], color="#ff8000", lw=3.6, ls=(0, (2, 1)))
     ((style, more, places),) = recorded(ax, line)
     assert np.abs(places - [[0, 200], [150, 0], [300, 150]]).max() <= 0.5 / PARTS
-    fill, stroke, width, dashes, cap, join, box = style
+    fill, stroke, width, dashes, cap, join, box, marker = style
     assert (fill, stroke, width, cap, join) == (None, "#ff8000ff", 5.0, "butt", "round")
     assert dashes == (10.0, 5.0)  # in widths of the line
     assert box == (0, 0, 300, 200)
+    assert marker == ()
     assert not more
 
 
@@ -61,7 +42,7 @@ def test_a_patch_is_filled_with_its_colours(ax):
     ((style, _, places),) = recorded(ax, patch)
     corners = {tuple(place) for place in np.round(places)}
     assert corners == {(30, 150), (180, 150), (180, 50), (30, 50)}
-    assert style[:3] == ["#0000ff80", None, 0]
+    assert style[:3] == ("#0000ff80", None, 0)
 
 
 def test_a_hole_belongs_to_what_it_is_in(ax):
@@ -76,16 +57,16 @@ def test_a_hole_belongs_to_what_it_is_in(ax):
 
 def test_a_state_is_what_the_artists_are_then_and_none_may_be_empty(ax):
     (line,) = ax.plot([], [])
-    display = Display(ax.figure)
+    display, states = Display(ax.figure), []
     for x in (0.2, np.nan, 0.6):
         line.set_data([x, x], [0, 1])
-        display.record([line])
-    first, none, last = unpacked(display)
+        states.append(display.record([line]))
+    first, none, last = (polygons(state, list(display.styles)) for state in split(joined(states)))
     assert none == []
     assert np.abs(first[0][2][:, 0] - 60).max() <= 1
     assert np.abs(last[0][2][:, 0] - 180).max() <= 1
     assert first[0][0] == last[0][0]
-    assert len(display.styles) == 1
+    assert len(list(display.styles)) == 1
 
 
 def test_far_places_do_not_come_back_on_the_other_side(ax):
@@ -94,3 +75,33 @@ def test_far_places_do_not_come_back_on_the_other_side(ax):
     assert places[:, 0].min() < 0
     assert places[:, 0].max() > 300
     assert places[:, 1].min() < 0
+
+
+def test_a_marker_is_kept_once_and_drawn_at_each_point(ax):
+    (dots,) = ax.plot([0.1, np.nan, 0.5], [0.5, 0.5, 1], "s", ms=7.2, mew=0, color="#0000ff")
+    ((style, _, places),) = recorded(ax, dots)
+    assert np.abs(places - [[30, 100], [150, 0]]).max() <= 0.5 / PARTS
+    assert style[:2] == ("#0000ffff", None)
+    (marker,) = style[7]
+    square = np.reshape(marker, (-1, 2)).cumsum(axis=0) / PARTS
+    assert np.abs(np.abs(square) - 5).max() <= 1 / PARTS
+
+
+@pytest.mark.parametrize("width", [3, 15])
+def test_what_leaves_the_picture_keeps_its_slope(width):
+    fig = plt.figure(figsize=(width, 4), dpi=100, layout="none")
+    axes = fig.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, 1), ylim=(0, 1))
+    (line,) = axes.plot([0, 5], [0, 5])
+    ((_, _, places),) = recorded(axes, line)
+    x, y = (places / [100 * width, 400]).T
+    assert np.abs(y - (1 - x)).max() < 1 / (400 * PARTS)
+    assert x.max() > 1
+    plt.close(fig)
+
+
+def test_figures_that_are_too_large_are_refused():
+    fig = plt.figure(figsize=(16, 4), dpi=100)
+    with pytest.raises(ValueError, match=r"at most 1500 pixels each way wanted, got \(1600, 400\)"):
+        Display(fig)
+    plt.close(fig)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpl_toolkits.mplot3d import proj3d
 from scipy.linalg import expm
-from sweeps import corners, numbers_in, points, read_off, sweep
+from sweeps import corners, notice, numbers_in, points, read_off, sweep
 
 import rbcourse as rb
 from rbcourse.explore import flip_explorer, screw_explorer, theta_explorer
@@ -130,7 +130,7 @@ def test_what_does_not_turn_has_no_pitch(bolt):
     bolt.put(angle=0.0, x=1.0, z=-1.0, t=1.0)
     assert read_off(bolt)["its axis through"] == "none"
     assert read_off(bolt)["slide along it"] == "all of the way"
-    assert bolt.notice.value == ""
+    assert notice(bolt) == ""
 
 
 @pytest.mark.source("BK (8)")

@@ -7,10 +7,14 @@ import warnings
 import ipywidgets
 import numpy as np
 import pytest
+from displays import polygons, split
+from ipywidgets.widgets.widget import _remove_buffers
 from PIL import Image
+from sweeps import notice, tell
 from traitlets import TraitError
 
-from rbcourse.explore.explorer import LABELS, Explorer, choice, look, new_figure, new_line, slider
+from rbcourse.explore.explorer import LABELS, Explorer, look, new_figure, new_line
+from rbcourse.explore.widgets import choice, slider, stepped
 
 FAR, WARN = 9.0, 8.0
 
@@ -33,8 +37,8 @@ def explorer():
         fig = new_figure()
         ax = fig.add_axes((0.1, 0.15, 0.8, 0.8))
         ax.set(xlim=(0, 10), ylim=(-1, 2))
-        line = new_line(ax, marker="o", color="black")
-    controls = {"x": slider("x (m)", 2.0, 0.0, 10.0, 0.5), "kind": choice("kind", ["low", "high"])}
+        line = new_line(ax, marker="o", ls="", color="black")
+    controls = {"x": stepped("x (m)", 2.0, 0.0, 10.0, 0.5), "kind": choice("kind", ["low", "high"])}
     return Explorer("A dot", fig, {"dot": line}, controls, show_in(line), plays="x", point=place)
 
 
@@ -44,160 +48,160 @@ def place(x, y):
     return {"x": 4.0, "kind": "high"}
 
 
-def pixels(explorer):
-    return np.asarray(Image.open(io.BytesIO(explorer.picture.png)).convert("L"), dtype=int)
+def sent(explorer):
+    """What the browser was sent last: the places of the dots, by state, and the texts."""
+    run = explorer.picture.run
+    drawn = [polygons(state, run["styles"]) for state in split(run["states"])]
+    return [[places[0] for *_, places in state] for state in drawn], run["texts"]
 
 
-def darkest(explorer):
-    """The place of the dot, in shares of the picture, from the left and from the top."""
-    rows, columns = np.nonzero(pixels(explorer)[10:315, 70:500] < 50)
-    return (columns.mean() + 70) / 560, (rows.mean() + 10) / 380
+def at(x, y):
+    """Where the dot is in the picture, in pixels from the upper left."""
+    return 560 * (0.1 + 0.8 * x / 10), 380 * (1 - 0.15 - 0.8 * (y + 1) / 3)
 
 
 def test_it_shows_something_before_it_is_touched(explorer):
-    assert darkest(explorer) == pytest.approx((0.1 + 0.8 * 0.2, 1 - (0.15 + 0.8 / 3)), abs=0.003)
-    assert "2.0\nlow" in explorer.said.value
-    assert explorer.picture.alt == "A dot. place: 2.0 low"
-    assert explorer.notice.value == ""
+    ((dots,), (texts,)) = sent(explorer)
+    assert dots[0] == pytest.approx(at(2, 0), abs=0.07)
+    assert texts == [[("place", "2.0\nlow")], "", "A dot. place: 2.0 low"]
+    assert explorer.picture.run["index"] == 4
     assert not explorer.play.playing
 
 
 def test_the_picture_follows_each_control(explorer):
-    explorer.controls["x"].value = 7.0
-    assert darkest(explorer) == pytest.approx((0.1 + 0.8 * 0.7, 1 - (0.15 + 0.8 / 3)), abs=0.003)
+    explorer.put(x=7.0)
+    assert sent(explorer)[0][0] == [pytest.approx(at(7, 0), abs=0.07)]
     explorer.controls["kind"].value = "high"
-    assert darkest(explorer) == pytest.approx((0.1 + 0.8 * 0.7, 1 - (0.15 + 1.6 / 3)), abs=0.003)
-    assert "7.0\nhigh" in explorer.said.value
+    assert sent(explorer)[0][0] == [pytest.approx(at(7, 1), abs=0.07)]
+    assert sent(explorer)[1][0][0] == [("place", "7.0\nhigh")]
+
+
+def test_the_browser_is_sent_the_states_it_asks_for_one_after_the_other(explorer):
+    version, known = explorer.picture.run["version"], 0
+    while known < 21:
+        tell(explorer, index=known)
+        assert explorer.picture.run["version"] == version
+        assert explorer.picture.run["index"] == known
+        dots, texts = sent(explorer)
+        for dot, (rows, *_) in zip(dots, texts, strict=True):
+            x = known / 2
+            assert rows == ([] if x == FAR else [("place", f"{x:.1f}\nlow")])
+            assert dot == ([] if x == FAR else [pytest.approx(at(x, 0), abs=0.07)])
+            known += 1
+    assert explorer.values == {"x": 2.0, "kind": "low"}
+    explorer.controls["kind"].value = "high"
+    assert explorer.picture.run["version"] > version
+
+
+def test_what_plays_asks_nothing_while_another_control_starts_anew(explorer):
+    runs = []
+    explorer.picture.observe(lambda change: runs.append(change.new), "run")
+    explorer.controls["x"].value = 5.0
+    assert runs == []
+    explorer.controls["kind"].value = "high"
+    assert len(runs) == 1
+    assert runs[0]["index"] == 10
 
 
 def test_it_keeps_its_figure_and_its_artist(explorer):
     figure, dot = explorer._fig, explorer.artists["dot"]
-    explorer.controls["x"].value = 7.0
+    explorer.put(x=7.0)
     assert explorer._fig is figure
     assert list(figure.axes[0].lines) == [dot]
 
 
 def test_several_controls_are_set_with_one_picture(explorer):
     pictures = []
-    explorer.picture.observe(lambda change: pictures.append(change.new), "png")
+    explorer.picture.observe(lambda change: pictures.append(change.new), "run")
     explorer.put(x=5.0, kind="high")
     assert explorer.values == {"x": 5.0, "kind": "high"}
     assert len(pictures) == 1
 
 
 def test_reset_brings_everything_back_and_stops(explorer):
-    before = explorer.picture.png, explorer.said.value
+    dots, texts = sent(explorer)
     explorer.put(x=5.0, kind="high")
     explorer.play.playing = True
     explorer.reset.click()
     assert explorer.values == {"x": 2.0, "kind": "low"}
-    assert (explorer.picture.png, explorer.said.value) == before
+    assert np.array_equal(sent(explorer)[0], dots)
+    assert sent(explorer)[1] == texts
     assert not explorer.play.playing
 
 
-def test_play_and_slider_move_together(explorer):
+def test_play_has_the_steps_of_the_slider_and_its_seconds(explorer):
     assert (explorer.play.min, explorer.play.value, explorer.play.max) == (0, 4, 20)
     assert explorer.play.interval == 4000 / 20
-    explorer.play.playing = True
-    explorer.play.value = 9
-    assert explorer.controls["x"].value == 4.5
-    assert "4.5" in explorer.said.value
-    explorer.play.playing = False
-    explorer.controls["x"].value = 10.0
-    assert explorer.play.value == 20
-
-
-def test_what_the_player_says_too_late_is_not_followed(explorer):
-    explorer.play.playing = True
-    explorer.play.value = 9
-    explorer.reset.click()
-    explorer.play.value = 10  # sent before the browser heard of the reset
-    assert explorer.values == {"x": 2.0, "kind": "low"}
-    assert explorer.play.value == 4
-
-
-def test_stop_goes_to_the_start_of_the_range(explorer):
-    explorer.play.value = 0
-    assert explorer.controls["x"].value == 0
+    assert explorer.steps == [x / 2 for x in range(21)]
 
 
 def test_what_cannot_be_served_is_said_and_nothing_that_moves_is_drawn(explorer):
-    explorer.controls["x"].value = FAR
-    assert (pixels(explorer)[10:315, 70:500] >= 50).all()
-    assert "too &lt;far&gt;" in explorer.notice.value
-    assert 'role="alert"' in explorer.notice.value
-    assert explorer.picture.alt == "A dot. Nothing to show here: x: too <far>"
-    explorer.controls["x"].value = 3.0
-    assert explorer.notice.value == ""
-    assert darkest(explorer)[0] == pytest.approx(0.1 + 0.8 * 0.3, abs=0.003)
-
-
-def test_what_is_read_off_is_text_and_no_html(explorer):
-    explorer._show = lambda **values: {"1 < 2": "<b>"}
-    explorer.controls["x"].value = 3.0
-    assert "1 &lt; 2" in explorer.said.value
-    assert "&lt;b&gt;" in explorer.said.value
+    explorer.put(x=FAR)
+    said = "Nothing to show here: x: too <far>"
+    assert sent(explorer) == ([[]], [[[], said, f"A dot. {said}"]])
+    explorer.put(x=3.0)
+    assert notice(explorer) == ""
+    assert sent(explorer)[0][0] == [pytest.approx(at(3, 0), abs=0.07)]
 
 
 def test_a_warning_is_said_and_the_picture_drawn(explorer):
-    explorer.controls["x"].value = WARN
-    assert "nearly too far" in explorer.notice.value
-    assert darkest(explorer)[0] == pytest.approx(0.1 + 0.8 * 0.8, abs=0.003)
+    explorer.put(x=WARN)
+    (dots, (texts,)) = sent(explorer)
+    assert texts[1] == "nearly too far"
+    assert dots[0] == [pytest.approx(at(8, 0), abs=0.07)]
 
 
 def test_other_errors_are_not_hidden(explorer):
     explorer._show = lambda **values: 1 / 0
     with pytest.raises(ZeroDivisionError):
-        explorer.controls["x"].value = 3.0
+        explorer.controls["kind"].value = "high"
 
 
 def test_a_click_is_given_in_the_pixels_of_the_figure(explorer):
     seen = []
     explorer._point = lambda x, y: seen.append((x, y)) or {}
-    explorer.picture.place = [0.25, 0.1, 1]
+    tell(explorer, place=[0.25, 0.1])
     assert seen == [(0.25 * 560, 0.9 * 380)]
 
 
 def test_a_click_sets_controls_or_says_why_not(explorer):
-    explorer.picture.place = [0.5, 0.5, 1]
+    tell(explorer, place=[0.5, 0.5])
     assert explorer.values == {"x": 4.0, "kind": "high"}
-    explorer.picture.place = [0.05, 0.5, 2]
-    assert "click more to the right" in explorer.notice.value
-    assert 'role="alert"' in explorer.notice.value
+    version = explorer.picture.run["version"]
+    tell(explorer, place=[0.05, 0.5])
+    assert notice(explorer) == "click more to the right"
     assert explorer.values == {"x": 4.0, "kind": "high"}
     explorer.restart()
-    assert explorer.notice.value == ""
-    explorer.picture.place = [0.05, 0.5, 3]  # the same place again
-    assert "click more to the right" in explorer.notice.value
+    assert notice(explorer) == ""
+    tell(explorer, place=[0.05, 0.5])  # the same place again
+    assert notice(explorer) == "click more to the right"
+    assert explorer.picture.run["version"] > version
 
 
 def test_only_what_can_be_clicked_shows_it(explorer):
     from rbcourse.explore import arm_explorer, theta_explorer
 
-    assert explorer.picture.clickable
-    assert [make().picture.clickable for make in (arm_explorer, theta_explorer)] == [True, False]
+    made = [explorer, arm_explorer(), theta_explorer()]
+    assert [each.picture.made["clickable"] for each in made] == [True, True, False]
 
 
 def test_a_wrong_setting_leaves_a_true_picture(explorer):
     with pytest.raises(TraitError, match="Invalid selection"):
         explorer.put(kind="nope", x=5.0)
     assert explorer.values == {"x": 5.0, "kind": "low"}
-    assert "5.0\nlow" in explorer.said.value
-    explorer.controls["x"].value = 6.0
-    assert "6.0\nlow" in explorer.said.value
+    assert sent(explorer)[1][0][0] == [("place", "5.0\nlow")]
 
 
-@pytest.mark.parametrize(
-    ("density", "factor"), [(1.0, 1), (0.8, 1), (1.5, 1.5), (2.0, 2), (3.0, 2)]
-)
-def test_on_finer_screens_the_picture_is_finer_and_shows_the_same(explorer, density, factor):
-    explorer.picture.density = density
-    height, width = pixels(explorer).shape
-    assert (width, height) == (560 * factor, 380 * factor)
-    assert explorer.picture.width == 560
-    explorer.controls["x"].value = 7.0
-    columns = np.nonzero(pixels(explorer) < 50)[1]
-    assert (columns > 0.6 * width).any()
+@pytest.mark.parametrize("zoom", [1, 2, 3])
+def test_it_is_drawn_as_fine_as_is_wanted_and_shows_the_same(explorer, zoom):
+    drawn = Image.open(io.BytesIO(explorer.draw(explorer.state(x=7.0).shown, zoom))).convert("L")
+    assert drawn.size == (560 * zoom, 380 * zoom)
+    rows, columns = np.nonzero(
+        np.asarray(drawn)[10 * zoom : 315 * zoom, 70 * zoom : 500 * zoom] < 50
+    )
+    found = columns.mean() / zoom + 70, rows.mean() / zoom + 10
+    assert found == pytest.approx(at(7, 0), abs=0.6)
+    assert explorer._fig.dpi == 100
 
 
 def test_letters_have_18_pixels_and_the_style_is_left_alone(explorer):
@@ -218,9 +222,19 @@ def test_the_output_has_a_still_for_who_has_no_kernel(explorer):
 
 
 def test_the_state_can_be_sent(explorer):
-    for widget in (explorer, *explorer.controls.values(), explorer.play, explorer.said):
-        json.dumps(widget.get_state(), default=str)
-    assert isinstance(explorer.picture.png, bytes)
+    for widget in (explorer, explorer.picture, *explorer.controls.values(), explorer.play):
+        state, _, parts = _remove_buffers(widget.get_state())
+        json.dumps(state)
+        assert len(parts) == (2 if widget is explorer.picture else 0)  # background, and states
+    assert explorer.picture.made["background"].startswith(b"\x89PNG")
+
+
+def test_an_answer_is_sent_though_it_is_the_same_again(explorer):
+    runs = []
+    explorer.picture.observe(lambda change: runs.append(change.new), "run")
+    tell(explorer, index=20)
+    tell(explorer, index=20)
+    assert len(runs) == 2
 
 
 @pytest.mark.parametrize(
@@ -231,5 +245,13 @@ def test_readouts_have_the_digits_of_the_step(step, shown):
 
 
 def test_sliders_follow_while_they_are_dragged(explorer):
+    assert slider("x (m)", 0.0, 0.0, 10.0, 1.0).continuous_update
     assert explorer.controls["x"].continuous_update
-    assert isinstance(explorer.controls["x"], ipywidgets.FloatSlider)
+    assert isinstance(explorer.controls["x"], ipywidgets.SelectionSlider)
+
+
+def test_what_plays_has_its_steps_and_nothing_between(explorer):
+    control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)
+    labels = ("−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3")
+    assert control._options_labels == labels
+    assert [value for _, value in control.options] == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]

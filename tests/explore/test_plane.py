@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from sweeps import numbers_in, points, read_off, sweep
+from sweeps import notice, numbers_in, points, read_off, sweep, tell
 
 import rbcourse as rb
 from rbcourse.explore import arm_explorer, planar_explorer
 
 START = np.radians([-20, 110])
-CLICKS = []
 
 
 @pytest.fixture(scope="module")
@@ -124,8 +123,7 @@ def test_who_sets_a_goal_sees_the_arm_there(arm):
 def click(arm, place):
     x, y = arm.artists["links"].axes.transData.transform(place)
     box = arm._fig.bbox
-    arm.picture.place = [x / box.width, 1 - y / box.height, len(CLICKS) + 1]
-    CLICKS.append(place)
+    tell(arm, place=[x / box.width, 1 - y / box.height])
 
 
 @pytest.mark.parametrize("place", [(1, 2), (-2.5, -1), (0.6, -0.1), (3.4, 0)])
@@ -136,7 +134,7 @@ def test_a_click_brings_the_hand_there_with_the_elbow_on_its_side(arm, place, el
     click(arm, place)
     assert np.abs(points(arm.artists["links"])[-1] - place).max() < 1e-6
     assert arm.values["theta1"] * elbow > 0
-    assert arm.notice.value == ""
+    assert notice(arm) == ""
 
 
 @pytest.mark.parametrize("place", [(3, 3), (0.1, 0.2)])
@@ -144,5 +142,5 @@ def test_a_click_out_of_reach_is_said_and_moves_nothing(arm, place):
     arm.restart()
     before = arm.values
     click(arm, place)
-    assert "0.5 to 3.5 m from the base" in arm.notice.value
+    assert "0.5 to 3.5 m from the base" in notice(arm)
     assert arm.values == before

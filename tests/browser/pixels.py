@@ -1,0 +1,29 @@
+"""What a canvas shows, beside Matplotlib's own picture."""
+
+import base64
+import io
+
+import numpy as np
+from PIL import Image
+
+
+def pixels(png):
+    """A PNG as numbers, shape (rows, columns, 3)."""
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
+
+
+def shown(canvas):
+    """What a canvas of the page shows, as a PNG."""
+    return base64.b64decode(canvas.evaluate("(canvas) => canvas.toDataURL()").split(",")[1])
+
+
+def check_alike(drawn, want, background):
+    """Under 1 % of the pixels, and under half of those that move, are off by more than 64 levels.
+
+    The first alone an empty canvas would fulfil: thin lines cover little.
+    """
+    drawn, want, background = map(pixels, (drawn, want, background))
+    assert drawn.shape == want.shape == background.shape
+    off, moves = (np.abs(other - want).max(axis=-1) > 64 for other in (drawn, background))
+    assert off.mean() < 0.01
+    assert off.sum() <= 0.5 * moves.sum(), off.sum() / moves.sum()
