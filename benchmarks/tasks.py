@@ -105,7 +105,7 @@ def moving_cubes(frames):
     t = np.linspace(0, 1, frames)
     A1 = rb.pose_from_coordinates([np.pi / 6, 2 * np.pi / 3, np.pi / 2, 8, 10, 12])
     ways = {"screw": rb.screw_se3(np.eye(4), A1), "geodesic": rb.geodesic_se3(np.eye(4), A1)}
-    panes = {"layout": "none", "subplot_kw": {"projection": "3d"}}
+    panes = {"layout": "none", "subplot_kw": {"projection": "space"}}
     fig, axes = plt.subplots(1, 2, figsize=(8, 4), dpi=80, **panes)
     motions = {name: way(t) for name, way in ways.items()}
     return fig, bodies.moving_cubes(axes, motions, side=2)

@@ -460,7 +460,9 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
 
 
 def _show_images(name: str, alt: str, images: Any) -> tuple[Figure, Animation]:
-    fig, ax = plt.subplots(figsize=(5, 5), dpi=80, subplot_kw={"projection": "3d"}, layout="none")
+    fig, ax = plt.subplots(
+        figsize=(5, 5), dpi=80, layout="none", subplot_kw={"projection": "space"}
+    )
     frames = max(len(v0) for v0, _ in images.values()) + 1
     seconds = max(4.0, frames / 25)
     return fig, animate(fig, name, alt, moving_images([ax], images), frames, seconds)

@@ -15,11 +15,15 @@ def split(content):
 
 
 def polygons(state, styles):
-    """What a state draws: (style, whether it goes on, places in pixels) of each polygon."""
+    """What a state draws: (style, whether it goes on, places in pixels) of each polygon.
+
+    What is in space has styles with more parts, and places with three numbers.
+    """
     found, i = [], 0
     while i < len(state):
-        end = i + 2 + 2 * abs(int(state[i + 1]))
-        places = state[i + 2 : end].reshape(-1, 2).cumsum(axis=0) / PARTS
+        size = 3 if len(styles[state[i]]) > 8 else 2
+        end = i + 2 + size * abs(int(state[i + 1]))
+        places = state[i + 2 : end].reshape(-1, size).cumsum(axis=0) / PARTS
         found.append((styles[state[i]], state[i + 1] < 0, places))
         i = end
     return found

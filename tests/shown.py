@@ -62,8 +62,10 @@ def numbers_of(artists):
             along = np.diff(segment[:2], axis=0)  # of an arrow: its direction
             held += [segment, along, along / (np.linalg.norm(along) or 1)]
             held.append(-held[-1])
+        faces = getattr(artist, "corners", None)  # of a body
         if type(artist).__name__ == "Poly3DCollection":
             faces = np.asarray([face[:4] for face in artist._faces])
+        if faces is not None:
             held.append(faces)
             if len(faces) == 7:  # a box: where it is, and its axes
                 centres = faces[:6].mean(axis=1)

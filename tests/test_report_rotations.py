@@ -180,7 +180,8 @@ def test_a_hundred_random_rotations_are_shown(quaternion, tmp_path):
 
 def strokes_of(figure):
     """Where v0 and v1 go, as drawn."""
-    return np.array(figure.axes[0].collections[-1]._segments3d)
+    strokes = next(line for line in figure.axes[0].lines if line.get_linewidth() == 1.6)
+    return np.transpose(strokes.get_data_3d()).reshape(-1, 3, 3)[:, :2]
 
 
 @pytest.mark.source("RR 2.2", "RR Fig. 4", "RR Fig. 5")

@@ -7,20 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
 from rbcourse.draw.display import Display, Player
+from rbcourse.draw.pictures import drawn, painter
 from rbcourse.draw.save import (
     Table,
     caption,
     csv_text,
-    few_colours,
     figures_folder,
-    png,
     save_figure,
 )
+from rbcourse.draw.space import scenes
 
 Update = Callable[[int], Sequence[Any]]
 
@@ -63,7 +62,7 @@ def animate(
     fig.set_layout_engine("none")  # all stays where it is
     display = Display(fig)
     states = [display.record(update(i)) for i in range(frames)]
-    moving = update(still % frames)
+    moving = scenes(update(still % frames))
     shown, background = (drawn(fig, moving, artists) for artists in (moving, []))
     for artist in moving:
         artist.set_animated(False)
@@ -116,35 +115,6 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
     drawn = [paint(update(i)) for i in range(frames)]
     fig.set_canvas(before)
     return drawn
-
-
-def painter(fig: Figure, moving: Sequence[Any]) -> Callable[[Sequence[Any]], Image.Image]:
-    """Draw what does not move, once; return what draws moving artists over it."""
-    canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
-    for artist in moving:
-        artist.set_animated(True)
-    canvas.draw()
-    background = canvas.copy_from_bbox(fig.bbox)
-
-    def paint(artists: Sequence[Any]) -> Image.Image:
-        canvas.restore_region(background)
-        for artist in artists:
-            if hasattr(artist, "do_3d_projection"):
-                artist.do_3d_projection()
-            artist.draw(canvas.get_renderer())
-        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-
-    return paint
-
-
-def drawn(fig: Figure, moving: Sequence[Any], artists: Sequence[Any], zoom: float = 2) -> bytes:
-    """Return a figure with only these of its moving artists, so many times as fine, as a PNG."""
-    before, dpi = fig.canvas, fig.dpi
-    fig.set_dpi(zoom * dpi)
-    picture = painter(fig, moving)(artists)
-    fig.set_dpi(dpi)
-    fig.set_canvas(before)
-    return png(few_colours(picture))
 
 
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:

@@ -1,4 +1,4 @@
-"""Bodies and frames in space, still or moving: artists on axes that the caller owns.
+"""Bodies and frames, still or moving: artists on a `Space` that the caller owns.
 
 Motions are arrays of poses, shape (times, 4, 4); `pose_table` turns them into columns for a file.
 """
@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import MultipleLocator
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from matplotlib.ticker import MaxNLocator
 
 from rbcourse._numerics import Array
 from rbcourse.curves import Curve
 from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.space import OVER, Faces
+from rbcourse.se3 import pose_from_components
 from rbcourse.so3 import angle_between
 
 
@@ -51,49 +52,75 @@ def motion_table(t: Array, motion: Curve, drawn: Array) -> Table:
     return {**pose_table(first, motion(t)), **rates}
 
 
-def draw_box(ax: Any, pose: Array, edges: float | Array) -> Poly3DCollection:
+def draw_box(ax: Any, pose: Array, edges: float | Array) -> Faces:
     """Draw a box with a rectangle on the face of +z, centred at the origin of its frame.
 
     `edges` are its three edges, or the one of a cube, in m. `move_box` moves it (BK Fig. 5).
     """
-    fill = ["0.86", "0.93", "0.98"] * 2 + [COLOURS["x"]]  # a shade for each direction
-    box = Poly3DCollection(_box_faces(pose, edges), facecolors=fill, edgecolors="0.3", lw=0.8)
-    return ax.add_collection3d(box)
+    box: Faces = ax.add_artist(Faces(_box_faces(pose, edges), [*["0.98"] * 6, COLOURS["x"]]))
+    return box
 
 
-def move_box(box: Poly3DCollection, pose: Array, edges: float | Array) -> None:
+def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
     """Move a box that `draw_box` has drawn."""
-    box.set_verts(_box_faces(pose, edges))
+    box.corners = _box_faces(pose, edges)
 
 
 def draw_cube_motion(ax: Any, poses: Array, side: float) -> list[Any]:
-    """Draw a cube of edge `side` in m at each pose, and stars along the path of its centre.
+    """Draw a cube of edge `side` in m at each pose, and over them stars along its centre's path.
 
     Return the cubes, then the stars (BK Fig. 5).
     """
     cubes = [draw_box(ax, pose, side) for pose in poses]
     set_space(ax, poses[:, :3, 3], side)
-    return [*cubes, draw_centre_path(ax, poses[:, :3, 3])]
+    stars = draw_centre_path(ax, poses[:, :3, 3])
+    stars.set_zorder(OVER)
+    return [*cubes, stars]
 
 
 def draw_centre_path(ax: Any, places: Array) -> Any:
-    """Draw stars at places, shape (times, 3), joined by a thin line, in front of everything."""
-    return ax.plot(*places.T, "*-", color=COLOURS["optimum"], ms=7, lw=0.8, zorder=1000)[0]
+    """Draw stars at places, shape (times, 3), joined by a thin line."""
+    return ax.plot(*places.T, "*-", color=COLOURS["optimum"], ms=7, lw=0.8)[0]
 
 
 def set_space(ax: Any, places: Array, side: float) -> None:
-    """Fit the axes to a cube at these places, shape (times, 3), with equal units."""
+    """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it."""
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_xlabel("x (m)", labelpad=9)
-    ax.set_ylabel("y (m)", labelpad=9)
-    ax.zaxis.set_rotate_label(False)
-    ax.set_zlabel("z (m)", rotation=90)
-    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-        axis.set_major_locator(MultipleLocator(4))
-    ax.set_box_aspect(high - low, zoom=0.93)
-    ax.set_proj_type("ortho")  # in perspective the square can sink into its face
-    ax.view_init(elev=18, azim=-22)  # never behind the square of BK Fig. 5
+    ax.fit(low, high)
+    ax.view_init(elev=18, azim=-22)
+    draw_room(ax, low, high)
+
+
+def draw_ground(ax: Any, low: Array, high: Array) -> None:
+    """Draw a floor between two corners, with a line wherever `draw_room` has a number."""
+    pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
+    for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
+        ax.plot([x, x], [low[1], high[1]], low[2], **pale)
+    for y in [low[1], *_ticks(low[1], high[1]), high[1]]:
+        ax.plot([low[0], high[0]], [y, y], low[2], **pale)
+
+
+def draw_room(ax: Any, low: Array, high: Array) -> None:
+    """Draw a floor, and three axes with their names and numbers, in m, between two corners."""
+    draw_ground(ax, low, high)
+    ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
+    # where each axis begins, and in which direction its numbers stand beside it
+    corners = [low, np.array([high[0], *low[1:]]), low]
+    beside = 0.06 * np.max(high - low) * np.array([[0, -1, 0], [1, 0, 0], [0, -1, 0]])
+    centred: Any = {"ha": "center", "va": "center", "zorder": 3}
+    for k, name in enumerate("xyz"):
+        start, along = corners[k], np.eye(3)[k]
+        end = start + (high - low) * along
+        ax.plot(*np.stack([start, end], axis=-1), color="0.5", lw=1, zorder=0)
+        for tick in ticks[k]:
+            place = start + (tick - start[k]) * along + beside[k]
+            ax.text(*place, f"{tick:g}", color="0.4", fontsize="small", **centred)
+        ax.text(*(end + 0.1 * np.max(high - low) * along), f"{name} (m)", **centred)
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    found = MaxNLocator(4, steps=[1, 2, 4, 5, 10]).tick_values(low, high)
+    return [float(x) for x in found if low < x < high]
 
 
 def describe_cube_motion(poses: Array) -> str:
@@ -168,7 +195,6 @@ def moving_cubes(
         set_space(ax, poses[:, :3, 3], side)
         if np.ptp(poses[:, :3, 3], axis=0).any():
             draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
-        ax.set(xlabel="", ylabel="", zlabel="", xticklabels=[], yticklabels=[], zticklabels=[])
         ax.set_title(name)
 
     def update(i: int) -> list[Any]:
@@ -201,14 +227,14 @@ def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> list[Any]:
     (BK Fig. 1).
     """
     d, R = poses[:, :3, 3], poses[:, :3, :3]
-    artists = [_draw_wire_box(ax, d[1], R[1], np.array([0.7, 0.5, 0.35]))]
+    artists = [draw_box(ax, poses[1], np.array([1.4, 1.0, 0.7]))]
+    artists[0].set_alpha(0.5)
     for name, origin, axes in zip(names, d, R, strict=True):
         artists += draw_triad(ax, origin, axes, name)
-        ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center")
-    vector = ax.quiver(*d[0], *(d[1] - d[0]), color=COLOURS["reference"], arrow_length_ratio=0.06)
+        ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center", zorder=OVER)
+    vector = draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
     ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
-    ax.set_box_aspect(np.ptp([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()], axis=1), zoom=1.3)
-    ax.set_axis_off()
+    ax.fit(d.min(axis=0) - 0.4, d.max(axis=0) + 1, zoom=1.3)
     ax.view_init(elev=20, azim=-60)
     return [*artists, vector]
 
@@ -226,22 +252,20 @@ def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
 
 
 def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> list[Any]:
-    """Draw a box with its frame in orientations R, shape (n, 3, 3), each on its own axes.
+    """Draw a box with its frame in orientations R, shape (n, 3, 3), each in its own space.
 
     The names become titles; pale are the axes of the room (RR 2.1).
     """
     artists: list[Any] = []
     for ax, name, turned in zip(axes, names, R, strict=True):
-        artists.append(_draw_wire_box(ax, np.zeros(3), turned, np.array([0.8, 0.5, 0.15])))
+        pose = pose_from_components(turned, np.zeros(3))
+        artists.append(draw_box(ax, pose, np.array([1.6, 1.0, 0.3])))
         for room in 1.3 * np.eye(3):
             artists += ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
         for axis, direction in zip("xyz", turned.T, strict=True):
-            arrow = {"color": COLOURS[axis], "lw": 2.5, "arrow_length_ratio": 0.15}
-            artists.append(ax.quiver(0, 0, 0, *(1.2 * direction), **arrow))
+            artists.append(draw_arrow(ax, np.zeros(3), 1.2 * direction, COLOURS[axis]))
             ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
-        ax.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), zlim=(-1.3, 1.3))
-        ax.set_box_aspect((1, 1, 1), zoom=1.4)
-        ax.set_axis_off()
+        ax.fit(np.full(3, -1.3), np.full(3, 1.3), zoom=1.4)
         ax.view_init(elev=20, azim=-55)
         ax.set_title(name)
     return artists
@@ -266,22 +290,19 @@ def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
     """Draw the columns of R as arrows x, y, z from the origin, labelled with the name."""
     artists = []
     for axis, direction in zip("xyz", R.T, strict=True):
-        artists.append(ax.quiver(*origin, *direction, color=COLOURS[axis], lw=2.5))
+        artists.append(draw_arrow(ax, origin, direction, COLOURS[axis]))
         ax.text(*(origin + 1.15 * direction), f"${axis}_{name}$", color=COLOURS[axis])
     return artists
 
 
-def _draw_wire_box(ax: Any, centre: Array, R: Array, half: Array) -> Any:
-    """Draw the edges of a box with the half sides `half`, turned by R about its centre."""
-    corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij")).reshape(3, 8).T
-    placed = centre + (corners * half) @ R.T
-    edges = [
-        (placed[i], placed[j])
-        for i in range(8)
-        for j in range(i)
-        if np.abs(corners[i] - corners[j]).sum() == 2
-    ]
-    return ax.add_collection3d(Line3DCollection(edges, colors=COLOURS["reference"], lw=1))
+def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> Any:
+    """Draw an arrow from a place, shape (3,), with four barbs, so that it is one from each side."""
+    tip, length = start + along, float(np.linalg.norm(along))
+    size, across = 0.12 * min(1.0, length), np.linalg.svd(along[None])[2][1:]
+    foot = tip - size / length * along
+    barbs = [foot + side * size / 3 * u for u in across for side in (1, -1)]
+    places = [start, tip, *(place for barb in barbs for place in (barb, tip))]
+    return ax.plot(*np.transpose(places), color=color, lw=2.5)[0]
 
 
 def _box_faces(pose: Array, edges: float | Array) -> Array:

@@ -15,31 +15,45 @@ const rbcourseDisplay = {
     return new Uint8Array(await new Response(stream).arrayBuffer());
   },
 
-  // The canvas is as fine as the screen shows it; `still` is a loaded image.
-  draw(canvas, still, [width, height], styles, state) {
+  // What a state draws: styles, and runs of places in pixels: [x, y], in space [x, y, z].
+  decode(state, styles) {
+    const found = [];
+    for (let i = 0; i < state.length; ) {
+      const style = styles[state[i]], size = style.length > 8 ? 3 : 2, runs = [];
+      do {
+        const run = [], end = i + 2 + size * Math.abs(state[i + 1]);
+        let place = [0, 0, 0].slice(0, size);
+        for (i += 2; i < end; i += size) run.push((place = place.map((x, k) => x + state[i + k] / 8)));
+        runs.push(run);
+      } while (state[i + 1] < 0);
+      found.push({ style, runs });
+    }
+    return found;
+  },
+
+  // The canvas is as fine as the screen shows it; `still` is a loaded image. Scenes come first.
+  draw(canvas, still, { size: [width, height], rooms }, styles, state) {
     const zoom = (window.devicePixelRatio * (canvas.clientWidth || width)) / width;
     canvas.width = Math.round(width * zoom);
     canvas.height = Math.round(height * zoom);
     const ink = canvas.getContext("2d");
     ink.scale(zoom, zoom);
     ink.drawImage(still, 0, 0, width, height);
-    const add = (path, steps) => {
-      for (let k = 0, x = 0, y = 0; k < steps.length; k += 2) {
-        x += steps[k] / 8;
-        y += steps[k + 1] / 8;
-        if (k) path.lineTo(x, y);
-        else path.moveTo(x, y);
-      }
-    };
-    for (let i = 0; i < state.length; ) {
-      const [fill, stroke, line, dashes, lineCap, lineJoin, clip, marker] = styles[state[i]];
+    const all = rbcourseDisplay.decode(state, styles);
+    const drawn = rooms.flatMap((room, number) => {
+      const pieces = all.filter(({ style }) => style[8] === number).map(({ style, runs }) => (
+        { kind: style[9], zorder: style[10], style, places: runs[0] }));
+      return rbcourseScene.seen(pieces, room, (canvas.views ?? rooms.map(({ view }) => view))[number]);
+    });
+    for (const { style, runs, along } of [...drawn, ...all.filter(({ style }) => style.length === 8)]) {
+      const [fill, stroke, line, dashes, lineCap, lineJoin, clip, marker] = style;
       const path = new Path2D();
-      let places;
-      do {
-        places = state.subarray(i + 2, i + 2 + 2 * Math.abs(state[i + 1]));
-        if (!marker.length) add(path, places);
-        i += 2 + places.length;
-      } while (state[i + 1] < 0);
+      const add = (run) => run.forEach(([x, y], k) => (k ? path.lineTo(x, y) : path.moveTo(x, y)));
+      for (const steps of marker) {
+        let [x, y] = [0, 0];
+        add(Array.from({ length: steps.length / 2 }, (_, k) => [(x += steps[2 * k] / 8), (y += steps[2 * k + 1] / 8)]));
+      }
+      if (!marker.length) runs.forEach(add);
       ink.save();
       if (clip.length) {
         ink.beginPath();
@@ -48,9 +62,11 @@ const rbcourseDisplay = {
       }
       Object.assign(ink, { fillStyle: fill, strokeStyle: stroke, lineWidth: line, lineCap, lineJoin });
       ink.setLineDash(dashes);
-      marker.forEach((steps) => add(path, steps));
-      for (let k = 0; k < (marker.length ? places.length : 1); k += 2) {
-        if (marker.length) ink.translate(places[k] / 8, places[k + 1] / 8);
+      ink.lineDashOffset = along ?? 0;
+      let [left, top] = [0, 0];
+      for (const [x, y] of marker.length ? runs[0] : [[0, 0]]) {
+        ink.translate(x - left, y - top);
+        [left, top] = [x, y];
         if (fill) ink.fill(path);
         if (stroke) ink.stroke(path);
       }
@@ -74,7 +90,8 @@ const rbcourseDisplay = {
   },
 
   // Tell screen readers what is drawn: when they ask, and when nothing has moved for a while.
-  tell(canvas, text) {
+  tell(canvas, said) {
+    const text = canvas.seen ? `${said} ${canvas.seen}` : said;
     const style = "position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";
     canvas.live ??= Object.assign(document.createElement("span"), { role: "status", style });
     if (canvas.ariaLabel && canvas.ariaLabel !== text) {
@@ -86,13 +103,13 @@ const rbcourseDisplay = {
   },
 
   // Put a canvas, and controls of its own, in place of a still. The last control plays.
-  async revive(image, { size, styles, background, states, texts, controls, milliseconds }) {
+  async revive(image, { size, rooms, background, states, known, controls, milliseconds }) {
     if (image.dataset.read || !window.DecompressionStream) return;
     image.dataset.read = true;
     const back = Object.assign(new Image(), { src: background });
     await back.decode();
     const drawn = rbcourseDisplay.split(await rbcourseDisplay.inflate(states));
-    const said = JSON.parse(new TextDecoder().decode(await rbcourseDisplay.inflate(texts)));
+    const [styles, said] = JSON.parse(new TextDecoder().decode(await rbcourseDisplay.inflate(known)));
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
     const width = `width: ${size[0]}px; max-width: 100%`;
     const canvas = make("canvas", { style: `display: block; ${width}`, role: "img", ariaLabel: image.alt });
@@ -106,8 +123,8 @@ const rbcourseDisplay = {
       panel.append(row);
       return { slider, values, output };
     });
-    const last = rows.at(-1).slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
-    last.parentNode.prepend(button);
+    const last = rows.at(-1)?.slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
+    last?.parentNode.prepend(button);
     panel.append(table);
     const show = () => {
       let k = 0;
@@ -115,12 +132,12 @@ const rbcourseDisplay = {
         k = k * values.length + +slider.value;
         slider.ariaValueText = output.textContent = values[slider.value];
       }
-      rbcourseDisplay.draw(canvas, back, size, styles, drawn[k]);
+      rbcourseDisplay.draw(canvas, back, { size, rooms }, styles, drawn[k]);
       if (said.length) table.innerHTML = rbcourseDisplay.table(...said[k]);
       rbcourseDisplay.tell(canvas, said[k]?.[2] ?? image.alt);
     };
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    const step = calm ? Math.ceil(+last.max / 5) : 1;
+    const step = calm ? Math.ceil(+last?.max / 5) : 1;
     let timer = null;
     const pause = () => { clearInterval(timer); timer = null; button.textContent = "▶"; };
     button.onclick = () => {
@@ -130,6 +147,7 @@ const rbcourseDisplay = {
     };
     panel.oninput = () => { pause(); show(); };
     panel.onkeydown = (event) => event.stopPropagation(); // or JupyterLab takes them
+    if (rooms.length) panel.prepend(rbcourseScene.turn(canvas, rooms, show));
     image.replaceWith(canvas);
     canvas.after(panel);
     new ResizeObserver(show).observe(canvas);

@@ -3,6 +3,7 @@
 import base64
 import html
 import json
+import re
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,8 +17,14 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-ENGINE = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
-"""JavaScript: the object ``rbcourseDisplay``, which draws what `Display` has kept."""
+from rbcourse.draw.space import Scene, Space, scenes
+
+_SCENE, _DISPLAY = (
+    Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")
+    for name in ("scene", "display")
+)
+ENGINE = _SCENE + _DISPLAY
+"""JavaScript: ``rbcourseDisplay``, which draws what `Display` has kept, and ``rbcourseScene``."""
 PARTS = 8
 """Of a pixel: in these the places are counted; display.js divides by it."""
 FAR = 16000
@@ -46,7 +53,11 @@ class Display(RendererBase):
     styles : dict of tuple to int
         The numbers of the styles: of colour to fill, colour of the line, its width, its dashes,
         its ends and corners, the rectangle that is drawn in, and the marker: polygons as in
-        `record`. What there is not is None or empty. Lengths are in pixels, but for the marker.
+        `record`. What there is not is None or empty. Lengths are in pixels, but for the marker. Of
+        a piece in space also the number of its room, its kind, and its zorder.
+    rooms : list of dict
+        Of each `Space` of the figure the ``origin``, in pixels from the upper left, and the
+        ``view``: azimuth and elevation in degrees.
     """
 
     def __init__(self, fig: Figure) -> None:
@@ -56,6 +67,12 @@ class Display(RendererBase):
         if max(self.size) > 1500:  # farther places would not fit
             raise ValueError(f"fig: at most 1500 pixels each way wanted, got {self.size}")
         self.styles: dict[tuple[Any, ...], int] = {}
+        self._spaces: list[Any] = [ax for ax in fig.axes if isinstance(ax, Space)]
+        origins = [ax.sight()[1] * [1, -1] + [0, self.height] for ax in self._spaces]
+        self.rooms = [
+            {"origin": origin.tolist(), "view": [ax.azim, ax.elev]}
+            for ax, origin in zip(self._spaces, origins, strict=True)
+        ]
         self._drawn: list[NDArray[np.int16]] = []
 
     def record(self, artists: Iterable[Any]) -> NDArray[np.int16]:
@@ -64,14 +81,24 @@ class Display(RendererBase):
         A sequence of polygons, of each its style, its number of points, and their places in parts
         of a pixel from the upper left, each as the difference from the one before. A number below
         0 is of a polygon that is filled together with the one before it, as a hole perhaps. Where
-        the style has a marker, the marker is drawn at the points.
+        the style has a marker, the marker is drawn at the points. If one of the artists is in a
+        `Space`, all that is visible there is drawn, as places in the room.
         """
         self._drawn = [np.zeros(0, np.int16)]
-        for artist in artists:
-            if hasattr(artist, "do_3d_projection"):
-                artist.do_3d_projection()
-            artist.draw(self)
+        for artist in scenes(artists):
+            if isinstance(artist, Scene):
+                self._record_scene(artist)
+            else:
+                artist.draw(self)
         return np.concatenate(self._drawn)
+
+    def _record_scene(self, scene: Scene) -> None:
+        room = self._spaces.index(scene.axes)
+        for piece in scene.pieces(self):
+            polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
+            marker = _marker(outline for outlines in polygons for outline in outlines)
+            look = *self._style(piece.gc, piece.fill)[:-1], marker, room, piece.kind, piece.zorder
+            self._keep(look, len(piece.places), piece.places[:, :3])
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         """Return the size in pixels."""
@@ -103,9 +130,8 @@ class Display(RendererBase):
         """Keep the marker with the style, and where it is drawn."""
         points = trans.transform(path.vertices)
         points = points[np.isfinite(points).all(axis=1)] * [1, -1] + [0, self.height]
-        shape = marker_path.to_polygons(marker_trans, closed_only=False)
-        marker = tuple(tuple(_steps(polygon * [1, -1]).tolist()) for polygon in shape)
-        self._keep((*self._style(gc, rgbFace)[:-1], marker), len(points), points)
+        outlines = marker_path.to_polygons(marker_trans, closed_only=False)
+        self._keep((*self._style(gc, rgbFace)[:-1], _marker(outlines)), len(points), points)
 
     def _keep(self, look: tuple[Any, ...], number: int, points: Any) -> None:
         style = self.styles.setdefault(look, len(self.styles))
@@ -137,7 +163,11 @@ def _alpha(colour: Any, forced: float | None) -> float:
 
 def _steps(points: Any) -> NDArray[np.int_]:
     whole = np.clip(np.round(PARTS * points), -FAR, FAR).astype(int)
-    return np.diff(whole, axis=0, prepend=np.zeros((1, 2), int)).ravel()
+    return np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).ravel()
+
+
+def _marker(outlines: Any) -> tuple[tuple[int, ...], ...]:
+    return tuple(tuple(_steps(outline * [1, -1]).tolist()) for outline in outlines)
 
 
 def joined(states: Sequence[NDArray[np.int16]]) -> bytes:
@@ -162,8 +192,8 @@ class Player:
         One for each combination of the controls, that of the last one running fastest.
     controls : sequence of dict
         Of each its ``label``, its ``values`` as texts, and the number of its ``first`` one. The
-        last one plays.
-    milliseconds : int
+        last one plays. Without any there is one state, which can be turned.
+    milliseconds : int, optional
         From one state to the next while it plays.
     texts : sequence, optional
         Of each state what is to be read: pairs of texts, a notice, and all of it as one line.
@@ -177,7 +207,7 @@ class Player:
     display: Display
     states: Sequence[NDArray[np.int16]]
     controls: Sequence[dict[str, Any]]
-    milliseconds: int
+    milliseconds: int = 0
     texts: Sequence[Any] = ()
 
     def __repr__(self) -> str:
@@ -185,12 +215,13 @@ class Player:
         return f"{self.name}: {self.alt}"
 
     def _repr_html_(self) -> str:
+        engine = ENGINE if self.display.rooms else _DISPLAY
         data = {
             "size": self.display.size,
-            "styles": list(self.display.styles),
+            "rooms": self.display.rooms,
             "background": _url(self.background),
             "states": _deflated(joined(self.states)),
-            "texts": _deflated(json.dumps(self.texts, ensure_ascii=False).encode()),
+            "known": _deflated(_json([list(self.display.styles), self.texts]).encode()),
             "controls": self.controls,
             "milliseconds": self.milliseconds,
         }
@@ -200,9 +231,13 @@ class Player:
             alt=html.escape(self.alt),
             still=_url(self.shown),
             caption=self.caption,
-            engine=ENGINE,
-            data=json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"),
+            engine=re.sub(r"^\s+(//.*)?|\n(?=\n)", "", engine, flags=re.MULTILINE),
+            data=_json(data).replace("<", "\\u003c"),
         )
+
+
+def _json(data: Any) -> str:
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
 
 
 def _deflated(content: bytes) -> str:

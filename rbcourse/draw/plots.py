@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from rbcourse._numerics import Array
 from rbcourse.curves import Curve
 from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.draw.spheres import draw_sphere
 from rbcourse.so3 import log_so3
 
 LABELS = {
@@ -162,10 +163,7 @@ def draw_paths(ax: Any, paths: Mapping[str, Array]) -> list[Any]:
 
     They are those of a "geodesic" and a "projected line".
     """
-    longitude, latitude = np.mgrid[0 : 2 * np.pi : 25j, 0 : np.pi : 13j]
-    across = np.sin(latitude)
-    sphere = [np.cos(longitude) * across, np.sin(longitude) * across, np.cos(latitude)]
-    ax.plot_wireframe(*sphere, color="0.85", lw=0.5)
+    draw_sphere(ax)
     lines = [ax.plot(*path.T, **_MOTIONS[name])[0] for name, path in paths.items()]
     way = paths["geodesic"]
     start, middle, end = way[[0, len(way) // 2, -1]]
@@ -173,10 +171,6 @@ def draw_paths(ax: Any, paths: Mapping[str, Array]) -> list[Any]:
         ax.text(*(0.82 * place), when, ha="center", va="center")
     x, y, z = np.cross(start, end) / np.linalg.norm(np.cross(start, end)) + middle / 2
     ax.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
-    ax.set_proj_type("ortho")
-    ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-    ax.set_box_aspect((1, 1, 1), zoom=1.6)
-    ax.set_axis_off()
     return lines
 
 

@@ -21,6 +21,10 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from PIL import Image
 
+from rbcourse.draw.display import Display, Player
+from rbcourse.draw.pictures import drawn, few_colours, png
+from rbcourse.draw.space import Space
+
 Table = Mapping[str, ArrayLike]
 SHOWN = 120
 """Pixels on a page for an inch of a figure."""
@@ -85,34 +89,34 @@ def caption(alt: str, files: str = "") -> str:
     return f"<figcaption>{html.escape(sentence, quote=False)}{small}</figcaption>"
 
 
-def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture:
+def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Player:
     """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
 
+    What is in a `Space` can be turned in the notebook; the files show it as it is seen at first.
     The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, or else
     to ``figures`` in the current folder. The same input gives the same bytes. The PNG has 256
     colours, which nobody misses and which make it a third as large.
     """
     save_table(name, data)
     folder = figures_folder()
-    drawn = io.BytesIO()
-    fig.savefig(drawn, format="png")
-    fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
-    plt.close(fig)
-    picture = png(few_colours(Image.open(drawn)))
-    (folder / f"{name}.png").write_bytes(picture)
-    return Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
-
-
-def few_colours(picture: Image.Image) -> Image.Image:
-    """Return a picture in 256 colours, without dots in between."""
-    return picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-
-
-def png(picture: Image.Image) -> bytes:
-    """Return a picture as a PNG."""
     content = io.BytesIO()
-    picture.save(content, "png", optimize=True)
-    return content.getvalue()
+    fig.savefig(content, format="png")
+    fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+    picture = png(few_colours(Image.open(content)))
+    (folder / f"{name}.png").write_bytes(picture)
+    scenes = [ax.scene for ax in fig.axes if isinstance(ax, Space)]
+    shown = _turning(fig, scenes, name, alt) if scenes else None
+    plt.close(fig)
+    return shown or Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
+
+
+def _turning(fig: Figure, scenes: list[Any], name: str, alt: str) -> Player:
+    fig.set_layout_engine("none")  # all stays where it is
+    fig.set_dpi(SHOWN)
+    display, files = Display(fig), caption(alt, f"{name}.png, .pdf, .csv")
+    still = drawn(fig, scenes, scenes, zoom=1.25)  # for readers without scripts
+    background, states = drawn(fig, scenes, []), [display.record(scenes)]
+    return Player(name, alt, files, still, background, display, states, controls=())
 
 
 def save_table(name: str, data: Table) -> None:

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.space import Ball
 from rbcourse.sampling import angle_law
 from rbcourse.se3 import join
 
@@ -27,7 +27,6 @@ EYE = np.array(
         np.sin(ELEVATION),
     ]
 )
-PALE = "#E9CFDE"  # the colour of what lies behind
 _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
     "angle": ("angle (rad)", (0, np.pi), angle_law),
     "height of e₁": ("height of the image of e₁", (-1, 1), lambda z: (z + 1) / 2),
@@ -37,24 +36,17 @@ _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
 
 
 def draw_sphere(ax: Any) -> None:
-    """Draw the unit sphere by its meridians and parallels, as `moving_images` looks at it."""
-    longitude, latitude = np.mgrid[0 : 2 * np.pi : 61j, 0 : np.pi : 31j]
-    across = np.sin(latitude)
-    ax.plot_wireframe(
-        np.cos(longitude) * across,
-        np.sin(longitude) * across,
-        np.cos(latitude),
-        rstride=5,
-        cstride=5,
-        color="0.85",
-        lw=0.5,
-    )
-    ax.computed_zorder = False
+    """Draw the unit sphere with meridians and parallels; what is on its far side becomes pale."""
+    turn = np.linspace(0, 2 * np.pi, 49)
+    thin: Any = {"color": "0.8", "lw": 0.5, "zorder": 0}
+    ax.add_artist(Ball())
+    for longitude in np.radians(np.arange(0, 180, 30)):
+        across = np.outer([np.cos(longitude), np.sin(longitude)], np.sin(turn))
+        ax.plot(*across, np.cos(turn), **thin)
+    for height in np.sin(np.radians(np.arange(-60, 90, 30))):
+        ax.plot(*np.sqrt(1 - height**2) * np.array([np.cos(turn), np.sin(turn)]), height, **thin)
+    ax.fit(-np.ones(3), np.ones(3), zoom=1.4)
     ax.view_init(elev=np.degrees(ELEVATION), azim=np.degrees(AZIMUTH))
-    ax.set_proj_type("ortho")
-    ax.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
-    ax.set_box_aspect((1, 1, 1), zoom=1.4)
-    ax.set_axis_off()
 
 
 def image_table(images: Images) -> Table:
@@ -71,35 +63,26 @@ def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[A
     """Draw a sphere for each sample; return what marks on it where the rotations carry v0 and v1.
 
     A dot is the image of v0, and the stroke from it ends at the image of v1, so that a turn about
-    v0 shows too. What lies behind is pale. ``update(i)`` shows the first i rotations and returns
+    v0 shows too. ``update(i)`` shows the first i rotations and returns
     the artists that change (RR 2.2, RR Fig. 4, RR Fig. 5).
     """
     panels = []
     for ax, (name, pair) in zip(axes, images.items(), strict=True):
-        strokes = np.stack(pair, axis=1)
         draw_sphere(ax)
         ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
         ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
         ax.set_title(name)
-        behind = strokes[:, 0] @ EYE < 0
-        colours = np.where(behind, PALE, COLOURS["projection"])
-        lines = Line3DCollection(strokes, colors=colours, lw=1.6, zorder=3)
-        ax.add_collection3d(lines)
-        dots = [
-            ax.plot([], [], [], "o", ms=5, mew=0, color=colour, zorder=zorder)[0]
-            for colour, zorder in ((PALE, 2), (COLOURS["projection"], 4))
-        ]
-        panels.append((strokes, behind, colours, lines, dots))
+        gaps = np.full_like(pair[0], np.nan)  # between one stroke and the next
+        strokes = np.stack([*pair, gaps], axis=1)
+        lines = ax.plot([], [], [], color=COLOURS["projection"], lw=1.6)[0]
+        dots = ax.plot([], [], [], "o", ms=5, mew=0, color=COLOURS["projection"])[0]
+        panels.append((strokes, lines, dots))
 
     def update(i: int) -> list[Any]:
-        artists = []
-        for strokes, behind, colours, lines, (far, near) in panels:
-            lines.set_segments(strokes[:i])
-            lines.set_color(colours[:i])
-            far.set_data_3d(*strokes[:i, 0][behind[:i]].T)
-            near.set_data_3d(*strokes[:i, 0][~behind[:i]].T)
-            artists += [far, lines, near]
-        return artists
+        for strokes, lines, dots in panels:
+            lines.set_data_3d(*strokes[:i].reshape(-1, 3).T)
+            dots.set_data_3d(*strokes[:i, 0].T)
+        return [artist for _, *artists in panels for artist in artists]
 
     return update
 
@@ -240,20 +223,18 @@ def draw_momenta(ax: Any, directions: Array) -> list[Any]:
     """Draw closed paths of the angular momentum through the body, on the unit sphere.
 
     A path has the colour of the axis that it goes round; black are those that pass close to the
-    middle one. Return a line for the visible part of each.
+    middle one. Return a line for each.
     """
     draw_sphere(ax)
     lines: list[Any] = []
     for path in directions:
-        near_middle = _comes_near_axis_2(path)
-        colour = COLOURS["optimum"] if near_middle else COLOURS["xyz"[_goes_round(path)]]
-        seen = path @ EYE > 0
-        front = (seen | np.roll(seen, 1))[:, None]  # each piece begins where the last one ended
-        ax.plot(*np.where(front, np.nan, path).T, color=colour, lw=0.8, alpha=0.4, zorder=2)
-        lines += ax.plot(*np.where(front, path, np.nan).T, color=colour, lw=2, zorder=3)
-    for name, end in zip("123", np.diag(np.sign(EYE)), strict=True):
-        ax.text(*end, name, ha="center", va="center", zorder=4)
-        ax.text(*-end, name, ha="center", va="center", zorder=1, color="0.6")
+        colour = COLOURS["xyz"[_goes_round(path)]]
+        if _comes_near_axis_2(path):
+            colour = COLOURS["optimum"]
+        lines += ax.plot(*path.T, color=colour, lw=2)
+    for name, end in zip("123", 1.1 * np.eye(3), strict=True):
+        for place in (end, -end):
+            ax.text(*place, name, ha="center", va="center")
     return lines
 
 
@@ -287,17 +268,13 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
     """
     poses, edges = join(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
-    line = {"color": "0.75", "lw": 1.5}
-    behind, before = (ax.plot([], [], [], zorder=z, **line)[0] for z in (0, 3))
+    ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
     label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
     ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
     book = draw_box(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
-    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
-    ax.set_box_aspect((1, 1, 1), zoom=1.5)
-    ax.set_axis_off()
-    ax.set_proj_type("ortho")  # in perspective the square on the cover can sink into it
+    ax.fit(np.full(3, -reach), np.full(3, reach), zoom=1.5)
     ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
 
     def update(i: int) -> list[Any]:
@@ -305,15 +282,7 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
         ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
         pin.set_data_3d(*ends.T)
         clock.set_text(f"t = {t[i]:.1f}")
-        steep = np.abs(R[i, 2]) / edges  # the line leaves the book where this is largest
-        face = R[i, :, steep.argmax()]
-        near = 1 if face[2] * (face @ EYE) > 0 else -1
-        heights = near * np.array([0.5 / steep.max(), 1.2 * reach])
-        before.set_data_3d([0, 0], [0, 0], heights)
-        behind.set_data_3d([0, 0], [0, 0], -heights)
-        away = R[i, :, 1] @ EYE < 0  # the pin leaves the book on its far side
-        pin.set_zorder(0 if away else 3)  # that of the book is between them
-        return [clock, behind, pin, book, before] if away else [clock, behind, book, before, pin]
+        return [book, pin, clock]
 
     return update
 

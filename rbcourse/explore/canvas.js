@@ -1,7 +1,7 @@
 // The picture of an explorer in a notebook, which display.js draws; see explorer.py.
 export default {
   async render({ model, el }) {
-    const { size, background, first, clickable, parts } = model.get("made");
+    const made = model.get("made"), { size, rooms, background, first, clickable, parts } = made;
     const [time, play, said, ...others] = await Promise.all(parts.map((id) => model.widget_manager.get_model(id)));
     const count = time.get("_options_labels").length;
     const canvas = document.createElement("canvas"), back = new Image();
@@ -28,7 +28,7 @@ export default {
     };
     const paint = () => {
       const { state, styles, texts: [rows, notice, line] } = shown;
-      rbcourseDisplay.draw(canvas, back, size, styles, state);
+      rbcourseDisplay.draw(canvas, back, made, styles, state);
       said.set("value", rbcourseDisplay.table(rows, noted || notice));
       rbcourseDisplay.tell(canvas, line);
       canvas.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
@@ -83,6 +83,12 @@ export default {
     if (clickable) {
       Object.assign(canvas.style, { cursor: "crosshair", touchAction: "none" });
       canvas.onpointerdown = canvas.onpointermove = point;
+    }
+
+    if (rooms.length) {
+      const row = rbcourseScene.turn(canvas, rooms, () => paint());
+      Object.assign(row.style, { width: `${size[0]}px`, maxWidth: "100%" });
+      el.append(row);
     }
 
     // What only the panel beside the picture has: names for screen readers, and the reset of time.

@@ -8,7 +8,7 @@ import numpy as np
 from rbcourse._numerics import Array
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
-from rbcourse.draw.spheres import AZIMUTH, ELEVATION, EYE
+from rbcourse.draw.spheres import AZIMUTH, ELEVATION
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.metrics import geodesic_flow
@@ -154,10 +154,10 @@ def screw_explorer() -> Explorer:
 def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
-    Its axes stick out of it on both sides, one end with a number; it hides what is behind it. Its
-    angular momentum is upright and stays. Controls: the ``axis`` that it spins about; how far it is
-    ``off`` that axis, in degrees; the time ``t`` in s, which plays, and starts again when another
-    axis is chosen (BK (8), BK 2.4).
+    Its axes stick out of it on both sides, one end with a number. Its angular momentum is upright
+    and stays. Controls: the ``axis`` that it spins about; how far it is ``off`` that axis, in
+    degrees; the time ``t`` in s, which plays, and starts again when another axis is chosen (BK (8),
+    BK 2.4).
     """
     with look():
         fig = new_figure()
@@ -166,8 +166,10 @@ def flip_explorer() -> Explorer:
         side = fig.add_axes((0.6, 0.19, 0.37, 0.6))
         side.set(xlim=(0, 8), ylim=(-4.4, 4.4), xlabel="time t (s)", ylabel="ω (rad/s)")
         side.set_xticks([0, 2, 4, 6, 8])
-        artists = _ends_of_axes(ax, "behind")
-        artists |= {"book": draw_box(ax, np.eye(4), _EDGES)} | _ends_of_axes(ax, "before")
+        artists: dict[str, Any] = {"book": draw_box(ax, np.eye(4), _EDGES)}
+        for number, axis in zip("123", "xyz", strict=True):
+            artists[f"axis {number}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
+            artists[f"number {number}"] = ax.text(0, 0, 0, number, ha="center", va="center")
         for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True), start=1):
             style = {"color": COLOURS[axis], "ls": dash}
             artists[f"w{i}"] = new_line(side, **style, label=f"ω{'₁₂₃'[i - 1]}")
@@ -190,13 +192,10 @@ def flip_explorer() -> Explorer:
         k = round(t / 8 * (len(_SPIN_TIMES) - 1))
         move_box(artists["book"], pose_from_components(R[k], np.zeros(3)), _EDGES)
         for i in range(3):
-            reach = _EDGES[i] / 2 + np.array([0, 0.055])
-            near = 1 if R[k, :, i] @ EYE > 0 else -1
-            for place, end in {"before": near, "behind": -near}.items():
-                artists[f"axis {i + 1} {place}"].set_data_3d(*np.outer(end * R[k, :, i], reach))
-                number = artists[f"number {i + 1} {place}"]
-                number.set_position_3d((_EDGES[i] / 2 + 0.072) * R[k, :, i])
-                number.set_visible(end > 0)
+            half = _EDGES[i] / 2
+            ends = np.outer(R[k, :, i], half * np.array([-1, 1]) + [-0.055, 0.055])
+            artists[f"axis {i + 1}"].set_data_3d(*ends)
+            artists[f"number {i + 1}"].set_position_3d((half + 0.072) * R[k, :, i])
             artists[f"w{i + 1}"].set_data(_SPIN_TIMES[: k + 1], w[: k + 1, i])
         artists["now"].set_xdata([t, t])
         times_over = np.count_nonzero(np.diff(w[: k + 1, _SPINS[axis]] > 0))
@@ -208,16 +207,6 @@ def flip_explorer() -> Explorer:
 
     controls["axis"].observe(lambda _: controls["t"].set_trait("value", 0.0), "value")
     return Explorer("A book that spins", fig, artists, controls, show, plays="t", seconds=8)
-
-
-def _ends_of_axes(ax: Any, place: str) -> dict[str, Any]:
-    """Draw one end of each axis of the book, with its number: those before it, or behind it."""
-    ends: dict[str, Any] = {}
-    for number, axis in zip("123", "xyz", strict=True):
-        ends[f"axis {number} {place}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
-        style = {"ha": "center", "va": "center"}
-        ends[f"number {number} {place}"] = ax.text(0, 0, 0, number, **style)
-    return ends
 
 
 @lru_cache(maxsize=1)

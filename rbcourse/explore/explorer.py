@@ -18,8 +18,8 @@ import traitlets
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rbcourse.draw.animate import drawn
 from rbcourse.draw.display import ENGINE, Display, joined
+from rbcourse.draw.pictures import drawn
 
 DPI = 100
 """Pixels per inch of a picture at its own size."""
@@ -117,6 +117,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         others = [control for control in self.controls.values() if control is not self.time]
         made = {
             "size": self.display.size,
+            "rooms": self.display.rooms,
             "background": self.background,
             "first": self.time.index,
             "clickable": point is not None,
@@ -247,20 +248,17 @@ def new_figure() -> Figure:
 
 def new_space(fig: Figure, place: tuple[float, float, float, float], reach: float) -> Any:
     """Add axes for bodies that turn about the origin; pale: the axes of the room."""
-    ax: Any = fig.add_axes(place, projection="3d")
+    ax: Any = fig.add_axes(place, projection="space")
     for room in reach * np.eye(3):
-        ax.plot(*np.stack([-room, room], axis=1), color="0.88", lw=1.5, zorder=0)
-    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(-reach, reach))
-    ax.set_box_aspect((1, 1, 1), zoom=1.25)
-    ax.set_axis_off()
-    ax.set_proj_type("ortho")  # in perspective the square of a box can sink into its face
+        ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=1.5, zorder=0)
+    ax.fit(np.full(3, -reach), np.full(3, reach), zoom=1.25)
     ax.view_init(elev=20, azim=-55)
     return ax
 
 
 def new_line(ax: Any, **style: Any) -> Any:
     """Draw a line without points, in the plane or in space, to be filled."""
-    return ax.plot(*[[]] * (3 if ax.name == "3d" else 2), **style)[0]
+    return ax.plot(*[[]] * (3 if ax.name == "space" else 2), **style)[0]
 
 
 def numbers(values: Any, digits: int) -> str:

@@ -8,14 +8,14 @@ from numpy.typing import ArrayLike
 
 from rbcourse.cost import acceleration_cost_parts
 from rbcourse.curves import Curve
-from rbcourse.draw.bodies import draw_box, move_box
+from rbcourse.draw.bodies import draw_box, draw_ground, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.explore import widgets
-from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, numbers
+from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.motions import minimum_acceleration_se3, projected_cubic_se3
 from rbcourse.optimum import minimum_acceleration_so3
 from rbcourse.rivals import CLOSED_FORMS
-from rbcourse.se3 import pose_from_coordinates
+from rbcourse.se3 import pose_from_components, pose_from_coordinates
 from rbcourse.so3 import angle_between, exp_so3, log_so3
 
 Solved = tuple[dict[str, Curve], dict[str, float]]
@@ -23,6 +23,9 @@ Solved = tuple[dict[str, Curve], dict[str, float]]
 _TIMES = np.linspace(0, 1, 61)
 _SIGMA = np.pi / 6 * np.array([1, 2, 3])
 _SIDE = 3.5
+_LOW, _HIGH = np.array([-2.0, -2, -2]), np.array([10.0, 12, 15])
+_BOX = np.array([1.3, 0.8, 0.25])
+_OUTLINE: Any = {"colours": 7 * ["none"], "edgecolor": COLOURS["projection"], "linewidth": 1.5}
 _WAYS = {"optimum": "-", "projection": "--"}
 
 
@@ -30,13 +33,14 @@ def minimum_acceleration_explorer() -> Explorer:
     """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
 
     From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
-    `acceleration_cost`. Controls: the ``rival``, the projection or one of the others; the ``size``
-    s; and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK
-    Fig. 4).
+    `acceleration_cost`. The box moves as the optimum does, its pink outline as the closed form.
+    Controls: the ``rival``, the projection or one of the others; the ``size`` s; the time ``t``;
+    and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig.
+    4).
     """
     with look():
         fig = new_figure()
-        ax = fig.add_axes((0.13, 0.16, 0.76, 0.71))
+        ax = fig.add_axes((0.12, 0.16, 0.46, 0.71))
         ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
         artists: dict[str, Any] = {}
         for way, name, dash in (("optimum", "optimum", "-"), ("rival", "closed form", "--")):
@@ -47,20 +51,30 @@ def minimum_acceleration_explorer() -> Explorer:
             style: Any = {"color": COLOURS[axis], "va": "center"}
             artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+        artists["now"] = ax.axvline(0, color="0.6", lw=1)
+        space = new_space(fig, (0.63, 0.24, 0.41, 0.6), 1.0)
+        for way in ("optimum", "rival"):
+            artists[f"{way} box"] = draw_box(space, np.eye(4), _BOX)
+        artists["rival box"].set(**_OUTLINE)
+        fig.text(0.835, 0.2, "the body at t", ha="center")
     controls = {
         "rival": widgets.menu("closed form", list(CLOSED_FORMS)),
         "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
+        "t": widgets.slider("time t", 0.5, 0.0, 1.0, 0.01),
         "k": widgets.stepped("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
     }
 
-    def show(rival: str, size: float, k: float) -> dict[str, str]:
+    def show(rival: str, size: float, t: float, k: float) -> dict[str, str]:
         curves, costs = _solved_rotations(rival, size, k)
         for way, curve in zip(("optimum", "rival"), curves.values(), strict=True):
             for axis, line in zip("xyz", log_so3(curve(_TIMES)).T, strict=True):
                 artists[f"{way} {axis}"].set_data(_TIMES, line)
+            move_box(artists[f"{way} box"], pose_from_components(curve(t), np.zeros(3)), _BOX)
+        artists["now"].set_xdata([t, t])
         for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
-        return {**_compared(costs), "apart at most": _apart(curves, _TIMES)}
+        apart = {"apart at most": _apart(curves, _TIMES), "apart at t": _apart(curves, t)}
+        return {**_compared(costs), **apart}
 
     return Explorer("Minimum acceleration", fig, artists, controls, show, plays="k", seconds=6)
 
@@ -77,16 +91,13 @@ def cube_explorer() -> Explorer:
         fig = new_figure()
         artists: dict[str, Any] = {}
         for way, left in zip(_WAYS, (0.0, 0.5), strict=True):
-            ax: Any = fig.add_axes((left - 0.09, -0.05, 0.65, 1.0), projection="3d")
-            ax.set(xlim=(-2, 10), ylim=(-2, 12), zlim=(-2, 15))
-            for name, end in zip("xyz", 5 * np.eye(3), strict=True):
-                ax.plot(*np.outer(end, [0, 1]), color="0.8", lw=1.5, zorder=0)
-                ax.text(*(1.2 * end), name, color="0.5", ha="center", va="center")
-            ax.set_box_aspect((12, 14, 17), zoom=1.04)
-            ax.set_axis_off()
-            ax.patch.set_visible(False)
-            ax.set_proj_type("ortho")
+            ax: Any = fig.add_axes((left - 0.09, -0.05, 0.65, 1.0), projection="space")
+            ax.fit(_LOW, _HIGH, zoom=1.04)
             ax.view_init(elev=18, azim=-22)
+            draw_ground(ax, _LOW, _HIGH)
+            for name, end in zip("xyz", 5 * np.eye(3), strict=True):
+                ax.plot(*np.outer(end, [0, 1]), color="0.7", lw=1.5, zorder=0)
+                ax.text(*(1.2 * end), name, color="0.5", ha="center", va="center")
             style = {"color": "black", "lw": 1, "ls": _WAYS[way]}
             artists[f"{way} way"] = new_line(ax, **style)
             artists[f"{way} goal"] = draw_box(ax, np.eye(4), _SIDE)
@@ -94,7 +105,7 @@ def cube_explorer() -> Explorer:
             artists[way] = draw_box(ax, np.eye(4), _SIDE)
             fig.text(left + 0.25, 0.94, way, ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
-        artists["difference"].set(facecolor="none", edgecolor=COLOURS["projection"], lw=1.5)
+        artists["difference"].set(**_OUTLINE)
         fig.text(0.5, 0.02, "axes: 5 m; pink: where the optimum is now", ha="center")
     controls = {
         "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),

@@ -31,7 +31,7 @@ MOVED: dict[str, tuple[str, Any]] = {
     "chain": ("leg", None),
     "cube": ("spin", np.arange(-6, 7)),
     "flip": ("axis", None),
-    "minimum_acceleration": ("size", np.arange(1, 16) / 10),
+    "minimum_acceleration": ("size", np.arange(2, 15, 2) / 10),
     "planar": ("omega1", np.arange(-90, 91, 15)),
     "projection": ("e12", np.arange(-5, 6) / 5),
     "random": ("sampler", None),

@@ -9,7 +9,7 @@ from rbcourse._numerics import Array
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_matrix
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
-from rbcourse.draw.spheres import EYE, PALE, draw_sphere
+from rbcourse.draw.spheres import draw_sphere
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.projection import orthonormalize_gram_schmidt, project_so
@@ -35,7 +35,6 @@ def rotation_explorer() -> Explorer:
         fig = new_figure()
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.3)
         artists: dict[str, Any] = {"box": draw_box(ax, np.eye(4), _BOX)}
-        artists["box"].set_alpha(0.75)
         looks = {"first turn": "z", "second turn": "y", "third turn": "x"}
         artists |= {
             name: new_line(ax, ls="--", color=COLOURS[axis], lw=1.5, label=f"{name}'s axis")
@@ -91,7 +90,7 @@ def projection_explorer() -> Explorer:
         fig = new_figure()
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.5)
         looks: dict[str, Any] = {
-            "M": {"ls": "-", "lw": 7, "colour": "0.75"},
+            "M": {"ls": "-", "lw": 7, "colour": "0.75", "zorder": 1},
             "nearest": {"ls": "-", "lw": 3.5},
             "Gram–Schmidt": {"ls": "--", "lw": 2},
         }
@@ -145,14 +144,11 @@ def random_explorer() -> Explorer:
     """
     with look():
         fig = new_figure()
-        ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="3d")
+        ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="space")
         draw_sphere(ax)
         fig.text(0.26, 0.91, "images of e₁", ha="center")
-        colours = {"behind": PALE, "before": COLOURS["projection"]}
-        artists = {
-            name: new_line(ax, marker="o", ls="", ms=4, mew=0, color=colour)
-            for name, colour in colours.items()
-        }
+        style = {"marker": "o", "ls": "", "ms": 4, "mew": 0, "color": COLOURS["projection"]}
+        artists = {"points": new_line(ax, **style)}
         side = fig.add_axes((0.62, 0.19, 0.36, 0.69))
         side.set(
             xlim=(0, 3.2),
@@ -176,9 +172,7 @@ def random_explorer() -> Explorer:
     def show(sampler: str, number: float, seed: float) -> dict[str, str]:
         R = _sample(sampler, int(seed))[: int(number)]
         points = R[:, :, 0]
-        behind = points @ EYE < 0
-        artists["behind"].set_data_3d(*points[behind].T)
-        artists["before"].set_data_3d(*points[~behind].T)
+        artists["points"].set_data_3d(*points.T)
         counts, _ = np.histogram(np.clip(points[:, 2], -1, 1), _BINS)
         artists["histogram"].set_data(counts / (len(R) * np.diff(_BINS)), _BINS)
         caps = np.mean(np.abs(points[:, 2]) > 0.5)
@@ -200,15 +194,14 @@ def _sample(sampler: str, seed: int) -> Array:
     return _SAMPLERS[sampler](_MOST, rng=seed)
 
 
-def _axes_of(ax: Any, name: str, ls: str, lw: float, colour: str | None = None) -> dict[str, Any]:
-    """Draw three axes, to be moved by `_move_axes`; coloured ones have their letters."""
+def _axes_of(ax: Any, name: str, colour: str | None = None, **style: Any) -> dict[str, Any]:
+    """Draw three axes, to be moved by `_move_axes`; full coloured ones have their letters."""
     artists: dict[str, Any] = {}
     for axis in "xyz":
-        style = {"color": colour or COLOURS[axis], "lw": lw, "ls": ls}
-        artists[f"{name} {axis}"] = new_line(ax, **style)
-        if not colour and ls == "-":
-            style = {"color": COLOURS[axis], "ha": "center", "va": "center"}
-            artists[f"{name} {axis} letter"] = ax.text(0, 0, 0, axis, **style)
+        artists[f"{name} {axis}"] = new_line(ax, color=colour or COLOURS[axis], **style)
+        if not colour and style["ls"] == "-":
+            centred = {"color": COLOURS[axis], "ha": "center", "va": "center"}
+            artists[f"{name} {axis} letter"] = ax.text(0, 0, 0, axis, **centred)
     return artists
 
 

@@ -19,7 +19,7 @@ SEEN = """() => {
     const slider = figure?.querySelector("input");
     if (slider && slider.offsetWidth < picture.offsetWidth / 2)
       faults.push("slider of a player that is short: " + picture.ariaLabel);
-    const button = figure?.querySelector("button");
+    const button = figure?.querySelector("button[aria-label]");
     if (button && button.textContent !== "▶")
       faults.push("player that starts by itself: " + picture.ariaLabel);
   }

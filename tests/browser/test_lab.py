@@ -33,6 +33,7 @@ def test_lessons_are_whole_as_they_are_stored(home, lab, page):
             faults |= {"it is marked as changed"}
         if not stored or faults or stored != seen:
             wrong[path.stem] = faults | (stored ^ seen)
+        page.evaluate("opened.sessionContext.shutdown()")  # fifteen kernels need much memory
         page.evaluate("opened.dispose()")
         page.locator(".jp-NotebookPanel").wait_for(state="detached")
     assert not wrong

@@ -20,7 +20,9 @@ TABLE = bodies.pose_table({"t [1]": TIMES}, POSES)
 
 
 def cube():
-    fig, ax = plt.subplots(figsize=(3, 3), dpi=60, subplot_kw={"projection": "3d"}, layout="none")
+    fig, ax = plt.subplots(
+        figsize=(3, 3), dpi=60, layout="none", subplot_kw={"projection": "space"}
+    )
     return fig, bodies.moving_cubes([ax], {"cube": POSES}, side=1)
 
 

@@ -15,14 +15,14 @@ MOTIONS = {"geodesic": GEODESIC(TIMES), "screw": SCREW(TIMES)}
 
 @pytest.fixture
 def axes():
-    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "3d"})
+    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"})
     yield axes
     plt.close(fig)
 
 
 def corners(cube):
     """The corners of the six faces and of the square, in space."""
-    return np.asarray(cube._faces)[:, :4]
+    return cube.corners
 
 
 def test_a_pose_table_holds_the_poses():
@@ -87,14 +87,14 @@ def test_the_frame_is_drawn_at_the_start_and_once_at_each_end(axes):
     bodies.draw_ways(axes[0], MOTIONS)
     other = rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES)
     bodies.draw_ways(axes[1], {**MOTIONS, "back": other})
-    assert [len(ax.texts) for ax in axes] == [2 * 3, 3 * 3]
+    names = [[text.get_text() for text in ax.texts if "$" in text.get_text()] for ax in axes]
+    assert [len(those) for those in names] == [2 * 3, 3 * 3]
 
 
 def test_the_square_is_seen_on_the_face_that_is_turned_to_the_eye():
-    """From slightly above: in perspective it would sink into the top."""
     turns = rb.exp_so3(np.outer(np.linspace(0, 6, 20), [0, 0, 1]))
     for R in turns:
-        fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "3d"})
+        fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "space"})
         bodies.draw_cube_motion(ax, rb.pose_from_components(R, [[0, 0, 0]]), 2.0)
         fig.canvas.draw()
         red, green, blue = np.moveaxis(np.asarray(fig.canvas.buffer_rgba())[..., :3], -1, 0)
@@ -130,7 +130,7 @@ def test_descriptions_give_numbers():
 
 @pytest.fixture
 def ax3d():
-    fig, ax = plt.subplots(subplot_kw={"projection": "3d"})
+    fig, ax = plt.subplots(subplot_kw={"projection": "space"})
     yield ax
     plt.close(fig)
 
@@ -141,11 +141,10 @@ def test_the_moving_frame_shows_both_frames(ax3d):
     poses[1, :3, :3], poses[1, :3, 3] = rb.exp_so3([0, 0, np.pi / 2]), [1, 2, 3]
     artists = bodies.draw_moving_frame(ax3d, ["F", "M"], poses)
     assert len(artists) == 8  # box, six axes, vector
-    edges = np.array(artists[0]._segments3d)
-    assert edges.shape == (12, 2, 3)
-    assert np.abs(edges.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-15
-    assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-15  # turned by 90°
-    assert np.array_equal(artists[-1]._segments3d[0], [[1, 2, 3], [0, 0, 0]])
+    faces = corners(artists[0])[:6]
+    assert np.abs(faces.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-14
+    assert np.abs(np.ptp(faces, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-14  # turned by 90°
+    assert np.array_equal(np.transpose(artists[-1].get_data_3d())[:2], [[0, 0, 0], [1, 2, 3]])
     texts = [text.get_text() for text in ax3d.texts]
     axes = [f"${axis}_{name}$" for name in "FM" for axis in "xyz"]
     assert texts == [*axes[:3], "{F}", *axes[3:], "{M}", "d"]
@@ -159,12 +158,43 @@ def test_turned_boxes_carry_their_frames(ax3d):
     R = rb.exp_so3([[0, 0, np.pi / 2]])
     box, *room, x, y, z = bodies.draw_turns([ax3d], ["turned"], R)
     assert np.array_equal([np.ptp(line.get_data_3d(), axis=1) for line in room], 2.6 * np.eye(3))
-    edges = np.array(box._segments3d)
-    assert np.abs(np.ptp(edges, axis=(0, 1)) - [1.0, 1.6, 0.3]).max() < 1e-15
+    assert np.abs(np.ptp(corners(box)[:6], axis=(0, 1)) - [1.0, 1.6, 0.3]).max() < 1e-15
     for arrow, direction in zip((x, y, z), R[0].T, strict=True):
-        shaft = np.array(arrow._segments3d[0])
-        assert np.abs(shaft[np.linalg.norm(shaft, axis=1).argmax()] - 1.2 * direction).max() < 1e-12
+        start, tip, *_ = np.transpose(arrow.get_data_3d())
+        assert np.array_equal(start, [0, 0, 0])
+        assert np.abs(tip - 1.2 * direction).max() < 1e-15
     assert ax3d.get_title() == "turned"
     assert [text.get_text() for text in ax3d.texts] == ["x", "y", "z"]
     said = bodies.describe_turns(["turned"], R)
     assert "turned: x along +y, y along −x, z along +z." in said
+
+
+def test_an_arrow_has_its_barbs_at_its_tip_and_on_four_sides(ax3d):
+    along = np.array([1.0, -2, 2])
+    arrow = bodies.draw_arrow(ax3d, np.ones(3), along, "red")
+    start, tip, *others = np.transpose(arrow.get_data_3d())
+    assert np.array_equal(np.stack([start, tip]), [[1, 1, 1], [2, -1, 3]])
+    barbs, back = np.array(others[::2]), np.array(others[1::2])
+    assert np.array_equal(back, np.broadcast_to(tip, (4, 3)))
+    off = barbs - tip
+    assert np.abs(off.sum(axis=0) @ along + 4 * 0.12 * 3).max() < 1e-14
+    beside = off - np.outer(off @ along, along) / 9
+    assert np.linalg.matrix_rank(beside, tol=1e-12) == 2
+    assert np.abs(beside.sum(axis=0)).max() < 1e-15
+
+
+def test_the_room_has_names_with_units_and_numbers_where_they_are(ax3d):
+    low, high = np.array([-1.0, 2, 0]), np.array([11.0, 9, 5])
+    ax3d.fit(low, high)
+    bodies.draw_room(ax3d, low, high)
+    texts = {text.get_text(): text.get_position_3d() for text in ax3d.texts}
+    assert {"x (m)", "y (m)", "z (m)"} <= set(texts)
+    seen = {name: [] for name in "xyz"}
+    for text in ax3d.texts:
+        if not text.get_text().endswith("(m)"):
+            value, place = float(text.get_text().replace("−", "-")), text.get_position_3d()
+            seen[next(n for n, at in zip("xyz", place, strict=True) if at == value)].append(value)
+    assert all(len(values) > 1 for values in seen.values())
+    for line in ax3d.lines:
+        places = np.transpose(line.get_data_3d())
+        assert ((places >= low) & (places <= high)).all()

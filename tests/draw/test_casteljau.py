@@ -25,7 +25,7 @@ def level(name, k):
 @pytest.fixture
 def axes():
     fig = plt.figure()
-    yield fig.add_subplot(1, 2, 1), fig.add_subplot(1, 2, 2, projection="3d")
+    yield fig.add_subplot(1, 2, 1), fig.add_subplot(1, 2, 2, projection="space")
     plt.close(fig)
 
 
@@ -85,7 +85,7 @@ def test_control_points_have_names_and_legs(axes):
         strict=True,
     ):
         assert [text.get_text() for text in ax.texts][:4] == words
-        legs = drawn(ax.lines[0])
+        legs = drawn(next(line for line in ax.lines if line.get_marker() == "o"))
         for point in level(name, 0)[..., 0]:
             assert np.abs(legs - point[:, None]).max(axis=0).min() < 1e-12
 

@@ -122,14 +122,16 @@ def test_motions_are_carried_points_and_speeds(motions):
     )
 
 
-def test_paths_and_speeds_show_both_motions(ax, ax3d, motions):
+def test_paths_and_speeds_show_both_motions(ax, motions):
     t, paths, speeds = motions
+    sphere = plt.figure().add_subplot(projection="space")
     for name, path, speed in zip(
-        paths, plots.draw_paths(ax3d, paths), plots.draw_speeds(ax, t, speeds), strict=True
+        paths, plots.draw_paths(sphere, paths), plots.draw_speeds(ax, t, speeds), strict=True
     ):
         assert np.array_equal(path.get_data_3d(), paths[name].T)
         assert np.array_equal(speed.get_xydata(), np.transpose([t, speeds[name]]))
         assert path.get_color() == speed.get_color()
+    plt.close(sphere.figure)
     said = plots.describe_paths(paths, speeds)
     assert "the geodesic takes the steps 57, 57 degrees; its speed is 2.00 at the start" in said
     assert "0.91 at the start, 3.11 in the middle, 0.91 at the end" in said

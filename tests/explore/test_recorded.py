@@ -30,9 +30,8 @@ def stored(request):
     """The name of an explorer, the explorer, its page, and what the page holds."""
     page = (FOLDER / f"{request.param}.html").read_text(encoding="utf-8")
     data = json.loads(re.search(r"revive\(image, (\{.*\})\);\n", page)[1])
-    for part in ("states", "texts"):
-        data[part] = zlib.decompress(base64.b64decode(data[part]))
-    data["states"], data["texts"] = split(data["states"]), json.loads(data["texts"])
+    states, known = (zlib.decompress(base64.b64decode(data[key])) for key in ("states", "known"))
+    data["states"], (data["styles"], data["texts"]) = split(states), json.loads(known)
     return request.param, getattr(explore, f"{request.param}_explorer")(), page, data
 
 

@@ -115,6 +115,7 @@ const pages = (() => {
 
   const turn = (forward) => {
     sessionStorage["lecture-start"] ??= Date.now();
+    keep();
     const all = findPages();
     const next = forward
       ? all.findIndex((one) => distance(one) > screen() / 50)
@@ -135,6 +136,7 @@ const pages = (() => {
 
   // The headings of each page, which page is shown, and the poll that was reached last, or is here.
   const where = (here = false) => {
+    keep();
     const all = findPages(), at = findPlace(all);
     const reached = all.slice(here ? at : 0, at + 1).flatMap((one) => one.headings);
     const poll = reached.findLast((heading) => /^Poll \d/.test(heading.innerText));

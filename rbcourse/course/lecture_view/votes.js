@@ -46,23 +46,21 @@ window.vote = (() => {
     show();
   };
 
-  const turn = () => {
-    const { poll } = pages.where(true);
+  // V twice is V once: it would count a vote that nobody had time for.
+  let opened = -Infinity;
+  const turn = async () => {
+    if (state.open && performance.now() - opened < 1000) return;
     if (state.open) return ask({});
-    if (poll) return ask({ poll: poll.innerText.trim(), options: findOptions(poll).length });
-    pages.say("There is no poll on this page.");
+    const { poll } = pages.where(true);
+    if (!poll) return pages.say("There is no poll on this page.");
+    await ask({ poll: poll.innerText.trim(), options: findOptions(poll).length });
+    opened = performance.now();
   };
 
   // One request after the other.
-  let last = Promise.resolve(), turned = -Infinity;
+  let last = Promise.resolve();
   const then = (next) => (last = last.then(next));
-
-  // V twice is V once: it would count a vote that nobody had time for.
-  const press = () => {
-    if (performance.now() - turned < 1000) return;
-    turned = performance.now();
-    then(turn);
-  };
+  const press = () => then(turn);
 
   const watch = () => then(() => ask()).then(() => setTimeout(watch, 1000));
   watch();

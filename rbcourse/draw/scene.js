@@ -1,0 +1,142 @@
+// What is in space, seen from any side, as space.py draws it from one. A piece is a face, a line, a mark
+// or a ball: { kind, zorder, style, places }; places are [x, y, z, along the line] in pixels of the room.
+const rbcourseScene = {
+  // Where right, up and the eye are, for an azimuth and an elevation in degrees.
+  sight([azimuth, elevation]) {
+    const [a, e] = [azimuth, elevation].map((angle) => (angle * Math.PI) / 180);
+    const [ca, sa, ce, se] = [Math.cos(a), Math.sin(a), Math.cos(e), Math.sin(e)];
+    return { right: [-sa, ca, 0], up: [-se * ca, -se * sa, ce], eye: [ce * ca, ce * sa, se] };
+  },
+
+  dot: (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2],
+
+  normal(places) {
+    const [o, ...others] = places, n = [0, 0, 0];
+    const spokes = others.map((p) => p.map((x, i) => x - o[i]));
+    for (let k = 1; k < spokes.length; k++) {
+      const [p, q] = [spokes[k - 1], spokes[k]];
+      for (let i = 0; i < 3; i++) n[i] += p[(i + 1) % 3] * q[(i + 2) % 3] - p[(i + 2) % 3] * q[(i + 1) % 3];
+    }
+    const size = Math.hypot(...n) || 1;
+    return n.map((x) => x / size);
+  },
+
+  // Give `put` the parts above a plane (1), in it (0), and below (-1).
+  cut(piece, height, put) {
+    const { places, kind } = piece, heights = places.map(height);
+    const sides = heights.map((h) => (Math.abs(h) < 0.2 ? 0 : Math.sign(h)));
+    if (kind === "mark" || kind === "ball") {
+      for (const side of new Set(sides)) put(side, { ...piece, places: places.filter((_, i) => sides[i] === side) });
+      return;
+    }
+    const low = Math.min(0, ...sides), high = Math.max(0, ...sides);
+    if (!low || !high) return put(low + high, piece);
+    const parts = { "-1": [[]], 1: [[]] };
+    places.forEach((p, i) => {
+      for (const t of [-1, 1]) if (sides[i] === t || !sides[i]) parts[t].at(-1).push(p);
+      const j = (i + 1) % places.length;
+      if (sides[i] * sides[j] >= 0 || (kind === "line" && !j)) return;
+      const share = heights[i] / (heights[i] - heights[j]);
+      const q = p.map((x, k) => x + share * (places[j][k] - x));
+      parts[sides[i]].at(-1).push(q);
+      if (kind === "line") parts[sides[i]].push([]);
+      parts[sides[j]].at(-1).push(q);
+    });
+    for (const t of [-1, 1]) for (const run of parts[t]) if (run.length > 1) put(t, { ...piece, places: run });
+  },
+
+  // Pieces from the farthest to the nearest, cut where they pass through one another: what the plane of a
+  // face hides, what is in it, and what is on the side of the eye; on both sides so with the next face.
+  order(pieces, eye) {
+    const { dot, normal, cut, order } = rbcourseScene;
+    const wall = pieces.find(({ kind }) => kind === "face" || kind === "ball");
+    if (!wall) {
+      const mean = ({ places }) => places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length;
+      const known = pieces.map((piece) => [piece.zorder, mean(piece), piece]);
+      return known.sort((a, b) => a[0] - b[0] || a[1] - b[1]).map(([, , piece]) => piece);
+    }
+    let n = wall.kind === "ball" ? eye : normal(wall.places);
+    if (dot(n, eye) < 0) n = n.map((x) => -x);
+    const level = dot(wall.places[0], n), sides = { "-1": [], 0: [], 1: [] };
+    for (const piece of pieces) cut(piece, (p) => dot(p, n) - level, (side, part) => sides[side].push(part));
+    return [...order(sides[-1], eye), ...sides[0], ...order(sides[1], eye)];
+  },
+
+  // What is to be drawn on the screen: styles and places [x, y], and how far along the line they begin.
+  seen(pieces, { origin }, view) {
+    const { dot, order, sight } = rbcourseScene, { right, up, eye } = sight(view);
+    const flat = (p) => [origin[0] + dot(p, right), origin[1] - dot(p, up)];
+    // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut.
+    const parts = pieces.flatMap((piece) => {
+      const { kind, style, places } = piece, [fill, stroke, ...rest] = style;
+      if (kind !== "face") return [piece];
+      const edge = { ...piece, kind: "line", style: [null, stroke, ...rest], places: [...places, places[0]] };
+      return [{ ...piece, style: [fill, null, ...rest] }, edge];
+    });
+    const ready = parts.map((piece) => {
+      let before = null, along = 0;
+      const places = piece.places.map((p) => {
+        const now = flat(p);
+        along += before ? Math.hypot(now[0] - before[0], now[1] - before[1]) : 0;
+        before = now;
+        return [...p, along];
+      });
+      return { ...piece, places };
+    });
+    const [over, others] = [true, false].map((is) => ready.filter(({ zorder }) => zorder >= 10 === is));
+    return [...order(others, eye), ...over].map(({ kind, style, places }) => {
+      const ends = kind === "mark" ? [...places].sort((p, q) => dot(p, eye) - dot(q, eye)) : places;
+      return { style, along: places[0][3], runs: [(kind === "face" ? [...ends, ends[0]] : ends).map(flat)] };
+    });
+  },
+
+  // Let a canvas be turned by a pointer, by keys and by buttons, which are returned; all rooms turn together.
+  turn(canvas, rooms, redraw) {
+    const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
+    const row = make("div", { className: "rbcourse-view" }), said = make("output", {});
+    row.style = "display: flex; flex-wrap: wrap; gap: 0.3em; align-items: center";
+    const set = (views) => {
+      canvas.views = views.map(([a, e]) => [((a + 540) % 360) - 180, Math.max(-90, Math.min(90, e))]);
+      const [a, e] = canvas.views[0].map((x) => `${Math.round(x)}°`.replace("-", "−"));
+      canvas.seen = `Seen from azimuth ${a}, elevation ${e}.`;
+      said.textContent = canvas.seen;
+    };
+    const to = (views) => { set(views); redraw(); };
+    const by = (right, up) => to(canvas.views.map(([a, e]) => [a - right, e + up]));
+    const first = rooms.map(({ view }) => view), all = (view) => rooms.map(() => view);
+    const save = () => canvas.toBlob((blob) => {
+      const link = make("a", { href: URL.createObjectURL(blob), download: "picture.png" });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+    for (const [name, onclick] of [
+      ["front", () => to(all([-90, 0]))], ["side", () => to(all([0, 0]))], ["top", () => to(all([-90, 90]))],
+      ["as printed", () => to(first)], ["save picture", save],
+    ]) row.append(make("button", { type: "button", textContent: name, onclick, style: "font: inherit" }));
+    row.append(said);
+    const steps = { ArrowLeft: [-5, 0], ArrowRight: [5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] };
+    canvas.addEventListener("keydown", (event) => {
+      if (event.key === "Home") to(first);
+      else if (event.key in steps) by(...steps[event.key]);
+      else return;
+      event.preventDefault();
+      event.stopPropagation(); // JupyterLab and lectures have these keys, too
+    });
+    let from = null;
+    canvas.addEventListener("pointerdown", (event) => {
+      from = [event.clientX, event.clientY];
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", ({ buttons, clientX, clientY }) => {
+      if (!(buttons & 1) || !from) return;
+      const [x, y] = from;
+      from = [clientX, clientY];
+      by((clientX - x) / 2, (clientY - y) / 2); // half a degree for a pixel
+    });
+    canvas.tabIndex = 0;
+    Object.assign(canvas.style, { cursor: "grab", touchAction: "pan-y" });
+    canvas.title = "Drag, or press the arrow keys, to turn; Home: as printed";
+    set(first);
+    return row;
+  },
+};

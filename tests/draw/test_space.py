@@ -1,0 +1,226 @@
+"""In space: what is before hides what is behind, from every side."""
+
+import io
+from itertools import pairwise
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+from PIL import Image
+
+import rbcourse as rb
+from rbcourse.draw import bodies, space, spheres
+
+BOOK = np.array([0.20, 0.13, 0.03])
+SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
+"""Twelve sides from which one can look."""
+
+
+@pytest.fixture
+def ax():
+    fig, axes = plt.subplots(figsize=(4, 4), dpi=100, subplot_kw={"projection": "space"})
+    axes.fit(-np.ones(3), np.ones(3))
+    yield axes
+    plt.close(fig)
+
+
+def drawn(ax):
+    """The parts of a scene as they are drawn one after the other, and the sight."""
+    pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
+    scale, origin, sight = ax.sight()
+    return space.in_sight(pieces, sight[2]), scale, origin, sight
+
+
+def faces_over(parts, place, sight, least):
+    """The numbers of the faces that cover a place, with how far before it they are, in pixels.
+
+    The sine of the angle between a face and the line of sight is the least one, or more.
+    """
+    found = {}
+    for i, part in enumerate(parts):
+        if part.kind == "face":
+            flat, p = part.places @ sight[:2].T, place @ sight[:2].T
+            side = np.roll(flat, -1, axis=0) - flat
+            turn = side[:, 0] * (p - flat)[:, 1] - side[:, 1] * (p - flat)[:, 0]
+            origin, normal = space.plane(part.places)
+            if abs(normal @ sight[2]) > least and (np.all(turn > 0) or np.all(turn < 0)):
+                found[i] = (origin - place) @ normal / (normal @ sight[2])
+    return found
+
+
+def test_it_is_seen_as_matplotlib_sees_it_without_perspective(ax):
+    ax.view_init(elev=33, azim=-71)
+    ax.figure.canvas.draw()
+    places = np.random.default_rng().uniform(-1, 1, (20, 3))
+    scale, origin, sight = ax.sight()
+    x, y, _ = proj_transform(*places.T, ax.get_proj())
+    want = ax.transData.transform(np.stack([x, y], axis=-1))
+    assert np.abs(origin + scale * places @ sight[:2].T - want).max() < 1e-9
+    assert np.abs(sight @ sight.T - np.eye(3)).max() < 1e-12
+    e, a = np.radians([33, -71])
+    eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+    assert np.abs(sight[2] - eye).max() < 1e-12
+
+
+def test_units_are_equal(ax):
+    ax.fit([0, 0, 0], [1, 5, 2])
+    ax.figure.canvas.draw()
+    scale, origin, sight = ax.sight()
+    corners = origin + scale * np.eye(3) @ sight[:2].T
+    x, y, _ = proj_transform(*np.eye(3), ax.get_proj())
+    assert np.abs(corners - ax.transData.transform(np.stack([x, y], axis=-1))).max() < 1e-9
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_of_triangles_that_pass_through_one_another_the_nearest_is_on_top(ax, side):
+    """At random places the faces are drawn from the farthest to the nearest."""
+    ax.view_init(*side)
+    rng = np.random.default_rng()
+    for _ in range(12):
+        ax.add_artist(space.Faces(rng.uniform(-1, 1, (1, 3, 3)), ["red"]))
+    parts, scale, _, sight = drawn(ax)
+    seen = 0
+    for place in scale * rng.uniform(-1, 1, (400, 3)):
+        over = faces_over(parts, place, sight, 0.1)
+        depths = np.array([over[i] for i in sorted(over)])
+        # a place may be so far from a plane that it is taken to be in it
+        assert (np.diff(depths) > -2 * space.NEAR / 0.1).all()
+        seen += len(depths) > 1
+    assert seen > 10
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_axes_of_a_book_end_where_they_leave_it(ax, side):
+    """Of a line through a box what is inside, or behind, is drawn before the face that hides it."""
+    ax.fit(np.full(3, -0.15), np.full(3, 0.15))
+    ax.view_init(*side)
+    R = rb.sample_rotation(rng=np.random.default_rng())
+    bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), BOOK)
+    for i in range(3):
+        ax.plot(*np.outer(R[:, i], [-0.14, 0.14]), lw=3, zorder=7)
+    parts, scale, _, sight = drawn(ax)
+    lines = [(i, part) for i, part in enumerate(parts) if part.gc.get_linewidth() == 3]
+    hidden = 0
+    for i in range(3):
+        for share in np.linspace(-0.139, 0.139, 40):
+            place = scale * share * R[:, i]
+            ray = (place / scale + np.linspace(1e-3, 0.5, 2000)[:, None] * sight[2]) @ R
+            depth = (BOOK / 2 - np.abs(ray)).min(axis=1).max()
+            if abs(depth) < 2e-3:
+                continue  # at an edge
+            offs = {}
+            for number, part in lines:
+                start, end = part.places[[0, -1], :3]
+                t = np.clip((place - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
+                offs[number] = np.linalg.norm(start + t * (end - start) - place)
+            number = min(offs, key=offs.get)
+            assert offs[number] < 0.5
+            after = [face for face in faces_over(parts, place, sight, 1e-9) if face > number]
+            assert bool(after) == (depth > 0), (i, share)
+            hidden += depth > 0
+    assert hidden > 10
+
+
+def test_what_is_on_the_far_side_of_a_ball_is_behind_its_disc(ax):
+    spheres.draw_sphere(ax)
+    points = rb.sample_rotation(100, rng=np.random.default_rng())[:, :, 0]
+    ax.plot(*points.T, "o")
+    for side in SIDES:
+        ax.view_init(*side)
+        parts, _, _, sight = drawn(ax)
+        (disc,) = [i for i, part in enumerate(parts) if part.kind == "ball"]
+        behind, before = (
+            np.concatenate([part.places for part in those if part.kind == "mark"])
+            for those in (parts[:disc], parts[disc + 1 :])
+        )
+        assert len(behind) + len(before) == 100
+        assert (behind @ sight[2] < space.NEAR).all()
+        assert (before @ sight[2] > -space.NEAR).all()
+
+
+def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
+    bodies.draw_box(ax, np.eye(4), 0.5)
+    ax.plot([-1, 1], [0.1, 0.1], [0.05, -0.05], ls="--", lw=3)
+    parts, scale, _, sight = drawn(ax)
+    line = [part for part in parts if part.gc.get_linewidth() == 3]
+    assert len(line) > 2
+    line.sort(key=lambda part: part.places[0, 3])
+    for one, after in pairwise(line):
+        assert np.abs(one.places[-1] - after.places[0]).max() < 1e-9
+    flat = scale * np.array([[-1, 0.1, 0.05], [1, 0.1, -0.05]]) @ sight[:2].T
+    assert line[-1].places[-1, 3] == pytest.approx(np.linalg.norm(flat[1] - flat[0]))
+
+
+def test_a_face_is_lightest_where_it_is_turned_to_the_light(ax):
+    shades = {}
+    for R in rb.sample_rotation(50, rng=np.random.default_rng()):
+        box = bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), 1.0)
+        box = space.Faces(box.corners[:6], 6 * ["1"])
+        for face, corners in zip(box.pieces(1.0), box.corners, strict=True):
+            out = corners.mean(axis=0) / np.linalg.norm(corners.mean(axis=0))
+            shades[float(out @ space.LIGHT)] = face.fill[0]
+    assert np.linalg.norm(space.LIGHT) == pytest.approx(1)
+    towards = sorted(shades)
+    assert (np.diff([shades[x] for x in towards]) >= 0).all()
+    assert shades[towards[0]] < 0.6 < 0.95 < shades[towards[-1]]
+
+
+def test_what_is_named_over_everything_is_drawn_last(ax):
+    bodies.draw_box(ax, np.eye(4), 1.0)
+    ax.text(0, 0, 0, "inside", zorder=space.OVER)
+    parts, *_ = drawn(ax)
+    assert parts[-1].kind == "mark"
+
+
+def test_a_line_with_gaps_is_drawn_without_them(ax):
+    places = np.array([[0, 0, 0], [1, 0, 0], [np.nan] * 3, [0, 1, 0], [1, 1, 0], [0, np.inf, 0]])
+    ax.plot(*places.T)
+    parts, scale, *_ = drawn(ax)
+    assert sorted(part.places[:, 1].tolist() for part in parts) == [[0, 0], [scale, scale]]
+
+
+def test_a_change_is_seen_and_what_stays_is_not_made_again(ax):
+    (line,) = ax.plot([0, 1], [0, 0], [0, 0])
+    text = ax.text(0, 0, 0, "a")
+    first, *_ = drawn(ax)
+    again, *_ = drawn(ax)
+    assert {id(part) for part in again} == {id(part) for part in first}
+    line.set_data_3d([0, 0.5], [0, 0], [0, 0])
+    text.set_text("b")
+    moved, scale, *_ = drawn(ax)
+    assert {part.places[-1, 0] for part in moved} == {0.5 * scale, 0}
+    assert not {id(part) for part in moved} & {id(part) for part in first}
+    ax.view_init(10, 10)
+    turned, *_ = drawn(ax)
+    assert not {id(part) for part in turned} & {id(part) for part in moved}
+    line.set_visible(False)
+    assert len(drawn(ax)[0]) == 1
+
+
+def test_titles_and_legends_are_drawn_too_and_nothing_twice(ax):
+    (line,) = ax.plot([-1, 1], [0, 0], [0, 0], color="red", lw=8, alpha=0.5, label="a line")
+    ax.legend(loc="upper left")
+    content = io.BytesIO()
+    ax.figure.savefig(content, dpi=100)
+    assert line.get_visible()
+    picture = np.asarray(Image.open(content).convert("RGB"), dtype=int)
+    shades = set(picture[200:].reshape(-1, 3)[:, 1].tolist())
+    assert min(shades) == pytest.approx(127, abs=2)  # twice it would be 64
+    assert (picture[:100] < 100).all(axis=-1).any()  # the letters of the legend
+
+
+def test_scenes_stand_for_what_is_in_them(ax):
+    (line,) = ax.plot([0, 1], [0, 1], [0, 1])
+    text = ax.text2D(0, 0, "flat")
+    assert space.scenes([line, text, line]) == [ax.scene, text]
+
+
+@pytest.mark.parametrize(
+    ("every", "marked"), [(None, [0, 1, 2, 3, 4]), (2, [0, 2, 4]), ([0, 3], [0, 3])]
+)
+def test_only_some_places_of_a_line_may_have_marks(ax, every, marked):
+    ax.plot(np.arange(5) / 5, np.zeros(5), np.zeros(5), "o", markevery=every)
+    ((part,), scale, *_) = drawn(ax)
+    assert np.allclose(part.places[:, 0], scale * np.array(marked) / 5)
