@@ -86,7 +86,7 @@ def draw_centre_path(ax: Any, places: Array) -> Any:
 def set_space(ax: Any, places: Array, side: float) -> None:
     """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it."""
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
-    ax.fit(low, high)
+    ax.fit(low, high, zoom=0.95)
     ax.view_init(elev=18, azim=-22)
     draw_room(ax, low, high)
 
@@ -115,7 +115,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
         for tick in ticks[k]:
             place = start + (tick - start[k]) * along + beside[k]
             ax.text(*place, f"{tick:g}", color="0.4", fontsize="small", **centred)
-        ax.text(*(end + 0.1 * np.max(high - low) * along), f"{name} (m)", **centred)
+        ax.text(*(end + 0.09 * np.max(high - low) * along), f"{name} (m)", **centred)
 
 
 def _ticks(low: float, high: float) -> list[float]:

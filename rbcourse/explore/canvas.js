@@ -85,11 +85,7 @@ export default {
       canvas.onpointerdown = canvas.onpointermove = point;
     }
 
-    if (rooms.length) {
-      const row = rbcourseScene.turn(canvas, rooms, () => paint());
-      Object.assign(row.style, { width: `${size[0]}px`, maxWidth: "100%" });
-      el.append(row);
-    }
+    const view = rooms.length ? rbcourseScene.turn(canvas, rooms, () => paint()) : "";
 
     // What only the panel beside the picture has: names for screen readers, and the reset of time.
     const label = (panel) => {
@@ -114,6 +110,7 @@ export default {
     const fit = new ResizeObserver(() => {
       paint();
       if (panel || !(panel = el.closest(".rbcourse-explorer"))) return;
+      panel.querySelector(".rbcourse-panel").append(view);
       label(panel);
       labels.observe(panel, { childList: true, subtree: true });
       panel.addEventListener("click", reset);
@@ -141,6 +138,7 @@ export default {
     return () => {
       [time, play, ...others].forEach((part) => part.off(null, null, canvas));
       [fit, labels].forEach((observer) => observer.disconnect());
+      view.remove?.();
       [timer, late].forEach(clearTimeout);
     };
   },

@@ -73,8 +73,7 @@ def minimum_acceleration_explorer() -> Explorer:
         artists["now"].set_xdata([t, t])
         for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
-        apart = {"apart at most": _apart(curves, _TIMES), "apart at t": _apart(curves, t)}
-        return {**_compared(costs), **apart}
+        return {**_compared(costs), "apart at most": _apart(curves, _TIMES)}
 
     return Explorer("Minimum acceleration", fig, artists, controls, show, plays="k", seconds=6)
 

@@ -57,12 +57,13 @@ def record(explorer: Explorer, name: str, moved: str, values: Sequence[Any]) -> 
     fixed = f" Here these stay: {'; '.join(stays)}." if stays else ""
     caption = f"{explorer.name}, recorded.{fixed} {_LESSON}"
     shown = explorer.state()
+    still = explorer.draw(shown.shown, zoom=2)  # before the artists move on
     states = [explorer.state(**{moved: x, plays: t}) for x in values for t in explorer.steps]
     return Player(
         name,
         shown.line,
         f"<figcaption>{html.escape(caption)}</figcaption>",
-        explorer.draw(shown.shown, zoom=2),
+        still,
         explorer.background,
         explorer.display,
         [state.drawn for state in states],

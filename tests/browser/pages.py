@@ -41,7 +41,7 @@ NOTE = """() => {
 
 PICTURES = """() => [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")]
     .filter((picture) => picture.complete ?? true)
-    .map((picture) => picture.alt ?? picture.ariaLabel)"""
+    .map((picture) => picture.alt ?? picture.ariaLabel.replace(/ Seen from azimuth .*/, ""))"""
 LOADED = """() => !document.body.innerText.includes("Loading widget")
     && !document.querySelector("img[data-read]")"""  # a player that has not unpacked its states
 STARRED = """() => [...document.querySelectorAll(".jp-InputPrompt")]

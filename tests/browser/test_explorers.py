@@ -99,4 +99,4 @@ def settle(page):
 
 def kind(name):
     figure = getattr(explore, name)()._fig
-    return "3-D" if any(ax.name == "3d" for ax in figure.axes) else "2-D"
+    return "3-D" if any(ax.name == "space" for ax in figure.axes) else "2-D"

@@ -15,7 +15,8 @@ SMALL = """(least) => {
     const text = walker.currentNode, box = text.parentElement;
     const apart = "mjx-container, script, style, sup, sub, small, [hidden]";
     if (!text.textContent.trim() || box.closest(apart)) continue;
-    const printed = box.closest("pre, code, .rbcourse-panel, .rbcourse-view") ? least * 5 / 6 : least;
+    const smaller = "pre, code, .rbcourse-panel, .rbcourse-view";
+    const printed = box.closest(smaller) ? least * 5 / 6 : least;
     if (parseFloat(getComputedStyle(box).fontSize) < printed)
       found.push(getComputedStyle(box).fontSize + " " + text.textContent.trim().slice(0, 40));
   }

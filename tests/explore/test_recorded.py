@@ -2,6 +2,7 @@
 
 import base64
 import html
+import io
 import json
 import re
 import zlib
@@ -11,6 +12,7 @@ import ipywidgets
 import numpy as np
 import pytest
 from displays import polygons, split
+from PIL import Image
 
 from rbcourse import explore
 from rbcourse.explore import recorded
@@ -87,6 +89,12 @@ def test_a_page_needs_nothing_else_and_has_its_still(stored):
     alt = html.unescape(re.search(r'<img [^>]*alt="([^"]*)"', page)[1])
     assert alt == repr(explorer)
     assert page.count("<img ") == 1
+    png = base64.b64decode(re.search(r'<img [^>]*src="data:image/png;base64,([^"]*)"', page)[1])
+    still, want = (
+        np.asarray(Image.open(io.BytesIO(content)).convert("RGB"), dtype=int)
+        for content in (png, explorer.draw(explorer.state().shown, zoom=2))
+    )
+    assert (np.abs(still - want).max(axis=-1) > 64).mean() < 1e-4
 
 
 def test_the_same_explorer_gives_the_same_page():
