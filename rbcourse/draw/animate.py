@@ -62,9 +62,9 @@ def animate(
     fig.set_layout_engine("none")  # all stays where it is
     display = Display(fig)
     states = [display.record(update(i)) for i in range(frames)]
-    moving = scenes(update(still % frames))
-    shown, background = (drawn(fig, moving, artists) for artists in (moving, []))
-    for artist in moving:
+    moving = update(still % frames)
+    shown, background = (drawn(fig, moving, artists) for artists in (moving, None))
+    for artist in [*scenes(fig), *moving]:
         artist.set_animated(False)
     shares = [f"{round(100 * i / max(1, frames - 1))} %" for i in range(frames)]
     return Animation(

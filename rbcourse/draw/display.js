@@ -91,15 +91,15 @@ const rbcourseDisplay = {
 
   // Tell screen readers what is drawn: when they ask, and when nothing has moved for a while.
   tell(canvas, said) {
-    const text = canvas.seen ? `${said} ${canvas.seen}` : said;
+    const text = canvas.seen ? `${said} ${canvas.seen}` : said, news = canvas.said === said ? canvas.seen : text;
     const style = "position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";
     canvas.live ??= Object.assign(document.createElement("span"), { role: "status", style });
     if (canvas.ariaLabel && canvas.ariaLabel !== text) {
       canvas.after(canvas.live);
       clearTimeout(canvas.timer);
-      canvas.timer = setTimeout(() => { canvas.live.textContent = text; }, 500);
+      canvas.timer = setTimeout(() => { canvas.live.textContent = news; }, 500);
     }
-    Object.assign(canvas, { role: "img", ariaLabel: text });
+    Object.assign(canvas, { role: "img", ariaLabel: text, said });
   },
 
   // Put a canvas, and controls of its own, in place of a still. The last control plays.

@@ -17,7 +17,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rbcourse.draw.space import Scene, Space, scenes
+from rbcourse.draw.space import Piece, flat, scenes
 
 _SCENE, _DISPLAY = (
     Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")
@@ -56,8 +56,8 @@ class Display(RendererBase):
         `record`. What there is not is None or empty. Lengths are in pixels, but for the marker. Of
         a piece in space also the number of its room, its kind, and its zorder.
     rooms : list of dict
-        Of each `Space` of the figure the ``origin``, in pixels from the upper left, and the
-        ``view``: azimuth and elevation in degrees.
+        Of each `Space` of the figure the ``origin``, where its middle is seen, in pixels from the
+        upper left, and the ``view``: azimuth and elevation in degrees.
     """
 
     def __init__(self, fig: Figure) -> None:
@@ -67,11 +67,11 @@ class Display(RendererBase):
         if max(self.size) > 1500:  # farther places would not fit
             raise ValueError(f"fig: at most 1500 pixels each way wanted, got {self.size}")
         self.styles: dict[tuple[Any, ...], int] = {}
-        self._spaces: list[Any] = [ax for ax in fig.axes if isinstance(ax, Space)]
-        origins = [ax.sight()[1] * [1, -1] + [0, self.height] for ax in self._spaces]
+        places = [scene.axes.sight().origin * [1, -1] + [0, self.height] for scene in scenes(fig)]
+        views = [(scene.axes.azim, scene.axes.elev) for scene in scenes(fig)]
         self.rooms = [
-            {"origin": origin.tolist(), "view": [ax.azim, ax.elev]}
-            for ax, origin in zip(self._spaces, origins, strict=True)
+            {"origin": place.tolist(), "view": view}
+            for place, view in zip(places, views, strict=True)
         ]
         self._drawn: list[NDArray[np.int16]] = []
 
@@ -81,24 +81,23 @@ class Display(RendererBase):
         A sequence of polygons, of each its style, its number of points, and their places in parts
         of a pixel from the upper left, each as the difference from the one before. A number below
         0 is of a polygon that is filled together with the one before it, as a hole perhaps. Where
-        the style has a marker, the marker is drawn at the points. If one of the artists is in a
-        `Space`, all that is visible there is drawn, as places in the room.
+        the style has a marker, the marker is drawn at the points. All that is visible in a `Space`
+        is drawn, too, as places in the room.
         """
         self._drawn = [np.zeros(0, np.int16)]
-        for artist in scenes(artists):
-            if isinstance(artist, Scene):
-                self._record_scene(artist)
-            else:
-                artist.draw(self)
+        for room, scene in enumerate(scenes(self._fig)):
+            for piece in scene.pieces(self):
+                for part in _within(piece, 0.99 * FAR / PARTS):
+                    self._keep_piece(room, part)
+        for artist in flat(artists):
+            artist.draw(self)
         return np.concatenate(self._drawn)
 
-    def _record_scene(self, scene: Scene) -> None:
-        room = self._spaces.index(scene.axes)
-        for piece in scene.pieces(self):
-            polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
-            marker = _marker(outline for outlines in polygons for outline in outlines)
-            look = *self._style(piece.gc, piece.fill)[:-1], marker, room, piece.kind, piece.zorder
-            self._keep(look, len(piece.places), piece.places[:, :3])
+    def _keep_piece(self, room: int, piece: Piece) -> None:
+        polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
+        marker = _marker(outline for outlines in polygons for outline in outlines)
+        look = *self._style(piece.gc, piece.fill)[:-1], marker, room, piece.kind, piece.zorder
+        self._keep(look, len(piece.places), piece.places[:, :3])
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         """Return the size in pixels."""
@@ -155,6 +154,15 @@ class Display(RendererBase):
             tuple(round(float(x), 2) for x in box),
             (),
         )
+
+
+def _within(piece: Piece, reach: float) -> list[Piece]:
+    """Return the parts of a piece that are within a cube, so far on each side."""
+    parts = [piece]
+    for side in [*np.eye(3), *-np.eye(3)] if np.abs(piece.places[:, :3]).max() > reach else []:
+        cut = (part.cut(reach - part.places[:, :3] @ side) for part in parts)
+        parts = [part for some in cut for where, part in some if where >= 0]
+    return parts
 
 
 def _alpha(colour: Any, forced: float | None) -> float:

@@ -9,28 +9,38 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.draw.space import scenes
+from rbcourse.draw.space import flat, scenes
+
+Paint = Callable[[Sequence[Any] | None], Image.Image]
 
 
-def painter(fig: Figure, moving: Sequence[Any]) -> Callable[[Sequence[Any]], Image.Image]:
-    """Draw what does not move, once; return what draws moving artists over it."""
+def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
+    """Draw what does not move, once; return what draws moving artists, and scenes, over it.
+
+    None, for the artists, leaves the scenes away, too.
+    """
     canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
-    for artist in scenes(moving):
+    for artist in [*scenes(fig), *flat(moving)]:
         artist.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(fig.bbox)
 
-    def paint(artists: Sequence[Any]) -> Image.Image:
+    def paint(artists: Sequence[Any] | None) -> Image.Image:
         canvas.restore_region(background)
-        for artist in scenes(artists):
+        for artist in [] if artists is None else [*scenes(fig), *flat(artists)]:
             artist.draw(canvas.get_renderer())
         return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
     return paint
 
 
-def drawn(fig: Figure, moving: Sequence[Any], artists: Sequence[Any], zoom: float = 2) -> bytes:
-    """Return a figure with only these of its moving artists, so many times as fine, as a PNG."""
+def drawn(
+    fig: Figure, moving: Sequence[Any], artists: Sequence[Any] | None, zoom: float = 2
+) -> bytes:
+    """Return a figure with only these of its moving artists, so many times as fine, as a PNG.
+
+    None: without scenes, as `painter` has it.
+    """
     before, dpi = fig.canvas, fig.dpi
     fig.set_dpi(zoom * dpi)
     picture = painter(fig, moving)(artists)

@@ -23,7 +23,7 @@ from PIL import Image
 
 from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import drawn, few_colours, png
-from rbcourse.draw.space import Space
+from rbcourse.draw.space import scenes
 
 Table = Mapping[str, ArrayLike]
 SHOWN = 120
@@ -104,18 +104,17 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
     picture = png(few_colours(Image.open(content)))
     (folder / f"{name}.png").write_bytes(picture)
-    scenes = [ax.scene for ax in fig.axes if isinstance(ax, Space)]
-    shown = _turning(fig, scenes, name, alt) if scenes else None
+    shown = _turning(fig, name, alt) if scenes(fig) else None
     plt.close(fig)
     return shown or Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
 
 
-def _turning(fig: Figure, scenes: list[Any], name: str, alt: str) -> Player:
+def _turning(fig: Figure, name: str, alt: str) -> Player:
     fig.set_layout_engine("none")  # all stays where it is
-    fig.set_dpi(SHOWN)
+    fig.set_dpi(min(SHOWN, 1500 // fig.get_size_inches().max()))
     display, files = Display(fig), caption(alt, f"{name}.png, .pdf, .csv")
-    still = drawn(fig, scenes, scenes, zoom=1.25)  # for readers without scripts
-    background, states = drawn(fig, scenes, []), [display.record(scenes)]
+    still = drawn(fig, [], [], zoom=1.25)  # for readers without scripts
+    background, states = drawn(fig, [], None), [display.record([])]
     return Player(name, alt, files, still, background, display, states, controls=())
 
 

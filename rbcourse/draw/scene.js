@@ -10,6 +10,7 @@ const rbcourseScene = {
 
   dot: (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2],
 
+  // The unit normal of a whole face.
   normal(places) {
     const [o, ...others] = places, n = [0, 0, 0];
     const spokes = others.map((p) => p.map((x, i) => x - o[i]));
@@ -42,36 +43,49 @@ const rbcourseScene = {
       if (kind === "line") parts[sides[i]].push([]);
       parts[sides[j]].at(-1).push(q);
     });
-    for (const t of [-1, 1]) for (const run of parts[t]) if (run.length > 1) put(t, { ...piece, places: run });
+    const least = kind === "line" ? 2 : 3;
+    for (const t of [-1, 1]) for (const run of parts[t]) if (run.length >= least) put(t, { ...piece, places: run });
   },
 
-  // Pieces from the farthest to the nearest, cut where they pass through one another: what the plane of a
-  // face hides, what is in it, and what is on the side of the eye; on both sides so with the next face.
+  // Pieces from the farthest to the nearest, cut where they pass through faces: what the plane of a face
+  // hides, what is in it, and what is on the side of the eye; on both sides so with the next face.
   order(pieces, eye) {
-    const { dot, normal, cut, order } = rbcourseScene;
-    const wall = pieces.find(({ kind }) => kind === "face" || kind === "ball");
-    if (!wall) {
-      const mean = ({ places }) => places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length;
-      const known = pieces.map((piece) => [piece.zorder, mean(piece), piece]);
-      return known.sort((a, b) => a[0] - b[0] || a[1] - b[1]).map(([, , piece]) => piece);
+    const { dot, cut } = rbcourseScene, drawn = [], todo = [[false, pieces]];
+    const mean = ({ places }) => places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length;
+    while (todo.length) {
+      const [ready, group] = todo.pop();
+      const wall = group.find(({ kind }) => kind === "face" || kind === "ball");
+      if (ready) drawn.push(...group);
+      else if (!wall) {
+        const known = group.map((piece) => [piece.zorder, mean(piece), piece]);
+        known.sort((a, b) => a[0] - b[0] || a[1] - b[1]).forEach(([, , piece]) => drawn.push(piece));
+      } else {
+        const ahead = wall.normal ?? eye, n = dot(ahead, eye) < 0 ? ahead.map((x) => -x) : ahead;
+        const level = dot(wall.places[0], n), sides = { "-1": [], 0: [wall], 1: [] };
+        for (const piece of group) {
+          if (piece !== wall) cut(piece, (p) => dot(p, n) - level, (side, part) => sides[side].push(part));
+        }
+        sides[0].sort((a, b) => a.zorder - b.zorder);
+        todo.push([false, sides[1]], [true, sides[0]], [false, sides[-1]]);
+      }
     }
-    let n = wall.kind === "ball" ? eye : normal(wall.places);
-    if (dot(n, eye) < 0) n = n.map((x) => -x);
-    const level = dot(wall.places[0], n), sides = { "-1": [], 0: [], 1: [] };
-    for (const piece of pieces) cut(piece, (p) => dot(p, n) - level, (side, part) => sides[side].push(part));
-    return [...order(sides[-1], eye), ...sides[0], ...order(sides[1], eye)];
+    return drawn;
   },
 
   // What is to be drawn on the screen: styles and places [x, y], and how far along the line they begin.
   seen(pieces, { origin }, view) {
-    const { dot, order, sight } = rbcourseScene, { right, up, eye } = sight(view);
+    const { dot, order, sight, normal } = rbcourseScene, { right, up, eye } = sight(view);
     const flat = (p) => [origin[0] + dot(p, right), origin[1] - dot(p, up)];
-    // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut.
+    // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut. An opaque
+    // one is a trifle larger, so that nothing shines through there.
     const parts = pieces.flatMap((piece) => {
-      const { kind, style, places } = piece, [fill, stroke, ...rest] = style;
+      const { kind, style, places } = piece, [fill, stroke, width, ...rest] = style;
       if (kind !== "face") return [piece];
-      const edge = { ...piece, kind: "line", style: [null, stroke, ...rest], places: [...places, places[0]] };
-      return [{ ...piece, style: [fill, null, ...rest] }, edge];
+      const own = fill.endsWith("ff") ? fill : null, edge = [...places, places[0]];
+      return [
+        { ...piece, normal: normal(places), style: [fill, own, 0.7, ...rest] },
+        { ...piece, kind: "line", style: [null, stroke, width, ...rest], places: edge },
+      ];
     });
     const ready = parts.map((piece) => {
       let before = null, along = 0;
@@ -84,6 +98,7 @@ const rbcourseScene = {
       return { ...piece, places };
     });
     const [over, others] = [true, false].map((is) => ready.filter(({ zorder }) => zorder >= 10 === is));
+    over.sort((a, b) => a.zorder - b.zorder);
     return [...order(others, eye), ...over].map(({ kind, style, places }) => {
       const ends = kind === "mark" ? [...places].sort((p, q) => dot(p, eye) - dot(q, eye)) : places;
       return { style, along: places[0][3], runs: [(kind === "face" ? [...ends, ends[0]] : ends).map(flat)] };
@@ -93,7 +108,7 @@ const rbcourseScene = {
   // Let a canvas be turned by a pointer, by keys and by buttons, which are returned; all rooms turn together.
   turn(canvas, rooms, redraw) {
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
-    const row = make("div", { className: "rbcourse-view" }), said = make("output", {});
+    const row = make("div", { className: "rbcourse-view" }), said = make("output", { ariaLive: "off" });
     row.style = "display: flex; flex-wrap: wrap; gap: 0.3em; align-items: center";
     const set = (views) => {
       canvas.views = views.map(([a, e]) => [((a + 540) % 360) - 180, Math.max(-90, Math.min(90, e))]);
@@ -111,30 +126,33 @@ const rbcourseScene = {
     });
     for (const [name, onclick] of [
       ["front", () => to(all([-90, 0]))], ["side", () => to(all([0, 0]))], ["top", () => to(all([-90, 90]))],
-      ["as printed", () => to(first)], ["save picture", save],
+      ["↑", () => by(0, 15)], ["↓", () => by(0, -15)], ["as printed", () => to(first)], ["save picture", save],
     ]) row.append(make("button", { type: "button", textContent: name, onclick, style: "font: inherit" }));
     row.append(said);
     const steps = { ArrowLeft: [-5, 0], ArrowRight: [5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] };
     canvas.addEventListener("keydown", (event) => {
+      if (event.altKey || event.ctrlKey || event.metaKey) return;
       if (event.key === "Home") to(first);
       else if (event.key in steps) by(...steps[event.key]);
       else return;
       event.preventDefault();
       event.stopPropagation(); // JupyterLab and lectures have these keys, too
     });
-    let from = null;
-    canvas.addEventListener("pointerdown", (event) => {
-      from = [event.clientX, event.clientY];
-      canvas.setPointerCapture(event.pointerId);
+    let from = null; // of the first finger
+    canvas.addEventListener("pointerdown", ({ pointerId, clientX, clientY }) => {
+      from ??= { pointerId, clientX, clientY };
+      canvas.setPointerCapture(pointerId);
     });
-    canvas.addEventListener("pointermove", ({ buttons, clientX, clientY }) => {
-      if (!(buttons & 1) || !from) return;
-      const [x, y] = from;
-      from = [clientX, clientY];
-      by((clientX - x) / 2, (clientY - y) / 2); // half a degree for a pixel
+    canvas.addEventListener("pointermove", ({ pointerId, clientX, clientY }) => {
+      if (from?.pointerId !== pointerId) return;
+      by((clientX - from.clientX) / 2, (clientY - from.clientY) / 2); // half a degree for a pixel
+      from = { pointerId, clientX, clientY };
     });
+    for (const end of ["pointerup", "pointercancel"]) {
+      canvas.addEventListener(end, ({ pointerId }) => { if (from?.pointerId === pointerId) from = null; });
+    }
     canvas.tabIndex = 0;
-    Object.assign(canvas.style, { cursor: "grab", touchAction: "pan-y" });
+    Object.assign(canvas.style, { cursor: "grab", touchAction: "pan-y pinch-zoom" });
     canvas.title = "Drag, or press the arrow keys, to turn; Home: as printed";
     set(first);
     return row;

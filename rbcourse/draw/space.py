@@ -8,12 +8,15 @@ where they pass through one another. The browser does the same, for each directi
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backend_bases import GraphicsContextBase, RendererBase
 from matplotlib.colors import to_rgba, to_rgba_array
+from matplotlib.figure import Figure
 from matplotlib.path import Path
 from matplotlib.projections import register_projection
 from matplotlib.transforms import Affine2D, IdentityTransform
@@ -42,7 +45,7 @@ class Piece:
         A filled "face"; a "line"; a "mark", which is always seen from its front, as letters are; or
         a "ball", a mark with a plane that parts the others.
     places : ndarray, shape (n, 3) or (n, 4)
-        In the room, in pixels from its origin; of lines also how far each is along the line, as it
+        From the middle of the axes, in pixels; of lines also how far each is along the line, as it
         is seen, for dashes.
     gc : GraphicsContextBase
         How it is drawn.
@@ -51,7 +54,9 @@ class Piece:
     marker : tuple of Path
         What is drawn at each of its places, in pixels, y upwards.
     zorder : float
-        Of what no face parts that is drawn first where it is least.
+        Where no face decides, what has the least one is drawn first.
+    normal : ndarray, shape (3,), optional
+        Of a face: the normal of the whole, of which this may be a part.
     """
 
     kind: Literal["face", "line", "mark", "ball"]
@@ -60,13 +65,13 @@ class Piece:
     fill: Any = None
     marker: tuple[Path, ...] = ()
     zorder: float = 0.0
+    normal: Array | None = None
 
     @property
     def edge(self) -> "Piece":
         """The edge of a face, as a line."""
-        ends = np.pad(self.places, ((0, 1), (0, 1)), mode="wrap")
-        ends[:, 3] = 0
-        return replace(self, kind="line", places=ends, fill=None)
+        ends = np.column_stack([[*self.places, self.places[0]], np.zeros(len(self.places) + 1)])
+        return replace(self, kind="line", places=ends, fill=None, normal=None)
 
     def cut(self, height: Array) -> "list[tuple[int, Piece]]":
         """Return the parts above a plane (1), in it (0), and below (-1).
@@ -96,7 +101,7 @@ class Piece:
             (t, replace(self, places=np.array(run)))
             for t, runs in parts.items()
             for run in runs
-            if len(run) > 1
+            if len(run) > (2 if closed else 1)
         ]
 
 
@@ -105,40 +110,56 @@ def in_sight(pieces: list[Piece], eye: Array) -> list[Piece]:
 
     A face has become two: what fills it, and its edge, which is not drawn where the face is cut.
     """
-    inner = _context(None, 0)
-    pieces = [
-        part
-        for piece in pieces
-        for part in ([replace(piece, gc=inner), piece.edge] if piece.kind == "face" else [piece])
-    ]
-    hidden, seen = ([p for p in pieces if (p.zorder >= OVER) is over] for over in (False, True))
-    return [*in_order(hidden, eye), *seen]
+    parts = [part for piece in pieces for part in _filling_and_edge(piece)]
+    hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
+    return [*in_order(hidden, eye), *sorted(seen, key=lambda piece: piece.zorder)]
 
 
 def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
-    """Return pieces from the farthest to the nearest, cut where they pass through one another.
+    """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
     The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
-    then what is in the plane, then what is on the side of the eye; and so on with the next face,
-    on both sides. `eye` is the direction to the eye, shape (3,).
+    then what is in the plane, by its zorder, then what is on the side of the eye; and so on with
+    the next face, on both sides. What no face parts is drawn by its zorder, and then by its mean
+    depth. `eye` is the direction to the eye, shape (3,).
     """
-    wall = next((piece for piece in pieces if piece.kind in ("face", "ball")), None)
-    if wall is None:
-        return sorted(pieces, key=lambda one: (one.zorder, (one.places[:, :3] @ eye).mean()))
-    origin, normal = plane(wall.places) if wall.kind == "face" else (wall.places[0], eye)
-    normal = normal if normal @ eye >= 0 else -normal
-    sides: dict[int, list[Piece]] = {-1: [], 0: [], 1: []}
-    for piece in pieces:
-        for side, part in piece.cut((piece.places[:, :3] - origin) @ normal):
-            sides[side].append(part)
-    return [*in_order(sides[-1], eye), *sides[0], *in_order(sides[1], eye)]
+    drawn: list[Piece] = []
+    todo = [(False, pieces)]  # whether they are in order, the next ones last
+    while todo:
+        ready, group = todo.pop()
+        wall = next((piece for piece in group if piece.kind in ("face", "ball")), None)
+        if ready:
+            drawn += group
+        elif wall is None:
+            drawn += sorted(group, key=lambda one: (one.zorder, (one.places[:, :3] @ eye).mean()))
+        else:
+            normal = eye if wall.normal is None else wall.normal
+            normal = normal if normal @ eye >= 0 else -normal
+            sides: dict[int, list[Piece]] = {-1: [], 0: [wall], 1: []}
+            for piece in group:
+                if piece is not wall:
+                    height = (piece.places[:, :3] - wall.places[0]) @ normal
+                    for side, part in piece.cut(height):
+                        sides[side].append(part)
+            inside = sorted(sides[0], key=lambda piece: piece.zorder)
+            todo += [(False, sides[1]), (True, inside), (False, sides[-1])]
+    return drawn
 
 
-def plane(places: Array) -> tuple[Array, Array]:
-    """Return a point of the plane of a polygon, and its unit normal."""
-    spokes = places[1:, :3] - places[0, :3]
-    normal = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
-    return places[0, :3], normal / (np.linalg.norm(normal) or 1.0)
+def _filling_and_edge(piece: Piece) -> list[Piece]:
+    if piece.kind != "face":
+        return [piece]
+    # an opaque face is a trifle larger, so that nothing shines through where it is cut
+    own = piece.fill if piece.fill[3] == 1 else None
+    return [replace(piece, gc=_context(own, 0.5 if own else 0)), piece.edge]
+
+
+def normal_of(corners: Array) -> Array:
+    """Return the unit normal of a polygon, shape (n, 3); of one without area, zeros."""
+    spokes = corners[1:] - corners[0]
+    normal: Array = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
+    size = np.linalg.norm(normal)
+    return normal / size if size > 1e-9 * (spokes**2).sum() else np.zeros(3)
 
 
 class Faces(Artist):
@@ -176,18 +197,21 @@ class Faces(Artist):
         """Set the width of all edges, in points."""
         self._linewidth = width
 
-    def pieces(self, scale: float) -> Iterable[Piece]:
+    def pieces(self, scale: float, middle: Array) -> Iterable[Piece]:
         """Return the faces; of those that are not filled their edges."""
-        middle = self.corners.mean(axis=(0, 1))
+        centre = self.corners.mean(axis=(0, 1))
+        edge = _context(to_rgba(self._edgecolor, self.get_alpha()), self._linewidth)
+        opacity = 1.0 if self.get_alpha() is None else self.get_alpha()
         for corners, colour in zip(self.corners, self._colours, strict=True):
-            _, normal = plane(corners)
-            outward = np.sign(normal @ (corners.mean(axis=0) - middle))
-            light = round(32 * (0.78 + 0.22 * outward * (normal @ LIGHT))) / 32
-            alpha = colour[3] * (1.0 if self.get_alpha() is None else self.get_alpha())
-            edge = _context(to_rgba(self._edgecolor, self.get_alpha()), self._linewidth)
-            fill = (*np.clip(light * colour[:3], 0, 1), alpha)
-            face = Piece("face", scale * corners, edge, fill)
-            yield face if alpha else face.edge
+            normal = normal_of(corners)
+            if not np.isfinite(corners).all() or not normal.any():
+                continue
+            outward = np.sign(normal @ (corners.mean(axis=0) - centre)) * normal
+            light = round(32 * (0.78 + 0.22 * outward @ LIGHT)) / 32
+            fill = (*np.clip(light * colour[:3], 0, 1), opacity * colour[3])
+            places, zorder = scale * (corners - middle), self.get_zorder()
+            face = Piece("face", places, edge, fill, zorder=zorder, normal=normal)
+            yield face if fill[3] else face.edge
 
 
 class Ball(Artist):
@@ -203,12 +227,13 @@ class Ball(Artist):
         super().__init__()
         self.radius = radius
 
-    def pieces(self, scale: float) -> Iterable[Piece]:
+    def pieces(self, scale: float, middle: Array) -> Iterable[Piece]:
         """Return the disc that is seen; its plane goes through the centre."""
         turn = np.linspace(0, 2 * np.pi, 91)
         disc = Path(scale * self.radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         fill = to_rgba("white", 0.7)
-        yield Piece("ball", np.zeros((1, 3)), _context(to_rgba("0.8"), 0.8), fill, (disc,))
+        place = -scale * middle[None]
+        yield Piece("ball", place, _context(to_rgba("0.8"), 0.8), fill, (disc,))
 
 
 class Scene(Artist):
@@ -219,46 +244,48 @@ class Scene(Artist):
     def __init__(self) -> None:
         super().__init__()
         self.set_in_layout(False)
-        self._known: dict[Artist, tuple[Any, list[Piece]]] = {}  # as long as they do not change
+        # what lines and letters are made of, as long as they do not change
+        self._known: WeakKeyDictionary[Artist, tuple[Any, list[Piece]]] = WeakKeyDictionary()
 
     @property
     def artists(self) -> list[Any]:
         """What is in the scene."""
-        kinds = Line3D | Text3D | Faces | Ball
-        return [artist for artist in self.axes.get_children() if isinstance(artist, kinds)]
+        for artist in self.axes.get_children():
+            if hasattr(artist, "do_3d_projection"):
+                name = type(artist).__name__
+                raise ValueError(f"{name}: lines, letters, Faces or a Ball wanted in a Space")
+        return [artist for artist in self.axes.get_children() if isinstance(artist, IN_SPACE)]
 
     def pieces(self, renderer: Any) -> list[Piece]:
         """Return what is visible, whole, as it is seen from where the axes are seen."""
         found: list[Piece] = []
-        scale, origin, sight = self.axes.sight()
-        now = scale, origin.tobytes(), sight.tobytes()
+        sight = self.axes.sight()
         for artist in [artist for artist in self.artists if artist.get_visible()]:
             if isinstance(artist, Faces | Ball):
-                found += artist.pieces(scale)
+                found += artist.pieces(sight.scale, sight.middle)
                 continue
-            if artist.stale or self._known.get(artist, (None,))[0] != now:
-                looks = Looks(renderer)
+            known, made = self._known.get(artist, (None, []))
+            if artist.stale or known != sight.key:
+                looks = Looks(renderer, isinstance(artist, Text3D))
                 artist.draw(looks)
                 make = _letters if isinstance(artist, Text3D) else _strokes
-                made = [p for p in make(artist, looks, scale, origin, sight) if len(p.places)]
-                self._known[artist] = now, made
-            found += self._known[artist][1]
+                made = [piece for piece in make(artist, looks, sight) if len(piece.places)]
+                self._known[artist] = sight.key, made
+            found += made
         return found
 
     def draw(self, renderer: Any) -> None:
         """Draw all that is visible."""
-        if not self.get_visible():
-            return
-        _, origin, sight = self.axes.sight()
-        for piece in in_sight(self.pieces(renderer), sight[2]):
+        sight = self.axes.sight()
+        for piece in in_sight(self.pieces(renderer), sight.eye):
             gc = renderer.new_gc()
             gc.copy_properties(piece.gc)
-            seen = origin + piece.places[:, :3] @ sight[:2].T
+            seen = sight.flat(piece.places[:, :3])
             dashes = gc.get_dashes()[1]
             if dashes is not None:
                 gc.set_dashes(piece.places[0, 3] / renderer.points_to_pixels(1), dashes)
             for path in piece.marker:
-                nearer = np.argsort(piece.places[:, :3] @ sight[2], kind="stable")
+                nearer = np.argsort(piece.places[:, :3] @ sight.eye, kind="stable")
                 renderer.draw_markers(gc, path, _SAME, Path(seen[nearer]), _SAME, piece.fill)
             if not piece.marker:
                 ends = seen[[*range(len(seen)), 0]] if piece.fill else seen
@@ -267,24 +294,35 @@ class Scene(Artist):
 
 
 class Looks(RendererBase):
-    """A renderer that keeps how an artist is drawn: context, filling, and outlines in pixels."""
+    """A renderer that keeps how an artist is drawn: context, filling, and outlines in pixels.
 
-    def __init__(self, renderer: Any) -> None:
+    Of letters it keeps the outlines; of a line, whose places are known, those of its marker.
+    """
+
+    def __init__(self, renderer: Any, letters: bool) -> None:
         super().__init__()
-        self.points_to_pixels = renderer.points_to_pixels
-        self.get_canvas_width_height = renderer.get_canvas_width_height
+        self.renderer, self.letters = renderer, letters
         self.found: list[tuple[GraphicsContextBase, Any, tuple[Path, ...]]] = []
+
+    def points_to_pixels(self, points: Any) -> Any:
+        """Return a length in points as one in pixels."""
+        return self.renderer.points_to_pixels(points)
+
+    def get_canvas_width_height(self) -> Any:
+        """Return the size in pixels."""
+        return self.renderer.get_canvas_width_height()
 
     def _keep(self, gc: Any, fill: Any, outlines: tuple[Path, ...]) -> None:
         kept = GraphicsContextBase()
         kept.copy_properties(gc)
         kept.set_clip_rectangle(None)
+        kept.set_clip_path(None)
+        kept.set_capstyle("butt")  # or the parts of a line that is cut would overlap
         self.found.append((kept, fill, outlines))
 
     def draw_path(self, gc: Any, path: Any, transform: Any, rgbFace: Any = None) -> None:
-        """Keep the outlines of letters; of lines the context alone is wanted."""
-        outlines = () if rgbFace is None else (path.transformed(transform),)
-        self._keep(gc, rgbFace, outlines)
+        """Keep letters, or how a line is drawn."""
+        self._keep(gc, rgbFace, (path.transformed(transform),) if self.letters else ())
 
     def draw_markers(
         self,
@@ -299,12 +337,46 @@ class Looks(RendererBase):
         self._keep(gc, rgbFace, (marker_path.transformed(marker_trans),))
 
 
+@dataclass(frozen=True)
+class Sight:
+    """How a `Space` is seen.
+
+    Parameters
+    ----------
+    scale : float
+        Pixels per unit.
+    middle : ndarray, shape (3,)
+        The middle of the limits, which stays where it is when the view turns.
+    origin : ndarray, shape (2,)
+        Where it is seen, in pixels.
+    right, up, eye : ndarray, shape (3,)
+        Unit vectors; the last one points to the eye.
+    """
+
+    scale: float
+    middle: Array
+    origin: Array
+    right: Array
+    up: Array
+    eye: Array
+
+    @property
+    def key(self) -> bytes:
+        """The same bytes for the same sight."""
+        parts = self.middle, self.origin, self.right, self.up
+        return np.concatenate([[self.scale], *parts]).tobytes()
+
+    def flat(self, places: Array) -> Array:
+        """Return where places, in pixels from the middle, are seen, shape (n, 2)."""
+        return self.origin + places @ np.stack([self.right, self.up], axis=-1)
+
+
 class Space(Axes3D):  # type: ignore[misc]
     """Axes in which units are equal and what is far is as large as what is near.
 
     They are the projection "space" of Matplotlib: ``plt.subplots(subplot_kw={"projection":
     "space"})``. ``plot``, ``text`` and ``add_artist``, with `Faces` or a `Ball`, put into them what
-    is to be seen.
+    is to be seen. Elevations run from -90° to 90°, and there is no roll.
 
     Attributes
     ----------
@@ -315,6 +387,7 @@ class Space(Axes3D):  # type: ignore[misc]
     name = "space"
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
+        self._magnified = 1.0
         super().__init__(*args, proj_type="ortho", **kwargs)
         self.set_axis_off()
         self.patch.set_visible(False)
@@ -324,75 +397,86 @@ class Space(Axes3D):  # type: ignore[misc]
 
     def fit(self, low: ArrayLike, high: ArrayLike, zoom: float = 1.0) -> None:
         """Show what is between two corners, shape (3,)."""
-        (x0, y0, z0), (x1, y1, z1) = low, high = np.array(low, float), np.array(high, float)
+        (x0, y0, z0), (x1, y1, z1) = np.array(low, float), np.array(high, float)
         self.set(xlim=(x0, x1), ylim=(y0, y1), zlim=(z0, z1))
-        self.set_box_aspect(high - low, zoom=zoom)
+        self._magnified = zoom
 
-    def sight(self) -> tuple[float, Array, Array]:
-        """Return pixels per unit, the place of the origin in pixels, and three unit vectors.
-
-        They point to the right, upwards, and to the eye, shape (3, 3).
-        """
+    def sight(self) -> Sight:
+        """Return how what is in space is seen."""
+        if self.roll or not -90 <= self.elev <= 90:
+            view = f"elev {self.elev:g}, roll {self.roll:g}"
+            raise ValueError(f"view_init: -90 <= elev <= 90 and roll 0 wanted, got {view}")
+        low, high = np.reshape(self.get_w_lims(), (3, 2)).T
+        self.set_box_aspect(high - low, zoom=self._magnified)
         self.apply_aspect()
         self.M = self.get_proj()
-        x, y, _ = proj_transform(*np.column_stack([np.zeros(3), np.eye(3)]), self.M)
+        middle = (low + high) / 2
+        x, y, _ = proj_transform(*(middle + np.vstack([np.zeros(3), np.eye(3)])).T, self.M)
         seen = self.transData.transform(np.stack([x, y], axis=-1))
         across = (seen[1:] - seen[0]).T
         scale = float(np.linalg.norm(across[0]))
         right, up = across / scale
-        return scale, seen[0], np.stack([right, up, np.cross(right, up)])
+        return Sight(scale, middle, seen[0], right, up, np.cross(right, up))
 
     def draw(self, renderer: Any) -> None:
-        """Draw the scene, and over it what is not in space: titles, legends."""
+        """Draw what is not in space, titles and legends, and the scene over it."""
+        if not self.get_visible():
+            return
+        inside = [artist for artist in self.scene.artists if artist.get_visible()]
+        for artist in inside:  # or each of them would be drawn once more
+            artist.set_visible(False)
+        try:
+            super().draw(renderer)
+        finally:
+            for artist in inside:
+                artist.set_visible(True)
         if not self.scene.get_animated() or self.get_figure(root=True).canvas.is_saving():
             self.scene.draw(renderer)
-        hidden = [artist for artist in self.scene.artists if artist.get_visible()]
-        for artist in hidden:  # or each of them would be drawn once more
-            artist.set_visible(False)
-        super().draw(renderer)
-        for artist in hidden:
-            artist.set_visible(True)
 
 
 register_projection(Space)
 
+IN_SPACE = Line3D | Text3D | Faces | Ball
 _SAME = IdentityTransform()
 
 
-def scenes(artists: Iterable[Any]) -> list[Any]:
-    """Return artists, each scene instead of what is in it."""
-    found = (
-        artist.axes.scene
-        if isinstance(artist.axes, Space) and artist in artist.axes.scene.artists
-        else artist
-        for artist in artists
-    )
-    return list(dict.fromkeys(found))
+def scenes(fig: Figure) -> list[Scene]:
+    """Return the scenes of a figure."""
+    return [ax.scene for ax in fig.axes if isinstance(ax, Space)]
 
 
-def _letters(
-    artist: Text3D, looks: Looks, scale: float, origin: Array, sight: Array
-) -> Iterable[Piece]:
-    place = scale * np.array([artist.get_position_3d()])
-    back = Affine2D().translate(*(-origin - place[0] @ sight[:2].T))
+def flat(artists: Iterable[Any]) -> list[Any]:
+    """Return those artists that are not in a scene."""
+    return [artist for artist in artists if not isinstance(artist, IN_SPACE)]
+
+
+def _letters(artist: Text3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
+    place = sight.scale * (np.array([artist.get_position_3d()]) - sight.middle)
+    back = Affine2D().translate(*-sight.flat(place)[0])
     for gc, fill, outlines in looks.found:
         letters = tuple(back.transform_path(path) for path in outlines)
         yield Piece("mark", place, gc, fill, letters, artist.get_zorder())
 
 
-def _strokes(
-    artist: Line3D, looks: Looks, scale: float, origin: Array, sight: Array
-) -> Iterable[Piece]:
-    places = scale * np.stack(artist.get_data_3d(), axis=-1)
-    every: Any = artist.get_markevery()
-    marked = places[:: every or 1] if every is None or isinstance(every, int) else places[every]
+def _strokes(artist: Line3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
+    places = sight.scale * (np.stack(artist.get_data_3d(), axis=-1) - sight.middle)
     for gc, fill, marker in looks.found:
         if marker:
+            marked = places[_marked(artist.get_markevery())]
             some = marked[np.isfinite(marked).all(axis=1)]
             yield Piece("mark", some, gc, fill, marker, artist.get_zorder())
         else:
             for run in _runs(places):
                 yield Piece("line", _along(run, sight), gc, zorder=artist.get_zorder())
+
+
+def _marked(every: Any) -> Any:
+    """Return which places of a line have a marker, as an index."""
+    if isinstance(every, Integral):
+        return slice(None, None, int(every))
+    if every is None or isinstance(every, list | slice):
+        return slice(None) if every is None else every
+    raise ValueError(f"markevery: None, an integer, a list or a slice wanted, got {every!r}")
 
 
 def _context(colour: Any, width: float) -> GraphicsContextBase:
@@ -411,7 +495,7 @@ def _runs(places: Array) -> list[Array]:
     return [part for part in kept if len(part) > 1]
 
 
-def _along(places: Array, sight: Array) -> Array:
+def _along(places: Array, sight: Sight) -> Array:
     """Return places, and how far each is along their line, as it is seen."""
-    steps = np.linalg.norm(np.diff(places @ sight[:2].T, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(sight.flat(places), axis=0), axis=1)
     return np.column_stack([places, np.concatenate([[0.0], np.cumsum(steps)])])

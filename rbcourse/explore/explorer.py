@@ -104,7 +104,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         self.plays, self.time = plays, self.controls[plays]
         self.steps = [value for _, value in self.time.options]
         self._first, self._resting, self._version = self.values, False, 0
-        self.display, self.background = Display(fig), self.draw([], zoom=2)
+        self.display, self.background = Display(fig), self.draw(None, zoom=2)
         self.play = ipywidgets.Play(
             value=self.time.index,
             max=len(self.steps) - 1,
@@ -169,12 +169,17 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
                 notice = " ".join(str(warning.message) for warning in warned)
             except (ValueError, RuntimeError) as error:
                 shown, notice = [], f"Nothing to show here: {error}"
+        for artist in self.artists.values():
+            artist.set_visible(bool(shown))
         parts = (f"{name}: {' '.join(text.split())}" for name, text in said.items())
         line = f"{self.name}. {'; '.join(parts) or notice}"
         return State(shown, self.display.record(shown), said, notice, line)
 
-    def draw(self, shown: Sequence[Any], zoom: float = 1) -> bytes:
-        """Return these artists as a PNG over what does not move, so many times as fine."""
+    def draw(self, shown: Sequence[Any] | None, zoom: float = 1) -> bytes:
+        """Return these artists as a PNG over what does not move, so many times as fine.
+
+        None: without what is in space, which may be turned.
+        """
         with look():
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
 

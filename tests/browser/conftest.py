@@ -16,7 +16,7 @@ from playwright.sync_api import expect, sync_playwright
 from servers import serving
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 60_000
+PATIENCE = 600_000  # milliseconds; long enough for a slow machine
 QUIET = [
     "--no-sandbox",
     "--disable-quic",

@@ -57,6 +57,7 @@ def test_cubes_are_where_the_poses_are(axes):
     low, high = np.array([axes[0].get_xlim(), axes[0].get_ylim(), axes[0].get_zlim()]).T
     drawn = np.concatenate([corners(cube).reshape(-1, 3) for cube in cubes])
     assert np.all((drawn.min(axis=0) > low) & (drawn.max(axis=0) < high))
+    axes[0].sight()
     assert np.allclose(np.divide(*(axes[0].get_box_aspect()[:2])), np.divide(*(high - low)[:2]))
 
 
