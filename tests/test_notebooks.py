@@ -2,12 +2,15 @@
 
 import ast
 import base64
+import io
 import re
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 from freshness import BASE64
+from PIL import Image
 
 from rbcourse.course import notebooks
 
@@ -117,7 +120,14 @@ def test_the_figures_in_a_lesson_are_the_stored_ones(path):
     shown = re.findall(BASE64 + r".{0,30}<figcaption>[^<]* <small>(\w+)\.", text)
     assert len(shown) == len(re.findall(r"<small>\w+\.(?:png|gif), ", text))
     for picture, name in shown:
-        assert base64.b64decode(picture) == (STORED / f"{name}.png").read_bytes()
+        content, stored = base64.b64decode(picture), (STORED / f"{name}.png").read_bytes()
+        if content == stored:
+            continue
+        # the still of what can be turned is less fine
+        still, fine = (Image.open(io.BytesIO(png)).convert("RGB") for png in (content, stored))
+        assert still.width < fine.width
+        off = np.abs(np.asarray(fine.resize(still.size), int) - np.asarray(still, int))
+        assert (off.max(axis=-1) > 128).mean() < 1e-3, name
 
 
 CITED = re.compile(r"\[([A-Za-z]+\d{4}(?:; [A-Za-z]+\d{4})*)\]")

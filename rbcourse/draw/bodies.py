@@ -86,7 +86,7 @@ def draw_centre_path(ax: Any, places: Array) -> Any:
 def set_space(ax: Any, places: Array, side: float) -> None:
     """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it."""
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
-    ax.fit(low, high, zoom=0.95)
+    ax.fit(low, high, zoom=0.9)
     ax.view_init(elev=18, azim=-22)
     draw_room(ax, low, high)
 
@@ -114,12 +114,12 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
         ax.plot(*np.stack([start, end], axis=-1), color="0.5", lw=1, zorder=0)
         for tick in ticks[k]:
             place = start + (tick - start[k]) * along + beside[k]
-            ax.text(*place, f"{tick:g}", color="0.4", fontsize="small", **centred)
+            ax.text(*place, f"{tick:g}", color="0.4", **centred)
         ax.text(*(end + 0.09 * np.max(high - low) * along), f"{name} (m)", **centred)
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    found = MaxNLocator(4, steps=[1, 2, 4, 5, 10]).tick_values(low, high)
+    found = MaxNLocator(3, steps=[1, 2, 4, 5, 10]).tick_values(low, high)
     return [float(x) for x in found if low < x < high]
 
 

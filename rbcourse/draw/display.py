@@ -68,9 +68,9 @@ class Display(RendererBase):
             raise ValueError(f"fig: at most 1500 pixels each way wanted, got {self.size}")
         self.styles: dict[tuple[Any, ...], int] = {}
         places = [scene.axes.sight().origin * [1, -1] + [0, self.height] for scene in scenes(fig)]
-        views = [(scene.axes.azim, scene.axes.elev) for scene in scenes(fig)]
+        views = np.round([(scene.axes.azim, scene.axes.elev) for scene in scenes(fig)], 2)
         self.rooms = [
-            {"origin": place.tolist(), "view": view}
+            {"origin": place.round(2).tolist(), "view": view.tolist()}
             for place, view in zip(places, views, strict=True)
         ]
         self._drawn: list[NDArray[np.int16]] = []

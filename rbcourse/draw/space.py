@@ -57,6 +57,8 @@ class Piece:
         Where no face decides, what has the least one is drawn first.
     normal : ndarray, shape (3,), optional
         Of a face: the normal of the whole, of which this may be a part.
+    text : Text3D, optional
+        Of letters: what draws them in print, with its font.
     """
 
     kind: Literal["face", "line", "mark", "ball"]
@@ -66,6 +68,7 @@ class Piece:
     marker: tuple[Path, ...] = ()
     zorder: float = 0.0
     normal: Array | None = None
+    text: Text3D | None = None
 
     @property
     def edge(self) -> "Piece":
@@ -276,8 +279,13 @@ class Scene(Artist):
 
     def draw(self, renderer: Any) -> None:
         """Draw all that is visible."""
-        sight = self.axes.sight()
+        sight, written = self.axes.sight(), set()
         for piece in in_sight(self.pieces(renderer), sight.eye):
+            if piece.text:
+                if piece.text not in written:  # all of its lines at once
+                    piece.text.draw(renderer)
+                written.add(piece.text)
+                continue
             gc = renderer.new_gc()
             gc.copy_properties(piece.gc)
             seen = sight.flat(piece.places[:, :3])
@@ -455,7 +463,7 @@ def _letters(artist: Text3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
     back = Affine2D().translate(*-sight.flat(place)[0])
     for gc, fill, outlines in looks.found:
         letters = tuple(back.transform_path(path) for path in outlines)
-        yield Piece("mark", place, gc, fill, letters, artist.get_zorder())
+        yield Piece("mark", place, gc, fill, letters, artist.get_zorder(), text=artist)
 
 
 def _strokes(artist: Line3D, looks: Looks, sight: Sight) -> Iterable[Piece]:

@@ -14,6 +14,7 @@ import rbcourse as rb
 from rbcourse import explore
 from rbcourse.draw import animate, bodies, save_figure, spheres
 from rbcourse.draw.display import ENGINE, Display
+from rbcourse.draw.space import in_sight
 
 TIMES = np.linspace(0, 1, 21)
 GOAL = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
@@ -44,6 +45,7 @@ def sphere():
 def crossing():
     """Two boxes that pass through one another, dashes through both, and letters."""
     fig, ax = plt.subplots(figsize=(4, 4), dpi=100, subplot_kw={"projection": "space"})
+    ax.plot([-0.7, 0.7], [0.3, 0.3], [0.15, 0.15], color="green", lw=5)  # on the box
     bodies.draw_box(ax, np.eye(4), np.array([1.6, 0.8, 0.3]))
     bodies.draw_box(ax, rb.pose_from_coordinates([0.5, 0.4, 1.0, 0.2, 0.1, 0.1]), 0.7)
     ax.plot([-1, 1], [-0.8, 0.9], [0.3, -0.2], color="black", lw=3, ls="--")
@@ -147,6 +149,41 @@ def test_the_corners_are_at_the_same_pixels_and_the_poses_those_of_the_motion(pa
         for corner in np.concatenate([np.array(run) for run in seen]):
             assert np.linalg.norm(want - corner, axis=1).min() < 0.02 * sight.scale  # of its side
     plt.close(fig)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_browser_cuts_and_orders_as_python_does(side, page):
+    """The same parts, one after the other, at the same places, dashes as far along their line."""
+    fig, ax = crossing()
+    display = Display(fig)
+    state = display.record([])
+    ax.view_init(*side)
+    sight = ax.sight()
+    want = in_sight(ax.scene.pieces(display), sight.eye)
+    page.add_script_tag(content=ENGINE.replace("const rbcourse", "globalThis.rbcourse"))
+    found = page.evaluate(
+        """({ state, styles, room, view }) => {
+            const all = rbcourseDisplay.decode(Int16Array.from(state), styles);
+            const pieces = all.map(({ style, runs }) =>
+                ({ kind: style[9], zorder: style[10], style, places: runs[0] }));
+            return rbcourseScene.seen(pieces, room, view);
+        }""",
+        {
+            "state": state.tolist(),
+            "styles": list(display.styles),
+            "room": display.rooms[0],
+            "view": side[::-1],
+        },
+    )
+    plt.close(fig)
+    assert len(found) == len(want)
+    for part, piece in zip(found, want, strict=True):
+        assert (part["style"][0] is None) == (piece.fill is None)
+        flat = sight.flat(piece.places[:, :3]) * [1, -1] + [0, display.height]
+        run = np.array(part["runs"][0])[: len(flat)]
+        assert np.abs(run - flat).max() < 0.5  # pixels
+        if piece.kind == "line" and piece.places.shape[1] > 3:
+            assert abs(part["along"] - piece.places[0, 3]) < 1 or piece.zorder == 0
 
 
 def test_buttons_and_keys_set_the_view_and_it_is_told(page):
