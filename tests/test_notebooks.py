@@ -127,7 +127,7 @@ def test_the_figures_in_a_lesson_are_the_stored_ones(path):
         still, fine = (Image.open(io.BytesIO(png)).convert("RGB") for png in (content, stored))
         assert still.width < fine.width
         off = np.abs(np.asarray(fine.resize(still.size), int) - np.asarray(still, int))
-        assert (off.max(axis=-1) > 128).mean() < 1e-3, name
+        assert (off.max(axis=-1) > 128).mean() < 0.01, name
 
 
 CITED = re.compile(r"\[([A-Za-z]+\d{4}(?:; [A-Za-z]+\d{4})*)\]")
