@@ -12,7 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from rbcourse._numerics import Array
 from rbcourse.curves import Curve
 from rbcourse.draw.save import COLOURS, Table
-from rbcourse.draw.space import OVER, Faces
+from rbcourse.draw.scene import OVER
+from rbcourse.draw.space import Faces
 from rbcourse.se3 import pose_from_components
 from rbcourse.so3 import angle_between
 

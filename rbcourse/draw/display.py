@@ -17,7 +17,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rbcourse.draw.space import Piece, flat, scenes
+from rbcourse.draw.scene import Piece
+from rbcourse.draw.space import flat, scenes
 
 _SCENE, _DISPLAY = (
     Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ import rbcourse as rb
 from rbcourse import explore
 from rbcourse.draw import animate, bodies, save_figure, spheres
 from rbcourse.draw.display import ENGINE, Display
-from rbcourse.draw.space import in_sight
+from rbcourse.draw.scene import in_sight
 
 TIMES = np.linspace(0, 1, 21)
 GOAL = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])

@@ -11,7 +11,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image
 
 import rbcourse as rb
-from rbcourse.draw import bodies, space, spheres
+from rbcourse.draw import bodies, scene, space, spheres
 
 BOOK = np.array([0.20, 0.13, 0.03])
 SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
@@ -29,7 +29,7 @@ def ax():
 def drawn(ax):
     """The parts of a scene as they are drawn one after the other, and how it is seen."""
     pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
-    return space.in_sight(pieces, ax.sight().eye), ax.sight()
+    return scene.in_sight(pieces, ax.sight().eye), ax.sight()
 
 
 def faces_over(parts, place, sight, least):
@@ -98,7 +98,7 @@ def test_of_triangles_that_pass_through_one_another_the_nearest_is_on_top(ax, si
         over = faces_over(parts, place, sight, 0.1)
         depths = np.array([over[i] for i in sorted(over)])
         # a place may be so far from a plane that it is taken to be in it
-        assert (np.diff(depths) > -2 * space.NEAR / 0.1).all()
+        assert (np.diff(depths) > -2 * scene.NEAR / 0.1).all()
         seen += len(depths) > 1
     assert seen > 10
 
@@ -149,8 +149,8 @@ def test_what_is_on_the_far_side_of_a_ball_is_behind_its_disc(ax):
             for those in (parts[:disc], parts[disc + 1 :])
         )
         assert len(behind) + len(before) == 100
-        assert (behind @ sight.eye < space.NEAR).all()
-        assert (before @ sight.eye > -space.NEAR).all()
+        assert (behind @ sight.eye < scene.NEAR).all()
+        assert (before @ sight.eye > -scene.NEAR).all()
 
 
 def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
@@ -182,9 +182,9 @@ def test_a_face_is_lightest_where_it_is_turned_to_the_light(ax):
 
 def test_what_is_named_over_everything_is_drawn_last(ax):
     bodies.draw_box(ax, np.eye(4), 1.0)
-    ax.text(0, 0, 0, "inside", zorder=space.OVER)
-    ax.text(0, 0, 0, "over it", zorder=space.OVER + 1)
-    ax.plot([0, 1], [0, 0], [0, 0], zorder=space.OVER + 0.5)
+    ax.text(0, 0, 0, "inside", zorder=scene.OVER)
+    ax.text(0, 0, 0, "over it", zorder=scene.OVER + 1)
+    ax.plot([0, 1], [0, 0], [0, 0], zorder=scene.OVER + 0.5)
     parts, _ = drawn(ax)
     assert [part.kind for part in parts[-3:]] == ["mark", "line", "mark"]
 
@@ -266,7 +266,7 @@ def test_many_faces_can_be_drawn(ax):
     ax.add_artist(space.Faces(corners, 1200 * ["red"]))
     parts, _ = drawn(ax)
     depths = [part.places[:, 2].mean() for part in parts if part.kind == "face"]
-    assert (np.diff(depths) > -2 * space.NEAR).all()
+    assert (np.diff(depths) > -2 * scene.NEAR).all()
 
 
 def test_in_the_plane_of_a_face_what_has_the_higher_zorder_is_over_it(ax):

@@ -1,0 +1,157 @@
+"""Pieces of a scene in space, cut and ordered for the eye: what is before hides what is behind.
+
+The browser does the same, for each direction of view, with scene.js.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.backend_bases import GraphicsContextBase
+from matplotlib.path import Path
+
+from rbcourse._numerics import Array
+
+OVER = 10
+"""What has this zorder, or a higher one, is seen through everything."""
+NEAR = 0.2
+"""A piece that is nearer to a plane than this, in pixels, lies in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What is drawn in one go.
+
+    Parameters
+    ----------
+    kind : str
+        A filled "face"; a "line"; a "mark", which is always seen from its front, as letters are; or
+        a "ball", a mark with a plane that parts the others.
+    places : ndarray, shape (n, 3) or (n, 4)
+        From the middle of the axes, in pixels; of lines also how far each is along the line, as it
+        is seen, for dashes.
+    gc : GraphicsContextBase
+        How it is drawn.
+    fill : tuple of float, optional
+        The colour that it is filled with.
+    marker : tuple of Path
+        What is drawn at each of its places, in pixels, y upwards.
+    zorder : float
+        Where no face decides, what has the least one is drawn first.
+    normal : ndarray, shape (3,), optional
+        Of a face: the normal of the whole, of which this may be a part.
+    text : artist, optional
+        Of letters: what draws them in print, with its font.
+    """
+
+    kind: Literal["face", "line", "mark", "ball"]
+    places: Array
+    gc: GraphicsContextBase
+    fill: Any = None
+    marker: tuple[Path, ...] = ()
+    zorder: float = 0.0
+    normal: Array | None = None
+    text: Any = None
+
+    @property
+    def edge(self) -> "Piece":
+        """The edge of a face, as a line."""
+        ends = np.column_stack([[*self.places, self.places[0]], np.zeros(len(self.places) + 1)])
+        return replace(self, kind="line", places=ends, fill=None, normal=None)
+
+    def cut(self, height: Array) -> "list[tuple[int, Piece]]":
+        """Return the parts above a plane (1), in it (0), and below (-1).
+
+        `height` is that of the places over the plane, shape (n,).
+        """
+        side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
+        if self.marker:
+            return [(s, replace(self, places=self.places[side == s])) for s in set(side.tolist())]
+        low, high = int(side.min(initial=0)), int(side.max(initial=0))
+        if low * high == 0:
+            return [(low + high, self)]
+        closed = self.kind == "face"
+        parts: dict[int, list[list[Array]]] = {-1: [[]], 1: [[]]}
+        for i, (p, s) in enumerate(zip(self.places, side, strict=True)):
+            for t in (-1, 1):
+                if s in (t, 0):
+                    parts[t][-1].append(p)
+            j = (i + 1) % len(side)
+            if s * side[j] < 0 and (closed or j):
+                q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)
+                parts[s][-1].append(q)
+                if not closed:
+                    parts[s].append([])
+                parts[int(side[j])][-1].append(q)
+        return [
+            (t, replace(self, places=np.array(run)))
+            for t, runs in parts.items()
+            for run in runs
+            if len(run) > (2 if closed else 1)
+        ]
+
+
+def in_sight(pieces: list[Piece], eye: Array) -> list[Piece]:
+    """Return pieces in the order in which they are drawn; `eye` is the direction to the eye.
+
+    A face has become two: what fills it, and its edge, which is not drawn where the face is cut.
+    """
+    parts = [part for piece in pieces for part in _filling_and_edge(piece)]
+    hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
+    return [*in_order(hidden, eye), *sorted(seen, key=lambda piece: piece.zorder)]
+
+
+def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
+    """Return pieces from the farthest to the nearest, cut where they pass through faces.
+
+    The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
+    then what is in the plane, by its zorder, then what is on the side of the eye; and so on with
+    the next face, on both sides. What no face parts is drawn by its zorder, and then by its mean
+    depth. `eye` is the direction to the eye, shape (3,).
+    """
+    drawn: list[Piece] = []
+    todo = [(False, pieces)]  # whether they are in order, the next ones last
+    while todo:
+        ready, group = todo.pop()
+        wall = next((piece for piece in group if piece.kind in ("face", "ball")), None)
+        if ready:
+            drawn += group
+        elif wall is None:
+            drawn += sorted(group, key=lambda one: (one.zorder, (one.places[:, :3] @ eye).mean()))
+        else:
+            normal = eye if wall.normal is None else wall.normal
+            normal = normal if normal @ eye >= 0 else -normal
+            sides: dict[int, list[Piece]] = {-1: [], 0: [wall], 1: []}
+            for piece in group:
+                if piece is not wall:
+                    height = (piece.places[:, :3] - wall.places[0]) @ normal
+                    for side, part in piece.cut(height):
+                        sides[side].append(part)
+            inside = sorted(sides[0], key=lambda piece: piece.zorder)
+            todo += [(False, sides[1]), (True, inside), (False, sides[-1])]
+    return drawn
+
+
+def _filling_and_edge(piece: Piece) -> list[Piece]:
+    if piece.kind != "face":
+        return [piece]
+    # an opaque face is a trifle larger, so that nothing shines through where it is cut
+    own = piece.fill if piece.fill[3] == 1 else None
+    return [replace(piece, gc=context(own, 0.5 if own else 0)), piece.edge]
+
+
+def normal_of(corners: Array) -> Array:
+    """Return the unit normal of a polygon, shape (n, 3); of one without area, zeros."""
+    spokes = corners[1:] - corners[0]
+    normal: Array = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
+    size = np.linalg.norm(normal)
+    return normal / size if size > 1e-9 * (spokes**2).sum() else np.zeros(3)
+
+
+def context(colour: Any, width: float) -> GraphicsContextBase:
+    """Return how to draw with a colour, perhaps None, and a width in points."""
+    gc = GraphicsContextBase()
+    gc.set_foreground(colour or (0.0, 0.0, 0.0, 0.0), isRGBA=True)
+    gc.set_linewidth(width)
+    gc.set_joinstyle("round")
+    return gc
