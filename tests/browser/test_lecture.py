@@ -241,5 +241,13 @@ def look_at_question_and_explorer(page, explorer):
         box = explorer.locator(part).bounding_box()
         assert 0 <= box["x"] <= box["x"] + box["width"] <= 1024
         assert 0 <= box["y"] <= box["y"] + box["height"] <= 768
+    view = explorer.locator(".rbcourse-view")
+    if view.count():  # what is in space can be turned by buttons that come with the pointer
+        expect(view).to_have_css("opacity", "0")
+        explorer.locator("canvas").hover()
+        expect(view).to_have_css("opacity", "1")
+        row, picture = view.bounding_box(), explorer.locator("canvas").bounding_box()
+        assert abs(row["x"] - picture["x"]) < 2
+        assert picture["y"] < row["y"] < row["y"] + row["height"] <= 768
     # so that letters have 18 px
     assert explorer.locator("canvas").bounding_box()["width"] == pytest.approx(560, abs=1)
