@@ -84,11 +84,14 @@ def draw_centre_path(ax: Any, places: Array) -> Any:
     return ax.plot(*places.T, "*-", color=COLOURS["optimum"], ms=7, lw=0.8)[0]
 
 
-def set_space(ax: Any, places: Array, side: float) -> None:
-    """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it."""
+def set_space(ax: Any, places: Array, side: float, view: tuple[float, float] = (18, -22)) -> None:
+    """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it.
+
+    `view` has the elevation and the azimuth in degrees.
+    """
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
     ax.fit(low, high, zoom=0.9)
-    ax.view_init(elev=18, azim=-22)
+    ax.view_init(*view)
     draw_room(ax, low, high)
 
 
@@ -102,12 +105,18 @@ def draw_ground(ax: Any, low: Array, high: Array) -> None:
 
 
 def draw_room(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor, and three axes with their names and numbers, in m, between two corners."""
+    """Draw a floor, and three axes with their names and numbers, in m, between two corners.
+
+    The upright one stands at the corner that is farthest to the left.
+    """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
     # where each axis begins, and in which direction its numbers stand beside it
-    corners = [low, np.array([high[0], *low[1:]]), low]
-    beside = 0.06 * np.max(high - low) * np.array([[0, -1, 0], [1, 0, 0], [0, -1, 0]])
+    azimuth = np.radians(ax.azim)
+    left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
+    farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
+    corners = [low, np.array([high[0], *low[1:]]), farthest]
+    beside = 0.06 * np.max(high - low) * np.array([[0, -1, 0], [1, 0, 0], left])
     centred: Any = {"ha": "center", "va": "center", "zorder": 3}
     for k, name in enumerate("xyz"):
         start, along = corners[k], np.eye(3)[k]
@@ -153,22 +162,21 @@ def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
         draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
     paths = np.array([poses[:, :3, 3].T for poses in ways.values()])
     places = np.concatenate(paths, axis=1).T
-    set_space(ax, np.concatenate([places, *(A[:3, 3] + 0.5 * A[:3, :3].T for A in frames)]), 1.0)
-    _look_across(ax, paths)
+    tips = [A[:3, 3] + A[:3, :3].T for A in frames]
+    set_space(ax, np.concatenate([places, *tips]), 1.5, _across(paths))
     ax.legend(loc="upper left", bbox_to_anchor=(0, 1.1))
     return lines
 
 
-def _look_across(ax: Any, paths: Array) -> None:
-    """Look at the plane in which the paths, shape (n, 3, times), bend away from the chord."""
+def _across(paths: Array) -> tuple[float, float]:
+    """Return from where the plane is seen in which paths, shape (n, 3, times), leave the chord."""
     chord = paths[0, :, -1] - paths[0, :, 0]
     from_start = (paths - paths[:, :, :1]).transpose(0, 2, 1).reshape(-1, 3)
     off = from_start - np.outer(from_start @ chord, chord) / (chord @ chord)
     x, y, z = np.cross(off[np.linalg.norm(off, axis=-1).argmax()], chord)
     up = 1 if z >= 0 else -1
-    ax.view_init(
-        np.degrees(np.arctan2(up * z, np.hypot(x, y))), np.degrees(np.arctan2(up * y, up * x))
-    )
+    elevation, azimuth = np.arctan2(up * z, np.hypot(x, y)), np.arctan2(up * y, up * x)
+    return float(np.degrees(elevation)), float(np.degrees(azimuth))
 
 
 def describe_ways(ways: Mapping[str, Array]) -> str:

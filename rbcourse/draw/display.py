@@ -17,8 +17,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rbcourse.draw.scene import Piece
-from rbcourse.draw.space import flat, scenes
+from rbcourse.draw.scene import Piece, normal_of
+from rbcourse.draw.space import not_in_space, scenes
 
 _SCENE, _DISPLAY = (
     Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")
@@ -90,11 +90,13 @@ class Display(RendererBase):
             for piece in scene.pieces(self):
                 for part in _within(piece, 0.99 * FAR / PARTS):
                     self._keep_piece(room, part)
-        for artist in flat(artists):
+        for artist in not_in_space(artists):
             artist.draw(self)
         return np.concatenate(self._drawn)
 
     def _keep_piece(self, room: int, piece: Piece) -> None:
+        if piece.kind == "face" and not normal_of(np.round(PARTS * piece.places)).any():
+            piece = piece.edge  # it has no area in whole numbers
         polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
         marker = _marker(outline for outlines in polygons for outline in outlines)
         look = *self._style(piece.gc, piece.fill)[:-1], marker, room, piece.kind, piece.zorder

@@ -9,25 +9,25 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from rbcourse.draw.space import flat, scenes
+from rbcourse.draw.space import not_in_space, scenes
 
 Paint = Callable[[Sequence[Any] | None], Image.Image]
 
 
 def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
-    """Draw what does not move, once; return what draws moving artists, and scenes, over it.
+    """Draw what does not move, once; return a function that draws moving artists over it.
 
-    None, for the artists, leaves the scenes away, too.
+    The function draws the scenes of the figure, too; with None instead of artists it draws nothing.
     """
     canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
-    for artist in [*scenes(fig), *flat(moving)]:
+    for artist in [*scenes(fig), *not_in_space(moving)]:
         artist.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(fig.bbox)
 
     def paint(artists: Sequence[Any] | None) -> Image.Image:
         canvas.restore_region(background)
-        for artist in [] if artists is None else [*scenes(fig), *flat(artists)]:
+        for artist in [] if artists is None else [*scenes(fig), *not_in_space(artists)]:
             artist.draw(canvas.get_renderer())
         return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
@@ -39,7 +39,7 @@ def drawn(
 ) -> bytes:
     """Return a figure with only these of its moving artists, so many times as fine, as a PNG.
 
-    None: without scenes, as `painter` has it.
+    With None instead of artists it is the background alone, without scenes.
     """
     before, dpi = fig.canvas, fig.dpi
     fig.set_dpi(zoom * dpi)

@@ -1,7 +1,7 @@
 """Axes for what is in space: lines, letters, marks and the faces of bodies are one scene.
 
 Matplotlib draws one artist in space after the other, so that a line is before or behind all of a
-body. Here all artists become pieces of a scene, which are cut where they pass through one another.
+body. Here all artists become pieces of a scene, which are cut where they pass through faces.
 """
 
 from collections.abc import Iterable
@@ -35,7 +35,7 @@ class Faces(Artist):
 
     Parameters
     ----------
-    corners : array_like, shape (n, k, 3)
+    corners : ndarray, shape (n, k, 3)
         Of each face its corners, one after the other.
     colours : sequence of colours
         Of each face.
@@ -318,7 +318,7 @@ def scenes(fig: Figure) -> list[Scene]:
     return [ax.scene for ax in fig.axes if isinstance(ax, Space)]
 
 
-def flat(artists: Iterable[Any]) -> list[Any]:
+def not_in_space(artists: Iterable[Any]) -> list[Any]:
     """Return those artists that are not in a scene."""
     return [artist for artist in artists if not isinstance(artist, IN_SPACE)]
 

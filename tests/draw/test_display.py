@@ -6,6 +6,7 @@ import pytest
 from displays import polygons, split
 from matplotlib.patches import Annulus, Rectangle
 
+from rbcourse.draw import bodies
 from rbcourse.draw.display import PARTS, Display, joined
 
 
@@ -104,4 +105,19 @@ def test_figures_that_are_too_large_are_refused():
     fig = plt.figure(figsize=(16, 4), dpi=100)
     with pytest.raises(ValueError, match=r"at most 1500 pixels each way wanted, got \(1600, 400\)"):
         Display(fig)
+    plt.close(fig)
+
+
+def test_a_face_that_has_no_area_in_whole_numbers_is_its_edge():
+    """In the browser its plane would part nothing from nothing."""
+    fig = plt.figure(figsize=(3, 3), dpi=100)
+    space = fig.add_subplot(projection="space")
+    space.fit(-np.ones(3), np.ones(3))
+    bodies.draw_box(space, np.eye(4), np.array([1.0, 1.0, 1e-4]))
+    display = Display(fig)
+    found = polygons(display.record([]), list(display.styles))
+    kinds = [style[9] for style, _, _ in found]
+    assert kinds.count("line") == 4
+    for (_, _, places), kind in zip(found, kinds, strict=True):
+        assert kind == "line" or np.linalg.matrix_rank(places - places[0]) == 2
     plt.close(fig)

@@ -231,7 +231,7 @@ def test_titles_and_legends_are_drawn_too_and_nothing_twice(ax):
 def test_what_is_in_space_is_told_from_what_is_not(ax):
     (line,) = ax.plot([0, 1], [0, 1], [0, 1])
     text, box = ax.text2D(0, 0, "flat"), bodies.draw_box(ax, np.eye(4), 1.0)
-    assert space.flat([line, text, box]) == [text]
+    assert space.not_in_space([line, text, box]) == [text]
     assert space.scenes(ax.figure) == [ax.scene]
 
 
