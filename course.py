@@ -78,6 +78,10 @@ def main():
     grade.add_argument("--require-box", action="store_true", help="refuse to grade without a box")
     tasks.add_parser("hostile", help="grade submissions that mean harm; further words go to pytest")
     tasks.add_parser("browser", help="try all pages in Chromium; further words go to pytest")
+    book = tasks.add_parser("book", help="make pages of everything, in book/, to be read anywhere")
+    book.add_argument("--serve", action="store_true", help="show them in the browser")
+    help_ = "where Binder finds the lessons on GitHub"
+    book.add_argument("--repository", default="", metavar="OWNER/NAME", help=help_)
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")
@@ -123,6 +127,10 @@ def main():
         test_in(VENV, "tests/hostile", *further)
     elif known.task == "browser":
         look_in_browser(further)
+    elif known.task == "book":
+        set_up_extra("book")
+        words = ["--repository", known.repository] if known.repository else []
+        run("-m", "rbcourse.book.build", *(words + ["--serve"] * known.serve))
     elif known.task == "ledger":
         run("-m", "rbcourse.course.ledger")
     elif known.task == "bench":
@@ -223,8 +231,10 @@ def write_json(path, content):
 
 
 def look_in_browser(further):
-    """Try every lesson and every explorer in a browser."""
+    """Make the book; try every page, lesson and explorer in a browser."""
     set_up_extra("browser")
+    set_up_extra("book")
+    run("-m", "rbcourse.book.build")
     os.environ["CHROMIUM"] = find_chromium()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     set_up_lab()

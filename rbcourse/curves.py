@@ -160,7 +160,7 @@ class Curve:
 
         Parameters
         ----------
-        t : array_like, shape (..., *batch_shape)
+        t : array_like, shape (...) + batch_shape
             Times in the domain.
         order : {0, 1, 2}, optional
             As for a call.
@@ -552,7 +552,7 @@ def least_over_time(
 ) -> tuple[Array, Array]:
     """Return when a function of time is least, and its value: on 129 times, then refined.
 
-    Times and values have the shape (N, *batch_shape).
+    Times and values have the shape (N,) + batch_shape.
     """
     centre, reach, count = np.full(batch_shape, 0.5), 0.5, 129
     while reach > 1e-15:

@@ -224,7 +224,7 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     Returns
     -------
     ndarray
-        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, |θ|); or a
+        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)); or a
         derivative, accurate to a few eps relative.
 
     Raises

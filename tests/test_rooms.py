@@ -19,6 +19,7 @@ MAY_IMPORT = {  # the rooms, beside the core and itself, that a room may import
     "report": {"draw"},
     "course": None,  # not even the core
     "assignments": {"draw", "course"},
+    "book": {"course", "assignments"},
 }
 LIBRARIES = {
     "core": {"numpy", "scipy"},
@@ -29,6 +30,7 @@ LIBRARIES = {
     "course": {"jupyter_server", "nbclient", "nbformat", "segno", "tornado", "traitlets", "voila"},
     "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}
     | {"nbformat", "nbgrader", "traitlets"},
+    "book": {"nbformat", "pygments"},
 }
 
 

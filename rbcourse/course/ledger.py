@@ -102,26 +102,27 @@ def _headings(root: Path) -> Iterator[tuple[str, str]]:
 
 
 def render(found: dict[str, Entry]) -> str:
-    """Return the ledger as a page."""
+    """Return the ledger in short: the modules and the lessons of each entry."""
     lines = [
         "# Ledger",
         "",
-        "Where each equation, proposition, remark and figure of the two texts is implemented, "
-        "tested and taught, and what is misprinted in our copies of them. Written by "
-        "`python3 course.py ledger` from the docstrings, the marks of the tests and the headings "
-        "of the lessons; not by hand.",
+        "Which modules of `rbcourse/` and which lessons belong to each equation, proposition,",
+        "remark and figure of the two texts, and what is misprinted in our copies of them. Written",
+        "by `python3 course.py ledger`, not by hand. The ledger of the book, which",
+        "`python3 course.py book` makes, links functions, tests, sections and pictures, too.",
     ]
     for text, title in SOURCES["texts"].items():
-        rows = [
-            (key, what, *map(_links, _places(found[key])))
-            for key, what in SOURCES["entries"].items()
-            if key.startswith(text)
-        ]
+        rows = []
+        for key, what in SOURCES["entries"].items():
+            if key.startswith(text):
+                modules = {name.rsplit(".", 1)[0]: None for name in found[key].functions}
+                lessons = {lesson[:2]: None for lesson in found[key].lessons}
+                rows.append((key, what, ", ".join(modules), ", ".join(lessons)))
         lines += ["", f"## {text}: {title}", ""]
-        lines += _table(("", "what", "code", "tests", "lessons"), rows)
+        lines += _table(("", "what", "modules", "lessons"), rows)
     rows = [
-        (number, row["where"], row["printed"], row["holds"], _links(_places(found[key])[1]))
-        for number, (key, row) in enumerate(MISPRINTS.items(), start=1)
+        (key.removeprefix("errata "), row["where"], row["printed"], row["holds"])
+        for key, row in MISPRINTS.items()
     ]
     lines += [
         "",
@@ -130,30 +131,13 @@ def render(found: dict[str, Entry]) -> str:
         "The tests show that the one does not hold, and the other does. (21 only looks like one.)",
         "",
     ]
-    lines += _table(("", "where", "as printed in our copy", "what holds", "tests"), rows)
+    lines += _table(("", "where", "as printed in our copy", "what holds"), rows)
     lines.append("")
     return "\n".join(lines)
 
 
-def _places(entry: Entry) -> list[list[tuple[str, str]]]:
-    """Return name and file of what was found, of each of the three kinds."""
-    places = [(name, *name.rsplit(".", 1)) for name in entry.functions]
-    functions = [(name, f"rbcourse/{module.replace('.', '/')}.py") for name, module, _ in places]
-    tests = [(name, f"tests/{name.split('::')[0]}") for name in entry.tests]
-    lessons = [
-        (f"{name[:2]} {'§ ' * place.isdigit()}{place}", f"notebooks/{name}")
-        for name, place in (lesson.split(", ", 1) for lesson in entry.lessons)
-    ]
-    return [functions, tests, lessons]
-
-
-def _links(found: list[tuple[str, str]]) -> str:
-    return "<br>".join(f"[{name.rpartition('::')[2]}]({file})" for name, file in found)
-
-
-def _table(head: tuple[str, ...], rows: Iterable[Iterable[object]]) -> list[str]:
-    lines = head, ["---"] * len(head), *rows
-    return [f"| {' | '.join(map(str, cells))} |" for cells in lines]
+def _table(head: tuple[str, ...], rows: Iterable[Iterable[str]]) -> list[str]:
+    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
 """Matrices that should be rotations: how they drift, and where repairs take them (lesson 04).
 
 A 2 × 2 matrix is a turn with a stretch plus a mirror with a stretch. As a map of complex numbers it
-takes ζ to z ζ + m ζ*, and the nearest rotation, z/|z|, depends on z alone: the `shadows` are these
-z, and the rotations are the unit circle.
+takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends on z alone: the `shadows`
+are these z, and the rotations are the unit circle.
 """
 
 from collections.abc import Callable, Mapping, Sequence

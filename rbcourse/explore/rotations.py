@@ -83,8 +83,8 @@ def projection_explorer() -> Explorer:
     """Return an explorer of repairs: a matrix pulled away from SO(3), and what two make of it.
 
     Grey: the columns of I + pull · E. Full: the nearest rotation. Dashed: Gram–Schmidt. Controls:
-    the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it ``pull``s, which plays (BK 4,
-    BK Prop. 2, RR 1.4).
+    the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it is pulled, ``pull``, which
+    plays (BK 4, BK Prop. 2, RR 1.4).
     """
     with look():
         fig = new_figure()

@@ -1,0 +1,66 @@
+"""What Sphinx is to do with the sources of the book; it reads this file itself."""
+
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import Any
+
+from rbcourse.book import reference
+from rbcourse.book.places import anchor
+from rbcourse.course.ledger import KEY
+
+project = html_title = "Rigid-body motion"
+author = "The rbcourse authors"
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.linkcode", "sphinx.ext.mathjax"]
+extensions += ["numpydoc"]
+
+nb_execution_mode = "off"
+nb_merge_streams = True
+myst_enable_extensions = ["amsmath", "dollarmath"]
+# what other packages describe, and a page of JavaScript
+autodoc_default_options = {"exclude-members": "ENGINE, capture_log, read, set"}
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+toc_object_entries = False  # the navigation of each page would hold them all
+
+html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["book.css"]
+html_favicon = "static/favicon.svg"
+html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
+html_show_search_summary = False  # pages of a folder may not read each other
+mathjax_path = "tex-svg.js"
+
+
+def name_sections(_app: Any, doctree: Any) -> None:
+    """Give the headings of lessons addresses that stay: ``#s3`` for section 3."""
+    if Path(doctree["source"]).parent.name == "lessons":
+        for section in doctree.findall(lambda node: node.tagname == "section"):
+            section["ids"] = [reference.fragment(section.children[0].astext())]
+
+
+def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:
+    """Link the keys of a docstring to the ledger, and add the tests of a function."""
+    for i, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            lines[i] = KEY.sub(lambda key: f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__", line)
+    if what not in ("function", "class"):
+        return
+    if tests := reference.tests_of(name.removeprefix("rbcourse."), app.config.tests):
+        links = [reference.to_test(test, "package/so3.html") for test in tests]
+        lines += ["", ".. raw:: html", "", f"   {reference.folded('tests', links)}", ""]
+
+
+def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
+    """Return where the source of an object is."""
+    name = found["fullname"].partition(".")[0]
+    return f"../code/{found['module'].replace('.', '/')}.html#{name}"
+
+
+def setup(app: Any) -> None:
+    """Add MathJax, and what these functions do, before the contents of a page are collected."""
+    scripts = distribution("sphinx-mathjax-offline")
+    path = scripts.locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
+    app.config.html_static_path.append(str(path))
+    app.add_config_value("tests", reference.naming(Path()), "")
+    app.connect("doctree-read", name_sections, priority=400)
+    app.connect("autodoc-process-docstring", join_ledger, priority=900)

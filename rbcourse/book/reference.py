@@ -1,0 +1,279 @@
+"""Pages about the package, its tests, its figures, and the ledger that joins them."""
+
+import ast
+import html
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from rbcourse.book.lessons import Figure
+from rbcourse.book.places import address, anchor, link, source_of, with_keys
+from rbcourse.course.ledger import MISPRINTS, SOURCES, Entry
+
+HOUSE = {
+    "Rotations and poses": "so3 quaternion conversions se3",
+    "Projection, sampling, metrics": "projection sampling metrics",
+    "Curves": "curves projected_line projected_cubic rivals optimum shooting motions paths cost",
+    "The plane": "planar arm",
+    "On the board, and in files": "textbook files report",
+}
+"""The modules that are flat in the package, in the order of the house."""
+ROOMS = {
+    "draw": "Pictures",
+    "explore": "Explorers",
+    "study": "The atlas",
+    "course": "Lessons run and shown",
+    "assignments": "Problem sets",
+    "book": "This book",
+}
+"""Its rooms."""
+_ENTRIES = {"": 8, "what": 20, "functions": 30, "tests": 14, "lessons": 9, "pictures": 19}
+_MISPRINTS = {"": 8, "where": 14, "as printed in our copy": 29, "what holds": 29, "tests": 20}
+
+
+def modules(root: Path) -> dict[str, list[str]]:
+    """Return the public modules under the headings of the house, by their dotted names."""
+    package = root / "rbcourse"
+    groups = {title: names.split() for title, names in HOUSE.items()}
+    for room, title in ROOMS.items():
+        paths = sorted((package / room).rglob("*.py"))
+        names = [".".join(path.relative_to(package).with_suffix("").parts) for path in paths]
+        groups[title] = [name for name in names if not re.search(r"\b(_|conf$|problems\b)", name)]
+    return groups
+
+
+def module_page(name: str, root: Path) -> str:
+    """Return the page of a module: what is in it, and its docstrings, which Sphinx reads."""
+    source = (root / "rbcourse" / f"{name.replace('.', '/')}.py").read_text(encoding="utf-8")
+    public = [
+        node.name
+        for node in ast.parse(source).body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_"
+    ]
+    listed = " · ".join(
+        f'<a href="#rbcourse.{name}.{each}"><code>{each}</code></a>' for each in public
+    )
+    return (
+        f"{name}\n{'=' * len(name)}\n\n"
+        f'.. raw:: html\n\n   <p class="listed">{listed}</p>\n\n'
+        f".. automodule:: rbcourse.{name}\n   :members:\n   :member-order: bysource\n"
+    )
+
+
+def module_tables(groups: dict[str, list[str]], root: Path) -> str:
+    """Return the modules with what each is for, and the contents of their folder."""
+    lines = []
+    for title, names in groups.items():
+        lines += [f"## {title}", "", "| module | |", "|---|---|"]
+        for name in names:
+            source = (root / "rbcourse" / f"{name.replace('.', '/')}.py").read_text("utf-8")
+            first = (ast.get_docstring(ast.parse(source)) or "").splitlines()[0]
+            lines.append(f"| [{name}]({name}.rst) | {first} |")
+        lines += ["", "```{toctree}", ":hidden:", "", *names, "```", ""]
+    return "\n".join(lines)
+
+
+def shown_code(root: Path) -> list[Path]:
+    """Return the files with a page in the folder ``code``: none that answers a problem."""
+    paths = [*(root / "rbcourse").rglob("*.py"), *(root / "tests").rglob("test_*.py")]
+    hidden = root / "rbcourse/assignments/problems", root / "tests/assignments"
+    return sorted(path for path in paths if not any(map(path.is_relative_to, hidden)))
+
+
+def _tests(source: str) -> Iterator[ast.FunctionDef]:
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            yield node
+
+
+def naming(root: Path) -> dict[str, list[str]]:
+    """Return for each function of the package the tests of its module that name it.
+
+    Both as the ledger has them: ``so3.exp_so3``, ``test_so3.py::test_exp``.
+    """
+    found = defaultdict(list)
+    tests = root / "tests"
+    for path in (path for path in shown_code(root) if path.is_relative_to(tests)):
+        place = path.relative_to(tests).as_posix()
+        for test in _tests(path.read_text(encoding="utf-8")):
+            nodes = list(ast.walk(test))
+            names = {node.id for node in nodes if isinstance(node, ast.Name)}
+            names |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+            for name in names:
+                found[name].append(f"{place}::{test.name}")
+    return found
+
+
+def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
+    """Return the tests of a function: those for its module that name it, otherwise all that do."""
+    *room, module, function = name.split(".")
+    own = "/".join([*room, f"test_{module}"])
+    found = named.get(function, [])
+    return [test for test in found if test.startswith(own)] or found
+
+
+def to_test(test: str, page: str) -> str:
+    """Return a link to a test."""
+    path, name = test.removesuffix(".py").split(".py::")
+    return link(f"code/tests/{path}.html#{name}", page, name.replace("_", "_<wbr>"))
+
+
+def to_function(name: str, page: str) -> str:
+    """Return a link to a function: to its docstring, of what is private to its code."""
+    module, _, own = name.rpartition(".")
+    path = f"rbcourse/{module.replace('.', '/')}"
+    to = address(source_of(f"{path}.py") or "", f"rbcourse.{name}")
+    if module.startswith("_"):
+        to = f"code/{path}.html#{own}"
+    text = name.replace(".", ".<wbr>").replace("_", "_<wbr>")
+    return link(to, page, f"<code>{text}</code>")
+
+
+def to_section(place: str, page: str) -> str:
+    """Return a link to a section of a lesson, as the ledger names it."""
+    file, section = place.split(", ", 1)
+    source = source_of(f"notebooks/{file}") or ""
+    text = f"{file[:2]} {'§ ' * section.isdigit()}{section}"
+    return link(address(source, fragment(section)), page, text)
+
+
+def fragment(heading: str) -> str:
+    """Return the part of an address that stands for a heading of a lesson, or for its number.
+
+    Examples
+    --------
+    >>> [fragment(x) for x in ("3", "3 · Angular velocity", "Exercise 2, on paper", "Recap")]
+    ['s3', 's3', 'exercise-2', 'recap']
+    """
+    if number := re.match(r"(\d+)(?: ·|$)", heading):
+        return f"s{number[1]}"
+    if numbered := re.match(r"(\w+ \d+)\b", heading):
+        heading = numbered[1]
+    return re.sub(r"\W+", "-", heading.lower()).strip("-")
+
+
+def pictures_of(entry: Entry, key: str, figures: Iterable[Figure]) -> list[Figure]:
+    """Return the figures in the sections that teach an entry; of a figure, those it is."""
+    if figure := re.fullmatch(r"(BK|RR) Fig\. (\d+)", key):
+        own = re.compile(rf"{ {'BK': 'paper', 'RR': 'report'}[figure[1]] }_fig{figure[2]}[a-z]?")
+        if drawn := [each for each in figures if own.fullmatch(each.name)]:
+            return drawn
+    return [each for each in figures if f"{each.lesson}.ipynb, {each.section}" in entry.lessons]
+
+
+def ledger_tables(found: dict[str, Entry], figures: list[Figure]) -> str:
+    """Return the ledger, each row with an anchor."""
+    page, lines = "ledger.md", []
+    for text, title in SOURCES["texts"].items():
+        keys = [key for key in SOURCES["entries"] if key.startswith(text)]
+        rows = [_row(key, found[key], pictures_of(found[key], key, figures), page) for key in keys]
+        lines += [f"## {text}: {title}", "", *_table(_ENTRIES, rows)]
+    misprints = [
+        (
+            _named(key, key.replace("errata", "misprint")),
+            with_keys(row["where"], page),
+            row["printed"],
+            row["holds"],
+            folded("tests", [to_test(name, page) for name in found[key].tests]),
+        )
+        for key, row in MISPRINTS.items()
+    ]
+    said = (
+        "The tests show that the one does not hold, and the other does. (21 only looks like one.)"
+    )
+    return "\n".join([*lines, "## Misprints", "", said, "", *_table(_MISPRINTS, misprints)])
+
+
+def _row(key: str, entry: Entry, drawn: list[Figure], page: str) -> tuple[str, ...]:
+    return (
+        _named(key, key),
+        SOURCES["entries"][key],
+        _lines(to_function(name, page) for name in entry.functions),
+        folded("tests", [to_test(name, page) for name in entry.tests]),
+        _lines(to_section(place, page) for place in entry.lessons),
+        _lines(link(f"figures.html#{figure.name}", page, figure.name) for figure in drawn),
+    )
+
+
+def _named(key: str, text: str) -> str:
+    """Return the first cell of a row: its anchor, its text, and an entry of the index."""
+    return f'<a class="row" id="{anchor(key)}" href="#{anchor(key)}">{{index}}`!{text}`</a>'
+
+
+def _lines(links: Iterable[str]) -> str:
+    return "<br>".join(links)
+
+
+def folded(what: str, links: list[str]) -> str:
+    """Return links that are shown when they are asked for; a single one as it is."""
+    if len(links) < 2:
+        return "".join(links)
+    return f"<details><summary>{len(links)} {what}</summary>{_lines(links)}</details>"
+
+
+def _table(shares: dict[str, int], rows: Iterable[tuple[str, ...]]) -> list[str]:
+    widths = " ".join(map(str, shares.values()))
+    lines = ["```{list-table}", ":class: ledger", ":header-rows: 1", f":widths: {widths}", ""]
+    for row in (shares, *rows):
+        lines += [f"{'* ' if not i else '  '}- {cell}".rstrip() for i, cell in enumerate(row)]
+    return [*lines, "```", ""]
+
+
+def gallery(figures: list[Figure], root: Path) -> str:
+    """Return each figure with its files and the lines that draw it."""
+    groups: dict[str, list[Figure]] = defaultdict(list)
+    for figure in sorted(figures, key=lambda figure: figure.name):
+        groups[figure.name.partition("_")[0]].append(figure)
+    lines = []
+    for title, start in (("The paper (BK)", "paper"), ("The report (RR)", "report")):
+        lines += [f"## {title}", ""]
+        lines += [line for figure in groups.pop(start) for line in _figure(figure, root)]
+    lines += ["## The lessons", ""]
+    lines += [line for some in groups.values() for each in some for line in _figure(each, root)]
+    return "\n".join(lines)
+
+
+def _figure(figure: Figure, root: Path) -> list[str]:
+    page, endings = "figures.md", ("png", "pdf", "csv", "gif")
+    there = [e for e in endings if (root / "figures" / f"{figure.name}.{e}").exists()]
+    files = " · ".join(link(f"figures/{figure.name}.{e}", page, e.upper()) for e in there)
+    place = f"{figure.lesson}.ipynb, {figure.section or 'Is the machine ready?'}"
+    number = re.fullmatch(r"(paper|report)_fig(\w+)", figure.name)
+    title = f"{number[1].capitalize()}, Figure {number[2]}: " if number else ""
+    return [
+        f'<a id="{figure.name}"></a>',
+        "",
+        f"### {title}{figure.name}",
+        "",
+        f'<img class="figure" loading="lazy" src="figures/{figure.name}.png" alt="{figure.name}">',
+        "",
+        f"<p>{html.escape(figure.text)}</p>",
+        "",
+        f"{files} · lesson {to_section(place, page)}",
+        "",
+        "<details><summary>The lines that draw it</summary>",
+        "",
+        "```python",
+        figure.lines,
+        "```",
+        "",
+        "</details>",
+        "",
+    ]
+
+
+def folded_answers(text: str) -> str:
+    """Return the page of questions with the answers of each in something that opens."""
+    answers = re.compile(r"^#### Answers\n(.*?)(?=^#|\Z)", re.MULTILINE | re.DOTALL)
+    shown = r'<details class="answer"><summary>Answers</summary>\n\n\1\n</details>\n\n'
+    return answers.sub(shown, text)
+
+
+def works(cited: dict[str, list[str]]) -> str:
+    """Return the works that the lessons cite, from what stands at the end of each."""
+    found = defaultdict(list)
+    for lesson, lines in cited.items():
+        for line in lines:
+            found[line].append(to_section(f"{lesson}.ipynb, References", "references.md"))
+    return "\n".join(f"{line} Lesson {', '.join(found[line])}." for line in sorted(found))
