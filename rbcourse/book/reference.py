@@ -235,9 +235,12 @@ def gallery(figures: list[Figure], root: Path) -> str:
 
 
 def _figure(figure: Figure, root: Path) -> list[str]:
-    page, endings = "figures.md", ("png", "pdf", "csv", "gif")
-    there = [e for e in endings if (root / "figures" / f"{figure.name}.{e}").exists()]
-    files = " · ".join(link(f"figures/{figure.name}.{e}", page, e.upper()) for e in there)
+    page, folder = "figures.md", root / "figures"
+    files = {f"{figure.name}.{ending}": ending.upper() for ending in ("png", "pdf", "csv", "gif")}
+    for path in sorted(folder.glob(f"{re.sub('[a-z]$', '', figure.name)}_*.csv")):
+        if not path.with_suffix(".png").exists():  # a table that belongs to several figures
+            files[path.name] = path.name
+    there = [link(f"figures/{x}", page, files[x]) for x in files if (folder / x).exists()]
     place = f"{figure.lesson}.ipynb, {figure.section or 'Is the machine ready?'}"
     number = re.fullmatch(r"(paper|report)_fig(\w+)", figure.name)
     title = f"{number[1].capitalize()}, Figure {number[2]}: " if number else ""
@@ -250,7 +253,7 @@ def _figure(figure: Figure, root: Path) -> list[str]:
         "",
         f"<p>{html.escape(figure.text)}</p>",
         "",
-        f"{files} · lesson {to_section(place, page)}",
+        f"{' · '.join(there)} · lesson {to_section(place, page)}",
         "",
         "<details><summary>The lines that draw it</summary>",
         "",

@@ -55,6 +55,11 @@ def parsed():
     return {name: Page(name) for name in PAGES}
 
 
+def test_the_book_is_there():
+    assert {"index.html", "ledger.html", "lessons/06_geodesics.html"} <= set(PAGES)
+    assert len(LIVING) >= 14
+
+
 def test_every_link_leads_somewhere(parsed):
     broken = []
     for name, page in parsed.items():

@@ -1,0 +1,57 @@
+"""The sources of the book, and the folder that it is written to."""
+
+from pathlib import Path
+
+import pytest
+
+from rbcourse.assignments.handout import REGION
+from rbcourse.book import build
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("book")
+    build.write_sources(ROOT, folder / "sources", folder / "extra", "us/course")
+    return folder
+
+
+def test_the_sources_have_all_parts(written):
+    pages = {p.relative_to(written / "sources").as_posix() for p in written.rglob("sources/**/*")}
+    assert {
+        *("index.md", "install.md", "ledger.md", "figures.md", "references.md", "conventions.md"),
+        *("changelog.md", "contributing.md", "lessons/index.md", "lessons/06_geodesics.ipynb"),
+        *("teach/06_geodesics.md", "teach/questions.md", "teach/problem_sets.md"),
+        *("problems/ps1.ipynb", "package/index.md", "package/draw.save.rst", "files/LICENSE"),
+    } <= pages
+    extra = {path.relative_to(written / "extra").as_posix() for path in written.rglob("extra/**/*")}
+    assert {"figures/paper_fig5a.csv", "lessons/06_geodesics.ipynb"} <= extra
+    assert "code/tests/test_so3.html" in extra
+    assert "figures/explorers" not in extra
+
+
+def test_problem_sets_come_without_solutions(written):
+    source = (ROOT / "notebooks/assignments/source/ps1/ps1.ipynb").read_text("utf-8")
+    assert "BEGIN SOLUTION" in source
+    for path in (written / "sources/problems").iterdir():
+        text = path.read_text("utf-8")
+        assert "YOUR CODE HERE" in text
+        assert "SOLUTION" not in text
+        assert "HIDDEN" not in text
+        assert not REGION.search(text)
+
+
+def test_no_place_in_a_page_is_left_empty(written):
+    for path in (written / "sources").rglob("*.md"):
+        assert "$lessons" not in path.read_text("utf-8")
+    assert "mybinder.org/v2/gh/us/course" in (written / "sources/lessons/01_plane.ipynb").read_text(
+        "utf-8"
+    )
+
+
+def test_a_folder_that_is_no_book_is_left_alone(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(ValueError, match="is no book that was made here"):
+        build.build(ROOT, tmp_path)
+    assert (tmp_path / "mine.txt").read_text() == "mine"
