@@ -183,9 +183,16 @@ def build(root: Path, book: Path, repository: str = "") -> None:
     print(f"{book / 'index.html'}: {len(list(book.rglob('*.html')))} pages, {size / 1e6:.1f} MB")
 
 
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    """Serves files and does not tell of each."""
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
 def serve(book: Path) -> None:
     """Show the book in a browser, from this machine, until Ctrl-C."""
-    handler = partial(http.server.SimpleHTTPRequestHandler, directory=str(book))
+    handler = partial(_Quiet, directory=str(book))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         address = f"http://127.0.0.1:{server.server_port}/"
         print(f"The book is at {address}. Stop it here, with Ctrl-C.", flush=True)

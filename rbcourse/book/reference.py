@@ -88,10 +88,7 @@ def _tests(source: str) -> Iterator[ast.FunctionDef]:
 
 
 def naming(root: Path) -> dict[str, list[str]]:
-    """Return for each function of the package the tests of its module that name it.
-
-    Both as the ledger has them: ``so3.exp_so3``, ``test_so3.py::test_exp``.
-    """
+    """Return for each name the tests that name it, such as ``test_so3.py::test_exp``."""
     found = defaultdict(list)
     tests = root / "tests"
     for path in (path for path in shown_code(root) if path.is_relative_to(tests)):
@@ -115,7 +112,7 @@ def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
 
 def to_test(test: str, page: str) -> str:
     """Return a link to a test."""
-    path, name = test.removesuffix(".py").split(".py::")
+    path, name = test.split(".py::")
     return link(f"code/tests/{path}.html#{name}", page, name.replace("_", "_<wbr>"))
 
 
