@@ -151,13 +151,19 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
     }
     if taken := files.keys() & own.keys():
         raise ValueError(f"{name}: {min(taken)} is a name that the handout needs")
+    packed = pack({f"{name}/{path}": data for path, data in {**files, **own}.items()})
+    return write_whole(assignments / "handouts" / f"{name}.zip", packed)
+
+
+def pack(files: dict[str, bytes]) -> bytes:
+    """Return files as a zip, the same bytes each time."""
     packed = io.BytesIO()
     with ZipFile(packed, "w") as archive:
-        for path, data in sorted({**files, **own}.items()):
-            entry = ZipInfo(f"{name}/{path}")  # of the first day a zip knows
+        for path, data in sorted(files.items()):
+            entry = ZipInfo(path)  # of the first day a zip knows
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
-    return write_whole(assignments / "handouts" / f"{name}.zip", packed.getvalue())
+    return packed.getvalue()
 
 
 def make_solutions(name: str, assignments: Path) -> Path:

@@ -16,7 +16,7 @@ from string import Template
 
 import nbformat
 
-from rbcourse.assignments.handout import release
+from rbcourse.assignments.handout import pack, release
 from rbcourse.book import reference
 from rbcourse.book.code import code_page
 from rbcourse.book.lessons import (
@@ -34,6 +34,12 @@ from rbcourse.course import ledger
 from rbcourse.course.notebooks import lesson_paths
 
 HERE = Path(__file__).parent
+_NOT_TAKEN = r"\.|conftest\.py|.*\.(pyc|part)$"
+_TO_READ = (
+    "*Here to be read. To work on it, take the zip from who teaches you; who teaches makes it by* "
+    "`python3 course.py handout {name}`."
+)
+_TAKE = "(green button *Code*, *Download ZIP*, then unpack; or `git clone`)"
 MADE = "made-by-course.txt"
 """A file in the book by which it is known as one."""
 
@@ -75,7 +81,8 @@ class Sources:
             page, notebook = f"lessons/{path.name}", nbformat.read(path, as_version=4)
             title = notebook.cells[0].source.splitlines()[0].removeprefix("# ")
             short = f"{path.stem[:2]} {title.partition(':')[0]}"
-            lessons.append(f"{short} <lessons/{path.stem}>")
+            if path.stem != "00_start_here":  # it is about the installation
+                lessons.append(f"{short} <lessons/{path.stem}>")
             figures += figures_of(path.stem, notebook)
             cited[path.stem] = cited_in(notebook)
             shown, sheet = prepared(f"notebooks/{path.name}", page, self.root, pictures)
@@ -83,7 +90,7 @@ class Sources:
             if sheet:
                 sheets.append(f"{short} <{path.stem}>")
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
-            _write(self.extra / page, nbformat.writes(without_outputs(notebook)))
+            _write(self.extra / page, nbformat.writes(without_outputs(notebook)) + "\n")
         self.shown |= {
             "lessons": "\n".join(lessons),
             "sheets": "\n".join(sheets),
@@ -96,7 +103,11 @@ class Sources:
         assignments = self.root / "notebooks" / "assignments"
         names = sorted(path.name for path in (assignments / "source").iterdir())
         for name in names:
-            self.put(f"problems/{name}.ipynb", release(name, assignments)[f"{name}.ipynb"].decode())
+            released = release(name, assignments)[f"{name}.ipynb"].decode()
+            notebook = nbformat.reads(released, as_version=4)
+            title, _, rest = notebook.cells[0].source.partition("\n")
+            notebook.cells[0].source = f"{title}\n\n{_TO_READ.format(name=name)}\n{rest}"
+            self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
         sets = [f"Problem set {name[2:]} <problems/{name}>" for name in names]
         links = [f"- [](../problems/{name}.ipynb)" for name in names]
         self.shown |= {"sets": "\n".join(sets), "set_links": "\n".join(links)}
@@ -126,6 +137,10 @@ class Sources:
                 rows = re.findall(r"^\| \[\d\d .*", text, re.MULTILINE)
                 self.shown["table"] = relinked("\n".join(rows), path, "lessons/index.md")
                 text = "# Install and run\n\n" + text[text.index("## Run") :]
+                take = '(<a href="course.zip">course.zip</a>, then unpack'
+                if self.repository:
+                    take += f"; or `git clone https://github.com/{self.repository}`"
+                text = text.replace(_TAKE, f"{take})")
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             self.put(page, relinked(text, path, page))
@@ -133,6 +148,21 @@ class Sources:
             for target in re.findall(r"\]\((?:\.\./)*(files/[^)]+)\)", source.read_text("utf-8")):
                 content = self.read(target.removeprefix("files/"))
                 self.put(target, content)
+
+    def put_course(self) -> None:
+        """Write ``course.zip``, which runs: the package, the lessons and `course.py`.
+
+        Left out are problem sets, which have solutions, the tests, and what the lessons draw.
+        """
+        there = [*self.root.glob("*.*"), *(self.root / "rbcourse").rglob("*.*")]
+        there += [*(self.root / "benchmarks").glob("*.*"), *(self.root / "notebooks").glob("*.*")]
+        names = [path.relative_to(self.root).as_posix() for path in there if path.is_file()]
+        names = [name for name in [*names, "LICENSE"] if not re.match(_NOT_TAKEN, name)]
+        files = {name: (self.root / name).read_bytes() for name in names}
+        for path in (self.extra / "lessons").glob("*.ipynb"):
+            files[f"notebooks/{path.name}"] = path.read_bytes()
+        packed = pack({f"rbcourse/{name}": content for name, content in files.items()})
+        (self.extra / "course.zip").write_bytes(packed)
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""
@@ -154,6 +184,7 @@ def write_sources(root: Path, folder: Path, extra: Path, repository: str = "") -
     sources.put_problem_sets()
     sources.put_package(figures)
     sources.put_files()
+    sources.put_course()
     sources.put_fronts()
 
 

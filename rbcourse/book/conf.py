@@ -10,6 +10,7 @@ from rbcourse.course.ledger import KEY
 
 project = html_title = "Rigid-body motion"
 author = "The rbcourse authors"
+default_role = "py:obj"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.linkcode", "sphinx.ext.mathjax"]
 extensions += ["numpydoc"]
 
@@ -17,7 +18,7 @@ nb_execution_mode = "off"
 nb_merge_streams = True
 myst_enable_extensions = ["amsmath", "dollarmath"]
 # what other packages describe, and a page of JavaScript
-autodoc_default_options = {"exclude-members": "ENGINE, capture_log, read, set"}
+autodoc_default_options = {"exclude-members": "ENGINE, capture_log, per_curve, read, set"}
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 toc_object_entries = False  # the navigation of each page would hold them all
@@ -50,6 +51,23 @@ def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str
         lines += ["", ".. raw:: html", "", f"   {reference.folded('tests', links)}", ""]
 
 
+def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
+    """Return a link for a name that stands in another module."""
+    from sphinx.util.nodes import make_refnode
+
+    kinds = ("class", "data", "exception", "function")
+    ending = f".{node['reftarget']}"
+    found = [
+        (name, entry.docname)
+        for name, entry in env.domains["py"].objects.items()
+        if name.endswith(ending) and entry.objtype in kinds and ".textbook." not in name
+    ]
+    if len(found) != 1 or node["refdomain"] != "py":
+        return None
+    ((name, page),) = found
+    return make_refnode(app.builder, node["refdoc"], page, name, content)
+
+
 def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
     """Return where the source of an object is."""
     name = found["fullname"].partition(".")[0]
@@ -64,3 +82,4 @@ def setup(app: Any) -> None:
     app.add_config_value("tests", reference.naming(Path()), "")
     app.connect("doctree-read", name_sections, priority=400)
     app.connect("autodoc-process-docstring", join_ledger, priority=900)
+    app.connect("missing-reference", find_anywhere)

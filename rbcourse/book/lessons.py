@@ -13,11 +13,15 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 
 from rbcourse.book.places import relinked, with_keys
+from rbcourse.course.notebooks import lesson_paths
 
 SHEET = "## Run sheet for the lecturer"
 _PICTURE = re.compile(r'(?P<before><img\b[^>]*?) src="data:image/png;base64,(?P<content>[^"]+)"')
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
 _APART = re.compile(r"(the lecturer's) (run sheets?) (is|are) at the end")
+_FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
+_LESSON = re.compile(r"\b(lesson (\d+))\b")
+_CONTROL = re.compile(r'\{"label":"([^"]+)"')
 _EXPLORER = re.compile(r"explore\.(\w+)_explorer\(\)")
 
 
@@ -135,6 +139,23 @@ class Pictures:
         return f'{before} loading="lazy" src="{self._known[content]}"'
 
 
+def with_files(shown: str) -> str:
+    """Return a figure whose caption links its files; a still leads to its picture in full size."""
+
+    def put(caption: re.Match[str]) -> str:
+        endings = caption[2].split(", ")
+        files = [f"{caption[1] * (not i)}{ending}" for i, ending in enumerate(endings)]
+        linked = [
+            f'<a href="../figures/{caption[1]}{ending}">{text}</a>'
+            for ending, text in zip(endings, files, strict=True)
+        ]
+        return f"<small>{', '.join(linked)}</small>"
+
+    if "<script" not in shown:
+        shown = re.sub(r'(<img [^>]*src="([^"]+)"[^>]*>)', r'<a href="\2">\1</a>', shown)
+    return _FILES.sub(put, shown)
+
+
 def living(name: str, root: Path) -> str:
     """Return an explorer that moves without Python, as HTML."""
     page = (root / "figures" / "explorers" / f"{name}.html").read_text(encoding="utf-8")
@@ -145,20 +166,29 @@ def prepared(path: str, page: str, root: Path, pictures: Pictures) -> tuple[Note
     """Return a lesson as the book shows it, and its run sheet."""
     notebook = nbformat.read(root / path, as_version=4)
     cells, sheet = split_sheet(notebook)
+    names = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
+
+    def to_lesson(match: re.Match[str]) -> str:
+        name = names.get(int(match[2]))
+        return f"[{match[1]}]({name})" if name else match[1]
+
     for cell in cells:
         if cell.cell_type == "markdown":
             lines = cell.source.split("\n")
             keyed = [with_keys(x, page) if x.startswith("<small>") else x for x in lines]
-            text = relinked("\n".join(keyed), path, page)
+            text = _LESSON.sub(to_lesson, "\n".join(keyed))
+            text = relinked(text, path, page)
             cell.source = _APART.sub(rf"\1 [\2](../teach/{Path(path).stem}.md) \3 apart", text)
             continue
         explorer = _EXPLORER.search(cell.source)
         for output in cell.outputs:
             shown = output.get("data", {})
             if explorer and "text/html" in shown:
-                shown["text/html"] = living(explorer[1], root)
+                figure = living(explorer[1], root)
+                moved = " and ".join(f"<b>{label}</b>" for label in _CONTROL.findall(figure))
+                shown["text/html"] = f"<p>Here two of its controls move: {moved}.</p>{figure}"
             if "text/html" in shown:
-                shown["text/html"] = pictures.taken_out(shown["text/html"])
+                shown["text/html"] = with_files(pictures.taken_out(shown["text/html"]))
     notebook.cells = folded(cells)
     return notebook, relinked(sheet, path, f"teach/{Path(path).stem}.md")
 
@@ -171,5 +201,6 @@ def with_buttons(notebook: NotebookNode, name: str, repository: str) -> Notebook
         lesson = quote(f"notebooks/{name}", safe="")
         binder = f"https://mybinder.org/v2/gh/{repository}/HEAD?labpath={lesson}"
         ways.append(f'<a href="{binder}">Run it in Binder</a>')
+    title = f"# {name[:2]} · {title.removeprefix('# ')}"
     notebook.cells[0].source = f'{title}\n\n<p class="buttons">{" ".join(ways)}</p>\n{rest}'
     return notebook

@@ -23,11 +23,13 @@ ROOMS = {
     "draw": "Pictures",
     "explore": "Explorers",
     "study": "The atlas",
-    "course": "Lessons run and shown",
-    "assignments": "Problem sets",
-    "book": "This book",
+    "course": "For maintainers: lessons run and shown",
+    "assignments": "For maintainers: problem sets",
+    "book": "For maintainers: this book",
 }
 """Its rooms."""
+MAINTAINED = ("course", "assignments", "book")
+"""Rooms for who works on the course: their pages are neither in the contents nor in the search."""
 _ENTRIES = {"": 8, "what": 20, "functions": 30, "tests": 14, "lessons": 9, "pictures": 19}
 _MISPRINTS = {"": 8, "where": 14, "as printed in our copy": 29, "what holds": 29, "tests": 20}
 
@@ -54,7 +56,8 @@ def module_page(name: str, root: Path) -> str:
     listed = " · ".join(
         f'<a href="#rbcourse.{name}.{each}"><code>{each}</code></a>' for each in public
     )
-    return (
+    hidden = ":orphan:\n:nosearch:\n\n" if name.split(".")[0] in MAINTAINED else ""
+    return hidden + (
         f"{name}\n{'=' * len(name)}\n\n"
         f'.. raw:: html\n\n   <p class="listed">{listed}</p>\n\n'
         f".. automodule:: rbcourse.{name}\n   :members:\n   :member-order: bysource\n"
@@ -70,7 +73,8 @@ def module_tables(groups: dict[str, list[str]], root: Path) -> str:
             source = (root / "rbcourse" / f"{name.replace('.', '/')}.py").read_text("utf-8")
             first = (ast.get_docstring(ast.parse(source)) or "").splitlines()[0]
             lines.append(f"| [{name}]({name}.rst) | {first} |")
-        lines += ["", "```{toctree}", ":hidden:", "", *names, "```", ""]
+        outer = [name for name in names if name.split(".")[0] not in MAINTAINED]
+        lines += ["", "```{toctree}", ":hidden:", "", *outer, "```", ""]
     return "\n".join(lines)
 
 

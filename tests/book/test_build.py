@@ -1,6 +1,8 @@
 """The sources of the book, and the folder that it is written to."""
 
+import json
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -40,6 +42,21 @@ def test_problem_sets_come_without_solutions(written):
         assert "SOLUTION" not in text
         assert "HIDDEN" not in text
         assert not REGION.search(text)
+
+
+def test_the_course_comes_along_without_answers_to_problems(written):
+    with ZipFile(written / "extra/course.zip") as archive:
+        names = {name.removeprefix("rbcourse/") for name in archive.namelist()}
+        lesson = json.loads(archive.read("rbcourse/notebooks/06_geodesics.ipynb"))
+    assert {"course.py", "environment.txt", "pyproject.toml", "LICENSE", "README.md"} <= names
+    assert {"rbcourse/so3.py", "rbcourse/py.typed", "benchmarks/benchmarks.csv"} <= names
+    assert not any(name.startswith(("notebooks/assignments", "tests", "figures")) for name in names)
+    assert not any("__pycache__" in name or name.startswith(".") for name in names)
+    assert all(cell.get("outputs", []) == [] for cell in lesson["cells"])
+    install = (written / "sources/install.md").read_text("utf-8")
+    assert '<a href="course.zip">' in install
+    assert "git clone https://github.com/us/course" in install
+    assert "green button" not in install
 
 
 def test_no_place_in_a_page_is_left_empty(written):

@@ -18,6 +18,7 @@ from rbcourse.book.lessons import (
     prepared,
     split_sheet,
     with_buttons,
+    with_files,
     without_outputs,
 )
 from rbcourse.course.notebooks import lesson_paths
@@ -97,6 +98,33 @@ def test_pictures_become_files_and_figures_are_not_written_twice(tmp_path):
     assert "base64" not in found
 
 
+def test_a_caption_links_its_files_and_a_still_its_picture():
+    small = "<figcaption>A turn. <small>turn.png, .csv</small></figcaption></figure>"
+    still = f'<figure><img width="3" src="../figures/turn.png"/>{small}'
+    linked = '<small><a href="../figures/turn.png">turn.png</a>, '
+    linked += '<a href="../figures/turn.csv">.csv</a></small>'
+    found = with_files(still)
+    assert '<a href="../figures/turn.png"><img width="3" src="../figures/turn.png"/></a>' in found
+    assert linked in found
+    player = f'<figure><img src="pictures/0.png"/>{small}<script>1</script>'
+    assert "<figure><img" in with_files(player)
+    assert linked in with_files(player)
+
+
+def test_a_lesson_that_is_named_is_linked(tmp_path):
+    page, _ = prepared(
+        "notebooks/06_geodesics.ipynb",
+        "lessons/06_geodesics.ipynb",
+        ROOT,
+        Pictures(ROOT, tmp_path),
+    )
+    assert "([lesson 3](03_rotations_in_space.ipynb))" in page.cells[0].source
+    assert "[run sheet](../teach/06_geodesics.md) is apart" in page.cells[0].source
+    explorers = [c for c in page.cells if "explore.theta_explorer()" in c.source]
+    shown = explorers[0].outputs[0]["data"]["text/html"]
+    assert shown.startswith("<p>Here two of its controls move: <b>")
+
+
 def test_the_figures_of_a_lesson_have_their_sections_and_lines():
     lines = 'save_animation(\n    fig, "lesson01_way", data, alt)'
     data = {"text/plain": "lesson01_way: A way.", "text/html": "…"}
@@ -137,7 +165,7 @@ def test_a_lesson_can_be_downloaded_and_with_a_repository_be_run():
     assert "https://mybinder.org/v2/gh/us/course/HEAD?labpath=notebooks%2F01_plane.ipynb" in first(
         "us/course"
     )
-    assert first("").startswith("# T\n\n")
+    assert first("").startswith("# 01 · T\n\n")
     assert first("").endswith("\n\ntext")
 
 

@@ -171,6 +171,8 @@ def test_the_ledger_is_filtered(page):
     page.locator("#filter").fill("bk (16) 06")
     assert 0 < rows.count() < every
     assert rows.first.locator("#bk-eq-16").count() == 1
+    page.locator("#filter").fill("Figure 5")
+    assert rows.locator("a.row").all_inner_texts() == ["BK Fig. 5", "RR Fig. 5"]
     page.locator("#filter").fill("nothing has this")
     assert rows.count() == 0
     assert page.locator("#found").inner_text() == f"0 of {every} rows"

@@ -1,16 +1,18 @@
-// Rows of the ledger that have all words of the filter are shown, the others not.
+// Rows of the ledger that have what the filter says are shown: the phrase, or else all of its words.
 addEventListener("DOMContentLoaded", () => {
   const filter = document.getElementById("filter"), found = document.getElementById("found");
+  const plain = (text) => text.toLowerCase().replace(/\bfigures?\b/g, "fig.").replace(/\s+/g, " ").trim();
+  const sections = [...document.querySelectorAll("section:has(> * table.ledger, > table.ledger)")];
   const rows = [...document.querySelectorAll("table.ledger tbody tr")].map((row) => (
-    { row, text: row.textContent.toLowerCase().replaceAll("\u00ad", "") }));
+    { row, cells: [...row.cells].map((cell) => plain(cell.innerText || cell.textContent)), text: plain(row.textContent) }));
   const show = () => {
-    const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-    let count = 0;
-    for (const { row, text } of rows) {
-      row.hidden = !words.every((word) => text.includes(word));
-      count += !row.hidden;
-    }
-    found.textContent = words.length ? `${count} of ${rows.length} rows` : "";
+    const phrase = plain(filter.value), words = phrase.split(" ");
+    let chosen = rows.filter(({ cells }) => cells.some((cell) => `${cell} `.includes(phrase)));
+    if (!chosen.length) chosen = rows.filter(({ text }) => words.every((word) => text.includes(word)));
+    for (const { row } of rows) row.hidden = true;
+    for (const { row } of chosen) row.hidden = false;
+    for (const section of sections) section.hidden = !section.querySelector("tbody tr:not([hidden])");
+    found.textContent = phrase ? `${chosen.length} of ${rows.length} rows` : "";
   };
   filter.addEventListener("input", show);
   addEventListener("hashchange", () => { filter.value = ""; show(); });
