@@ -34,11 +34,42 @@ from rbcourse.course import ledger
 from rbcourse.course.notebooks import lesson_paths
 
 HERE = Path(__file__).parent
-_NOT_TAKEN = r"\.|conftest\.py|.*\.(pyc|part)$"
+_TAKEN = [
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "CONTRIBUTING.md",
+    "CONVENTIONS.md",
+    "LEDGER.md",
+    "LICENSE",
+    "README.md",
+    "course.py",
+    "environment.txt",
+    "pyproject.toml",
+    "benchmarks/benchmarks.csv",
+    "notebooks/QUESTIONS.md",
+    "notebooks/REFERENCES.bib",
+]
+_KINDS = [
+    ".css",
+    ".html",
+    ".j2",
+    ".js",
+    ".md",
+    ".mplstyle",
+    ".py",
+    ".svg",
+    ".toml",
+    ".txt",
+    ".typed",
+]
 _TO_READ = (
-    "*Here to be read. To work on it, take the zip from who teaches you; who teaches makes it by* "
-    "`python3 course.py handout {name}`."
+    "*This page is for reading. Get the problem set as a zip from your teacher; teachers make it "
+    "with* `python3 course.py handout {name}`."
 )
+_HAS = """
+What `lab`, `lecture`, `check` and `figures` need is in `course.zip`; the other tasks need the whole
+course, with its tests and problem sets.
+"""
 _TAKE = "(green button *Code*, *Download ZIP*, then unpack; or `git clone`)"
 MADE = "made-by-course.txt"
 """A file in the book by which it is known as one."""
@@ -101,7 +132,7 @@ class Sources:
     def put_problem_sets(self) -> None:
         """Write the problem sets as students get them."""
         assignments = self.root / "notebooks" / "assignments"
-        names = sorted(path.name for path in (assignments / "source").iterdir())
+        names = sorted(path.stem for path in assignments.glob("source/ps*/ps*.ipynb"))
         for name in names:
             released = release(name, assignments)[f"{name}.ipynb"].decode()
             notebook = nbformat.reads(released, as_version=4)
@@ -130,7 +161,7 @@ class Sources:
         }
 
     def put_files(self) -> None:
-        """Write the pages that are files of the course, and the files that they link to."""
+        """Write the pages that are files of the course."""
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
@@ -140,29 +171,26 @@ class Sources:
                 take = '(<a href="course.zip">course.zip</a>, then unpack'
                 if self.repository:
                     take += f"; or `git clone https://github.com/{self.repository}`"
-                text = text.replace(_TAKE, f"{take})")
+                text = text.replace(_TAKE, f"{take})").replace("\n**Linux**", f"{_HAS}\n**Linux**")
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             self.put(page, relinked(text, path, page))
-        for source in self.folder.rglob("*.md"):
-            for target in re.findall(r"\]\((?:\.\./)*(files/[^)]+)\)", source.read_text("utf-8")):
-                content = self.read(target.removeprefix("files/"))
-                self.put(target, content)
 
     def put_course(self) -> None:
-        """Write ``course.zip``, which runs: the package, the lessons and `course.py`.
+        """Write ``course.zip``, which runs: the package, the lessons without outputs, `course.py`.
 
-        Left out are problem sets, which have solutions, the tests, and what the lessons draw.
+        The notebooks of teachers, with model answers and hidden tests, are left out; the checks
+        that students run are in the package, and know what is right.
         """
-        there = [*self.root.glob("*.*"), *(self.root / "rbcourse").rglob("*.*")]
-        there += [*(self.root / "benchmarks").glob("*.*"), *(self.root / "notebooks").glob("*.*")]
-        names = [path.relative_to(self.root).as_posix() for path in there if path.is_file()]
-        names = [name for name in [*names, "LICENSE"] if not re.match(_NOT_TAKEN, name)]
-        files = {name: (self.root / name).read_bytes() for name in names}
+        package = (self.root / "rbcourse").rglob("*.*")
+        paths = [*(path for path in package if path.suffix in _KINDS)]
+        paths += (self.root / name for name in _TAKEN)
+        files = {path.relative_to(self.root).as_posix(): path.read_bytes() for path in paths}
         for path in (self.extra / "lessons").glob("*.ipynb"):
             files[f"notebooks/{path.name}"] = path.read_bytes()
-        packed = pack({f"rbcourse/{name}": content for name, content in files.items()})
-        (self.extra / "course.zip").write_bytes(packed)
+        hidden = re.compile(r"(^|/)(\.|__pycache__)")
+        kept = {f"rbcourse/{name}": files[name] for name in files if not hidden.search(name)}
+        (self.extra / "course.zip").write_bytes(pack(kept))
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""
@@ -170,6 +198,15 @@ class Sources:
         for path in (HERE / "pages").rglob("*.md"):
             text = Template(path.read_text(encoding="utf-8")).substitute(self.shown)
             self.put(path.relative_to(HERE / "pages").as_posix(), text)
+
+    def put_linked(self) -> None:
+        """Copy the files without a page that pages link to."""
+        for page in [*self.folder.rglob("*.md"), *self.folder.rglob("*.ipynb")]:
+            text = page.read_text(encoding="utf-8")
+            for name in re.findall(r"\]\((?:\.\./)*files/([^)#]+)", text):
+                target = self.folder / "files" / name
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(self.root / name, target)
 
 
 def _write(path: Path, text: str) -> None:
@@ -186,30 +223,32 @@ def write_sources(root: Path, folder: Path, extra: Path, repository: str = "") -
     sources.put_files()
     sources.put_course()
     sources.put_fronts()
+    sources.put_linked()
 
 
 def build(root: Path, book: Path, repository: str = "") -> None:
     """Make the book of a course, in a folder that is not there or is an older book."""
     if book.exists() and not (book / MADE).exists():
         raise ValueError(f"{book} is no book that was made here: move it away or delete it")
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=book.absolute().parent, prefix=".book-") as folder:
         sources, extra, pages = (Path(folder, name) for name in ("sources", "extra", "pages"))
         print("Reading the lessons ...", flush=True)
         write_sources(root, sources, extra, repository)
         print("Making the pages ...", flush=True)
         words = ["-b", "html", "-W", "--keep-going", "-q", "-j", "2", "-c", str(HERE)]
-        words += ["-d", f"{folder}/read", "-D", f"html_extra_path={extra}"]
         subprocess.run(
-            [sys.executable, "-m", "sphinx", *words, str(sources), str(pages)],
+            [sys.executable, "-m", "sphinx", *words, "-d", f"{folder}/read", sources, pages],
             cwd=root,
-            env={**os.environ, "PYTHONHASHSEED": "0"},
+            env={**os.environ, "PYTHONHASHSEED": "0", "RBCOURSE_BOOK_EXTRA": str(extra)},
             check=True,
         )
         (pages / ".buildinfo").unlink()
+        (pages / "_sources").rmdir()
+        (pages / ".nojekyll").touch()  # or GitHub Pages leaves out _static
         (pages / MADE).write_text("The book of rbcourse; course.py makes it anew.\n")
         if book.exists():
-            shutil.rmtree(book)
-        shutil.move(pages, book)
+            book.rename(Path(folder, "old"))
+        pages.rename(book)
     size = sum(path.stat().st_size for path in book.rglob("*") if path.is_file())
     print(f"{book / 'index.html'}: {len(list(book.rglob('*.html')))} pages, {size / 1e6:.1f} MB")
 
@@ -240,11 +279,17 @@ def main() -> None:
     parser.add_argument("--serve", action="store_true", help="show it in the browser")
     parser.add_argument("--repository", default="", help="owner/name on GitHub, for Binder")
     asked = parser.parse_args()
+    if not re.fullmatch(r"([\w.-]+/[\w.-]+)?", asked.repository):
+        parser.error(f"--repository: owner/name wanted, got {asked.repository}")
     book = Path("book")
     try:
         build(Path(), book, asked.repository)
-    except (OSError, ValueError, subprocess.CalledProcessError) as error:
+    except (OSError, ValueError) as error:
         sys.exit(str(error))
+    except subprocess.CalledProcessError:
+        sys.exit("The pages could not be made; what Sphinx says stands above.")
+    except KeyboardInterrupt:
+        sys.exit(130)
     if asked.serve:
         serve(book)
 

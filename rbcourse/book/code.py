@@ -28,7 +28,7 @@ def code_page(path: str, root: Path) -> str:
         (next((kind for kind in _COLOURED if found in kind), Token), text)
         for found, text in PythonLexer(stripnl=False).get_tokens(source)
     )
-    lines = formatted(tokens, HtmlFormatter(nowrap=True)).splitlines()
+    lines = formatted(tokens, HtmlFormatter(nowrap=True)).split("\n")
     for node in ast.parse(source).body:
         match node:
             case ast.FunctionDef(name=name) | ast.ClassDef(name=name):

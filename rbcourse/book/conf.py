@@ -1,5 +1,7 @@
 """What Sphinx is to do with the sources of the book; it reads this file itself."""
 
+import os
+import re
 from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
@@ -17,8 +19,6 @@ extensions += ["numpydoc"]
 nb_execution_mode = "off"
 nb_merge_streams = True
 myst_enable_extensions = ["amsmath", "dollarmath"]
-# what other packages describe, and a page of JavaScript
-autodoc_default_options = {"exclude-members": "ENGINE, capture_log, per_curve, read, set"}
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 toc_object_entries = False  # the navigation of each page would hold them all
@@ -26,6 +26,7 @@ toc_object_entries = False  # the navigation of each page would hold them all
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["book.css"]
+exclude_patterns = ["files"]
 html_favicon = "static/favicon.svg"
 html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
 html_show_search_summary = False  # pages of a folder may not read each other
@@ -36,19 +37,30 @@ def name_sections(_app: Any, doctree: Any) -> None:
     """Give the headings of lessons addresses that stay: ``#s3`` for section 3."""
     if Path(doctree["source"]).parent.name == "lessons":
         for section in doctree.findall(lambda node: node.tagname == "section"):
-            section["ids"] = [reference.fragment(section.children[0].astext())]
+            if section.parent is not doctree:
+                section["ids"] = [reference.fragment(section.children[0].astext())]
+
+
+def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
+    """Leave out what other packages describe, a page of JavaScript, and what curves keep."""
+    module = getattr(obj, "__module__", None) or "rbcourse"
+    return True if name in ("ENGINE", "per_curve") or not module.startswith("rbcourse") else None
 
 
 def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:
     """Link the keys of a docstring to the ledger, and add the tests of a function."""
     for i, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
-            lines[i] = KEY.sub(lambda key: f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__", line)
+            lines[i] = KEY.sub(_as_link, line)
     if what not in ("function", "class"):
         return
     if tests := reference.tests_of(name.removeprefix("rbcourse."), app.config.tests):
-        links = [reference.to_test(test, "package/so3.html") for test in tests]
+        links = [reference.to_test(test, "package/index.html") for test in tests]
         lines += ["", ".. raw:: html", "", f"   {reference.folded('tests', links)}", ""]
+
+
+def _as_link(key: re.Match[str]) -> str:
+    return f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__"
 
 
 def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
@@ -80,6 +92,8 @@ def setup(app: Any) -> None:
     path = scripts.locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
     app.config.html_static_path.append(str(path))
     app.add_config_value("tests", reference.naming(Path()), "")
+    app.config.html_extra_path.append(os.environ["RBCOURSE_BOOK_EXTRA"])
+    app.connect("autodoc-skip-member", skip_foreign)
     app.connect("doctree-read", name_sections, priority=400)
     app.connect("autodoc-process-docstring", join_ledger, priority=900)
     app.connect("missing-reference", find_anywhere)

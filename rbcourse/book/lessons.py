@@ -1,6 +1,7 @@
-"""A stored lesson as a page of the book: nothing is run, nothing is lost but what spoils it."""
+"""A stored lesson as a page: outputs are kept, answers folded, the run sheet is split off."""
 
 import base64
+import copy
 import hashlib
 import re
 import struct
@@ -20,7 +21,7 @@ _PICTURE = re.compile(r'(?P<before><img\b[^>]*?) src="data:image/png;base64,(?P<
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
 _APART = re.compile(r"(the lecturer's) (run sheets?) (is|are) at the end")
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
-_LESSON = re.compile(r"\b(lesson (\d+))\b")
+_LESSON = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|<[^>]*>|\b(lesson (\d+))\b")
 _CONTROL = re.compile(r'\{"label":"([^"]+)"')
 _EXPLORER = re.compile(r"explore\.(\w+)_explorer\(\)")
 
@@ -36,7 +37,7 @@ class Figure:
     lesson : str
         Such as ``06_geodesics``.
     section : str
-        The number of the section that draws it, empty before the first.
+        The number of the section that draws it, or its heading.
     lines : str
         The cell that draws it.
     text : str
@@ -54,14 +55,15 @@ def figures_of(lesson: str, notebook: NotebookNode) -> list[Figure]:
     """Return the figures that a lesson draws, in their order."""
     found, section = [], ""
     for cell in notebook.cells:
-        if heading := re.match(r"## (\d+) ·", cell.source):
-            section = heading[1]
+        if heading := re.match(r"## (?:(\d+) ·|(.*))", cell.source):
+            section = heading[1] or heading[2]
         saved = _SAVED.search(cell.source) if cell.cell_type == "code" else None
         if saved:
-            texts = [o.data["text/plain"] for o in cell.outputs if "data" in o]
-            text = next(t for t in texts if t.startswith(f"{saved[1]}: "))
-            text = text.removeprefix(f"{saved[1]}: ")
-            found.append(Figure(saved[1], lesson, section, cell.source, text))
+            name, texts = saved[1], [o.data["text/plain"] for o in cell.outputs if "data" in o]
+            shown = [t.partition(": ")[2] for t in texts if t.startswith(f"{name}: ")]
+            if not shown:
+                raise ValueError(f"{lesson}: {name} has no stored output")
+            found.append(Figure(name, lesson, section, cell.source, shown[0]))
     return found
 
 
@@ -73,10 +75,11 @@ def cited_in(notebook: NotebookNode) -> list[str]:
 
 def without_outputs(notebook: NotebookNode) -> NotebookNode:
     """Return a lesson as it is to be run: a file that is small."""
-    for cell in notebook.cells:
+    plain = copy.deepcopy(notebook)
+    for cell in plain.cells:
         if cell.cell_type == "code":
-            cell.outputs = []
-    return notebook
+            cell.outputs, cell.execution_count = [], None
+    return plain
 
 
 def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
@@ -169,8 +172,8 @@ def prepared(path: str, page: str, root: Path, pictures: Pictures) -> tuple[Note
     names = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
 
     def to_lesson(match: re.Match[str]) -> str:
-        name = names.get(int(match[2]))
-        return f"[{match[1]}]({name})" if name else match[1]
+        name = names.get(int(match[2] or -1))
+        return f"[{match[1]}]({name})" if name else match[0]
 
     for cell in cells:
         if cell.cell_type == "markdown":
@@ -186,7 +189,7 @@ def prepared(path: str, page: str, root: Path, pictures: Pictures) -> tuple[Note
             if explorer and "text/html" in shown:
                 figure = living(explorer[1], root)
                 moved = " and ".join(f"<b>{label}</b>" for label in _CONTROL.findall(figure))
-                shown["text/html"] = f"<p>Here two of its controls move: {moved}.</p>{figure}"
+                shown["text/html"] = f"<p>Of its controls these move here: {moved}.</p>{figure}"
             if "text/html" in shown:
                 shown["text/html"] = with_files(pictures.taken_out(shown["text/html"]))
     notebook.cells = folded(cells)

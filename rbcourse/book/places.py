@@ -3,7 +3,7 @@
 import re
 from posixpath import dirname, join, normpath, relpath
 
-from rbcourse.course.ledger import KEY
+from rbcourse.course.ledger import KEY, MISPRINTS, SOURCES
 
 PAGES = {
     "README.md": "install.md",
@@ -15,7 +15,7 @@ PAGES = {
 }
 """The sources of pages that are made of one file each."""
 
-_LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(#[^)\s]+)?\)")
+_LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
 
 
 def source_of(path: str) -> str | None:
@@ -29,9 +29,21 @@ def source_of(path: str) -> str | None:
     """
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
-    if module := re.fullmatch(r"rbcourse/([\w/]+)\.py", path):
-        return f"package/{module[1].replace('/', '.')}.rst"
+    if code := re.fullmatch(r"rbcourse/([\w/]+)\.py", path):
+        module = code[1].replace("/", ".")
+        return f"package/{module}.rst" if has_page(module) else None
     return {"LEDGER.md": "ledger.md", **PAGES}.get(path)
+
+
+def has_page(module: str) -> bool:
+    """Tell whether a module has a page: the private ones and the answers to problems have none.
+
+    Examples
+    --------
+    >>> has_page("draw.save"), has_page("_foam"), has_page("assignments.problems.arm")
+    (True, False, False)
+    """
+    return not re.search(r"\b(_|conf$|problems\b)", module)
 
 
 def anchor(key: str) -> str:
@@ -59,7 +71,12 @@ def link(to: str, page: str, text: str) -> str:
 
 def with_keys(text: str, page: str) -> str:
     """Return a text with the keys of the two sources as links to their rows of the ledger."""
-    return KEY.sub(lambda key: link(f"ledger.html#{anchor(key[0])}", page, key[0]), text)
+
+    def put(key: re.Match[str]) -> str:
+        known = key[0] in SOURCES["entries"] or key[0] in MISPRINTS
+        return link(f"ledger.html#{anchor(key[0])}", page, key[0]) if known else key[0]
+
+    return KEY.sub(put, text)
 
 
 def relinked(text: str, path: str, page: str) -> str:
@@ -69,6 +86,8 @@ def relinked(text: str, path: str, page: str) -> str:
     """
 
     def put(match: re.Match[str]) -> str:
+        if not match[1]:
+            return match[0]  # code
         target = normpath(join(dirname(path), match[1]))
         source = source_of(target) or source_of(f"{target}/README.md") or f"files/{target}"
         return f"]({relpath(source, dirname(page) or '.')}{match[2] or ''})"

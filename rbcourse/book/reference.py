@@ -4,11 +4,11 @@ import ast
 import html
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from rbcourse.book.lessons import Figure
-from rbcourse.book.places import address, anchor, link, source_of, with_keys
+from rbcourse.book.places import address, anchor, has_page, link, source_of, with_keys
 from rbcourse.course.ledger import MISPRINTS, SOURCES, Entry
 
 HOUSE = {
@@ -16,9 +16,9 @@ HOUSE = {
     "Projection, sampling, metrics": "projection sampling metrics",
     "Curves": "curves projected_line projected_cubic rivals optimum shooting motions paths cost",
     "The plane": "planar arm",
-    "On the board, and in files": "textbook files report",
+    "Textbook versions, files, the report": "textbook files report",
 }
-"""The modules that are flat in the package, in the order of the house."""
+"""The modules that are flat in the package, in the order of CONTRIBUTING.md."""
 ROOMS = {
     "draw": "Pictures",
     "explore": "Explorers",
@@ -29,7 +29,7 @@ ROOMS = {
 }
 """Its rooms."""
 MAINTAINED = ("course", "assignments", "book")
-"""Rooms for who works on the course: their pages are neither in the contents nor in the search."""
+"""Rooms for who works on the course: left out of the contents and of the search for words."""
 _ENTRIES = {"": 8, "what": 20, "functions": 30, "tests": 14, "lessons": 9, "pictures": 19}
 _MISPRINTS = {"": 8, "where": 14, "as printed in our copy": 29, "what holds": 29, "tests": 20}
 
@@ -41,7 +41,7 @@ def modules(root: Path) -> dict[str, list[str]]:
     for room, title in ROOMS.items():
         paths = sorted((package / room).rglob("*.py"))
         names = [".".join(path.relative_to(package).with_suffix("").parts) for path in paths]
-        groups[title] = [name for name in names if not re.search(r"\b(_|conf$|problems\b)", name)]
+        groups[title] = [name for name in names if has_page(name)]
     return groups
 
 
@@ -85,32 +85,54 @@ def shown_code(root: Path) -> list[Path]:
     return sorted(path for path in paths if not any(map(path.is_relative_to, hidden)))
 
 
-def _tests(source: str) -> Iterator[ast.FunctionDef]:
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-            yield node
-
-
 def naming(root: Path) -> dict[str, list[str]]:
-    """Return for each name the tests that name it, such as ``test_so3.py::test_exp``."""
-    found = defaultdict(list)
-    tests = root / "tests"
+    """Return for each function, such as ``so3.exp_so3``, the tests that name it.
+
+    They are named as in the ledger: ``test_so3.py::test_exp``.
+    """
+    found, tests = defaultdict(list), root / "tests"
+    exported = {}
+    for path in (root / "rbcourse").rglob("__init__.py"):
+        room = ".".join(path.relative_to(root).parts[:-1])
+        for name, full in _imported(ast.parse(path.read_text(encoding="utf-8"))).items():
+            exported[f"{room}.{name}"] = full
     for path in (path for path in shown_code(root) if path.is_relative_to(tests)):
-        place = path.relative_to(tests).as_posix()
-        for test in _tests(path.read_text(encoding="utf-8")):
-            nodes = list(ast.walk(test))
-            names = {node.id for node in nodes if isinstance(node, ast.Name)}
-            names |= {node.attr for node in nodes if isinstance(node, ast.Attribute)}
-            for name in names:
-                found[name].append(f"{place}::{test.name}")
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        known = _imported(tree)
+        for test in tree.body:
+            if isinstance(test, ast.FunctionDef) and test.name.startswith("test_"):
+                for full in {_full_name(node, known) for node in ast.walk(test)} - {""}:
+                    name = exported.get(full, full).removeprefix("rbcourse.")
+                    found[name].append(f"{path.relative_to(tests).as_posix()}::{test.name}")
     return found
+
+
+def _imported(tree: ast.Module) -> dict[str, str]:
+    """Return the full names of what a file imports, by the names that it uses."""
+    known = {}
+    for node in tree.body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            module = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+            for alias in node.names:
+                known[alias.asname or alias.name] = f"{module}{alias.name}"
+    return known
+
+
+def _full_name(node: ast.AST, known: dict[str, str]) -> str:
+    """Return the name of an imported object, such as ``rbcourse.so3.exp_so3``; otherwise ""."""
+    if isinstance(node, ast.Name):
+        return known.get(node.id, "")
+    if isinstance(node, ast.Attribute):
+        left = _full_name(node.value, known)
+        return f"{left}.{node.attr}" if left else ""
+    return ""
 
 
 def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
     """Return the tests of a function: those for its module that name it, otherwise all that do."""
-    *room, module, function = name.split(".")
+    *room, module, _ = name.split(".")
     own = "/".join([*room, f"test_{module}"])
-    found = named.get(function, [])
+    found = named.get(name, [])
     return [test for test in found if test.startswith(own)] or found
 
 
@@ -124,9 +146,8 @@ def to_function(name: str, page: str) -> str:
     """Return a link to a function: to its docstring, of what is private to its code."""
     module, _, own = name.rpartition(".")
     path = f"rbcourse/{module.replace('.', '/')}"
-    to = address(source_of(f"{path}.py") or "", f"rbcourse.{name}")
-    if module.startswith("_"):
-        to = f"code/{path}.html#{own}"
+    source = source_of(f"{path}.py")
+    to = address(source, f"rbcourse.{name}") if source else f"code/{path}.html#{own}"
     text = name.replace(".", ".<wbr>").replace("_", "_<wbr>")
     return link(to, page, f"<code>{text}</code>")
 
@@ -238,11 +259,11 @@ def gallery(figures: list[Figure], root: Path) -> str:
 def _figure(figure: Figure, root: Path) -> list[str]:
     page, folder = "figures.md", root / "figures"
     files = {f"{figure.name}.{ending}": ending.upper() for ending in ("png", "pdf", "csv", "gif")}
-    for path in sorted(folder.glob(f"{re.sub('[a-z]$', '', figure.name)}_*.csv")):
+    for path in sorted(folder.glob(f"{re.sub('(?<=[0-9])[a-z]$', '', figure.name)}_*.csv")):
         if not path.with_suffix(".png").exists():  # a table that belongs to several figures
             files[path.name] = path.name
     there = [link(f"figures/{x}", page, files[x]) for x in files if (folder / x).exists()]
-    place = f"{figure.lesson}.ipynb, {figure.section or 'Is the machine ready?'}"
+    place = f"{figure.lesson}.ipynb, {figure.section}"
     number = re.fullmatch(r"(paper|report)_fig(\w+)", figure.name)
     title = f"{number[1].capitalize()}, Figure {number[2]}: " if number else ""
     return [
@@ -279,5 +300,6 @@ def works(cited: dict[str, list[str]]) -> str:
     found = defaultdict(list)
     for lesson, lines in cited.items():
         for line in lines:
-            found[line].append(to_section(f"{lesson}.ipynb, References", "references.md"))
+            address = f"lessons/{lesson}.html#references"
+            found[line].append(link(address, "references.html", lesson[:2]))
     return "\n".join(f"{line} Lesson {', '.join(found[line])}." for line in sorted(found))

@@ -14,7 +14,8 @@ import nbformat
 from rbcourse.course.notebooks import lesson_paths
 
 KEY = re.compile(
-    r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)|errata \d+)",
+    r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)|errata \d+)"
+    r"(?!\w|\.\d)",
     re.ASCII,
 )
 SOURCES: dict[str, Any] = tomllib.loads(

@@ -44,14 +44,16 @@ def test_problem_sets_come_without_solutions(written):
         assert not REGION.search(text)
 
 
-def test_the_course_comes_along_without_answers_to_problems(written):
+def test_the_course_comes_along_without_the_notebooks_of_teachers(written):
     with ZipFile(written / "extra/course.zip") as archive:
         names = {name.removeprefix("rbcourse/") for name in archive.namelist()}
         lesson = json.loads(archive.read("rbcourse/notebooks/06_geodesics.ipynb"))
     assert {"course.py", "environment.txt", "pyproject.toml", "LICENSE", "README.md"} <= names
     assert {"rbcourse/so3.py", "rbcourse/py.typed", "benchmarks/benchmarks.csv"} <= names
     assert not any(name.startswith(("notebooks/assignments", "tests", "figures")) for name in names)
-    assert not any("__pycache__" in name or name.startswith(".") for name in names)
+    kinds = {*build._KINDS, ".bib", ".cff", ".csv", ".ipynb", ""}
+    assert {Path(name).suffix for name in names} - {".typed"} <= kinds
+    assert not any("__pycache__" in name or "/." in name for name in names)
     assert all(cell.get("outputs", []) == [] for cell in lesson["cells"])
     install = (written / "sources/install.md").read_text("utf-8")
     assert '<a href="course.zip">' in install
@@ -59,12 +61,17 @@ def test_the_course_comes_along_without_answers_to_problems(written):
     assert "green button" not in install
 
 
-def test_no_place_in_a_page_is_left_empty(written):
-    for path in (written / "sources").rglob("*.md"):
-        assert "$lessons" not in path.read_text("utf-8")
-    assert "mybinder.org/v2/gh/us/course" in (written / "sources/lessons/01_plane.ipynb").read_text(
-        "utf-8"
-    )
+def test_with_a_repository_lessons_open_in_binder(written):
+    lesson = (written / "sources/lessons/01_plane.ipynb").read_text("utf-8")
+    assert "mybinder.org/v2/gh/us/course" in lesson
+
+
+@pytest.mark.parametrize("name", ["https://github.com/us/course", "us", "us/a b"])
+def test_a_repository_is_an_owner_and_a_name(name, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["build", "--repository", name])
+    with pytest.raises(SystemExit):
+        build.main()
+    assert "owner/name wanted" in capsys.readouterr().err
 
 
 def test_a_folder_that_is_no_book_is_left_alone(tmp_path):

@@ -120,9 +120,13 @@ def test_a_lesson_that_is_named_is_linked(tmp_path):
     )
     assert "([lesson 3](03_rotations_in_space.ipynb))" in page.cells[0].source
     assert "[run sheet](../teach/06_geodesics.md) is apart" in page.cells[0].source
+    first, _ = prepared(
+        "notebooks/00_start_here.ipynb", "lessons/x.ipynb", ROOT, Pictures(ROOT, tmp_path)
+    )
+    assert "On to [lesson 1](01_plane.ipynb)" in first.cells[-1].source
     explorers = [c for c in page.cells if "explore.theta_explorer()" in c.source]
     shown = explorers[0].outputs[0]["data"]["text/html"]
-    assert shown.startswith("<p>Here two of its controls move: <b>")
+    assert shown.startswith("<p>Of its controls these move here: <b>")
 
 
 def test_the_figures_of_a_lesson_have_their_sections_and_lines():

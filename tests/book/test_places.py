@@ -25,12 +25,19 @@ def test_links_between_files_become_links_between_pages():
         "[a](../ledger.md) [b](06_geodesics.ipynb#x) [c](https://x.org) [d](#here) "
         "[e](../files/LICENSE)"
     )
+    text = "`f[i](x)` [m](mailto:a@b.org)"
+    assert relinked(text, "README.md", "install.md") == text
     text = "[a](notebooks/assignments) [b](notebooks/06_geodesics.ipynb)"
     assert relinked(text, "README.md", "install.md") == (
         "[a](teach/problem_sets.md) [b](lessons/06_geodesics.ipynb)"
     )
 
 
+def test_only_keys_are_linked():
+    assert with_keys("BK 2002, BK 6.1.2, BK Fig. 5a", "x.md") == "BK 2002, BK 6.1.2, BK Fig. 5a"
+
+
 def test_what_has_no_page_has_no_source():
+    assert source_of("rbcourse/_foam.py") is None
     assert source_of("course.py") is None
     assert source_of("notebooks/assignments/source/ps1/ps1.ipynb") is None

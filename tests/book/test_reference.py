@@ -51,10 +51,30 @@ def test_the_tests_of_a_function_are_those_that_name_it():
     assert reference.tests_of("so3.nothing", named) == []
 
 
+def test_a_test_names_what_it_imports(tmp_path):
+    """By whatever name; `str.split` is no function of the package."""
+    (tmp_path / "rbcourse/draw").mkdir(parents=True)
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "rbcourse/__init__.py").write_text("from rbcourse.so3 import exp_so3\n")
+    (tmp_path / "rbcourse/draw/__init__.py").write_text("from rbcourse.draw.save import save\n")
+    code = "import rbcourse as rb\nfrom rbcourse import so3 as s\nfrom rbcourse.draw import save\n"
+    code += "def test_a():\n    rb.exp_so3(1)\n    rb.so3.hat(1)\n    'x'.split()\n"
+    code += "def test_b():\n    s.hat(2)\n    save(3)\ndef other():\n    s.vee(1)\n"
+    (tmp_path / "tests/test_so3.py").write_text(code)
+    found = reference.naming(tmp_path)
+    assert found["so3.exp_so3"] == ["test_so3.py::test_a"]
+    assert found["so3.hat"] == ["test_so3.py::test_a", "test_so3.py::test_b"]
+    assert found["draw.save.save"] == ["test_so3.py::test_b"]
+    assert not any("split" in name or "vee" in name for name in found)
+
+
 def test_what_has_no_test_for_its_module_has_those_that_name_it_elsewhere():
-    assert reference.tests_of("so3.turn", {"turn": ["test_se3.py::test_a"]}) == [
-        "test_se3.py::test_a"
-    ]
+    named = {
+        "so3.turn": ["test_se3.py::test_a"],
+        "so3.hat": ["test_so3.py::test_b", "test_c.py::x"],
+    }
+    assert reference.tests_of("so3.turn", named) == ["test_se3.py::test_a"]
+    assert reference.tests_of("so3.hat", named) == ["test_so3.py::test_b"]
 
 
 def test_code_has_an_anchor_for_each_definition_and_loses_nothing():
@@ -67,7 +87,7 @@ def test_code_has_an_anchor_for_each_definition_and_loses_nothing():
     text = re.sub("<[^>]*>", "", page[page.index("<pre>") : page.index("</pre>")])
     for entity, letter in (("&#39;", "'"), ("&quot;", '"'), ("&lt;", "<"), ("&gt;", ">")):
         text = text.replace(entity, letter)
-    assert text.replace("&amp;", "&") == source.rstrip("\n")
+    assert text.replace("&amp;", "&") == source
 
 
 def test_a_figure_of_the_texts_is_its_own_picture(figures):

@@ -1,4 +1,4 @@
-// Rows of the ledger that have what the filter says are shown: the phrase, or else all of its words.
+// Of the ledger the rows are shown whose name the filter is; or else that contain it, or else its words.
 addEventListener("DOMContentLoaded", () => {
   const filter = document.getElementById("filter"), found = document.getElementById("found");
   const plain = (text) => text.toLowerCase().replace(/\bfigures?\b/g, "fig.").replace(/\s+/g, " ").trim();
@@ -7,7 +7,8 @@ addEventListener("DOMContentLoaded", () => {
     { row, cells: [...row.cells].map((cell) => plain(cell.innerText || cell.textContent)), text: plain(row.textContent) }));
   const show = () => {
     const phrase = plain(filter.value), words = phrase.split(" ");
-    let chosen = rows.filter(({ cells }) => cells.some((cell) => `${cell} `.includes(phrase)));
+    let chosen = rows.filter(({ cells }) => cells[0] === phrase);
+    if (!chosen.length) chosen = rows.filter(({ cells }) => cells.some((cell) => cell.includes(phrase)));
     if (!chosen.length) chosen = rows.filter(({ text }) => words.every((word) => text.includes(word)));
     for (const { row } of rows) row.hidden = true;
     for (const { row } of chosen) row.hidden = false;
