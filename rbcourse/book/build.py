@@ -66,10 +66,6 @@ _TO_READ = (
     "*This page is for reading. Get the problem set as a zip from your teacher; teachers make it "
     "with* `python3 course.py handout {name}`."
 )
-_HAS = """
-What `lab`, `lecture`, `check` and `figures` need is in `course.zip`; the other tasks need the whole
-course, with its tests and problem sets.
-"""
 _TAKE = "(green button *Code*, *Download ZIP*, then unpack; or `git clone`)"
 MADE = "made-by-course.txt"
 """A file in the book by which it is known as one."""
@@ -168,10 +164,11 @@ class Sources:
                 rows = re.findall(r"^\| \[\d\d .*", text, re.MULTILINE)
                 self.shown["table"] = relinked("\n".join(rows), path, "lessons/index.md")
                 text = "# Install and run\n\n" + text[text.index("## Run") :]
-                take = '(<a href="course.zip">course.zip</a>, then unpack'
+                take = '(<a href="course.zip">course.zip</a>, then unpack; '
+                take += "it has what `lab`, `lecture`, `check` and `figures` need"
                 if self.repository:
                     take += f"; or `git clone https://github.com/{self.repository}`"
-                text = text.replace(_TAKE, f"{take})").replace("\n**Linux**", f"{_HAS}\n**Linux**")
+                text = text.replace(_TAKE, f"{take})")
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             self.put(page, relinked(text, path, page))
