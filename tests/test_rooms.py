@@ -30,7 +30,7 @@ LIBRARIES = {
     "course": {"jupyter_server", "nbclient", "nbformat", "segno", "tornado", "traitlets", "voila"},
     "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}
     | {"nbformat", "nbgrader", "traitlets"},
-    "book": {"nbformat", "pygments"},
+    "book": {"nbformat", "pygments", "sphinx"},
 }
 
 
