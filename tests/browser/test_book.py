@@ -14,7 +14,7 @@ from pixels import shown
 ROOT = Path(__file__).parents[2]
 BOOK = ROOT / "book"
 PAGES = sorted(path.relative_to(BOOK).as_posix() for path in BOOK.rglob("*.html"))
-LIVING = [name for name in PAGES if "rbcourseDisplay.revive" in (BOOK / name).read_text("utf-8")]
+LIVING = [name for name in PAGES if "<script>{" in (BOOK / name).read_text("utf-8")]
 
 # formulas that were not set, and whether they were set wrongly
 FORMULAS = """async () => {
