@@ -49,19 +49,7 @@ _TAKEN = [
     "notebooks/QUESTIONS.md",
     "notebooks/REFERENCES.bib",
 ]
-_KINDS = [
-    ".css",
-    ".html",
-    ".j2",
-    ".js",
-    ".md",
-    ".mplstyle",
-    ".py",
-    ".svg",
-    ".toml",
-    ".txt",
-    ".typed",
-]
+_KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|txt|typed)")
 _TO_READ = (
     "*This page is for reading. Get the problem set as a zip from your teacher; teachers make it "
     "with* `python3 course.py handout {name}`."
@@ -179,15 +167,14 @@ class Sources:
         The notebooks of teachers, with model answers and hidden tests, are left out; the checks
         that students run are in the package, and know what is right.
         """
-        package = (self.root / "rbcourse").rglob("*.*")
-        paths = [*(path for path in package if path.suffix in _KINDS)]
-        paths += (self.root / name for name in _TAKEN)
-        files = {path.relative_to(self.root).as_posix(): path.read_bytes() for path in paths}
+        inside = (self.root / "rbcourse").rglob("*.*")
+        package = [path.relative_to(self.root).as_posix() for path in inside]
+        names = [*_TAKEN, *(name for name in package if _KEPT.fullmatch(name) and "/." not in name)]
+        files = {name: (self.root / name).read_bytes() for name in names}
         for path in (self.extra / "lessons").glob("*.ipynb"):
             files[f"notebooks/{path.name}"] = path.read_bytes()
-        hidden = re.compile(r"(^|/)(\.|__pycache__)")
-        kept = {f"rbcourse/{name}": files[name] for name in files if not hidden.search(name)}
-        (self.extra / "course.zip").write_bytes(pack(kept))
+        packed = pack({f"rbcourse/{name}": content for name, content in files.items()})
+        (self.extra / "course.zip").write_bytes(packed)
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""

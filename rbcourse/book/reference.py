@@ -300,6 +300,6 @@ def works(cited: dict[str, list[str]]) -> str:
     found = defaultdict(list)
     for lesson, lines in cited.items():
         for line in lines:
-            address = f"lessons/{lesson}.html#references"
-            found[line].append(link(address, "references.html", lesson[:2]))
+            to = f"lessons/{lesson}.html#references"
+            found[line].append(link(to, "references.html", lesson[:2]))
     return "\n".join(f"{line} Lesson {', '.join(found[line])}." for line in sorted(found))

@@ -58,7 +58,7 @@ def test_a_test_names_what_it_imports(tmp_path):
     (tmp_path / "rbcourse/__init__.py").write_text("from rbcourse.so3 import exp_so3\n")
     (tmp_path / "rbcourse/draw/__init__.py").write_text("from rbcourse.draw.save import save\n")
     code = "import rbcourse as rb\nfrom rbcourse import so3 as s\nfrom rbcourse.draw import save\n"
-    code += "def test_a():\n    rb.exp_so3(1)\n    rb.so3.hat(1)\n    'x'.split()\n"
+    code += "def test_a():\n    rb.exp_so3(1)\n    rb.so3.hat(1)\n    x = 'y'\n    x.split()\n"
     code += "def test_b():\n    s.hat(2)\n    save(3)\ndef other():\n    s.vee(1)\n"
     (tmp_path / "tests/test_so3.py").write_text(code)
     found = reference.naming(tmp_path)
@@ -97,7 +97,8 @@ def test_a_figure_of_the_texts_is_its_own_picture(figures):
         return [figure.name for figure in reference.pictures_of(found[key], key, figures)]
 
     assert names("BK Fig. 5") == ["paper_fig5a", "paper_fig5b"]
-    assert names("RR Fig. 4") == ["report_fig4"]
+    assert sorted(names("BK Fig. 4")) == ["paper_fig4a", "paper_fig4b", "paper_fig4c"]
+    assert names("RR Fig. 6") == ["report_fig6"]
     assert "lesson06_chord" in names("BK (16)")
 
 
