@@ -15,7 +15,7 @@ from rbcourse.conversions import (
     rotation_vector_from_quaternion,
     zyx_from_matrix,
 )
-from rbcourse.cost import acceleration_cost, acceleration_cost_parts
+from rbcourse.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
 from rbcourse.curves import Curve, geodesic_so3, retime
 from rbcourse.files import read_path, write_path
 from rbcourse.metrics import METRIC_SE3, METRIC_SO3, geodesic_flow
@@ -26,9 +26,18 @@ from rbcourse.motions import (
     screw_from_pose,
     screw_se3,
 )
-from rbcourse.optimum import ConvergenceError, minimum_acceleration_so3
+from rbcourse.optimum import (
+    ConvergenceError,
+    minimum_acceleration_so3,
+    minimum_jerk_so3,
+    minimum_torque_so3,
+)
 from rbcourse.paths import bessel_velocities, chain
-from rbcourse.projected_cubic import projected_cubic_so3, projected_quintic_so3
+from rbcourse.projected_cubic import (
+    projected_cubic_so3,
+    projected_quintic_so3,
+    weighted_cubic_so3,
+)
 from rbcourse.projected_line import projected_line_so3
 from rbcourse.projection import (
     distance_to_so,
@@ -52,6 +61,8 @@ from rbcourse.rivals import (
     cayley_cubic_so3,
     cumulative_bezier_so3,
     exponential_cubic_so3,
+    exponential_quintic_so3,
+    normal_cubic_so3,
     quaternion_cubic_so3,
 )
 from rbcourse.sampling import sample_quaternion, sample_rotation
@@ -144,10 +155,14 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # the optimum, and what curves cost
     "minimum_acceleration_so3",
     "minimum_acceleration_se3",
+    "minimum_torque_so3",
+    "minimum_jerk_so3",
     "shoot_minimum_acceleration_so3",
     "ConvergenceError",
     "acceleration_cost",
     "acceleration_cost_parts",
+    "torque_cost",
+    "jerk_cost",
     # other closed forms
     "CLOSED_FORMS",
     "exponential_cubic_so3",
@@ -155,6 +170,9 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "cumulative_bezier_so3",
     "quaternion_cubic_so3",
     "cayley_cubic_so3",
+    "exponential_quintic_so3",
+    "normal_cubic_so3",
+    "weighted_cubic_so3",
     # paths through many poses, and files
     "retime",
     "chain",

@@ -106,6 +106,25 @@ def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
     return half + mirrored
 
 
+def as_inertia(name: str, value: ArrayLike) -> Array:
+    """Return `as_symmetric` of 3 × 3 matrices that are positive definite.
+
+    Raises
+    ------
+    ValueError
+        As `as_symmetric`; and the message names the first matrix that is not positive definite.
+    """
+    G = as_symmetric(name, value, 3)
+    moments = np.linalg.eigvalsh(G)
+    refused = moments[..., 0] <= 8 * EPS * np.abs(moments).max(axis=-1)
+    if refused.any():
+        listed = ", ".join(f"{x:.6g}" for x in moments[refused][0])
+        raise ValueError(
+            f"{first_index(name, refused)} is not positive definite: its eigenvalues are {listed}"
+        )
+    return G
+
+
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
     """Return `as_finite` of the arguments, where all entries must lie in [0, 1].
 
@@ -157,6 +176,14 @@ def as_tolerance(name: str, value: float) -> float:
     return float(tolerance)
 
 
+def as_positive(name: str, value: float) -> float:
+    """Return a number above 0, or raise a ValueError."""
+    number = float(as_single(name, value))
+    if number <= 0:
+        raise ValueError(f"{name} is {number}, a number above 0 is wanted")
+    return number
+
+
 def as_count(name: str, value: int) -> int:
     """Return a count, or raise a ValueError if it is not an integer from 1 up."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
@@ -187,10 +214,12 @@ def as_generator(rng: Rng) -> np.random.Generator:
         raise ValueError(f"rng: a Generator, a seed or None wanted, got {rng!r}") from error
 
 
-def check_order(order: int) -> int:
-    """Return `order`, the order of a derivative, or raise a ValueError if it is not 0, 1 or 2."""
-    if not isinstance(order, int | np.integer) or isinstance(order, bool) or order not in (0, 1, 2):
-        raise ValueError(f"order: 0, 1 or 2 wanted, got {order!r}")
+def check_order(order: int, most: int) -> int:
+    """Return `order`, that of a derivative; a ValueError if it is no integer from 0 to `most`."""
+    known = isinstance(order, int | np.integer) and not isinstance(order, bool)
+    if not known or not 0 <= order <= most:
+        wanted = ", ".join(map(str, range(most)))
+        raise ValueError(f"order: {wanted} or {most} wanted, got {order!r}")
     return order
 
 

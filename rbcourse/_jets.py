@@ -1,7 +1,7 @@
 """Quaternions as functions of time: products, exp and slerp with their derivatives.
 
-A jet is the list [x, x', x''] of a function of time and its first derivatives, or the first one or
-two of these. Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
+A jet is the list [x, x', x'', x'''] of a function of time and its first derivatives, or the first
+few of these. Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
 Quaternions are (w, x, y, z).
 """
 
@@ -14,10 +14,11 @@ from rbcourse._numerics import Array
 
 Jet = list[Array]
 
-# Coefficients, the highest first: of the second derivative of sin(√s)/√s in s, and of that of
-# arccos(x)² in (1 − x)/2.
+# Coefficients, the highest first: of the second derivative of sin(√s)/√s in s, of that of
+# arccos(x)² in (1 − x)/2, and of both third derivatives.
 _SINC_BEND = [n * (n - 1) * (-1) ** n / math.factorial(2 * n + 1) for n in range(9, 1, -1)]
 _ANGLE_BEND = [k * math.prod(j / (j + 0.5) for j in range(1, k + 1)) for k in range(13, 0, -1)]
+_SINC_THIRD, _ANGLE_THIRD = np.polyder(_SINC_BEND), -np.polyder(_ANGLE_BEND) / 2
 
 
 def product(p: Jet, q: Jet) -> Jet:
@@ -125,6 +126,11 @@ def dot(x: Jet, y: Jet) -> Jet:
     return _leibniz(_dot, x, y)
 
 
+def cross(x: Jet, y: Jet) -> Jet:
+    """Return the jet of the cross product of two vectors, by Leibniz's rule."""
+    return _leibniz(_cross, x, y)
+
+
 def matrix(q: Array, scale: float | Array = 1.0) -> Array:
     """Return `scale` times the matrix that rotates by q and scales by ‖q‖²: shape (..., 3, 3)."""
     w, x, y, z = q
@@ -144,10 +150,10 @@ def rotation(q: Array) -> Array:
 
 
 def angular_velocity(q: Jet) -> Array:
-    """Return the last derivative that a jet gives: w of [q, q'], w' of [q, q', q''].
+    """Return the last derivative that a jet gives: w of [q, q'], w' of [q, q', q''], then w''.
 
     A unit quaternion has q' = q (0, w)/2. One of any norm, n = ‖q‖², has n w = 2 im(q̄ q'), and,
-    differentiated, n w' + n' w = 2 im(q̄ q'').
+    differentiated, n w' + n' w = 2 im(q̄ q''), n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
 
     Parameters
     ----------
@@ -157,7 +163,7 @@ def angular_velocity(q: Jet) -> Array:
     Returns
     -------
     ndarray, shape (3, ...)
-        Angular velocity or acceleration, body frame.
+        Angular velocity, acceleration or jerk, body frame.
 
     Examples
     --------
@@ -169,7 +175,12 @@ def angular_velocity(q: Jet) -> Array:
     w = 2 * _imaginary(q[0], q[1]) / n
     if len(q) == 2:
         return w
-    return 2 * (_imaginary(q[0], q[2]) - _dot(q[0], q[1]) * w) / n
+    a = 2 * (_imaginary(q[0], q[2]) - _dot(q[0], q[1]) * w) / n
+    if len(q) == 3:
+        return a
+    bend = _imaginary(q[0], q[3]) + _imaginary(q[1], q[2])
+    n_bend = _dot(q[1], q[1]) + _dot(q[0], q[2])
+    return 2 * (bend - 2 * _dot(q[0], q[1]) * a - n_bend * w) / n
 
 
 def _imaginary(p: Array, q: Array) -> Array:
@@ -188,6 +199,11 @@ def _dot(x: Array, y: Array) -> Array:
     return np.einsum("i...,i...->...", x, y)
 
 
+def _cross(x: Array, y: Array) -> Array:
+    (a, b, c), (u, v, w) = x, y
+    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
+
+
 def _leibniz(op: Callable[[Array, Array], Array], x: Jet, y: Jet) -> Jet:
     """Return the jet of a product of any kind."""
     jet = [op(x[0], y[0])]
@@ -195,6 +211,8 @@ def _leibniz(op: Callable[[Array, Array], Array], x: Jet, y: Jet) -> Jet:
         jet.append(op(x[1], y[0]) + op(x[0], y[1]))
     if len(x) > 2:
         jet.append(op(x[2], y[0]) + 2 * op(x[1], y[1]) + op(x[0], y[2]))
+    if len(x) > 3:
+        jet.append(op(x[3], y[0]) + 3 * (op(x[2], y[1]) + op(x[1], y[2])) + op(x[0], y[3]))
     return jet
 
 
@@ -205,21 +223,31 @@ def _chain(f: list[Array], x: Jet) -> Jet:
         jet.append(f[1] * x[1])
     if len(f) > 2:
         jet.append(f[2] * x[1] ** 2 + f[1] * x[2])
+    if len(f) > 3:
+        jet.append(f[3] * x[1] ** 3 + 3 * f[2] * x[1] * x[2] + f[1] * x[3])
     return jet
 
 
 def _over(x: Jet, y: Jet) -> Jet:
-    """Return the jet of the quotient of two numbers."""
+    """Return the jet of the quotient of two numbers: x = quotient times y, by Leibniz's rule."""
     quotient: Jet = [x[0] / y[0]]
     if len(x) > 1:
         quotient.append((x[1] - quotient[0] * y[1]) / y[0])
     if len(x) > 2:
         quotient.append((x[2] - 2 * quotient[1] * y[1] - quotient[0] * y[2]) / y[0])
+    if len(x) > 3:
+        rest = 3 * (quotient[2] * y[1] + quotient[1] * y[2]) + quotient[0] * y[3]
+        quotient.append((x[3] - rest) / y[0])
     return quotient
 
 
 def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
-    """Return cos √s, sin(√s)/√s, and their derivatives by s; where s is small by a power series."""
+    """Return c = cos √s, k = sin(√s)/√s, and their derivatives by s.
+
+    Where s is small the second and third derivatives of k are power series. The first follows, as
+    c' = −k/2 and 4 s k'' + 6 k' + k = 0; where s is not small the third does too, as
+    4 s k''' + 10 k'' + k' = 0.
+    """
     root = np.sqrt(s)
     tangent = np.tan(root / 2)  # NumPy's fastest way
     sine = 2 * tangent / (1 + tangent * tangent)
@@ -230,16 +258,27 @@ def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
     direct = ((3 - s) * k - 3 * c) / np.where(small, 1.0, 4 * s * s)
     k2 = np.where(small, np.polyval(_SINC_BEND, s), direct)
     k1 = -(k / 2 + 2 * s * k2) / 3
-    return [c, -k / 2, -k1 / 2][: order + 1], [k, k1, k2][: order + 1]
+    if order < 3:
+        return [c, -k / 2, -k1 / 2][: order + 1], [k, k1, k2][: order + 1]
+    direct = -(10 * k2 + k1) / np.where(small, 1.0, 4 * s)
+    k3 = np.where(small, np.polyval(_SINC_THIRD, s), direct)
+    return [c, -k / 2, -k1 / 2, -k2 / 2], [k, k1, k2, k3]
 
 
 def _squared_angle(x: Array, order: int) -> list[Array]:
-    """Return arccos(x)² and its derivatives by x; where x is near 1 by a power series."""
+    """Return h = arccos(x)² and its derivatives by x; where x is near 1 by power series.
+
+    They satisfy (1 − x²) h'' = 2 + x h' and (1 − x²) h''' = 3 x h'' + h'.
+    """
     x = np.clip(x, -1.0, 1.0)
     angle, z = np.arccos(x), (1 - x) * (1 + x)
     g = np.where(x < 1, angle / np.sqrt(np.where(x < 1, z, 1.0)), 1.0)
     if order < 2:
         return [angle**2, -2 * g][: order + 1]
-    small = x > 0.95
+    small, near = x > 0.95, (1 - x) / 2
     direct = 2 * (1 - x * g) / np.where(small, 1.0, z)
-    return [angle**2, -2 * g, np.where(small, np.polyval(_ANGLE_BEND, (1 - x) / 2), direct)]
+    bend = np.where(small, np.polyval(_ANGLE_BEND, near), direct)
+    if order == 2:
+        return [angle**2, -2 * g, bend]
+    direct = (3 * x * bend - 2 * g) / np.where(small, 1.0, z)
+    return [angle**2, -2 * g, bend, np.where(small, np.polyval(_ANGLE_THIRD, near), direct)]

@@ -1,36 +1,61 @@
-"""What a curve costs: the acceleration functional of BK (18)."""
+"""What a curve costs: the squares of its acceleration, BK (18), of the torque, and of the jerk."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable
+from functools import partial
+from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._chebyshev import grid
+from rbcourse._checks import as_inertia, as_positive, as_single, check_broadcast
 from rbcourse._numerics import EPS, Array, blocks
-from rbcourse.curves import Curve, which_curve
-from rbcourse.optimum import grid
+from rbcourse.curves import Chosen, Curve, which_curve
+from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
 
 _TOGETHER = 2000  # panels that are evaluated at once
 _HALVINGS = 30
 _MOST = 50_000  # panels that may be halved at once
+Density: TypeAlias = Callable[[Array, Chosen], Array]
+"""What is integrated, at the times t, shape (T, K), on the curves which[k]."""
 
 
-def acceleration_cost(curve: Curve) -> Array:
-    """Return L_a, the integral of the squared acceleration in metric (12) or (14).
+def acceleration_cost(
+    curve: Curve,
+    inertia: ArrayLike | None = None,
+    mass: float = 1.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+) -> Array:
+    """Return L_a, the integral of the squared acceleration in metric (12) or (14), or of a body.
 
     Parameters
     ----------
     curve : Curve
         On SO(3) or SE(3), or a stack of them.
+    inertia : array_like, shape (..., 3, 3), optional
+        G, the inertia of the body about its centre of mass, body axes: symmetric and positive
+        definite; one, or one for each curve. By default 2 I, that of the ball of metric (12).
+    mass : float, optional
+        Of the body, more than 0; used on SE(3) only.
+    centre : array_like, shape (3,), optional
+        Its centre of mass, in the body frame, in m; used on SE(3) only.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt; to 1e-10 relative, or 1e-20 absolute,
+        ∫ τᵀ G⁻¹ τ dt, where τ = G w' + w × G w is the torque, and on SE(3) that and
+        ∫ m ‖d_c''‖² dt, where d_c is the place of the centre of mass. By default this is
+        ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. To 1e-10 relative, or 1e-20 absolute,
         unless all of the acceleration falls within a hundredth of the interval, as with an abrupt
         ``f`` of a `projected_line_so3`.
 
     Raises
     ------
+    ValueError
+        If an argument is not finite or not of its shape, `inertia` is not symmetric and positive
+        definite or does not fit the stack, or `mass` is not positive.
     RuntimeError
         If the integral does not settle to that, if the curve almost jumps: ``margin`` below 1e-6,
         or if the velocity of a `chain` jumps.
@@ -38,15 +63,22 @@ def acceleration_cost(curve: Curve) -> Array:
     See Also
     --------
     acceleration_cost_parts : Rotation and translation apart.
+    torque_cost : ∫ ‖τ‖² dt.
+    jerk_cost : The integral of the squared jerk.
 
     Notes
     -----
+    G⁻¹τ is the covariant acceleration of the rotation in the metric G, the metric of the kinetic
+    energy ½ wᵀ G w, and τᵀ G⁻¹ τ its square in that metric. A body that turns freely has τ = 0 and
+    costs nothing.
+
     On SE(3) the two parts have different units; their sum, and any ratio of sums, depends on the
-    unit of length.
+    unit of length, unless inertia and mass are those of a body.
 
     References
     ----------
-    BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14).
+    BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for other
+    inertias beyond BK.
 
     Examples
     --------
@@ -54,36 +86,46 @@ def acceleration_cost(curve: Curve) -> Array:
     >>> R1 = exp_so3([0, 0, 1.5])
     >>> float(acceleration_cost(geodesic_so3(np.eye(3), R1)))
     0.0
-    >>> float(acceleration_cost(projected_line_so3(np.eye(3), R1)).round(4))
+    >>> line = projected_line_so3(np.eye(3), R1)
+    >>> float(acceleration_cost(line).round(4))
     6.7627
+    >>> float(acceleration_cost(line, np.diag([1.0, 2, 2.5])).round(4))  # 2.5 in place of 2
+    8.4534
     """
-    rotation, translation = acceleration_cost_parts(curve)
+    rotation, translation = acceleration_cost_parts(curve, inertia, mass, centre)
     return rotation + translation
 
 
-def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
+def acceleration_cost_parts(
+    curve: Curve,
+    inertia: ArrayLike | None = None,
+    mass: float = 1.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+) -> tuple[Array, Array]:
     """Return the two parts of `acceleration_cost`: of the rotation, and of the translation.
 
     Parameters
     ----------
     curve : Curve
         On SO(3) or SE(3), or a stack of them.
+    inertia, mass, centre : optional
+        As for `acceleration_cost`.
 
     Returns
     -------
     rotation : ndarray, shape curve.batch_shape
-        ∫ 2 ‖w'‖² dt.
+        ∫ τᵀ G⁻¹ τ dt; by default ∫ 2 ‖w'‖² dt.
     translation : ndarray, shape curve.batch_shape
-        ∫ ‖d''‖² dt; 0 on SO(3).
+        ∫ m ‖d_c''‖² dt; by default ∫ ‖d''‖² dt; 0 on SO(3).
 
     Raises
     ------
-    RuntimeError
+    ValueError, RuntimeError
         As `acceleration_cost`.
 
     References
     ----------
-    BK (18).
+    BK (18); for other inertias beyond BK.
 
     Examples
     --------
@@ -95,82 +137,225 @@ def acceleration_cost_parts(curve: Curve) -> tuple[Array, Array]:
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
-    legs, durations = curve._unit_legs()
-    cubes = (1 / np.asarray(durations, float)) ** 3
-    parts = (
-        part.reshape(legs.batch_shape) * cubes for part in integral(legs, _panels(legs), 1e-10)
-    )
-    if legs.batch_shape == curve.batch_shape:
-        rotation, translation = parts
-    else:
-        rotation, translation = (np.sum(part, axis=-1) for part in parts)
-    return rotation[()], translation[()]
+    m, r = as_positive("mass", mass), as_single("centre", centre, 3)
+    name = "acceleration cost"
+    legs, durations = curve._unit_legs(name, 1)
+    functional: Functional = BallAcceleration()
+    if inertia is not None:
+        functional = Effort(_inertias(curve, legs, inertia), of_torque=False)
+    rotation = rotation_cost(name, legs, functional)
+    translation: Array = np.zeros(legs.count)
+    if legs.size == 4:
+        translation = m * integral(name, legs, partial(_squared_acceleration, legs, r))
+    rate = (1 / np.asarray(durations, float)) ** 3
+    return _summed(curve, legs, rate * rotation), _summed(curve, legs, rate * translation)
 
 
-def integral(curve: Curve, ends: Array, tolerance: float) -> tuple[Array, Array]:
-    """Return ∫ 2 ‖w'‖² dt and ∫ ‖d''‖² dt for each curve of a stack on [0, 1], by halving panels.
-
-    A panel is halved while the rules of Clenshaw and Curtis with 9 and 17 nodes differ there by
-    more than `tolerance` times the cost; each curve has panels of its own.
+def torque_cost(curve: Curve, inertia: ArrayLike) -> Array:
+    """Return the integral of the squared torque on a body that turns so.
 
     Parameters
     ----------
     curve : Curve
-    ends : ndarray, shape (n + 1,)
-        The ends of the panels at the start, from 0 to 1.
+        On SO(3), or a stack of them.
+    inertia : array_like, shape (..., 3, 3)
+        G, in body axes: symmetric and positive definite; one, or one for each curve.
+
+    Returns
+    -------
+    ndarray, shape curve.batch_shape
+        ∫ ‖τ‖² dt with the torque τ = G w' + w × G w; to 1e-10 relative, as `acceleration_cost`.
+
+    Raises
+    ------
+    ValueError
+        If `curve` is on SE(3), or as `acceleration_cost`.
+    RuntimeError
+        As `acceleration_cost`.
+
+    See Also
+    --------
+    minimum_torque_so3 : The curve for which it is least.
+
+    References
+    ----------
+    Beyond BK.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, geodesic_so3
+    >>> c = geodesic_so3(np.eye(3), exp_so3([1.0, 1.0, 0]))  # no acceleration, but w × G w
+    >>> float(torque_cost(c, np.diag([1.0, 2, 2.5])).round(12))
+    1.0
+    """
+    _check_on_so3(curve)
+    legs, durations = curve._unit_legs("torque cost", 1)
+    functional = Effort(_inertias(curve, legs, inertia), of_torque=True)
+    cost = rotation_cost("torque cost", legs, functional)
+    return _summed(curve, legs, cost * (1 / np.asarray(durations, float)) ** 3)
+
+
+def jerk_cost(curve: Curve) -> Array:
+    """Return the integral of the squared covariant jerk in metric (12).
+
+    Parameters
+    ----------
+    curve : Curve
+        On SO(3), or a stack of them.
+
+    Returns
+    -------
+    ndarray, shape curve.batch_shape
+        ∫ 2 ‖w'' + ½ w × w'‖² dt, to 1e-10 relative, as `acceleration_cost`.
+
+    Raises
+    ------
+    ValueError
+        If `curve` is on SE(3).
+    RuntimeError
+        As `acceleration_cost`, or if the acceleration of a `chain` jumps.
+
+    See Also
+    --------
+    minimum_jerk_so3 : The curve for which it is least.
+
+    Notes
+    -----
+    w'' + ½ w × w' is the covariant derivative of the acceleration. With ∫ 2 ‖w''‖² dt a motion and
+    the motion seen from the body, Rᵀ(t), would cost different amounts.
+
+    References
+    ----------
+    Beyond BK; M. Žefran, V. Kumar and C. Croke 1998.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, minimum_jerk_so3
+    >>> rest = [0, 0, 0]
+    >>> c = minimum_jerk_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, rest)
+    >>> float(jerk_cost(c).round(9))  # 2 · 720 · 1.5²
+    3240.0
+    """
+    _check_on_so3(curve)
+    legs, durations = curve._unit_legs("jerk cost", 2)
+    cost = rotation_cost("jerk cost", legs, Jerk())
+    return _summed(curve, legs, cost * (1 / np.asarray(durations, float)) ** 5)
+
+
+def _check_on_so3(curve: Curve) -> None:
+    if curve.size != 3:
+        raise ValueError(f"curve: one on SO(3) is wanted, got {curve!r}; take its rotation")
+
+
+def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
+    """Return the inertia for each leg, shape (legs.count, 3, 3)."""
+    G = as_inertia("inertia", inertia)
+    batch = check_broadcast(curve=(np.empty(curve.batch_shape), 0), inertia=(G, 2))
+    if batch != curve.batch_shape:
+        raise ValueError(
+            f"inertia: one, or one for each curve of a stack of shape {curve.batch_shape}, is "
+            f"wanted, got shape {G.shape}"
+        )
+    return np.broadcast_to(G, (*legs.batch_shape, 3, 3)).reshape(-1, 3, 3)
+
+
+def _summed(curve: Curve, legs: Curve, costs: Array) -> Array:
+    """Return the costs of the curves from those of their legs, shape (legs.count,)."""
+    if legs.batch_shape == curve.batch_shape:
+        return costs.reshape(curve.batch_shape)[()]
+    return np.sum(costs.reshape(legs.batch_shape), axis=-1)[()]
+
+
+def rotation_cost(
+    name: str,
+    curve: Curve,
+    functional: Functional,
+    ends: Array | None = None,
+    tolerance: float = 1e-10,
+) -> Array:
+    """Return a functional of the rotations of a stack of curves on [0, 1], as `integral`."""
+
+    def density(t: Array, which: Chosen) -> Array:
+        some = functional.of(which)
+        rates = [_values(curve, t, which, order)[..., :3] for order in some.needs]
+        u = some.deviation(*(np.moveaxis(rate, 0, 1) for rate in rates))
+        return (np.reshape(some.scale, (-1, 1)) * np.sum(u**2, axis=-1)).T
+
+    return integral(name, curve, density, ends, tolerance)
+
+
+def _squared_acceleration(curve: Curve, r: Array, t: Array, which: Chosen) -> Array:
+    """Return ‖d_c''‖², of the point r of the body: Rᵀ d_c'' = Rᵀ d'' + w' × r + w × (w × r)."""
+    w, a = (_values(curve, t, which, order) for order in (1, 2))
+    w, a, moved = w[..., :3], a[..., :3], a[..., 3:]
+    return np.sum((moved + np.cross(a, r) + np.cross(w, np.cross(w, r))) ** 2, axis=-1)
+
+
+def _values(curve: Curve, t: Array, which: Chosen, order: int) -> Array:
+    values = np.empty((*t.shape, *curve._core(order)))
+    curve._at(t, which, order, values)
+    return values
+
+
+def integral(
+    name: str, curve: Curve, density: Density, ends: Array | None = None, tolerance: float = 1e-10
+) -> Array:
+    """Return the integral over [0, 1] for each curve of a stack, by halving panels.
+
+    A panel is halved while the rules of Clenshaw and Curtis with 9 and 17 nodes differ there by
+    more than `tolerance` times the integral; each curve has panels of its own.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in messages.
+    curve : Curve
+    density : callable
+        ``density(t, which)``: what is integrated, at the times t, shape (T, K), on curves which[k].
+    ends : ndarray, shape (n + 1,), optional
+        The ends of the panels at the start, from 0 to 1; by default many where the curve is quick.
     tolerance : float
 
     Returns
     -------
-    rotation, translation : ndarray, shape (count,)
+    ndarray, shape (count,)
 
     Raises
     ------
     RuntimeError
         If the integral does not settle.
     """
+    ends = _panels(name, curve) if ends is None else ends
     fine, rough = grid(17), grid(9)
-    cost = np.zeros((2, curve.count))
+    cost = np.zeros(curve.count)
     which = np.repeat(np.arange(curve.count), len(ends) - 1)
     start, width = np.tile(ends[:-1], curve.count), np.tile(np.diff(ends), curve.count)
     for _ in range(_HALVINGS):
-        value, error = np.empty((2, len(which))), np.empty((2, len(which)))
+        value, error = np.empty((2, len(which)))
         for part in blocks(len(which), _TOGETHER):
-            a = np.empty((17, len(which[part]), *curve._core(2)))
-            curve._at(start[part] + fine.t[:, None] * width[part], which[part], 2, a)
-            squares = np.stack([2 * _squares(a[..., :3]), _squares(a[..., 3:])])
-            value[:, part] = width[part] * (fine.integral[-1] @ squares)
-            rest = width[part] * (rough.integral[-1] @ squares[:, ::2])
+            squares = density(start[part] + fine.t[:, None] * width[part], which[part])
+            value[part] = width[part] * (fine.integral[-1] @ squares)
+            rest = width[part] * (rough.integral[-1] @ squares[::2])
             with np.errstate(invalid="ignore"):  # inf − inf
-                error[:, part] = np.abs(value[:, part] - rest)
-        expected = cost + _sums(which, value, curve.count)
-        settled = error <= tolerance * expected[:, which] + 1e-20  # NaN is not
-        coarse = ~settled.all(axis=0)
+                error[part] = np.abs(value[part] - rest)
+        expected = cost + np.bincount(which, value, curve.count)
+        coarse = ~(error <= tolerance * expected[which] + 1e-20)  # NaN is
         lost = coarse & (width < 256 * EPS * (start + width))  # beyond the resolution of the times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
-        cost += _sums(which[~coarse], value[:, ~coarse], curve.count)
+        cost += np.bincount(which[~coarse], value[~coarse], curve.count)
         which = np.repeat(which[coarse], 2)
         start, width = (np.repeat(x[coarse], 2) for x in (start, width / 2))
         start[1::2] += width[1::2]
         if not len(which):
-            return cost[0], cost[1]
+            return cost
     raise RuntimeError(
-        f"acceleration cost: halved panels leave an uncertainty of {error.sum(axis=1).max():.1e} "
+        f"{name}: halved panels leave an uncertainty of {error.sum():.1e} "
         f"in {expected.max():.6g} (see margin)"
     )
 
 
-def _squares(a: Array) -> Array:
-    return np.sum(a**2, axis=-1)
-
-
-def _sums(which: NDArray[np.intp], values: Array, count: int) -> Array:
-    """Return the sums of the rows of values over the panels of each curve."""
-    return np.stack([np.bincount(which, row, count) for row in values])
-
-
-def _panels(curve: Curve) -> Array:
+def _panels(name: str, curve: Curve) -> Array:
     """Return the ends of panels: sixteenths, and ever smaller ones to where the curve is quick.
 
     It may be quick at its start and end, as its velocities and accelerations there tell, and at
@@ -179,7 +364,7 @@ def _panels(curve: Curve) -> Array:
     w, a = (np.linalg.norm(curve([0, 1], k)[..., :3], axis=-1).reshape(2, -1) for k in (1, 2))
     if not np.isfinite(w).all():
         lost = which_curve(int(np.argmin(np.isfinite(w).all(axis=0))), curve.batch_shape)
-        raise RuntimeError(f"acceleration cost{lost}: the curve is NaN, it did not converge")
+        raise RuntimeError(f"{name}{lost}: the curve is NaN, it did not converge")
     speeds = (w + np.sqrt(a)).max(axis=-1, initial=0)
     ends = [(0.0, 1 / (1 + speeds[0])), (1.0, 1 / (1 + speeds[1]))]
     cuts = [np.arange(17) / 16]

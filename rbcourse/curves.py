@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_finite, as_single, as_time, check_broadcast, check_order
+from rbcourse._checks import as_finite, as_inertia, as_single, as_time, check_broadcast, check_order
 from rbcourse._numerics import Array, blocks
 from rbcourse.so3 import hat, log_so3
 
@@ -49,6 +49,11 @@ class Ends(NamedTuple):
         rotations = (R.reshape(-1, 3, 3) for R in self[:2])
         return Ends(*rotations, *(w.reshape(-1, 3) for w in self[2:]))
 
+    def broadcast_to(self, batch: tuple[int, ...]) -> Ends:
+        """Return the same with another batch shape."""
+        rotations = (np.broadcast_to(R, (*batch, 3, 3)) for R in self[:2])
+        return Ends(*rotations, *(np.broadcast_to(w, (*batch, 3)) for w in self[2:]))
+
     def of(self, which: Any) -> Ends:
         """Return some of the problems, by an index of NumPy's into the batch axes."""
         return Ends(*(array[which] for array in self))
@@ -66,16 +71,22 @@ def check_ends(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> En
     """
     R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
     w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
-    check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
-    return broadcast_ends(R0, R1, w0, w1)
+    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+    return Ends(R0, R1, w0, w1).broadcast_to(batch)
 
 
-def broadcast_ends(R0: Array, R1: Array, w0: Array, w1: Array) -> Ends:
-    """Return checked boundary conditions, all of one batch shape."""
-    batches = R0.shape[:-2], R1.shape[:-2], w0.shape[:-1], w1.shape[:-1]
-    batch = np.broadcast_shapes(*batches)
-    rotations = (np.broadcast_to(R, (*batch, 3, 3)) for R in (R0, R1))
-    return Ends(*rotations, *(np.broadcast_to(w, (*batch, 3)) for w in (w0, w1)))
+def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
+    """Return the boundary conditions and the inertia of bodies, of one batch shape.
+
+    Raises
+    ------
+    ValueError
+        If `inertia` is not finite, not of shape (..., 3, 3), not symmetric and positive definite,
+        or the batches do not broadcast.
+    """
+    G = as_inertia("inertia", inertia)
+    batch = check_broadcast(R0=(ends.R0, 2), inertia=(G, 2))
+    return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
 
 
 class SingularTime(ValueError):
@@ -95,8 +106,9 @@ class Curve:
 
     The time t is in [0, 1], except for what `retime` and `chain` return.
 
-    On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w and ``c(t, 2)``
-    the angular acceleration w', both in the body frame: R' = R hat_so3(w).
+    On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w, ``c(t, 2)``
+    the angular acceleration w' and ``c(t, 3)`` the angular jerk w'', all three in the body frame:
+    R' = R hat_so3(w).
 
     On SE(3), ``c(t)`` is the pose A, ``c(t, 1)`` the twist S = (w, v), A' = A hat_se3(S), and
     ``c(t, 2)`` the covariant acceleration in metric (14), (w', Rᵀ d''). That is *not* the
@@ -132,8 +144,8 @@ class Curve:
         ----------
         t : array_like
             Times in the domain, of any shape.
-        order : {0, 1, 2}, optional
-            The curve, its velocity or its acceleration.
+        order : {0, 1, 2, 3}, optional
+            The curve, its velocity, its acceleration or, on SO(3) only, its jerk.
 
         Returns
         -------
@@ -152,7 +164,7 @@ class Curve:
         ((5, 3, 3), (3,))
         """
         times = as_time(t, 0, self.domain)
-        values = self._at_all(times.reshape(-1, 1), check_order(order))
+        values = self._at_all(times.reshape(-1, 1), self._check_order(order))
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
@@ -162,7 +174,7 @@ class Curve:
         ----------
         t : array_like, shape (...) + batch_shape
             Times in the domain.
-        order : {0, 1, 2}, optional
+        order : {0, 1, 2, 3}, optional
             As for a call.
 
         Returns
@@ -179,7 +191,7 @@ class Curve:
             wanted = ", ".join(["...", *map(str, self.batch_shape)])
             raise ValueError(f"t: shape ({wanted}) wanted, got {times.shape}")
         rows = math.prod(times.shape[: times.ndim - stacked])
-        values = self._at_all(times.reshape(rows, self.count), check_order(order))
+        values = self._at_all(times.reshape(rows, self.count), self._check_order(order))
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
@@ -227,7 +239,7 @@ class Curve:
         t : ndarray, shape (T, K), or (T, 1) for the same times on all
         which : ndarray of int, shape (K,)
             Numbers that count through the stack.
-        order : {0, 1, 2}
+        order : {0, 1, 2, 3}
         out : ndarray, shape (T, K, 3, 3) or (T, K, 3); or with 4 and 6
             In C order.
         """
@@ -240,6 +252,10 @@ class Curve:
         for rows in blocks(len(t), max(1, BLOCK // max(1, count))):
             self._at(t[rows], which, order, values[rows])
         return values
+
+    def _check_order(self, order: int) -> int:
+        """Return the order of a derivative, or raise a ValueError if the curve has none of it."""
+        return check_order(order, 3 if self.size == 3 else 2)
 
     def _core(self, order: int) -> tuple[int, ...]:
         return (self.size,) * 2 if order == 0 else (3 * self.size - 6,)
@@ -277,8 +293,15 @@ class Curve:
         """Return when a curve of the stack is quick, and about how long that takes."""
         return []
 
-    def _unit_legs(self) -> tuple[Curve, Any]:
-        """Return the curves on [0, 1] that it consists of, as a stack, and their durations."""
+    def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
+        """Return the curves on [0, 1] that it consists of, as a stack, and their durations.
+
+        Raises
+        ------
+        RuntimeError
+            If a derivative jumps in between, up to the order `smooth`; `name` is the cost that
+            does not exist then.
+        """
         return self, 1.0
 
 
@@ -424,8 +447,8 @@ class Retimed(Curve):
         events = self.curve._events()
         return [(start + (t - first) / self.rate, width / self.rate) for t, width in events]
 
-    def _unit_legs(self) -> tuple[Curve, Any]:
-        legs, durations = self.curve._unit_legs()
+    def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
+        legs, durations = self.curve._unit_legs(name, smooth)
         return legs, durations / self.rate
 
 
@@ -542,7 +565,7 @@ def events_of(times: ArrayLike, margins: ArrayLike) -> list[tuple[float, float]]
     """
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
-        raise RuntimeError(f"acceleration cost: the curve almost jumps (margin {gaps.min():.1e})")
+        raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
     when = np.broadcast_to(np.ravel(times), gaps.shape)
     return [(float(t), gap / 4) for t, gap in zip(when, gaps, strict=True) if gap < 0.25]
 

@@ -365,14 +365,18 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     >>> weight_from_inertia(np.diag([1.0, 2, 3])).diagonal()  # a flat body
     array([2., 1., 0.])
     """
-    G = as_symmetric("G", G, 3)
+    return weight_of("G", as_symmetric("G", G, 3))
+
+
+def weight_of(name: str, G: Array) -> Array:
+    """Return `weight_from_inertia` of symmetric matrices; errors call them by their name."""
     moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
     refused = slack < -16 * EPS * np.abs(moments).max(axis=-1)
     if refused.any():
         least, middle, largest = np.linalg.eigvalsh(G[refused][0])
         raise ValueError(
-            f"{first_index('G', refused)} has the principal moments {least:.6g}, {middle:.6g}, "
+            f"{first_index(name, refused)} has the principal moments {least:.6g}, {middle:.6g}, "
             f"{largest:.6g}; each must be at most the sum of the other two"
         )
     return _trace_times_identity(G / 2) - G

@@ -8,10 +8,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, as_unit, check_broadcast
+from rbcourse._checks import as_finite, as_positive, as_single, as_unit, check_broadcast
 from rbcourse._numerics import EPS, Array
-from rbcourse.curves import Chosen, Curve, Ends, broadcast_ends, geodesic_so3
-from rbcourse.optimum import relax, solve
+from rbcourse.curves import Chosen, Curve, Ends, geodesic_so3, with_inertia
+from rbcourse.optimum import ball, body, solve
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
     hermite_stack,
@@ -23,7 +23,7 @@ from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
 
 
 class RigidMotion(Curve):
-    """The `Curve` on SE(3) of a rotation R(t) and a polynomial path d(t) of the origin.
+    """The `Curve` on SE(3) of a rotation R(t) and a polynomial path d(t) of a point of the body.
 
     Attributes
     ----------
@@ -31,7 +31,9 @@ class RigidMotion(Curve):
         R(t), on SO(3).
     path : ndarray, shape (n, ..., 3)
         d(0), d(1), and for a cubic d'(0), d'(1), for a quintic d''(0), d''(1) too: in m, fixed
-        frame.
+        frame; of the point `centre`.
+    centre : ndarray, shape (3,)
+        The point of the body that the path is of, body frame, in m; 0 is the origin.
 
     References
     ----------
@@ -41,7 +43,8 @@ class RigidMotion(Curve):
     size = 4
     per_curve: ClassVar[dict[str, int]] = {"rotation": 0, "path": 1}
 
-    def __init__(self, rotation: Curve, *path: Array) -> None:
+    def __init__(self, rotation: Curve, *path: Array, centre: Array | None = None) -> None:
+        self.centre = np.zeros(3) if centre is None else centre
         ends = np.stack(np.broadcast_arrays(*path))
         self.batch_shape = np.broadcast_shapes(rotation.batch_shape, ends.shape[1:-1])
         self.path = np.broadcast_to(ends, (len(ends), *self.batch_shape, 3))
@@ -51,14 +54,31 @@ class RigidMotion(Curve):
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         """Write (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
         d = np.moveaxis(hermite_stack(self._entries, t, which, order), 0, -1)
-        R, turning = (np.empty((*out.shape[:2], *core)) for core in ((3, 3), (3,)))
-        self.rotation._at(t, which, 0, R)
+        R = self._turning(t, which, 0)
         if order == 0:
-            out[..., :3, :3], out[..., :3, 3] = R, d
+            out[..., :3, :3], out[..., :3, 3] = R, d - self._arm(t, which, 0, R)
             out[..., 3, :3], out[..., 3, 3] = 0, 1
         else:
-            self.rotation._at(t, which, order, turning)
-            out[..., :3], out[..., 3:] = turning, (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
+            turning = self._turning(t, which, order)
+            moving = (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
+            out[..., :3], out[..., 3:] = turning, moving - self._arm(t, which, order, turning)
+
+    def _turning(self, t: Array, which: Chosen, order: int) -> Array:
+        values = np.empty((np.shape(t)[0], len(which), *self.rotation._core(order)))
+        self.rotation._at(t, which, order, values)
+        return values
+
+    def _arm(self, t: Array, which: Chosen, order: int, turning: Array) -> Array | float:
+        """Return R r, w × r or w' × r + w × (w × r): the centre's own part of its motion."""
+        r = self.centre
+        if not r.any():
+            return 0.0
+        if order == 0:
+            return turning @ r
+        if order == 1:
+            return np.cross(turning, r)
+        w = self._turning(t, which, 1)
+        return np.cross(turning, r) + np.cross(w, np.cross(w, r))
 
     @cached_property
     def _entries(self) -> Array:
@@ -198,8 +218,12 @@ def minimum_acceleration_se3(
     w1: ArrayLike,
     d0_dot: ArrayLike,
     d1_dot: ArrayLike,
+    *,
+    inertia: ArrayLike | None = None,
+    mass: float = 1.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
 ) -> RigidMotion:
-    """Return the minimum-acceleration motion: the optimum on SO(3), and a cubic in R³.
+    """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic.
 
     Parameters
     ----------
@@ -210,16 +234,27 @@ def minimum_acceleration_se3(
         Angular velocities there, body frame, in rad per unit time.
     d0_dot, d1_dot : array_like, shape (..., 3)
         Velocities of the origin there, *fixed* frame, in m per unit time.
+    inertia : array_like, shape (..., 3, 3), optional
+        G, the inertia of the body about its centre of mass, body axes: symmetric and positive
+        definite. By default 2 I, that of metric (14).
+    mass : float, optional
+        Of the body, more than 0. It changes what the motion costs, but not the motion.
+    centre : array_like, shape (3,), optional
+        The centre of mass, in the body frame, in m; by default its origin.
 
     Returns
     -------
     RigidMotion
-        A `Curve`: its ``rotation`` is `minimum_acceleration_so3`.
+        A `Curve`: its ``rotation`` is `minimum_acceleration_so3`, and its ``path``, that of the
+        centre of mass, a cubic. Of all motions with these ends it has the least
+        `acceleration_cost` with the same `inertia`, `mass` and `centre`, as far as the rotation
+        has.
 
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
+        If an argument is not finite, not of that shape, the batches do not broadcast, `inertia` is
+        not symmetric and positive definite, or `mass` is not positive.
     ConvergenceError
         As `minimum_acceleration_so3`.
 
@@ -235,11 +270,14 @@ def minimum_acceleration_se3(
 
     Notes
     -----
-    In metric (14) rotation and translation are independent, so each has its own optimum.
+    In metric (14) rotation and translation are independent, so each has its own optimum. In the
+    metric of the kinetic energy of a body they are too, when its place is that of its centre of
+    mass r, d_c = d + R r. So the ends become those of the centre, d_c' = d' + R (w × r), and its
+    path is a cubic; the origin runs round it.
 
     References
     ----------
-    BK 6.3.
+    BK 6.3; for bodies beyond BK.
 
     Examples
     --------
@@ -249,8 +287,18 @@ def minimum_acceleration_se3(
     >>> c(0.5)[:3, 3].round(9)
     array([1., 0., 0.])
     """
-    ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
-    return RigidMotion(solve(relax, ends), *path)
+    ends, (d0, d1, v0, v1) = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
+    r = as_single("centre", centre, 3)
+    as_positive("mass", mass)
+    task = ball(ends) if inertia is None else body(*with_inertia(ends, inertia), of_torque=False)
+    (R0, R1, w0, w1), rotation = ends, solve(task)
+    path = d0 + R0 @ r, d1 + R1 @ r, v0 + _spun(R0, w0, r), v1 + _spun(R1, w1, r)
+    return RigidMotion(rotation, *path, centre=r)
+
+
+def _spun(R: Array, w: Array, r: Array) -> Array:
+    """Return R (w × r), the velocity that turning gives to the point r of a body, fixed frame."""
+    return (R @ np.cross(w, r)[..., None])[..., 0]
 
 
 def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
@@ -442,7 +490,7 @@ def _cubic_ends(
     poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
     v = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)
-    check_broadcast(
+    batch = check_broadcast(
         A0=(poses[0], 2),
         A1=(poses[1], 2),
         w0=(w[0], 1),
@@ -451,4 +499,4 @@ def _cubic_ends(
         d1_dot=(v[1], 1),
     )
     (R0, d0), (R1, d1) = map(split, poses)
-    return broadcast_ends(R0, R1, *w), (d0, d1, *v)
+    return Ends(R0, R1, *w).broadcast_to(batch), (d0, d1, *v)

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import check_order
 from rbcourse._numerics import EPS, Array
 from rbcourse.curves import SHORTEST, Chosen, Curve, SingularTime
 from rbcourse.motions import RigidMotion, projected_cubic_se3
@@ -178,7 +177,8 @@ class Chain(Curve):
 
         Parameters
         ----------
-        order : {0, 1, 2}
+        order : {0, 1, 2, 3}
+            Of poses 2 is the last.
 
         Returns
         -------
@@ -196,7 +196,7 @@ class Chain(Curve):
         >>> chain([0, 1, 2], R, leg=geodesic_so3).jumps(1).round(12)
         array([[0., 0., 1.]])
         """
-        starts, ends = self.legs([0.0, 1.0], check_order(order))
+        starts, ends = self.legs([0.0, 1.0], self.legs._check_order(order))
         if order:
             starts, ends = (x / self.durations[:, None] ** order for x in (starts, ends))
         return starts[1:] - ends[:-1]
@@ -237,14 +237,15 @@ class Chain(Curve):
         if order:
             values /= durations[:, None] ** order
 
-    def _unit_legs(self) -> tuple[Curve, Any]:
-        """Return the legs; a velocity that jumps at a joint has no acceleration cost."""
+    def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
+        """Return the legs; where a velocity jumps at a joint there is no acceleration cost."""
         moments = np.append(self.times, self.times[:-1] + self.durations / 2)
-        jumps, speeds = np.abs(self.jumps(1)), np.abs(self(moments, 1))
-        for half in (slice(3), slice(3, None)):  # rad and m
-            jump = jumps[:, half].max(initial=0)
-            if jump > 1e-9 * speeds[:, half].max(initial=0):
-                raise RuntimeError(f"acceleration cost: a velocity jumps at a joint, by {jump:.3g}")
+        for order, what in ((1, "a velocity"), (2, "an acceleration"))[:smooth]:
+            jumps, sizes = np.abs(self.jumps(order)), np.abs(self(moments, order))
+            for half in (slice(3), slice(3, None)):  # rad and m
+                jump = jumps[:, half].max(initial=0)
+                if jump > 1e-9 * sizes[:, half].max(initial=0):
+                    raise RuntimeError(f"{name}: {what} jumps at a joint, by {jump:.3g}")
         return self.legs, self.durations
 
 

@@ -21,7 +21,9 @@ from rbcourse.curves import (
     has_long_runs,
     least_over_time,
     runs,
+    with_inertia,
 )
+from rbcourse.metrics import weight_of
 from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
 from rbcourse.so3 import hat
 
@@ -32,7 +34,7 @@ class ProjectedPolynomial(Curve):
     Attributes
     ----------
     ends : ndarray, shape (n, ..., 3, 3)
-        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1).
+        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1). With a weight, all times W.
     margin : ndarray, shape (...)
         The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M: how
         far the curve stays from where the nearest rotation is not unique. A small margin is a sign
@@ -56,7 +58,7 @@ class ProjectedPolynomial(Curve):
         self.batch_shape = self.ends.shape[1:-2]
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        """Write R, w or w' of the projection of M; its arrays have their components first."""
+        """Write R, w, w' or w'' of the projection of M; its arrays have their components first."""
         M = [hermite_stack(self._entries, t, which, k) for k in range(order + 1)]
         R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
         self._check_defined(t, which, ~unique, NOT_UNIQUE)
@@ -136,6 +138,7 @@ def projected_cubic_so3(
     --------
     rbcourse.textbook.projected_cubic_so3 : The same, matrix by matrix.
     minimum_acceleration_so3 : The optimum with the same ends.
+    weighted_cubic_so3 : For the inertia of another body than a ball.
     acceleration_cost : What both cost.
     retime : From [0, 1] to T seconds.
 
@@ -165,6 +168,74 @@ def projected_cubic_so3(
     1.464
     """
     return watched(projected_cubic(check_ends(R0, R1, w0, w1)))
+
+
+def weighted_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, inertia: ArrayLike
+) -> ProjectedPolynomial:
+    """Return the projection of the cubic with these ends in the metric of a body's inertia.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+    inertia : array_like, shape (..., 3, 3)
+        G, body frame: symmetric and positive definite, and of a body: each principal moment is at
+        most the sum of the other two.
+
+    Returns
+    -------
+    ProjectedPolynomial
+        A `Curve`: `project_so_weighted` of the cubic of `projected_cubic_so3`, with the weight W
+        that belongs to G, `weight_from_inertia`. It meets all four ends; with ``margin``, of M W
+        with W of trace 3.
+
+    Raises
+    ------
+    ValueError
+        As `projected_cubic_so3`; if `inertia` is not symmetric and positive definite; or if it
+        belongs to no body, so that there is no W.
+
+    Warns
+    -----
+    RuntimeWarning
+        If ``margin`` is below 1e-6; the message names the time.
+
+    See Also
+    --------
+    minimum_acceleration_so3 : The optimum, for any inertia.
+    normal_cubic_so3 : Another closed form, which needs no W.
+    acceleration_cost : What they cost.
+
+    Notes
+    -----
+    Near-optimal for small excursions: data s times as large have an excess over the optimum about
+    s⁴ times as large, where that of `projected_cubic_so3` is s² times as large. For large ones it
+    may be far from it, as `projected_cubic_so3` is.
+
+    Singular set: as for `projected_cubic_so3`, of M W. With G a multiple of I it is that curve.
+
+    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 and Qᵀ G Q.
+
+    References
+    ----------
+    BK 6.2, BK Prop. 3; beyond BK, which leaves such metrics to a later publication.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1, rest, book = exp_so3([0.5, 0.3, 0]), [0, 0, 0], np.diag([1.0, 2.22, 3.18])
+    >>> c = weighted_cubic_so3(np.eye(3), R1, rest, [0, 1, 0], book)
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    ends, G = with_inertia(check_ends(R0, R1, w0, w1), inertia)
+    W = weight_of("inertia", G)
+    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
+    return watched(ProjectedPolynomial(*(M @ W for M in projected_cubic(ends).ends)))
 
 
 def projected_quintic_so3(
@@ -201,12 +272,14 @@ def projected_quintic_so3(
     See Also
     --------
     projected_cubic_so3 : The projection of a cubic, for given velocities only.
+    exponential_quintic_so3 : What is near the curve of least jerk.
+    minimum_jerk_so3 : That curve.
     retime : From [0, 1] to T seconds.
 
     Notes
     -----
     The curve is in general not near the one of least jerk. From rest to rest, where the geodesic at
-    the pace of the quintic has the least ∫ ‖w''‖² dt, it has 1.002 times that for a turn by 20°,
+    the pace of the quintic has the least `jerk_cost`, it has 1.002 times that for a turn by 20°,
     1.17 times for 60°, 2.3 times for 90°, 11.6 times for 120° and 448 times for the 153° of BK
     Figure 5.
 
@@ -225,12 +298,26 @@ def projected_quintic_so3(
     array([[0., 0., 0.],
            [0., 0., 2.]])
     """
-    a0, a1 = as_finite("a0", a0, 3), as_finite("a1", a1, 3)
-    ends = check_ends(R0, R1, w0, w1)
-    check_broadcast(R0=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
+    ends, a0, a1 = check_ends_of_quintic(R0, R1, w0, w1, a0, a1)
     (R0, R1, w0, w1), W0, W1 = ends, hat(ends.w0), hat(ends.w1)
     curvatures = R0 @ (W0 @ W0 + hat(a0)), R1 @ (W1 @ W1 + hat(a1))
     return watched(ProjectedPolynomial(R0, R1, R0 @ W0, R1 @ W1, *curvatures))
+
+
+def check_ends_of_quintic(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+) -> tuple[Ends, Array, Array]:
+    """Return `check_ends`, and the accelerations a0 and a1, all of one batch shape.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of its shape, or the batches do not broadcast.
+    """
+    ends, a0, a1 = check_ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
+    batch = check_broadcast(R0=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
+    a0, a1 = (np.broadcast_to(a, (*batch, 3)) for a in (a0, a1))
+    return ends.broadcast_to(batch), a0, a1
 
 
 def projected_cubic(ends: Ends) -> ProjectedPolynomial:
@@ -260,7 +347,7 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
         derivatives at t = 0 and 1.
     t : ndarray
         The times; they broadcast with the ends.
-    order : {0, 1, 2}, optional
+    order : {0, 1, 2, 3}, optional
         Which derivative.
 
     Returns
@@ -281,7 +368,7 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
     array([0. , 0.5, 1. ])
     """
-    return _sum(_weights(len(ends), t, check_order(order)), _terms(ends))
+    return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
 
 
 def hermite_stack(terms: Array, t: Array, which: Chosen, order: int) -> Array:
@@ -352,7 +439,7 @@ def _start_weights(count: int, t: Array, order: int) -> list[Array]:
             return [s]
         case 2, 1:
             return [0 * t - 1]
-        case 2, 2:
+        case 2, _:
             return [0 * t]
         case 4, 0:
             return [s * s * (1 + 2 * t), t * s * s]
@@ -360,6 +447,8 @@ def _start_weights(count: int, t: Array, order: int) -> list[Array]:
             return [-6 * t * s, s * (1 - 3 * t)]
         case 4, 2:
             return [6 * (t - s), 2 - 6 * s]
+        case 4, 3:
+            return [12 + 0 * t, 6 + 0 * t]
         case 6, 0:
             sss = s * s * s
             return [sss * (1 + 3 * t + 6 * t * t), t * sss * (1 + 3 * t), t * t * sss / 2]
@@ -369,24 +458,41 @@ def _start_weights(count: int, t: Array, order: int) -> list[Array]:
         case 6, 2:
             ts = t * s
             return [60 * ts * (t - s), -12 * ts * (3 - 5 * t), s * (1 - 8 * t + 10 * t * t)]
+        case 6, 3:
+            tt = t * t
+            return [60 * (6 * t * s - 1), -12 * (3 - 16 * t + 15 * tt), -9 + 36 * t - 30 * tt]
     raise ValueError(f"ends: two, four or six wanted, got {count}")
 
 
-def _rates(R: Array, M: Array, M_rate: Array, M_bend: Array | None = None) -> list[Array]:
-    """Return w and, if M'' is given, w' of the nearest rotations R to M; components first.
+def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
+    """Return w, w', w'', as many as there are of M', M'', M'''; R nearest to M; components first.
 
     S = RᵀM is symmetric. With A = RᵀM', differentiated, that says (tr(S) I − S) w = vee(A − Aᵀ),
-    and once more (tr(S) I − S) w' = vee(A' − A'ᵀ) − (tr(S') I − S') w.
+    and differentiated again, by Leibniz's rule for its left side,
+
+        (tr(S) I − S) w' = vee(A' − A'ᵀ) − (tr(S') I − S') w
+        (tr(S) I − S) w'' = vee(A'' − A''ᵀ) − 2 (tr(S') I − S') w' − (tr(S'') I − S'') w.
+
+    The derivative of RᵀX is RᵀX' − ŵ RᵀX.
     """
-    S, A = _transposed_times(R, M), _transposed_times(R, M_rate)
+    S, *turned = (_transposed_times(R, X) for X in (M, *rates))
+    A = turned[0]
     w = _solve(S, _skew(A))
-    if M_bend is None:
+    if len(turned) == 1:
         return [w]
-    S_rate = A - _cross(w, S)
-    A_rate = _transposed_times(R, M_bend) - _cross(w, A)
-    trace = S_rate[0, 0] + S_rate[1, 1] + S_rate[2, 2]
-    spin = trace * w - (S_rate[:, 0] * w[0] + S_rate[:, 1] * w[1] + S_rate[:, 2] * w[2])
-    return [w, _solve(S, _skew(A_rate) - spin)]
+    S_rate, A_rate = A - _cross(w, S), turned[1] - _cross(w, A)
+    a = _solve(S, _skew(A_rate) - _spin(S_rate, w))
+    if len(turned) == 2:
+        return [w, a]
+    S_bend = A_rate - _cross(a, S) - _cross(w, S_rate)
+    A_bend = turned[2] - _cross(w, turned[1]) - _cross(a, A) - _cross(w, A_rate)
+    return [w, a, _solve(S, _skew(A_bend) - 2 * _spin(S_rate, a) - _spin(S_bend, w))]
+
+
+def _spin(S: Array, w: Array) -> Array:
+    """Return (tr(S) I − S) w."""
+    trace = S[0, 0] + S[1, 1] + S[2, 2]
+    return trace * w - (S[:, 0] * w[0] + S[:, 1] * w[1] + S[:, 2] * w[2])
 
 
 def _transposed_times(R: Array, M: Array) -> Array:

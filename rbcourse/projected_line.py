@@ -69,8 +69,11 @@ class ProjectedLine(AlongGeodesic):
         slope, speed = _theta_rate(angle, s), self._on_line(t, which, 1)
         if order == 1:
             return slope * speed
-        bend = _theta_bend(on_line, angle, s)
-        return bend * speed**2 + slope * self._on_line(t, which, 2)
+        bend, push = _theta_bend(on_line, angle, s), self._on_line(t, which, 2)
+        if order == 2:
+            return bend * speed**2 + slope * push
+        third = _theta_third(on_line, angle, s) * speed**3
+        return third + 3 * bend * speed * push + slope * self._on_line(t, which, 3)
 
     def _on_line(self, t: Array, which: Chosen, order: int) -> Array:
         """Return f or a derivative of the chosen curves, shape (T, K) or (T, 1)."""
@@ -115,8 +118,8 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
         Rotation matrices. Validity is not checked; see `project_so`.
     f : callable, optional
         ``f(t, order)``, order 0, 1 or 2: how the line is run through, f(0) = 0 and f(1) = 1 to
-        1e-12, and the derivatives of that. The times come with an axis of length 1 for each batch
-        axis. By default f(t) = t.
+        1e-12, and the derivatives of that; for the jerk ``c(t, 3)`` order 3 too. The times come
+        with an axis of length 1 for each batch axis. By default f(t) = t.
 
     Returns
     -------
@@ -218,7 +221,7 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
         Where on the line, any real numbers; broadcasts with `angle`.
     angle : array_like
         The angle ‖ω₀‖, in [0, π] rad.
-    order : {0, 1, 2}, optional
+    order : {0, 1, 2, 3}, optional
         Which derivative with respect to t.
 
     Returns
@@ -253,10 +256,12 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     array([0.   , 0.205, 0.5  , 1.   ])
     """
     t, angle = _where_and_angle(as_finite("t", t), angle)
-    if check_order(order) == 0:
+    if check_order(order, 3) == 0:
         return _theta(t, angle)
     s = _singular_value(t, angle)
-    return _theta_rate(angle, s) if order == 1 else _theta_bend(t, angle, s)
+    if order == 1:
+        return _theta_rate(angle, s)
+    return _theta_bend(t, angle, s) if order == 2 else _theta_third(t, angle, s)
 
 
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
@@ -271,7 +276,7 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
         Times in [0, 1]; broadcasts with `angle`.
     angle : array_like
         The angle ‖ω₀‖, in [0, π] rad.
-    order : {0, 1, 2}, optional
+    order : {0, 1, 2, 3}, optional
         Which derivative with respect to t.
 
     Returns
@@ -307,13 +312,16 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     t, angle = _where_and_angle(as_time(t, 0), angle)
     before, near = t <= 0.5, np.minimum(t, 1 - t)
     cosine = np.sin(((np.pi - angle) + _PI_REST) / 2 + angle * near)  # cos(angle (1/2 − t))
-    if check_order(order) == 0:
+    if check_order(order, 3) == 0:
         first_half = near * sinc(angle * near) / (sinc(angle / 2) * cosine)
         return np.where(before, first_half, 1 - first_half)[()]
     middle_speed = np.cos(angle / 2) / sinc(angle / 2)
     if order == 1:
         return middle_speed / cosine**2
-    return -2 * angle * middle_speed * np.sin(angle * (0.5 - t)) / cosine**3
+    sine = np.sin(angle * (0.5 - t))
+    if order == 2:
+        return -2 * angle * middle_speed * sine / cosine**3
+    return 2 * angle**2 * middle_speed * (1 + 2 * sine**2) / cosine**4
 
 
 def _where_and_angle(t: Array, angle: ArrayLike) -> tuple[Array, Array]:
@@ -338,3 +346,8 @@ def _theta_rate(angle: Array, s: Array) -> Array:
 
 def _theta_bend(t: Array, angle: Array, s: Array) -> Array:
     return -4 * (2 * t - 1) * np.sin(angle / 2) ** 2 * sinc(angle) / s**4
+
+
+def _theta_third(t: Array, angle: Array, s: Array) -> Array:
+    steep = 4 * (2 * t - 1) * np.sin(angle / 2) ** 2
+    return sinc(angle) * (2 * steep**2 / s**2 - 8 * np.sin(angle / 2) ** 2) / s**4

@@ -1,4 +1,4 @@
-"""Five other closed forms with the boundary conditions of the projected cubic (BK section 1).
+"""Other closed forms: five with the boundary conditions of the projected cubic (BK section 1).
 
 Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
 """
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import first_index
-from rbcourse._jets import Jet, angular_velocity, exp, multiply, product, rotation, slerp
+from rbcourse._jets import Jet, angular_velocity, cross, exp, multiply, product, rotation, slerp
 from rbcourse._numerics import EPS, Array
 from rbcourse.conversions import quaternion_from_matrix
 from rbcourse.curves import (
@@ -23,12 +23,14 @@ from rbcourse.curves import (
     Ends,
     check_ends,
     events_of,
+    identity,
     least_over_time,
     which_curve,
+    with_inertia,
 )
-from rbcourse.projected_cubic import hermite, projected_cubic_so3
+from rbcourse.projected_cubic import check_ends_of_quintic, hermite, projected_cubic_so3
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
-from rbcourse.so3 import exp_so3, log_so3, right_jacobian_inverse_so3
+from rbcourse.so3 import exp_so3, hat, log_so3, right_jacobian_inverse_so3
 
 Legs = tuple[Array, Array, Array]
 
@@ -307,6 +309,129 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     return CayleyCubic(check_ends(R0, R1, w0, w1))
 
 
+def normal_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, inertia: ArrayLike
+) -> NormalCubic:
+    """Return the cubic with these ends in normal coordinates of a body's metric, to second order.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+    inertia : array_like, shape (..., 3, 3)
+        G, body frame: symmetric and positive definite.
+
+    Returns
+    -------
+    NormalCubic
+        A `Curve` that meets all four ends: R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with x(t) the cubic
+        with x(0) = 0, x'(0) = w0 and the x(1) and x'(1) that give R1 and w1.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, `inertia` is not symmetric and positive
+        definite, the batches do not broadcast, or no x(1), or no x'(1), is found.
+
+    See Also
+    --------
+    minimum_acceleration_so3 : The optimum.
+    weighted_cubic_so3 : The projection in the metric of a body.
+    exponential_cubic_so3 : With G a multiple of I it is that curve.
+
+    Notes
+    -----
+    A geodesic of the metric G, the motion of a free body, starts from R0 with the velocity x as
+    R0 exp(ŷ) with y = x t − ½ G⁻¹(x × G x) t² + …: Euler's equation is G w' = −w × G w. So x is
+    its initial velocity, the Riemannian normal coordinate of R0 exp(ŷ), to second order. Cubics in
+    normal coordinates are Hermite interpolation as Zimmermann 2020 has it; with the map cut off
+    after its second term, a retraction of second order, we know no source. It is no Riemannian
+    cubic: that is the name of the optimum.
+
+    Near-optimal for small excursions: data s times as large have an excess over the optimum about
+    s⁴ times as large.
+
+    Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector y(1)
+    which `log_so3` chooses; and where x ↦ y is singular at x(1). Every y is reached, as
+    yᵀ G x = xᵀ G x bounds all x with this y. With y(1) up to π the moments 1, 2, 2.9 have no such
+    place, thin rods do, beyond about 2 rad, about their middle axis. Near it the curve is long.
+
+    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+
+    References
+    ----------
+    Beyond BK; R. Zimmermann, Hermite interpolation and data processing errors on Riemannian matrix
+    manifolds, SIAM Journal on Scientific Computing 2020.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1, book = exp_so3([0, 0, 1.5]), np.diag([1.0, 2.22, 3.18])
+    >>> c = normal_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0], book)
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    return NormalCubic(*with_inertia(check_ends(R0, R1, w0, w1), inertia))
+
+
+def exponential_quintic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+) -> ExponentialQuintic:
+    """Return R0 exp(σ̂(t)), σ(t) the quintic with these ends: near-optimal minimum jerk.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time.
+    a0, a1 : array_like, shape (..., 3)
+        Angular accelerations w' there, body frame, in rad per unit time squared.
+
+    Returns
+    -------
+    ExponentialQuintic
+        A `Curve` that meets all six ends: σ(0) = 0, σ(1) = log_so3(R0ᵀ R1), and the derivatives of
+        σ that give w and w' there.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of that shape, or the batches do not broadcast.
+
+    See Also
+    --------
+    minimum_jerk_so3 : The optimum with the same ends.
+    projected_quintic_so3 : In the space of matrices, far from the optimum where turns are large.
+    jerk_cost : What they cost.
+
+    Notes
+    -----
+    @CLAIM@
+
+    Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
+    `log_so3` chooses. The curve itself is smooth everywhere. Moved ends give the moved curve; but
+    run backwards, from R1 to R0, it is another one.
+
+    References
+    ----------
+    Beyond BK; the cubic is in BK 1, its reference 13.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> rest = [0, 0, 0]
+    >>> c = exponential_quintic_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, [0, 0, 2])
+    >>> c([0, 1], 2).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 0., 2.]])
+    """
+    return ExponentialQuintic(*check_ends_of_quintic(R0, R1, w0, w1, a0, a1))
+
+
 CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
     "projection": projected_cubic_so3,
     "exponential": exponential_cubic_so3,
@@ -379,6 +504,71 @@ class ExponentialCubic(QuaternionCurve):
         return exp(_cubic(controls, t, order))
 
 
+class ExponentialQuintic(ExponentialCubic):
+    """The `Curve` R0 exp(σ̂(t)), σ a quintic."""
+
+    def __init__(self, ends: Ends, a0: Array, a1: Array) -> None:
+        turn = log_so3(ends.turn)
+        super().__init__(ends, turn)
+        _, goal, _, rate = self._controls  # σ(1)/2 and σ'(1)/2
+        w_rate = np.moveaxis(angular_velocity(exp([goal, rate, 0 * rate]))[:, 0], 0, -1)
+        bend = (right_jacobian_inverse_so3(turn) @ (a1 - w_rate)[..., None])[..., 0]
+        more = [_components(x / 2) for x in (a0, bend)]
+        self._controls = np.concatenate([self._controls, more])
+
+
+class NormalCubic(QuaternionCurve):
+    """The `Curve` R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), x a cubic."""
+
+    def __init__(self, ends: Ends, inertia: Array) -> None:
+        super().__init__(ends)
+        inverse = np.linalg.inv(inertia)
+        turn = log_so3(ends.turn)
+        goal, by_goal = _normal_coordinates(turn, inertia, inverse)
+        lost = ~(np.abs(np.linalg.det(by_goal)) > 1e-9)
+        if lost.any():
+            which = which_curve(np.flatnonzero(lost)[0], lost.shape)
+            raise ValueError(f"normal cubic{which}: the map from x to y is singular at the goal")
+        rate = right_jacobian_inverse_so3(turn) @ ends.w1[..., None]
+        end_rate = np.linalg.solve(by_goal, rate)[..., 0]
+        cubic = np.zeros_like(turn), goal, ends.w0, end_rate
+        matrices = (M[..., i, :] for M in (inertia, inverse) for i in range(3))
+        self._controls = np.stack([_components(x) for x in (*cubic, *matrices)])
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        x, G, inverse = _cubic(controls[:4], t, order), controls[4:7], controls[7:]
+        bent = cross(x, [np.einsum("ij...,j...->i...", G, each) for each in x])
+        return exp(
+            [
+                each / 2 - np.einsum("ij...,j...->i...", inverse, bend) / 4
+                for each, bend in zip(x, bent, strict=True)
+            ]
+        )
+
+
+def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Array]:
+    """Return x with x − ½ G⁻¹(x × G x) = y, and the derivative of the left side by x.
+
+    Newton's method, for a quarter of y, two quarters, and so on.
+    """
+    x = np.zeros_like(y)
+    for share in (0.25, 0.5, 0.75, 1):
+        goal = share * y
+        for _ in range(4 if share < 1 else 8):
+            h = (G @ x[..., None])[..., 0]
+            by_x = np.eye(3) - inverse @ (hat(x) @ G - hat(h)) / 2
+            miss = x - (inverse @ np.cross(x, h)[..., None])[..., 0] / 2 - goal
+            try:
+                x = x - np.linalg.solve(by_x, miss[..., None])[..., 0]
+            except np.linalg.LinAlgError as error:
+                raise ValueError("normal cubic: the map from x to y is singular") from error
+    lost = ~(np.abs(miss).max(axis=-1, initial=0) < 1e-13 * (1 + np.abs(y).max(axis=-1, initial=0)))
+    if lost.any():
+        which = which_curve(np.flatnonzero(lost)[0], lost.shape)
+        raise ValueError(f"normal cubic{which}: no x is found for the goal")
+    return x, by_x
+
+
 class CumulativeBezier(QuaternionCurve):
     """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), β the cumulative Bernstein polynomials."""
 
@@ -389,9 +579,9 @@ class CumulativeBezier(QuaternionCurve):
     def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         s = 1 - t
         shares: list[Jet] = [
-            [t * (1 + s + s * s), 3 * s * s, -6 * s],
-            [t * t * (1 + 2 * s), 6 * t * s, 6 * (s - t)],
-            [t * t * t, 3 * t * t, 6 * t],
+            [t * (1 + s + s * s), 3 * s * s, -6 * s, 6 + 0 * t],
+            [t * t * (1 + 2 * s), 6 * t * s, 6 * (s - t), -12 + 0 * t],
+            [t * t * t, 3 * t * t, 6 * t, 6 + 0 * t],
         ]
         first, second, third = (
             exp([beta * half for beta in share[: order + 1]])
@@ -412,7 +602,7 @@ class Bezier(QuaternionCurve):
         self._controls = np.stack([start, first, multiply(first, second), last])
 
     def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        share = [t, np.ones_like(t), np.zeros_like(t)][: order + 1]
+        share = [identity(t, k) for k in range(order + 1)]
         points = [[point, *[np.zeros_like(point)] * order] for point in controls]
         while len(points) > 1:
             points = [slerp(a, b, share) for a, b in pairwise(points)]

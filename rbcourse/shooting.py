@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rbcourse._chebyshev import grid
 from rbcourse._numerics import Array
-from rbcourse.curves import Ends, check_ends
-from rbcourse.optimum import (
+from rbcourse.curves import check_ends
+from rbcourse.optimum import Optimum, ball, solve
+from rbcourse.relaxation import (
+    BallStationary,
     Failure,
-    MinimumAcceleration,
     Solution,
-    defects,
-    exact_cost,
-    first_guess,
-    grid,
-    solve,
+    in_body,
+    rates_at_nodes,
 )
 from rbcourse.so3 import hat_so3, log_so3
 
@@ -26,7 +25,7 @@ LONGEST_STEP = 0.5
 
 def shoot_minimum_acceleration_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
-) -> MinimumAcceleration:
+) -> Optimum:
     """Return the minimum-acceleration curve with these ends, by shooting.
 
     Equation (20), w'' + w × w' = b, is integrated from t = 0; the unknown w'(0) and b are improved
@@ -41,7 +40,7 @@ def shoot_minimum_acceleration_so3(
 
     Returns
     -------
-    MinimumAcceleration
+    Optimum
         As `minimum_acceleration_so3`, and for the same ends the same curve to about 1e-11, if both
         find the same solution of (19). Of a stack the problems are solved one by one.
 
@@ -78,53 +77,64 @@ def shoot_minimum_acceleration_so3(
     >>> c(0.5, 1).round(9) + 0.0  # 1.5 times the average, as for any cubic from rest to rest
     array([0.  , 0.  , 2.25])
     """
-    return solve(shoot, check_ends(R0, R1, w0, w1))
+    return solve(ball(check_ends(R0, R1, w0, w1))._replace(solver=shoot))
 
 
-def shoot(ends: Ends, R: Array) -> list[Solution | Failure]:
+def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:
     """Solve the problems of a stack, one by one."""
     parts = [slice(i, i + 1) for i in range(len(R))]
-    return [_shoot(ends.of(one), R[one]) for one in parts]
+    return [_shoot(equations.of(one), R[one]) for one in parts]
 
 
-def _shoot(ends: Ends, start: Array) -> Solution | Failure:
+def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
     """Improve the aim (w'(0), b) by Newton's method, the hit moved by half a unit at most."""
-    aim = _first_aim(ends, start)
-    for iteration in range(STEPS):
-        miss, by_aim = _miss(ends, aim)
-        size = float(np.abs(miss).max())
-        if size < 1e-11:
-            R = _shot(ends, aim, grid(NODES).t)[0]
-            c = ends.R0[0] @ (aim[3:] - np.cross(ends.w0[0], aim[:3]))
-            residual = float(np.abs(defects(ends, R[None], c[None])[0]).max())
-            if residual < 1e-10:
-                cost = float(exact_cost(ends, R[None], c[None])[0])
-                return Solution(R, c, cost, residual, iteration)
-            return Failure(residual, iteration)
-        aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
+    try:
+        aim = _first_aim(equations, start)
+        for iteration in range(STEPS):
+            miss, by_aim = _miss(equations, aim)
+            size = float(np.abs(miss).max())
+            if size < 1e-11:
+                return _solution(equations, aim, iteration)
+            aim = aim - np.linalg.solve(by_aim, miss) * min(1.0, LONGEST_STEP / size)
+    except (FloatingPointError, np.linalg.LinAlgError, ValueError):
+        return Failure(np.inf, 0)
     return Failure(size, STEPS)
 
 
-def _first_aim(ends: Ends, start: Array) -> Array:
+def _solution(equations: BallStationary, aim: Array, iterations: int) -> Solution | Failure:
+    """Return the curve of an aim that hits, unless it does not satisfy the equations."""
+    R, w, _ = _shot(equations, aim, grid(NODES).t)
+    c = equations.R0[0] @ (aim[3:] - np.cross(w[0], aim[:3]))
+    residual = float(equations.errors((R[None], c[None]))[0][0])
+    if not residual < 1e-10:
+        return Failure(residual, iterations)
+    k, c, cost = equations.solution((R[None], c[None]))
+    return Solution(R, k[0], c[0], float(cost[0]), residual, iterations)
+
+
+def _first_aim(equations: BallStationary, start: Array) -> Array:
     """Return w'(0) and b = w''(0) + w(0) × w'(0) of the curve that `relax` would start with."""
-    [R], [c] = first_guess(ends, start)
-    acceleration = MinimumAcceleration(ends, [Solution(R, c, 0.0, 0.0, 0)], ())(0, 2)
-    return np.concatenate([acceleration, R[0].T @ c + np.cross(ends.w0[0], acceleration)])
+    (c,), w0 = equations.first(start), equations.ends[0, 0]
+    _, [acceleration, *_], [bend, *_] = (
+        x[0] for x in rates_at_nodes(equations.ends, in_body(start, c))
+    )
+    return np.concatenate([acceleration, bend + np.cross(w0, acceleration)])
 
 
-def _miss(ends: Ends, aim: Array) -> tuple[Array, Array]:
+def _miss(equations: BallStationary, aim: Array) -> tuple[Array, Array]:
     """Return by how much R1 and w1 are missed, and, near the goal, how that depends on the aim."""
-    R, w, sensitivity = (values[-1] for values in _shot(ends, aim, np.ones(1)))
-    turn = log_so3(ends.R1[0].T @ R)
-    return np.concatenate([turn, w - ends.w1[0]]), sensitivity[:6]
+    R, w, sensitivity = (values[-1] for values in _shot(equations, aim, np.ones(1)))
+    turn = log_so3(equations.R1[0].T @ R)
+    return np.concatenate([turn, w - equations.ends[0, 1]]), sensitivity[:6]
 
 
-def _shot(ends: Ends, aim: Array, t: Array) -> tuple[Array, Array, Array]:
+def _shot(equations: BallStationary, aim: Array, t: Array) -> tuple[Array, Array, Array]:
     """Return R, w and the sensitivity of (turn, w, w') to the aim, at the times t."""
     from scipy.integrate import solve_ivp
 
     sensitivity = np.eye(9, 6, -6)
-    start = np.concatenate([ends.R0.ravel(), ends.w0[0], aim[:3], sensitivity.ravel()])
+    R0, w0 = equations.R0.ravel(), equations.ends[0, 0]
+    start = np.concatenate([R0, w0, aim[:3], sensitivity.ravel()])
     shot = solve_ivp(
         _flow, (0, 1), start, "DOP853", t_eval=t, args=(aim[3:],), rtol=1e-12, atol=1e-13
     )

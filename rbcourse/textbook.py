@@ -162,6 +162,55 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
     return value[()]
 
 
+def minimum_torque_so3(
+    R0: Array, R1: Array, w0: Array, w1: Array, G: Array, t: Array, tol: float = 1e-9
+) -> tuple[Array, Array]:
+    """Return R and w of a body's least torque at the times t, shape (N,), by SciPy's `solve_bvp`.
+
+    Their shapes are (N, 3, 3) and (N, 3). If it fails, a RuntimeError says why.
+
+    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
+    with p = G (τ' + w × τ) − G w × τ, for an unknown c. On the way ‖σ‖ has to stay below 2π.
+
+    References
+    ----------
+    Beyond BK (see `rbcourse.functionals.Effort`, with M = I).
+
+    Examples
+    --------
+    >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
+    >>> R, w = minimum_torque_so3(I, R1, rest, rest, np.diag([1.0, 2, 2.5]), np.array([0.5]))
+    >>> log_so3(R)[:, 2].round(9) + 0.0
+    array([0.75])
+    """
+    from scipy.integrate import solve_bvp
+
+    goal = log_so3(R0.T @ R1)
+
+    def cross(x: Array, y: Array) -> Array:
+        return np.cross(x, y, axis=0)
+
+    def rates(_: Array, y: Array, c: Array) -> Array:
+        sigma, w, torque = y.reshape(3, 3, -1)
+        sigma_rate = np.einsum("nij,jn->in", right_jacobian_inverse_so3(sigma.T), w)
+        costate = (R0 @ exp_so3(sigma.T)).mT @ c
+        w_rate = np.linalg.solve(G, torque - cross(w, G @ w))
+        torque_rate = np.linalg.solve(G, costate.T + cross(G @ w, torque)) - cross(w, torque)
+        return np.concatenate([sigma_rate, w_rate, torque_rate])
+
+    def misses(start: Array, end: Array, c: Array) -> Array:
+        return np.concatenate([start[:3], start[3:6] - w0, end[:3] - goal, end[3:6] - w1])
+
+    nodes = np.linspace(0, 1, 11)
+    guess = np.zeros((9, 11))
+    guess[:3], guess[3:6] = np.outer(goal, nodes), np.outer(w0, 1 - nodes) + np.outer(w1, nodes)
+    solution = solve_bvp(rates, misses, nodes, guess, p=np.zeros(3), tol=tol, max_nodes=100_000)
+    if not solution.success:
+        raise RuntimeError(solution.message)
+    sigma, w, _ = np.moveaxis(solution.sol(t).reshape(3, 3, -1), -1, 1)
+    return R0 @ exp_so3(sigma), w
+
+
 def _spin(S: Array) -> Array:
     return np.trace(S, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - S
 

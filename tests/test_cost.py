@@ -168,7 +168,7 @@ def test_a_sharp_turn_of_a_retimed_leg_is_not_missed(margin):
 
     want = rb.acceleration_cost(rb.projected_line_so3(np.eye(3), turn))
     assert rb.acceleration_cost(leg(np.eye(3), turn)) == pytest.approx(want, rel=1e-9)
-    legs, _ = rb.chain([0, 1], [np.eye(3), turn], leg=leg)._unit_legs()
+    legs, _ = rb.chain([0, 1], [np.eye(3), turn], leg=leg)._unit_legs("", 1)
     assert isinstance(legs, Retimed)
     ((when, width),) = legs._events()
     assert (when, width) == pytest.approx((0.5, margin / 4), rel=1e-6)

@@ -352,10 +352,10 @@ def test_bad_arguments_are_named(make):
     curve = make(STARTS[0], GOALS[0])
     with pytest.raises(ValueError, match=r"t\[2\] is 1.5, a time in \[0, 1\] is wanted"):
         curve([0, 1, 1.5])
-    with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got True"):
+    with pytest.raises(ValueError, match="order: 0, 1, 2 or 3 wanted, got True"):
         GEODESICS(0.5, True)
-    with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got 3"):
-        curve(0.5, 3)
+    with pytest.raises(ValueError, match="order: 0, 1, 2 or 3 wanted, got 4"):
+        curve(0.5, 4)
 
 
 OWN = [rb.projected_cubic_so3, rb.quaternion_cubic_so3, rb.exponential_cubic_so3]
@@ -398,8 +398,8 @@ def test_times_of_their_own_are_checked():
         with pytest.raises(ValueError, match=r"^t: shape .* wanted, got"):
             stack.at_own_times(np.zeros(shape))
     t = np.zeros((4, 2, 3))
-    with pytest.raises(ValueError, match=r"^order: 0, 1 or 2 wanted, got 3"):
-        stack.at_own_times(t, 3)
+    with pytest.raises(ValueError, match=r"^order: 0, 1, 2 or 3 wanted, got 4"):
+        stack.at_own_times(t, 4)
     for wrong in (np.nan, -0.1, 1.1):
         t[3, 1, 2] = wrong
         with pytest.raises(ValueError, match=r"^t\[3, 1, 2\] is "):

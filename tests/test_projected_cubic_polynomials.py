@@ -88,9 +88,9 @@ def test_it_takes_numbers_and_ends_that_broadcast_with_the_times():
     assert hermite(ends, np.zeros((7, 1, 1)), 2).shape == (7, 4, 3)
 
 
-def test_the_cubic_of_its_ends_has_two_derivatives():
-    with pytest.raises(ValueError, match=r"^order: 0, 1 or 2 wanted, got 3"):
-        hermite([0, 1, 0, 0], np.array([0.5]), 3)
+def test_the_cubic_of_its_ends_has_three_derivatives():
+    with pytest.raises(ValueError, match=r"^order: 0, 1, 2 or 3 wanted, got 4"):
+        hermite([0, 1, 0, 0], np.array([0.5]), 4)
 
 
 def test_an_odd_number_of_ends_makes_no_polynomial():

@@ -200,9 +200,9 @@ def test_shapes_and_bad_arguments(function):
         function(0.5, 3.2)
     with pytest.raises(ValueError, match=r"batch shapes do not broadcast: t \(2,\), angle \(3,\)"):
         function([0, 1], [1, 2, 3])
-    with pytest.raises(ValueError, match="order: 0, 1 or 2 wanted, got 3"):
-        function(0.5, 1.0, 3)
-    with pytest.raises(ValueError, match=r"order: 0, 1 or 2 wanted, got array"):
+    with pytest.raises(ValueError, match="order: 0, 1, 2 or 3 wanted, got 4"):
+        function(0.5, 1.0, 4)
+    with pytest.raises(ValueError, match=r"order: 0, 1, 2 or 3 wanted, got array"):
         function(0.5, 1.0, np.array([0, 1]))
     with pytest.raises(ValueError, match=r"t\[1\] is nan"):
         function([0, np.nan], 1.0)

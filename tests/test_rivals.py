@@ -324,8 +324,8 @@ def test_bad_arguments_are_named(name):
     for t in (-1e-9, 1 + 1e-9, np.nan):
         with pytest.raises(ValueError, match=r"^t\[1\] is "):
             curve([0, t])
-    with pytest.raises(ValueError, match=r"^order: 0, 1 or 2 wanted, got 3"):
-        curve(0.5, 3)
+    with pytest.raises(ValueError, match=r"^order: 0, 1, 2 or 3 wanted, got 4"):
+        curve(0.5, 4)
 
 
 def test_beziers_velocities_stay_below_3_pi():

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from rbcourse._checks import Rng, as_count, as_generator, as_single
 from rbcourse._numerics import Array, blocks
-from rbcourse.cost import integral
+from rbcourse.cost import rotation_cost
 from rbcourse.curves import Curve, Ends, check_ends
-from rbcourse.optimum import MinimumAcceleration, at_nodes, minimum_acceleration_so3, relax
+from rbcourse.functionals import BallAcceleration
+from rbcourse.optimum import from_guess, minimum_acceleration_so3
 from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic
 from rbcourse.rivals import (
     CLOSED_FORMS,
@@ -137,7 +138,8 @@ def costs(make: Maker, ends: Ends) -> Array:
     >>> bool(np.allclose(costs(projection, ends), acceleration_cost(projection(*ends)), rtol=1e-6))
     True
     """
-    return integral(make(*ends), np.array([0.0, 0.5, 1.0]), 1e-6)[0]
+    panels = np.array([0.0, 0.5, 1.0])
+    return rotation_cost("cost", make(*ends), BallAcceleration(), panels, 1e-6)
 
 
 def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
@@ -153,7 +155,7 @@ def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]
 
     def solve(part: slice) -> Array:
         some = ends.of(part)
-        return np.stack([_cost_from(some, make(*some)) for make in starts.values()])
+        return np.stack([from_guess(some, make(*some)).cost for make in starts.values()])
 
     found = _side_by_side(solve, parts, report)
     return dict(zip(starts, np.concatenate(found, axis=-1), strict=True))
@@ -260,12 +262,6 @@ def in_words(excess: float) -> str:
     if excess < 10:
         return f"{100 * excess:.2g} %" if excess < 0.1 else f"{100 * excess:.0f} %"
     return f"{1 + excess:.0f} ×" if excess < 1e4 else "> 10⁴ ×"
-
-
-def _cost_from(ends: Ends, guess: Curve) -> Array:
-    with np.errstate(over="ignore", invalid="ignore"):
-        solutions = relax(ends, at_nodes(guess))
-    return np.asarray(MinimumAcceleration(ends, solutions, (len(ends.w0),)).cost)
 
 
 def _side_by_side(

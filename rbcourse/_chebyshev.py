@@ -1,0 +1,104 @@
+"""Functions of time, by values at Chebyshev–Lobatto nodes on [0, 1] and as Chebyshev series."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from rbcourse._numerics import Array
+from rbcourse.projected_cubic import hermite
+
+
+class Grid(NamedTuple):
+    """Nodes, and matrices that act on values there.
+
+    `derivative` and `integral` from 0 give values at the nodes, `series` the Chebyshev
+    coefficients.
+    """
+
+    t: Array
+    derivative: Array
+    integral: Array
+    series: Array
+
+
+class Primitives(NamedTuple):
+    """How k = x⁽ᵐ⁾ at the nodes, and the m end values of x, give x, x', … x⁽ᵐ⁾.
+
+    At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k, without derivatives of k: x is the
+    m-fold integral of k, and the polynomial of least degree that mends its ends. The first are the
+    same for the Chebyshev coefficients of x⁽ⁱ⁾. `fit` gives the k, smooth, of an x that has zero
+    ends.
+    """
+
+    from_ends: list[Array]
+    from_k: list[Array]
+    series_from_ends: list[Array]
+    series_from_k: list[Array]
+    fit: Array
+
+
+def chebyshev(t: Array, count: int) -> Array:
+    """Return the first Chebyshev polynomials on [0, 1] at the times t, shape (..., count)."""
+    from numpy.polynomial.chebyshev import chebvander
+
+    return chebvander(2 * t - 1, count - 1)
+
+
+@lru_cache
+def grid(n: int) -> Grid:
+    """Return the grid of n nodes."""
+    from numpy.polynomial.chebyshev import chebder, chebint
+
+    t = (1 - np.cos(np.pi * np.arange(n) / (n - 1))) / 2
+    series = np.linalg.inv(chebyshev(t, n))
+    slopes, sums = chebder(series, scl=2), chebint(series, lbnd=-1, scl=0.5)
+    derivative, integral = (chebyshev(t, len(c)) @ c for c in (slopes, sums))
+    return Grid(t, derivative, integral, series)
+
+
+@lru_cache
+def primitives(n: int, m: int) -> Primitives:
+    """Return the matrices for n nodes, and m end values: x at 0 and 1, and for m = 4 x' too."""
+    from numpy.polynomial.chebyshev import chebint
+
+    nodes, few, each = grid(n), grid(m), list(np.eye(m)[:, None])
+    polynomial = [few.series @ hermite(each, few.t[:, None], i) for i in range(m)]
+    integral = [chebint(nodes.series, m - i, lbnd=-1, scl=0.5) for i in range(m)]
+    ends = np.concatenate([chebyshev(few.t[[0, -1]], len(c)) @ c for c in integral[: m // 2]])
+    series_from_ends = [np.pad(c, ((0, n - i), (0, 0))) for i, c in enumerate(polynomial)]
+    series_from_k = [c - p @ ends for c, p in zip(integral, series_from_ends, strict=True)]
+    from_ends, from_k = (
+        [chebyshev(nodes.t, len(c)) @ c for c in series]
+        for series in (series_from_ends, series_from_k)
+    )
+    smooth = chebyshev(nodes.t, max(3, n // 2))
+    return Primitives(
+        [*from_ends, np.zeros((n, m))],
+        [*from_k, np.eye(n)],
+        [*series_from_ends, np.zeros((n, m))],
+        [*series_from_k, nodes.series],
+        smooth @ np.linalg.pinv(from_k[0] @ smooth),
+    )
+
+
+@lru_cache
+def interpolation(few: int, many: int) -> Array:
+    """Return the matrix that goes from the values at some nodes to those at others."""
+    return chebyshev(grid(many).t, few) @ grid(few).series
+
+
+def along(matrix: Array, values: Array) -> Array:
+    """Return a matrix applied to values at the nodes, of any shape (N, n, ...)."""
+    count, n, *core = values.shape
+    columns = values.reshape(count, n, math.prod(core))
+    return (matrix @ columns).reshape(count, len(matrix), *core)
+
+
+def tails(values: Array) -> Array:
+    """Return the larger of the last two Chebyshev coefficients: what the nodes do not carry."""
+    last = np.abs(along(grid(values.shape[1]).series[-2:], values))
+    return last.max(axis=tuple(range(1, last.ndim)))

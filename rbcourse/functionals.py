@@ -1,0 +1,242 @@
+"""What the optima on SO(3) minimise, and the p for which R p is constant along them.
+
+Each functional is a number times ∫ ‖u‖² dt, with u a function of w, w' and, for the jerk, w''. Vary
+a curve R(t) to R exp(η̂), with η a small function of time. Then w changes by δw = η' + w × η, and,
+with L = ‖u‖²,
+
+    ½ δ ∫ L dt = ± ∫ p · δw dt,    p = ±½ (∂L/∂w − d/dt ∂L/∂w' + d²/dt² ∂L/∂w''),
+
+where η vanishes at both ends, with as many derivatives as are given there. The integral is
+±∫ (−p' − w × p) · η dt: it is 0 for every η if p' + w × p = 0. As (R p)' = R (p' + w × p), a curve
+is stationary exactly if
+
+    R p = c,  constant.
+
+That is Noether's theorem: turning the room changes no cost. p is called the costate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from rbcourse._numerics import Array
+from rbcourse.so3 import hat
+
+
+class Functional(Protocol):
+    """A number times ∫ ‖u‖² dt, for a stack of problems; and what is linear about it.
+
+    The rates w, w', … have the shape (N, n, 3): N problems, n times. Derivatives by them are lists
+    of 3 × 3 matrices, shape (N, n, 3, 3), of which the first is by w.
+
+    Attributes
+    ----------
+    name : str
+        What the optimum is called.
+    ends : int
+        How many end values the optimum has: w, or w and w', at 0 and at 1. So many derivatives of w
+        stand in p.
+    needs : tuple of int
+        On which derivatives ``c(t, order)`` of a curve the deviation depends.
+    scale, unit : float or ndarray, shape (N,)
+        What ∫ ‖u‖² dt and `p` are multiplied by.
+    """
+
+    name: str
+    ends: int
+    needs: tuple[int, ...]
+    scale: Any
+    unit: Any
+
+    def of(self, which: Any) -> Self:
+        """Return that of some of the problems."""
+
+    @property
+    def deviation(self) -> Callable[..., Array]:
+        """The function of w, w', … that returns u."""
+
+    @property
+    def deviation_by(self) -> Callable[..., list[Array]]:
+        """The function that returns the derivatives of u."""
+
+    @property
+    def p(self) -> Callable[..., Array]:
+        """The function of w, w', … that returns p."""
+
+    @property
+    def p_by(self) -> Callable[..., list[Array]]:
+        """The function that returns the derivatives of p."""
+
+
+class BallAcceleration:
+    """2 ∫ ‖w'‖² dt: the squared covariant acceleration in the metric of a ball, G = 2 I.
+
+    u = w' and p = w''. The optimum has R w'' = c.
+
+    References
+    ----------
+    BK (18), BK (19).
+    """
+
+    name, ends, scale, unit = "MinimumAcceleration", 2, 2.0, 1.0
+    needs: tuple[int, ...] = (2,)
+
+    def of(self, which: Any) -> Self:
+        """Return itself: it is the same for all problems."""
+        return self
+
+    def deviation(self, *rates: Array) -> Array:
+        """Return w', the last of the rates."""
+        return rates[-1]
+
+    def deviation_by(self, w: Array, a: Array) -> list[Array]:
+        """Return the derivatives of w' by w and w'."""
+        zero = np.zeros((*w.shape, 3))
+        return [zero, zero + np.eye(3)]
+
+    def p(self, w: Array, a: Array, b: Array) -> Array:
+        """Return w''."""
+        return b
+
+    def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
+        """Return the derivatives of w'' by w, w' and w''."""
+        return [*self.deviation_by(w, a)[:1] * 2, *self.deviation_by(w, a)[1:]]
+
+
+class Effort:
+    """∫ τᵀ M τ dt of a body with the inertia G: τ = G w' + w × G w is the torque on it.
+
+    With M = G⁻¹, M τ = w' + G⁻¹ (w × G w) is the covariant acceleration ∇_V V in the metric G of
+    its kinetic energy, and the functional its square. With M = I it is the square of the torque.
+
+    With v = M τ and h = G w,
+
+        p = G (v' + w × v) − h × v.
+
+    Parameters
+    ----------
+    G : ndarray, shape (N, 3, 3)
+        Inertia, symmetric and positive definite. It is divided by a third of its trace, so that
+        the unit of inertia does not matter.
+    of_torque : bool
+        Whether M is I, and not G⁻¹.
+
+    References
+    ----------
+    Beyond BK: BK 3 leaves these metrics to a later publication. With M = G⁻¹ the equation is that
+    of Noakes, Heinzinger and Paden 1989 and of Crouch and Silva Leite 1995.
+    """
+
+    ends = 2
+    needs: tuple[int, ...] = (1, 2)
+
+    def __init__(self, G: Array, *, of_torque: bool) -> None:
+        size = np.trace(G, axis1=-2, axis2=-1) / 3
+        self.G = G / size[:, None, None]
+        self.of_torque = of_torque
+        self.name = "MinimumTorque" if of_torque else "MinimumAcceleration"
+        self.M = np.broadcast_to(np.eye(3), G.shape) if of_torque else np.linalg.inv(self.G)
+        self.root = np.linalg.cholesky(self.M).mT
+        self.scale = self.unit = size**2 if of_torque else size
+
+    def of(self, which: Any) -> Self:
+        """Return that of some of the problems."""
+        chosen = object.__new__(type(self))
+        chosen.of_torque, chosen.name = self.of_torque, self.name
+        chosen.G, chosen.M, chosen.root = (x[which] for x in (self.G, self.M, self.root))
+        chosen.scale = chosen.unit = self.scale[which]
+        return chosen
+
+    def torque(self, w: Array, a: Array) -> Array:
+        """Return τ = G w' + w × G w, over a third of the trace of G."""
+        G = self.G[:, None]
+        return _times(G, a) + _cross(w, _times(G, w))
+
+    def deviation(self, w: Array, a: Array) -> Array:
+        """Return a root of M times the torque."""
+        return _times(self.root[:, None], self.torque(w, a))
+
+    def deviation_by(self, w: Array, a: Array) -> list[Array]:
+        """Return the derivatives of that by w and w'."""
+        G, root = self.G[:, None], self.root[:, None]
+        T0 = hat(w) @ G - hat(_times(G, w))
+        return [root @ T0, np.broadcast_to(root @ G, T0.shape)]
+
+    def p(self, w: Array, a: Array, b: Array) -> Array:
+        """Return G (v' + w × v) − h × v, v = M τ."""
+        G, M = self.G[:, None], self.M[:, None]
+        h, h_rate = _times(G, w), _times(G, a)
+        torque_rate = _times(G, b) + _cross(a, h) + _cross(w, h_rate)
+        v, v_rate = _times(M, h_rate + _cross(w, h)), _times(M, torque_rate)
+        return _times(G, v_rate + _cross(w, v)) - _cross(h, v)
+
+    def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
+        """Return the derivatives of p by w, w' and w''."""
+        G, M = self.G[:, None], self.M[:, None]
+        W, H = hat(w), hat(_times(G, w))
+        T0, T1 = W @ G - H, hat(a) @ G - hat(_times(G, a))  # of τ by w; of τ' by w
+        V, GM, QM = hat(_times(M, self.torque(w, a))), G @ M, (G @ W - H) @ M
+        by_w = GM @ T1 + QM @ T0 - G @ V + V @ G
+        return [by_w, GM @ T0 + QM @ G, np.broadcast_to(GM @ G, W.shape)]
+
+
+class Jerk:
+    """2 ∫ ‖j‖² dt, j = w'' + ½ w × w': the squared covariant jerk in the metric of a ball, G = 2 I.
+
+    p = j'' + ½ w × j' + w' × j. Of all j = w'' + κ w × w' only this one gives a motion and the
+    motion seen from the body, Rᵀ(t), the same cost.
+
+    References
+    ----------
+    Beyond BK: Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and Crouch 1995.
+    """
+
+    name, ends, scale, unit = "MinimumJerk", 4, 2.0, 1.0
+    needs: tuple[int, ...] = (1, 2, 3)
+
+    def of(self, which: Any) -> Self:
+        """Return itself: it is the same for all problems."""
+        return self
+
+    def deviation(self, w: Array, a: Array, b: Array) -> Array:
+        """Return j."""
+        return b + _cross(w, a) / 2
+
+    def deviation_by(self, w: Array, a: Array, b: Array) -> list[Array]:
+        """Return the derivatives of j by w, w' and w''."""
+        W = hat(w)
+        return [-hat(a) / 2, W / 2, np.broadcast_to(np.eye(3), W.shape)]
+
+    def p(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> Array:
+        """Return j'' + ½ w × j' + w' × j; d and e are the third and fourth derivatives of w."""
+        j, j_rate = self.deviation(w, a, b), d + _cross(w, b) / 2
+        j_bend = e + (_cross(a, b) + _cross(w, d)) / 2
+        return j_bend + _cross(w, j_rate) / 2 + _cross(a, j)
+
+    def p_by(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> list[Array]:
+        """Return the derivatives of p by w and its four derivatives."""
+        W, A, B, D = hat(w), hat(a), hat(b), hat(d)
+        J, J_rate = B + hat(_cross(w, a)) / 2, D + hat(_cross(w, b)) / 2
+        return [
+            -(D + J_rate + W @ B / 2 + A @ A) / 2,
+            A @ W / 2 - B / 2 - J,
+            1.5 * A + W @ W / 4,
+            W,
+            np.broadcast_to(np.eye(3), W.shape),
+        ]
+
+
+def _times(A: Array, x: Array) -> Array:
+    return (A @ x[..., None])[..., 0]
+
+
+def _cross(x: Array, y: Array) -> Array:
+    """Return x × y, several times as fast as NumPy's."""
+    a, b, c = x[..., 0], x[..., 1], x[..., 2]
+    u, v, w = y[..., 0], y[..., 1], y[..., 2]
+    product = np.empty_like(x)
+    product[..., 0], product[..., 1], product[..., 2] = b * w - c * v, c * u - a * w, a * v - b * u
+    return product

@@ -1,0 +1,455 @@
+"""R p = c solved for the whole curve at once: Newton's method on rotations at Chebyshev nodes.
+
+`Stationary` is the equation for any functional, `BallStationary` the same for a ball, where it is
+R w'' = c and a step is twenty times as fast.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
+from rbcourse._numerics import Array, blocks
+from rbcourse.functionals import BallAcceleration, Functional
+from rbcourse.so3 import hat, vee
+
+STEPS = 25
+EXACT = 3e-12  # what may be left of the equations, and of R in the last Chebyshev coefficients
+SHARE = 0.03  # of EXACT that may be left of p, and of k in the last coefficients, over their size
+LONGEST_STEP = 0.5  # rad: no node is turned by more at once
+ROUGH = 1e-2  # rad: with shorter steps the first nodes are left
+FAILED, FINER, SOLVED = range(3)
+Arrays: TypeAlias = tuple[Array, ...]
+
+
+class Solution(NamedTuple):
+    """One problem solved: R and the highest derivative k of w at the nodes, c = R p, ∫ ‖u‖² dt."""
+
+    R: Array
+    k: Array
+    c: Array
+    cost: float
+    residual: float
+    iterations: int
+
+
+class Failure(NamedTuple):
+    """One problem not solved: what was left, and after how many steps."""
+
+    residual: float
+    iterations: int
+
+
+def cost_of(one: Solution | Failure) -> float:
+    """Return the cost; infinity where there is no solution."""
+    return one.cost if isinstance(one, Solution) else np.inf
+
+
+class Equations(Protocol):
+    """R' = R ŵ and R p = c for a stack of problems; the unknowns are R at n nodes, and others.
+
+    Attributes
+    ----------
+    R0, R1 : ndarray, shape (N, 3, 3)
+        Where the curves begin and end.
+    together : int
+        How many problems are solved together: as many as fit into the cache.
+    """
+
+    R0: Array
+    R1: Array
+    together: int
+
+    def of(self, which: Any) -> Self:
+        """Return those of some of the problems."""
+
+    def first(self, R: Array) -> Arrays:
+        """Return the other unknowns to start with, from rotations of shape (N, n, 3, 3)."""
+
+    def nodes(self, n: int) -> tuple[int, ...]:
+        """Return on how many nodes to solve it, from n on."""
+
+    def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
+        """Return the largest error of each problem, and what a step is made from."""
+
+    def step(self, unknowns: Arrays, parts: Arrays) -> tuple[Array, Arrays]:
+        """Return the turns of the nodes, in the fixed frame, and the changes of the others."""
+
+    def tails(self, unknowns: Arrays) -> Array:
+        """Return what the nodes do not carry."""
+
+    def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
+        """Return k, c and the cost."""
+
+
+def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
+    """Solve a stack by Newton's method, from rotations at nodes, shape (N, n, 3, 3).
+
+    First on these nodes, until the steps are short; then on more, until the last Chebyshev
+    coefficients have decayed. A problem that is singular or overflows is a `Failure`.
+    """
+    parts = blocks(len(R), equations.together)
+    return [one for part in parts for one in _attempt(equations.of(part), R[part])]
+
+
+def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
+    """Return `relax`, with linear systems on the nodes of R."""
+    parts = equations.R0, equations.R1, equations.ends
+    return relax(BallStationary(*parts, R.shape[1]), R)
+
+
+def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
+    """Treat singular or non-finite problems as failures, one problem at a time."""
+    try:
+        return _relax(equations, R)
+    except (FloatingPointError, np.linalg.LinAlgError, ValueError):
+        if len(R) == 1:
+            return [Failure(np.inf, 0)]
+    parts = [slice(i, i + 1) for i in range(len(R))]
+    return [_attempt(equations.of(one), R[one])[0] for one in parts]
+
+
+def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
+    found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
+    which, steps = np.arange(len(R)), np.zeros(len(R), int)
+    first, R = R.shape[1], _with_ends(equations, R)
+    unknowns: Arrays = R, *equations.first(R)
+    for n in equations.nodes(first):
+        if not len(which):
+            break
+        if n > first:
+            unknowns = _on_nodes(equations, n, unknowns)
+        now = _newton(equations, unknowns, rough=n == first)
+        steps += now.steps
+        solved, finer = now.verdict == SOLVED, now.verdict == FINER
+        for i, left, taken in zip(which, now.left.tolist(), steps.tolist(), strict=True):
+            found[i] = Failure(left, taken)
+        good = tuple(x[solved] for x in now.unknowns)
+        results = equations.of(solved).solution(good)
+        for i, R_i, k, c, cost in zip(which[solved], good[0], *results, strict=True):
+            found[i] = Solution(R_i, k, c, float(cost), *found[i])
+        equations, which, steps = equations.of(finer), which[finer], steps[finer]
+        unknowns = tuple(x[finer] for x in now.unknowns)
+    return found
+
+
+def _with_ends(equations: Equations, R: Array) -> Array:
+    R = R.copy()
+    R[:, 0], R[:, -1] = equations.R0, equations.R1
+    return R
+
+
+def _on_nodes(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
+    """Return the unknowns on n nodes; c is the same on all."""
+    R, *others = unknowns
+    up = interpolation(R.shape[1], n)
+    R = _with_ends(equations, orthogonal(along(up, R)))
+    return R, *(up @ x if x.ndim == 3 else x for x in others)
+
+
+class Iterate(NamedTuple):
+    """What Newton's method makes of a stack on its nodes: solved, failed, or for finer ones."""
+
+    unknowns: Arrays
+    left: Array
+    steps: NDArray[np.intp]
+    verdict: NDArray[np.intp]
+
+
+def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
+    """Improve the unknowns, no node turned by more than half a rad at once."""
+    unknowns = tuple(x.copy() for x in unknowns)
+    R, *others = unknowns
+    left, size = np.full((2, len(R)), np.inf)
+    steps, verdict = np.zeros((2, len(R)), int)
+    active = np.arange(len(R))
+    for _ in range(STEPS):
+        some, now = equations.of(active), tuple(x[active] for x in unknowns)
+        before = left[active]
+        left[active], parts = some.errors(now)
+        left[np.isnan(left)] = np.inf
+        if rough:
+            verdict[active] = np.where(size[active] < ROUGH, FINER, FAILED)
+        else:
+            verdict[active] = _verdicts(some.tails(now), left[active], before, size[active])
+        going = (verdict[active] == FAILED) & np.isfinite(left[active])
+        if not going.any():
+            break
+        active = active[going]
+        now, parts = (tuple(x[going] for x in arrays) for arrays in (now, parts))
+        turn, changes = some.of(going).step(now, parts)
+        size[active] = np.linalg.norm(turn, axis=-1).max(axis=1)
+        share = LONGEST_STEP / np.maximum(size[active], LONGEST_STEP)
+        R[active] = _turned(now[0], share[:, None, None] * turn)
+        for x, change in zip(others, changes, strict=True):
+            x[active] += share.reshape(-1, *(1 for _ in x.shape[1:])) * change
+        steps[active] += 1
+    return Iterate(unknowns, left, steps, verdict)
+
+
+def _verdicts(tail: Array, left: Array, before: Array, size: Array) -> NDArray[np.intp]:
+    """Tell what is solved, and what wants finer nodes, after a step of that size; else FAILED.
+
+    It is solved where the equation and the last coefficients are small; it wants finer nodes where
+    the coefficients are the larger, or where rounding stops the iteration.
+    """
+    stalled = (size < 1e-6) & (left > before / 2)
+    enough = stalled | (tail > EXACT) & (size < 1e3 * tail)
+    return np.where((tail < EXACT) & (left < EXACT), SOLVED, np.where(enough, FINER, FAILED))
+
+
+def _turned(R: Array, turn: Array) -> Array:
+    """Return the rotations R turned, in the fixed frame, by Cayley's formula: 2 tan(a/2) for a."""
+    H = hat(turn)
+    share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
+    HR = H @ R
+    return R + share[..., None, None] * (HR + H @ HR / 2)
+
+
+def orthogonal(R: Array) -> Array:
+    """Return R without its rounding: one step of Newton and Schulz."""
+    return R @ (1.5 * np.eye(3) - 0.5 * (R.mT @ R))
+
+
+def in_body(R: Array, c: Array) -> Array:
+    """Return Rᵀc at the nodes, shape (N, n, 3)."""
+    return (c[:, None, None] @ R)[:, :, 0]
+
+
+def rates_at_nodes(ends: Array, k: Array) -> list[Array]:
+    """Return w, w', … k, its highest derivative, at the nodes, from k and the end values of w."""
+    by = primitives(k.shape[1], ends.shape[1])
+    return [E @ ends + K @ k for E, K in zip(by.from_ends, by.from_k, strict=True)]
+
+
+def kinematic_error(R0: Array, R: Array, w: Array) -> tuple[Array, Array]:
+    """Return E = R0 + ∫ R ŵ dt − R at the nodes, and ŵ."""
+    W = hat(w)
+    return R0[:, None] + along(grid(R.shape[1]).integral, R @ W) - R, W
+
+
+def mending_turns(R: Array, E: Array, W: Array) -> Array:
+    """Return d: to first order turns ε = d + ∫ R δw dt mend E, with δw a change of w.
+
+    Turns ε in the fixed frame change R ŵ too: d = vee(E Rᵀ + ∫ E ŵ Rᵀ dt).
+    """
+    Rt = np.ascontiguousarray(R.mT)  # faster to multiply with
+    return vee(E @ Rt + along(grid(R.shape[1]).integral, E @ W @ Rt))
+
+
+def costs(functional: Functional, ends: Array, k: Array) -> Array:
+    """Return ∫ ‖u‖² dt by a rule of twice as many nodes."""
+    fine = grid(2 * k.shape[1] - 1)
+    up = interpolation(k.shape[1], len(fine.t))
+    rates = rates_at_nodes(ends, up @ k)
+    u = functional.deviation(*rates[: ends.shape[1] // 2 + 1])
+    return np.sum(u**2, axis=-1) @ fine.integral[-1]
+
+
+class Stationary:
+    """R p = c for any functional; the unknowns are R, k = w⁽ᵐ⁾ at the nodes, and c.
+
+    Parameters
+    ----------
+    functional : Functional
+    R0, R1 : ndarray, shape (N, 3, 3)
+    ends : ndarray, shape (N, m, 3)
+        w0 and w1; for the jerk a0 and a1 too.
+    """
+
+    together = 24
+
+    def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
+        self.functional, self.R0, self.R1, self.ends = functional, R0, R1, ends
+
+    def of(self, which: Any) -> Self:
+        """Return those of some of the problems."""
+        parts = self.R0[which], self.R1[which], self.ends[which]
+        return type(self)(self.functional.of(which), *parts)
+
+    def first(self, R: Array) -> tuple[Array, Array]:
+        """Return the k that gives w most nearly, of half as many polynomials, and c = 0.
+
+        The mean of R p is a worse start than 0.
+        """
+        nodes, by = grid(R.shape[1]), primitives(R.shape[1], self.ends.shape[1])
+        w = vee(R.mT @ along(nodes.derivative, R))
+        return by.fit @ (w - by.from_ends[0] @ self.ends), np.zeros((len(R), 3))
+
+    def nodes(self, n: int) -> tuple[int, ...]:
+        """Return n and what is larger of 25, 33, 49, 65, 97, 129."""
+        return n, *(more for more in (25, 33, 49, 65, 97, 129) if more > n)
+
+    def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
+        """Return the largest entry of R0 + ∫ R ŵ − R, or of p − Rᵀc over the size of k and p."""
+        R, k, c = unknowns
+        rates = rates_at_nodes(self.ends, k)
+        E, W = kinematic_error(self.R0, R, rates[0])
+        p = self.functional.p(*rates)
+        lacking = p - in_body(R, c)
+        size = 1 + np.abs(k).max(axis=(1, 2)) + np.abs(p).max(axis=(1, 2))
+        left = np.abs(E).max(axis=(1, 2, 3)), np.abs(lacking).max(axis=(1, 2)) / (SHARE * size)
+        return np.maximum(*left), (E, W, lacking, *rates)
+
+    def step(self, unknowns: Arrays, parts: Arrays) -> tuple[Array, Arrays]:
+        """Return the turns ε of the nodes, and the changes of k and c.
+
+        With K the integrals that give w, w', … from k, and P the derivatives of p by them,
+
+            p + Σ Pᵢ Kᵢ δk = Rᵀ(c + ĉ ε + δc),    ε = d + ∫ R K₀ δk dt,    ε(1) = 0.
+
+        With the second put into the first these are 3 n + 3 equations for δk and δc.
+        """
+        (R, _, c), (E, W, lacking, *rates) = unknowns, parts
+        d, (count, n) = mending_turns(R, E, W), R.shape[:2]
+        by = primitives(n, self.ends.shape[1])
+        turned_by_k = _integrals(R, by.from_k[0])
+        pull = R.mT @ hat(c)[:, None]
+        system = np.zeros((count, 3 * n + 3, 3 * n + 4))
+        by_k = -(pull @ turned_by_k).reshape(count, n, 3, n, 3)
+        for P, K in zip(self.functional.p_by(*rates), by.from_k, strict=True):
+            if K is not by.from_k[-1]:
+                by_k += P[:, :, :, None, :] * K[:, None, :, None]
+            else:  # the identity
+                each = np.arange(n)
+                by_k[:, each, :, each, :] += P.swapaxes(0, 1)
+        system[:, : 3 * n, : 3 * n] = by_k.reshape(count, 3 * n, 3 * n)
+        system[:, : 3 * n, 3 * n : -1] = -R.mT.reshape(count, 3 * n, 3)
+        system[:, : 3 * n, -1] = ((pull @ d[..., None])[..., 0] - lacking).reshape(count, 3 * n)
+        system[:, 3 * n :, : 3 * n], system[:, 3 * n :, -1] = turned_by_k[:, -1], -d[:, -1]
+        x = np.linalg.solve(system[:, :, :-1], system[:, :, -1:])
+        turn = d + (turned_by_k.reshape(count, 3 * n, 3 * n) @ x[:, : 3 * n]).reshape(d.shape)
+        return turn, (x[:, : 3 * n].reshape(count, n, 3), x[:, 3 * n :, 0])
+
+    def tails(self, unknowns: Arrays) -> Array:
+        """Return the last coefficients of R, or of k over its size."""
+        R, k, _ = unknowns
+        return np.maximum(tails(R), tails(k) / (SHARE * (1 + np.abs(k).max(axis=(1, 2)))))
+
+    def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
+        """Return k, c and the cost."""
+        _, k, c = unknowns
+        return k, c, costs(self.functional, self.ends, k)
+
+
+def _integrals(R: Array, K: Array) -> Array:
+    """Return the matrices, for each node, of ∫ R K x dt of values x at the nodes."""
+    count, n = R.shape[:2]
+    entries = R.reshape(count, n, 9).mT[:, :, None]
+    blocks_of_nodes = ((grid(n).integral * entries) @ K).reshape(count, 3, 3, n, n)
+    return blocks_of_nodes.transpose(0, 3, 1, 4, 2).reshape(count, n, 3, 3 * n)
+
+
+class BallStationary:
+    """R w'' = c; the unknowns are R at the nodes, and c: w'' = Rᵀc gives w by integration.
+
+    Parameters
+    ----------
+    R0, R1 : ndarray, shape (N, 3, 3)
+    ends : ndarray, shape (N, 2, 3)
+        w0 and w1.
+    coarse : int, optional
+        On how many nodes the linear systems are solved: those of the first rotations.
+    """
+
+    together = 128
+
+    def __init__(self, R0: Array, R1: Array, ends: Array, coarse: int = 17) -> None:
+        self.R0, self.R1, self.ends, self.coarse = R0, R1, ends, coarse
+
+    def of(self, which: Any) -> Self:
+        """Return those of some of the problems."""
+        return type(self)(self.R0[which], self.R1[which], self.ends[which], self.coarse)
+
+    def first(self, R: Array) -> tuple[Array]:
+        """Return c for which w'' = Rᵀc gives w most nearly."""
+        nodes, by = grid(R.shape[1]), primitives(R.shape[1], 2)
+        w = vee(R.mT @ along(nodes.derivative, R))
+        lacking = (w - by.from_ends[0] @ self.ends).reshape(len(R), -1, 1)
+        effect = along(by.from_k[0], R.mT).reshape(len(R), -1, 3)
+        return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
+
+    def nodes(self, n: int) -> tuple[int, ...]:
+        """Return n, and what has twice, 4, 8 and 16 times as many intervals."""
+        return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16))
+
+    def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
+        """Return the largest entry of R0 + ∫ R ŵ dt − R."""
+        R, c = unknowns
+        by = primitives(R.shape[1], 2)
+        w = by.from_ends[0] @ self.ends + by.from_k[0] @ in_body(R, c)
+        E, W = kinematic_error(self.R0, R, w)
+        return np.abs(E).max(axis=(1, 2, 3)), (E, W)
+
+    def step(self, unknowns: Arrays, parts: Arrays) -> tuple[Array, Arrays]:
+        """Return the turns ε of the nodes, and the change of c.
+
+        With w'' = Rᵀc, so w = (1 − t) w0 + t w1 + K Rᵀc, the unknowns are R and c. When ε turns R,
+        Rᵀc changes by Rᵀ(ĉ ε + δc), and to first order
+
+            ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
+
+        It is solved for ĉ ε on the `coarse` nodes; the integrals smooth so much that the right
+        side, worked out on all nodes, is as good as a solution on all of them.
+        """
+        R, c = unknowns
+        stride = (R.shape[1] - 1) // (self.coarse - 1)
+        nodes, twice = grid(R.shape[1]), primitives(R.shape[1], 2).from_k[0]
+        Rt, defect = np.ascontiguousarray(R.mT), mending_turns(R, *parts)
+        coarse = _coarse_causes(R[:, ::stride], c, defect[:, ::stride])
+        causes = along(interpolation(coarse.shape[1], len(nodes.t)), coarse)
+        causes[..., 1:] += np.eye(3)
+        effects = along(nodes.integral, R @ along(twice, Rt @ causes))
+        effects[..., 0] += defect
+        dc = -np.linalg.solve(effects[:, -1, :, 1:], effects[:, -1, :, :1])[..., 0]
+        return effects[..., 0] + (effects[..., 1:] @ dc[:, None, :, None])[..., 0], (dc,)
+
+    def tails(self, unknowns: Arrays) -> Array:
+        """Return the last coefficients of R."""
+        return tails(unknowns[0])
+
+    def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
+        """Return w'' at the nodes, c and the cost."""
+        R, c = unknowns
+        k = in_body(R, c)
+        return k, c, costs(BallAcceleration(), self.ends, k)
+
+
+def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
+    """Return ĉ ε that comes from d and from each unit of δc, at the nodes, shape (N, n, 3, 4).
+
+    Only the two components of ε across c count: a linear system for each problem, for these.
+    """
+    count, n = R.shape[:2]
+    nodes, twice, (across, ahead) = grid(n), primitives(n, 2).from_k[0], _across(c)
+    rows, causes = ((x[:, None] @ R).reshape(count, 2 * n, 3) for x in (across, -ahead.mT))
+    between = (rows @ causes.mT) * _for_each_entry(n)
+    system = along(nodes.integral, between.reshape(count, n, -1)).reshape(count, 2 * n, 2 * n)
+    np.einsum("...ii->...i", system)[...] += 1
+    by_c = along(nodes.integral, R @ along(twice, R.mT))
+    right = across[:, None] @ np.concatenate([defect[..., None], by_c], axis=-1)
+    x = np.linalg.solve(system, right.reshape(count, 2 * n, 4)).reshape(count, n, 2, 4)
+    return ahead[:, None] @ x
+
+
+def _across(c: Array) -> tuple[Array, Array]:
+    """Return two unit vectors across c as rows, shape (N, 2, 3), and c × both as columns.
+
+    They are rows of Householder's reflection that takes c to the third axis.
+    """
+    v = c.copy()
+    v[:, 2] += np.copysign(np.sqrt(np.sum(c * c, axis=-1)), c[:, 2])
+    square = np.sum(v * v, axis=-1)
+    twice = v * (2 / np.where(square == 0, 1, square))[:, None]
+    across = np.eye(2, 3) - v[:, :2, None] * twice[:, None]
+    return across, hat(c) @ across.mT
+
+
+@lru_cache
+def _for_each_entry(n: int) -> Array:
+    """Return the Kronecker product of the matrix that integrates twice with 2 × 2 ones."""
+    return np.kron(primitives(n, 2).from_k[0], np.ones((2, 2)))
