@@ -116,7 +116,9 @@ def minimum_acceleration_so3(
       was found from one way round; reversing time changes the cost of 12. Eight random starts found
       a cheaper curve for 2 of 1,000.
     - Bodies with moments up to (1, 2.2, 3.2), ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 10,000 problems: all
-      converge, and none costs more than a closed form or than the optimum of the ball. @RANDOM@
+      converge, and none costs more than a closed form or than the optimum of the ball. Eight
+      random starts found a cheaper curve for 12 of 1,000, and for none of 1,000 with ‖σ‖ < 2,
+      ‖w0‖, ‖w1‖ < 4.
 
     End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
     R0ᵀR1, the shortest or one with full turns more or the other way round. Of those the cheapest
@@ -191,7 +193,8 @@ def minimum_torque_so3(
     -----
     The curve is found as that of `minimum_acceleration_so3`, and is stationary. Of 10,000 random
     problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, with moments up to (1, 2.2, 3.2), all converged, and none
-    costs more than one of the closed forms or than the optimum of the ball. @RANDOMT@
+    costs more than one of the closed forms or than the optimum of the ball. Eight random starts
+    found a cheaper curve for 13 of 1,000, and for none of 1,000 with ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4.
 
     In the fixed frame, with J = R G Rᵀ and H = R G w, so that H' is the torque, the equation is
     J H'' + H' × H = c.
@@ -255,7 +258,7 @@ def minimum_jerk_so3(
     -----
     The curve is found as that of `minimum_acceleration_so3`, and is stationary. Of 10,000 random
     problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, ‖a0‖, ‖a1‖ < 20, all converged, and none costs more than one
-    of the two quintics. @RANDOMJ@
+    of the two quintics. Eight random starts found a cheaper curve for none of 1,000.
 
     From rest to rest without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
     costs 1440 ‖σ‖².
@@ -530,8 +533,7 @@ def solve(task: Task) -> Optimum:
     RuntimeWarning
         If none is found, for some of a stack.
     """
-    with np.errstate(over="ignore", invalid="ignore"):
-        solutions = _cheapest(task)
+    solutions = _cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
     curve = Optimum(task.functional, task.equations.ends, solutions, task.batch)
@@ -568,6 +570,11 @@ def _cheapest(task: Task) -> list[Solution | Failure]:
     It is not where nothing is found, or what is found costs more than a start, lowered or not.
     Where all of them are not enough either, they are lowered farther.
     """
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _searched(task)
+
+
+def _searched(task: Task) -> list[Solution | Failure]:
     ends = task.equations.ends
     found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
     which = np.flatnonzero([one is NOTHING for one in found])

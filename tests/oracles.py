@@ -275,3 +275,151 @@ def free_body(moments, a, c, t):
         assert m < 1
         sn, cn, dn = (mp.ellipfun(name, rate * t, m=m) for name in ("sn", "cn", "dn"))
         return np.array([float(a * cn), float(b * sn), float(c * dn)])
+
+
+def stationary(functional, ends, curve, tol=1e-9):
+    """R p = c by SciPy's `solve_bvp`, with quaternions, from a curve nearby; w and ∫ ‖u‖² dt.
+
+    `functional` is ("effort", G, M), for ∫ τᵀ M τ dt, or ("jerk",). `ends` are R0, R1, w0, w1, and
+    for the jerk a0, a1. Returns the solution, w is in rows 4 – 6, and the cost.
+    """
+    from scipy.integrate import solve_bvp
+    from scipy.spatial.transform import Rotation
+
+    def cross(x, y):
+        return np.cross(x, y, axis=0)
+
+    def in_body(q, c):
+        w, v = q[0], q[1:]
+        c = c[:, None] + 0 * v
+        turned = c + 2 * cross(v, cross(v, c) - w * c)  # by the conjugate of q / ‖q‖
+        return turned + (1 / np.sum(q * q, axis=0) - 1) * (turned - c)
+
+    def spin(q, w):
+        return quaternion_product(q, np.concatenate([0 * w[:1], w])) / 2
+
+    mesh = np.linspace(0, 1, 40)
+    q = Rotation.from_matrix(curve(mesh)).as_quat(scalar_first=True)
+    for i in range(1, len(q)):
+        q[i] *= np.sign(q[i] @ q[i - 1])
+    w, a = curve(mesh, 1).T, curve(mesh, 2).T
+    if functional[0] == "effort":
+        G, M = functional[1:]
+        state, wanted = [M @ (G @ a + cross(w, G @ w))], []
+
+        def rates(_, y, c):
+            q, w, v = y[:4], y[4:7], y[7:10]
+            torque = np.linalg.solve(M, v)
+            w_rate = np.linalg.solve(G, torque - cross(w, G @ w))
+            v_rate = np.linalg.solve(G, in_body(q, c) + cross(G @ w, v)) - cross(w, v)
+            return np.concatenate([spin(q, w), w_rate, v_rate, np.sum(torque * v, axis=0)[None]])
+
+    else:
+        size = 1 + np.abs(curve(mesh, 3)).max()
+        j = curve(mesh, 3).T + cross(w, a) / 2
+        state, wanted = [a, j / size, 0 * j], [(7, ends[4:6])]
+
+        def rates(_, y, c):
+            q, w, a, j, g = y[:4], y[4:7], y[7:10], size * y[10:13], size * y[13:16]
+            g_rate = in_body(q, size * c) - cross(w, g) / 2 - cross(a, j)
+            square = np.sum(j * j, axis=0)[None] / size**2
+            return np.concatenate(
+                [spin(q, w), a, j - cross(w, a) / 2, g / size, g_rate / size, square]
+            )
+
+    wanted = [(4, ends[2:4]), *wanted]
+    y = np.concatenate([q.T, w, *state, np.zeros((1, len(mesh)))])
+
+    def misses(start, end, _):
+        goal = quaternion_product(q[-1] * [1, -1, -1, -1], end[:4])
+        pairs = ((row, x, v) for row, v in wanted for x, v in zip((start, end), v, strict=True))
+        rest = [x[row : row + 3] - v for row, x, v in pairs]
+        return np.concatenate([start[:4] - q[0], goal[1:], *rest, start[-1:]])
+
+    found = solve_bvp(rates, misses, mesh, y, p=np.zeros(3), tol=tol, max_nodes=200_000)
+    assert found.success, found.message
+    return found, float(found.y[-1, -1]) * (1 if functional[0] == "effort" else size**2)
+
+
+def least_directly(deviation, ends, curve, terms=16, nodes=80):
+    """The least ∫ ‖u‖² dt over normalised polynomials of quaternions, from a curve nearby.
+
+    No Euler–Lagrange equation is used. `deviation` takes w, w', … and returns u, all of shape
+    (..., 3); as many end rates are kept as `ends` has pairs after R0, R1. Returns a function of t
+    that is w, and the cost.
+    """
+    from math import comb
+
+    from numpy.polynomial import Polynomial, chebyshev
+    from scipy.interpolate import BPoly
+    from scipy.optimize import least_squares
+    from scipy.spatial.transform import Rotation
+
+    pairs = len(ends) // 2 - 1
+    x, weights = np.polynomial.legendre.leggauss(nodes)
+    t, root = (x + 1) / 2, np.sqrt(weights / 2)[:, None]
+    q = Rotation.from_matrix(curve(np.linspace(0, 1, 201))).as_quat(scalar_first=True)
+    for i in range(1, len(q)):
+        q[i] *= np.sign(q[i] @ q[i - 1])
+
+    def jet_at_end(q, rates):
+        jet = [q]
+        for k in range(len(rates)):
+            products = [
+                comb(k, i) * quaternion_product(jet[k - i], np.append(0, rates[i]))
+                for i in range(k + 1)
+            ]
+            jet.append(sum(products) / 2)
+        return jet
+
+    hermite = BPoly.from_derivatives(
+        [0, 1], [jet_at_end(q[0], ends[2::2]), jet_at_end(q[-1], ends[3::2])]
+    )
+    bump = Polynomial([0, 1, -1]) ** (pairs + 1)
+
+    def tables(t):
+        order = range(pairs + 2)
+        base = [np.array([hermite(s, k) if k else hermite(s) for s in t]) for k in order]
+        T = [chebyshev.chebval(2 * t - 1, chebyshev.chebder(np.eye(terms), k, 2)).T for k in order]
+        B = [(bump.deriv(k) if k else bump)(t)[:, None] for k in order]
+        return base, [sum(comb(k, i) * B[i] * T[k - i] for i in range(k + 1)) for k in order]
+
+    def rates(x, table):
+        """From n w = 2 im(q̄ q'), n = ‖q‖², and its derivatives."""
+        base, shapes = table
+        Q = [b + s @ x.reshape(*x.shape[:-1], terms, 4) for b, s in zip(base, shapes, strict=True)]
+
+        def im(p, q):
+            return (
+                p[..., :1] * q[..., 1:] - q[..., :1] * p[..., 1:] - np.cross(p[..., 1:], q[..., 1:])
+            )
+
+        def dot(p, q):
+            return np.sum(p * q, axis=-1, keepdims=True)
+
+        n, n1 = dot(Q[0], Q[0]), 2 * dot(Q[0], Q[1])
+        w = 2 * im(Q[0], Q[1]) / n
+        a = (2 * im(Q[0], Q[2]) - n1 * w) / n
+        if pairs == 1:
+            return Q[0], [w, a]
+        n2 = 2 * (dot(Q[1], Q[1]) + dot(Q[0], Q[2]))
+        b = (2 * (im(Q[0], Q[3]) + im(Q[1], Q[2])) - 2 * n1 * a - n2 * w) / n
+        return Q[0], [w, a, b]
+
+    table = tables(t)
+
+    def residuals(x):
+        Q, w = rates(x, table)
+        u = root * deviation(*w)
+        norm = 30 * root[:, 0] * (np.sum(Q * Q, axis=-1) - 1)  # which is free otherwise
+        return np.concatenate([u.reshape(*u.shape[:-2], -1), norm], axis=-1)
+
+    def jacobian(x):
+        return (residuals(x + 1e-30j * np.eye(len(x))).imag / 1e-30).T
+
+    base, shapes = tables(np.linspace(0, 1, 201))
+    x = np.linalg.lstsq(shapes[0], q - base[0])[0].ravel()
+    options = {"method": "lm", "xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15, "max_nfev": 500}
+    x = least_squares(residuals, x, jacobian, **options).x
+    u = root * deviation(*rates(x, table)[1])
+    return lambda t: rates(x, tables(t))[1][0], float(np.sum(u * u))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.polynomial import Chebyshev
 from scipy.integrate import quad
 
 import rbcourse as rb
@@ -187,3 +188,116 @@ def test_a_very_long_time_costs_nothing_and_an_overflow_is_no_number():
     far[:3, 3] = 1e160
     with np.errstate(over="ignore"), pytest.raises(RuntimeError, match="an uncertainty of"):
         rb.acceleration_cost(rb.projected_cubic_se3(np.eye(4), far, REST, REST, REST, REST))
+
+
+BOOK = np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]])
+CURVES = {
+    "projection": rb.projected_cubic_so3,
+    "geodesic": lambda R0, R1, w0, w1: rb.geodesic_so3(R0, R1),
+    "line": lambda R0, R1, w0, w1: rb.projected_line_so3(R0, R1),
+    "Bézier": rb.bezier_so3,
+    "Cayley": rb.cayley_cubic_so3,
+    "optimum": rb.minimum_acceleration_so3,
+    "retimed": lambda *ends: rb.retime(rb.cumulative_bezier_so3(*ends), 1.7),
+    "quintics": lambda R0, R1, w0, w1: rb.retime(
+        rb.exponential_quintic_so3(R0, R1, w0, w1, w1, w0), 0.6
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_costs_of_bodies_are_the_integrals(name):
+    curve = CURVES[name](np.eye(3), rb.exp_so3([0.5, 1.2, -0.4]), [1, 2, 0], [0, -1, 1])
+
+    def torque(t):
+        w, a = curve(t, 1), curve(t, 2)
+        return BOOK @ a + np.cross(w, BOOK @ w)
+
+    def jerk(t):
+        return curve(t, 3) + np.cross(curve(t, 1), curve(t, 2)) / 2
+
+    def integral(of):
+        return quad(of, *curve.domain, epsabs=1e-13, epsrel=1e-13, limit=500)[0]
+
+    for cost, square in (
+        (rb.acceleration_cost(curve, BOOK), lambda t: torque(t) @ np.linalg.solve(BOOK, torque(t))),
+        (rb.torque_cost(curve, BOOK), lambda t: torque(t) @ torque(t)),
+        (rb.jerk_cost(curve), lambda t: 2 * jerk(t) @ jerk(t)),
+    ):
+        assert cost == pytest.approx(integral(square), rel=1e-10, abs=1e-20)
+
+
+def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
+    """Quintics that meet with one acceleration; of cubics the acceleration jumps."""
+    R = rb.exp_so3([[0, 0, 0], [0.3, 0.8, 0], [0, 1.0, 1.0]])
+    w, a, T = np.array([[0, 0, 0], [0.2, 0.5, 0.5], [0, 0, 0]]), [0.3, -0.2, 0.1], [1.0, 2.0]
+    legs = [
+        rb.exponential_quintic_so3(
+            R[i], R[i + 1], T[i] * w[i], T[i] * w[i + 1], *T[i] ** 2 * np.array(rates)
+        )
+        for i, rates in enumerate((([0, 0, 0], a), (a, [0, 0, 0])))
+    ]
+
+    def leg(R0, R1, w0, w1):
+        rates = np.stack([[np.zeros(3), np.array(a)], [4 * np.array(a), np.zeros(3)]])
+        return rb.exponential_quintic_so3(R0, R1, w0, w1, rates[:, 0], rates[:, 1])
+
+    chain = rb.chain([0, 1, 3], R, velocities=w, leg=leg)
+    assert rb.jerk_cost(chain) == pytest.approx(
+        sum(rb.jerk_cost(legs) / T[i] ** 5 for i, legs in enumerate(legs)), rel=1e-10
+    )
+    assert rb.torque_cost(chain, BOOK) == pytest.approx(
+        sum(rb.torque_cost(leg, BOOK) / T[i] ** 3 for i, leg in enumerate(legs)), rel=1e-10
+    )
+    cubics = rb.chain([0, 1, 3], R, velocities=w, leg=rb.bezier_so3)
+    assert rb.torque_cost(cubics, BOOK) > 0
+    with pytest.raises(RuntimeError, match=r"^jerk cost: an acceleration jumps at a joint, by"):
+        rb.jerk_cost(cubics)
+    with pytest.raises(RuntimeError, match=r"^torque cost: a velocity jumps at a joint, by"):
+        rb.torque_cost(rb.chain([0, 1, 3], R, leg=rb.geodesic_so3), BOOK)
+
+
+def test_stacks_have_an_inertia_for_all_or_one_for_each():
+    turns = np.array([[0.5, 0, 0.2], [0, 1, 0.3]])
+    curves = rb.bezier_so3(np.eye(3), rb.exp_so3(turns), [1, 2, 0], [0, -1, 1])
+    G = np.stack([BOOK, np.diag([1.0, 2, 2.5])])
+    each = rb.torque_cost(curves, G)
+    for i in range(2):
+        assert each[i] == pytest.approx(rb.torque_cost(curves[i], G[i]), rel=1e-10)
+    assert rb.acceleration_cost(curves, BOOK)[1] == pytest.approx(
+        rb.acceleration_cost(curves[1], BOOK), rel=1e-10
+    )
+    with pytest.raises(
+        ValueError, match=r"^inertia: one, or one for each curve of a stack of shape \(\)"
+    ):
+        rb.torque_cost(curves[0], G)
+    with pytest.raises(ValueError, match=r"do not broadcast: curve \(2,\), inertia \(3,\)"):
+        rb.torque_cost(curves, np.stack([BOOK] * 3))
+
+
+def test_on_se3_the_centre_of_mass_counts():
+    """∫ m ‖d_c''‖² by differences of where the centre is."""
+    A1 = rb.pose_from_coordinates([0.5, 0.4, 0.3, 1, 2, 3])
+    curve = rb.projected_cubic_se3(np.eye(4), A1, [1, 2, 0], [0, -1, 1], [1, 1, 1], [1, 0, 3])
+    m, r = 2.5, np.array([0.1, -0.3, 0.2])
+
+    def place(t):
+        return curve(t)[..., :3, :3] @ r + curve(t)[..., :3, 3]
+
+    paths = [
+        Chebyshev.interpolate(lambda t, i=i: place(t)[..., i], 60, [0, 1]).deriv(2)
+        for i in range(3)
+    ]
+    x, weights = np.polynomial.legendre.leggauss(80)
+    squares = sum(path((x + 1) / 2) ** 2 for path in paths)
+    rotation, translation = rb.acceleration_cost_parts(curve, BOOK, m, r)
+    assert translation == pytest.approx(m * squares @ weights / 2, rel=1e-8)
+    assert rotation == pytest.approx(rb.acceleration_cost(curve.rotation, BOOK), rel=1e-10)
+    assert rb.acceleration_cost(curve, BOOK, m, r) == pytest.approx(rotation + translation)
+    assert rb.acceleration_cost(curve, 2 * np.eye(3)) == pytest.approx(rb.acceleration_cost(curve))
+    for bad, said in (({"mass": 0}, "^mass is 0.0"), ({"centre": [0, 1]}, r"^centre: shape \(3\)")):
+        with pytest.raises(ValueError, match=said):
+            rb.acceleration_cost(curve, **bad)
+    for cost in (rb.jerk_cost, lambda c: rb.torque_cost(c, BOOK)):
+        with pytest.raises(ValueError, match=r"^curve: one on SO\(3\) is wanted, got <Projected"):
+            cost(curve)

@@ -585,3 +585,34 @@ def test_a_time_at_which_f_fails_is_named_with_its_curve():
         stack.at_own_times([0.1, 0.2, 0.3], 1)
     each = [stack[k](t) for k, t in enumerate((0.1, 0.2, 0.3))]
     assert np.abs(stack.at_own_times([0.1, 0.2, 0.3]) - each).max() < 1e-14
+
+
+THIRD = {
+    **rb.CLOSED_FORMS,
+    "geodesic": lambda R0, R1, w0, w1: rb.geodesic_so3(R0, R1),
+    "line": lambda R0, R1, w0, w1: rb.projected_line_so3(R0, R1),
+    "timed line": lambda R0, R1, w0, w1: rb.projected_line_so3(
+        R0, R1, lambda t, order: (t**3, 3 * t**2, 6 * t, 6 + 0 * t)[order]
+    ),
+    "quintic": lambda R0, R1, w0, w1: rb.projected_quintic_so3(R0, R1, w0, w1, w1, w0),
+    "optimum": rb.minimum_acceleration_so3,
+    "retimed": lambda *ends: rb.retime(rb.bezier_so3(*ends), 2.5),
+}
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-7])
+@pytest.mark.parametrize("name", THIRD)
+def test_the_jerk_is_the_derivative_of_the_acceleration(name, size):
+    R0 = rb.exp_so3([0.1, 0.2, 0.3])
+    turns = size * np.array([[0.4, 1.2, -0.9], [1.0, 0.5, 2.0]])
+    ends = R0, R0 @ rb.exp_so3(turns), size * np.array([2.0, 1, 0]), size * np.array([1.0, -1, 2])
+    curves = THIRD[name](*ends)
+    start, end = curves.domain
+    for share in (0.1, 0.4, 0.77):
+        t = start + share * (end - start)
+        rate = oracles.derivative_by_differences(lambda u: curves(u, 2), t)
+        scale = np.abs(curves(t, 2)).max() + np.abs(rate).max()
+        assert np.abs(rate - curves(t, 3)).max() < 1e-11 * scale + 1e-12 * size
+    assert curves([[0.1, 0.2]], 3).shape == (1, 2, 2, 3)
+    own = curves.at_own_times([0.2, 0.3], 3)
+    assert np.abs(own[1] - curves(0.3, 3)[1]).max() < 1e-12 * size * (1 + np.abs(own / size).max())

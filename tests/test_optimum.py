@@ -10,8 +10,8 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.curves import Ends
 from rbcourse._chebyshev import grid
+from rbcourse.curves import Ends
 from rbcourse.optimum import ball
 from rbcourse.relaxation import cost_of, relax_ball
 from rbcourse.rivals import CLOSED_FORMS

@@ -85,6 +85,16 @@ def test_the_optimum_is_the_textbooks(case):
         assert np.abs(curve(t, order) - want).max() < 1e-9 * max(1, np.abs(want).max())
 
 
+@pytest.mark.parametrize("case", PAPER)
+def test_the_least_torque_is_the_textbooks(case):
+    turn, w0, w1 = PAPER[case]
+    R0, t, G = Rotation.random(rng=19).as_matrix(), np.linspace(0, 1, 101), np.diag([1, 2.2, 2.9])
+    ends = R0, R0 @ rb.exp_so3(turn), w0, w1, G
+    curve = rb.minimum_torque_so3(*ends)
+    for order, want in enumerate(textbook.minimum_torque_so3(*ends, t)):
+        assert np.abs(curve(t, order) - want).max() < 1e-8 * max(1, np.abs(want).max())
+
+
 def test_what_is_shown_is_the_code_without_its_docstring(capsys):
     textbook.show(textbook.geodesic_so3)
     shown = capsys.readouterr().out
@@ -103,3 +113,5 @@ def test_an_optimum_that_is_not_found_is_no_result(monkeypatch):
     rest = np.zeros(3)
     with pytest.raises(RuntimeError, match="too many nodes"):
         textbook.minimum_acceleration_so3(np.eye(3), np.eye(3), rest, rest, np.zeros(1))
+    with pytest.raises(RuntimeError, match="too many nodes"):
+        textbook.minimum_torque_so3(np.eye(3), np.eye(3), rest, rest, np.eye(3), np.zeros(1))
