@@ -18,6 +18,9 @@ CASES = {
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
 }
 """The turns and the end velocities of the figures of BK."""
+SIDES = np.array([0.3, 0.2, 0.03])
+BOOK = np.diag(np.sum(SIDES**2) - SIDES**2) / 12
+"""The inertia of a book of 1 kg, in kg m²."""
 
 
 def one_optimum(case):
@@ -109,6 +112,77 @@ def stacked_optimum(problems, rng, bvps=20):
         methods,
         references.against(lambda: _true_optima(curve, R1, w0, w1, few), (slice(None), few)),
     )
+
+
+def one_body(case):
+    """Return the contest of a body's least torque, from the ends to 101 rotations; and its kin."""
+    turn, w0, w1 = CASES[case]
+    ends = np.eye(3), rb.exp_so3(turn), w0, w1
+    rest = np.zeros(3)
+    methods = [
+        Method(OURS, "minimum_torque_so3", lambda: rb.minimum_torque_so3(*ends, BOOK)(MOMENTS)),
+        Method(
+            "rbcourse, least acceleration",
+            "minimum_acceleration_so3, of the book",
+            lambda: rb.minimum_acceleration_so3(*ends, BOOK)(MOMENTS),
+            same=False,
+        ),
+        Method(
+            "rbcourse, least jerk",
+            "minimum_jerk_so3",
+            lambda: rb.minimum_jerk_so3(*ends, rest, rest)(MOMENTS),
+            same=False,
+        ),
+        Method(
+            "textbook",
+            "solve_bvp, tol 1e-9",
+            lambda: textbook.minimum_torque_so3(*ends, BOOK, MOMENTS)[0],
+        ),
+    ]
+    return Contest("optimum of a body, one problem", case, 1, methods)
+
+
+def stacked_bodies(problems, rng, bvps=10):
+    """Return the contest of the least torques of many random bodies; times are of one problem.
+
+    Their moments are up to 1, 2 and 2.9. As in `stacked_optimum`, what `solve_bvp` finds may be
+    another optimum.
+    """
+    R1, bvps = rb.exp_so3(_ball(problems, 3, rng)), min(problems, bvps)
+    w0, w1 = _ball(problems, 6, rng), _ball(problems, 6, rng)
+    R0 = np.broadcast_to(np.eye(3), R1.shape)
+    axes = rb.sample_rotation(problems, rng=rng)
+    moments = np.array([1, 2, 2.9]) ** rng.random((problems, 3))
+    G = axes @ (moments[:, :, None] * axes.mT)
+    G = (G + G.mT) / 2
+    found = int(rb.minimum_torque_so3(R0, R1, w0, w1, G).converged.sum())
+
+    def one(k):
+        return textbook.minimum_torque_so3(R0[k], R1[k], w0[k], w1[k], G[k], MOMENTS, tol=1e-6)
+
+    def solves(k):
+        try:
+            return one(k) is not None
+        except RuntimeError:
+            return False
+
+    solved = [k for k in range(bvps) if solves(k)]
+    methods = [
+        Method(
+            OURS,
+            f"minimum_torque_so3, {found} of {problems} converged",
+            lambda: rb.minimum_torque_so3(R0, R1, w0, w1, G)(MOMENTS),
+            items=found,
+        ),
+        Method(
+            "textbook",
+            f"solve_bvp, tol 1e-6, {len(solved)} of {bvps} solved",
+            lambda: [one(k)[0] for k in solved],
+            same=False,
+            items=len(solved),
+        ),
+    ]
+    return Contest("optimum of a body, stacked", "random", problems, methods)
 
 
 def _ball(n, radius, rng):

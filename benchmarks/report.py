@@ -26,6 +26,8 @@ RATIOS = [
     ("the same of geodesics", "chain at N times", "geodesics"),
     ("minimum acceleration, BK Figure 4c", "optimum, one problem", "4c"),
     ("minimum acceleration, {} random problems at once", "optimum, stacked", "random"),
+    ("least torque of a book, BK Figure 4c", "optimum of a body, one problem", "4c"),
+    ("least torque, {} random bodies at once", "optimum of a body, stacked", "random"),
     ("{} frames of two cubes as GIF", "cubes as GIF", ""),
 ]
 

@@ -14,7 +14,7 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 import rbcourse as rb
 from benchmarks.chains import LEGS, chain_of_poses
 from benchmarks.contest import OURS, Contest, Method
-from benchmarks.optima import CASES, one_optimum, stacked_optimum
+from benchmarks.optima import CASES, one_body, one_optimum, stacked_bodies, stacked_optimum
 from benchmarks.rivals import closed_forms, closed_forms_with_derivatives
 from benchmarks.rotations import (
     geodesic,
@@ -61,6 +61,8 @@ def all_contests(peers, rng, sizes=SIZES, cases=tuple(CASES), problems=1000, fra
         yield from (chain_of_poses(n, rng, legs) for n in sizes[::3])
     yield from (one_optimum(case) for case in cases)
     yield stacked_optimum(problems, rng)
+    yield from (one_body(case) for case in cases)
+    yield stacked_bodies(problems, rng)
     yield imports()
     yield cubes(frames)
 

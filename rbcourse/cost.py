@@ -78,7 +78,7 @@ def acceleration_cost(
     References
     ----------
     BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for other
-    inertias beyond BK.
+    inertias beyond BK 1.
 
     Examples
     --------
@@ -125,7 +125,7 @@ def acceleration_cost_parts(
 
     References
     ----------
-    BK (18); for other inertias beyond BK.
+    BK (18); for other inertias beyond BK 1.
 
     Examples
     --------
@@ -179,7 +179,7 @@ def torque_cost(curve: Curve, inertia: ArrayLike) -> Array:
 
     References
     ----------
-    Beyond BK.
+    beyond BK 4.
 
     Examples
     --------
@@ -226,7 +226,7 @@ def jerk_cost(curve: Curve) -> Array:
 
     References
     ----------
-    Beyond BK; M. Žefran, V. Kumar and C. Croke 1998.
+    beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
 
     Examples
     --------

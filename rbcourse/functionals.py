@@ -126,8 +126,8 @@ class Effort:
 
     References
     ----------
-    Beyond BK: BK 3 leaves these metrics to a later publication. With M = G⁻¹ the equation is that
-    of Noakes, Heinzinger and Paden 1989 and of Crouch and Silva Leite 1995.
+    beyond BK 1, beyond BK 2; BK 3 leaves these metrics to a later publication. With M = G⁻¹ the
+    equation is that of Noakes, Heinzinger and Paden 1989 and of Crouch and Silva Leite 1995.
     """
 
     ends = 2
@@ -191,7 +191,7 @@ class Jerk:
 
     References
     ----------
-    Beyond BK: Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and Crouch 1995.
+    beyond BK 2, beyond BK 5; Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and Crouch 1995.
     """
 
     name, ends, scale, unit = "MinimumJerk", 4, 2.0, 1.0

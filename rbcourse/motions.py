@@ -277,7 +277,7 @@ def minimum_acceleration_se3(
 
     References
     ----------
-    BK 6.3; for bodies beyond BK.
+    BK 6.3; for bodies beyond BK 9.
 
     Examples
     --------

@@ -127,7 +127,7 @@ def minimum_acceleration_so3(
 
     References
     ----------
-    BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK (see `rbcourse.functionals.Effort`).
+    BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see `rbcourse.functionals.Effort`).
 
     Examples
     --------
@@ -201,7 +201,7 @@ def minimum_torque_so3(
 
     References
     ----------
-    Beyond BK (see `rbcourse.functionals.Effort`).
+    beyond BK 4 (see `rbcourse.functionals.Effort`).
 
     Examples
     --------
@@ -265,7 +265,7 @@ def minimum_jerk_so3(
 
     References
     ----------
-    Beyond BK (see `rbcourse.functionals.Jerk`).
+    beyond BK 5 (see `rbcourse.functionals.Jerk`).
 
     Examples
     --------
@@ -323,7 +323,7 @@ class Optimum(Curve):
 
     References
     ----------
-    BK (19). It says that R w'' is constant: (R w'')' = R (w''' + w × w'').
+    beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
     """
 
     def __init__(

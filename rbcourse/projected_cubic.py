@@ -221,7 +221,7 @@ def weighted_cubic_so3(
 
     References
     ----------
-    BK 6.2, BK Prop. 3; beyond BK, which leaves such metrics to a later publication.
+    BK 6.2, BK Prop. 3; beyond BK 6: the paper leaves such metrics to a later publication.
 
     Examples
     --------

@@ -259,6 +259,10 @@ class Stationary:
     R0, R1 : ndarray, shape (N, 3, 3)
     ends : ndarray, shape (N, m, 3)
         w0 and w1; for the jerk a0 and a1 too.
+
+    References
+    ----------
+    beyond BK 2.
     """
 
     together = 24
@@ -354,6 +358,10 @@ class BallStationary:
         w0 and w1.
     coarse : int, optional
         On how many nodes the linear systems are solved: those of the first rotations.
+
+    References
+    ----------
+    BK (19).
     """
 
     together = 128

@@ -362,8 +362,8 @@ def normal_cubic_so3(
 
     References
     ----------
-    Beyond BK; R. Zimmermann, Hermite interpolation and data processing errors on Riemannian matrix
-    manifolds, SIAM Journal on Scientific Computing 2020.
+    beyond BK 7; R. Zimmermann, Hermite interpolation and data processing errors on Riemannian
+    matrix manifolds, SIAM Journal on Scientific Computing 2020.
 
     Examples
     --------
@@ -420,7 +420,7 @@ def exponential_quintic_so3(
 
     References
     ----------
-    Beyond BK; the cubic is in BK 1, its reference 13.
+    beyond BK 8; the cubic is in BK 1, its reference 13.
 
     Examples
     --------

@@ -174,7 +174,7 @@ def minimum_torque_so3(
 
     References
     ----------
-    Beyond BK (see `rbcourse.functionals.Effort`, with M = I).
+    beyond BK 4 (see `rbcourse.functionals.Effort`, with M = I).
 
     Examples
     --------

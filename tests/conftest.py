@@ -1,6 +1,6 @@
 import pytest
 
-from rbcourse.course.ledger import MISPRINTS, SOURCES
+from rbcourse.course.ledger import MISPRINTS, WHAT
 
 
 def pytest_collection_modifyitems(items):
@@ -8,5 +8,5 @@ def pytest_collection_modifyitems(items):
     for item in items:
         for mark in item.iter_markers("source"):
             for key in mark.args:
-                if key not in SOURCES["entries"] and key not in MISPRINTS:
+                if key not in WHAT and key not in MISPRINTS:
                     raise pytest.UsageError(f"{item.nodeid}: {key!r} is no key of a text")

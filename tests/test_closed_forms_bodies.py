@@ -38,6 +38,7 @@ def test_the_ends_are_met_and_the_rates_are_derivatives(name):
     )
 
 
+@pytest.mark.source("beyond BK 6")
 def test_the_weighted_cubic_is_the_nearest_rotation_in_the_metric():
     curves, W = rb.weighted_cubic_so3(R0, R1, W0, W1, G), rb.metrics.weight_from_inertia(G)
     for t in TIMES[::10]:
@@ -54,6 +55,7 @@ def cubic(t):
     return sum(weight * M for weight, M in zip(weights, ends, strict=True))
 
 
+@pytest.mark.source("beyond BK 7")
 def test_the_normal_cubic_is_what_its_formula_says():
     """x(t) is solved for again, by SciPy, and is a cubic."""
     from scipy.optimize import fsolve
@@ -85,6 +87,7 @@ def test_of_a_thin_plate_the_normal_cubic_is_there_or_says_that_it_is_not(angle)
         rb.normal_cubic_so3(I3, singular, REST, REST, thin)
 
 
+@pytest.mark.source("beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize("make", [rb.weighted_cubic_so3, rb.normal_cubic_so3])
 def test_the_excess_falls_with_the_fourth_power(make):
     """Of the projection without the weight it falls with the square."""
@@ -98,6 +101,7 @@ def test_the_excess_falls_with_the_fourth_power(make):
         assert np.log2(excess(form, 0.2) / excess(form, 0.1)) == pytest.approx(power, abs=0.25)
 
 
+@pytest.mark.source("beyond BK 8")
 def test_the_quintic_is_near_the_least_jerk_and_is_it_from_rest_to_rest():
     def excess(s):
         ends = I3, rb.exp_so3(s * TURN), s * W0, s * W1, s * A0, s * A1

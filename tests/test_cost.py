@@ -205,6 +205,7 @@ CURVES = {
 }
 
 
+@pytest.mark.source("beyond BK 1", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize("name", CURVES)
 def test_costs_of_bodies_are_the_integrals(name):
     curve = CURVES[name](np.eye(3), rb.exp_so3([0.5, 1.2, -0.4]), [1, 2, 0], [0, -1, 1])
@@ -275,6 +276,7 @@ def test_stacks_have_an_inertia_for_all_or_one_for_each():
         rb.torque_cost(curves, np.stack([BOOK] * 3))
 
 
+@pytest.mark.source("beyond BK 9")
 def test_on_se3_the_centre_of_mass_counts():
     """∫ m ‖d_c''‖² by differences of where the centre is."""
     A1 = rb.pose_from_coordinates([0.5, 0.4, 0.3, 1, 2, 3])

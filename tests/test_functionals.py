@@ -23,6 +23,7 @@ def jets(polynomials, t, count):
     ]
 
 
+@pytest.mark.source("beyond BK 2")
 @pytest.mark.parametrize("name", FUNCTIONALS)
 def test_the_costate_is_the_derivative_of_the_integral(name):
     """½ d/ds of ∫ ‖u‖² along w + s δw is ±∫ p · δw, for a δw that vanishes at both ends."""
@@ -69,6 +70,7 @@ def test_the_derivatives_are_derivatives(name, what):
             assert np.abs(by[k][..., i] - slope).max() < 1e-11
 
 
+@pytest.mark.source("beyond BK 1", "beyond BK 5")
 def test_the_deviations_are_the_torque_and_the_covariant_jerk():
     rng = np.random.default_rng(3)
     w, a, b = rng.normal(size=(3, 1, 5, 3))
@@ -86,6 +88,7 @@ def test_the_deviations_are_the_torque_and_the_covariant_jerk():
         assert scale * np.sum(u**2, axis=-1) == pytest.approx(squares[name], rel=1e-13)
 
 
+@pytest.mark.source("beyond BK 5")
 def test_the_covariant_jerk_is_the_same_seen_from_the_body():
     """Rᵀ(t) has the body velocity −R w; only with κ = ½ has its jerk the same size."""
     rng = np.random.default_rng(4)

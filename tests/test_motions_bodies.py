@@ -20,6 +20,7 @@ def off_centre(**body):
     return A0, A1, w0, w1, v0, v1, rb.minimum_acceleration_se3(A0, A1, w0, w1, v0, v1, **body)
 
 
+@pytest.mark.source("beyond BK 9")
 def test_the_centre_of_mass_of_a_body_runs_along_a_cubic():
     A0, A1, w0, w1, v0, v1, motion = off_centre(**BODY)
     t = np.linspace(0, 1, 21)
@@ -69,6 +70,7 @@ def test_another_frame_of_the_same_body_gives_the_same_motion():
     )
 
 
+@pytest.mark.source("beyond BK 9")
 def test_no_motion_nearby_costs_a_body_less():
     """Perturbed by R exp(η̂) and d + ξ, η and ξ polynomials that vanish at the ends, twice."""
     *_, motion = off_centre(**BODY)

@@ -71,6 +71,7 @@ def deviation(what, G, w, a, b=0):
     }[what]()
 
 
+@pytest.mark.source("beyond BK 3", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize("what", OPTIMA)
 @pytest.mark.parametrize("which", range(6))
 def test_solve_bvp_finds_the_same_curve(what, which):
@@ -87,6 +88,7 @@ def test_solve_bvp_finds_the_same_curve(what, which):
     )
 
 
+@pytest.mark.source("beyond BK 3", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize("what", OPTIMA)
 @pytest.mark.parametrize("which", range(2))
 def test_no_polynomial_nearby_costs_less(what, which):
@@ -126,6 +128,7 @@ def test_the_ends_are_met_and_the_rates_are_derivatives(what):
             assert np.abs(rate - curves(t, order)).max() < 1e-10 * (1 + np.abs(rate).max())
 
 
+@pytest.mark.source("beyond BK 2")
 @pytest.mark.parametrize("what", OPTIMA)
 def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
     """p by its definition, from w and its derivatives; the fourth by differences."""
@@ -195,6 +198,7 @@ def test_about_a_principal_axis_it_is_a_cubic(what, axis, shares):
     assert curve.cost == pytest.approx(moment * square, rel=1e-12)
 
 
+@pytest.mark.source("beyond BK 1", "beyond BK 4")
 @pytest.mark.parametrize("what", FORCES)
 def test_a_free_motion_costs_nothing(what):
     """Euler's equations, by SciPy; the ends of the motion lead back to it."""
@@ -236,6 +240,7 @@ def test_the_numbers_that_other_programs_found():
     assert jerk.cost == pytest.approx(2 * 4550.04139829186, rel=1e-12)
 
 
+@pytest.mark.source("beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize(
     ("case", "weighted", "unweighted", "bezier", "ball", "normal"),
     [
@@ -261,6 +266,7 @@ def test_what_closed_forms_cost_for_the_book(case, weighted, unweighted, bezier,
     assert found == pytest.approx([weighted, unweighted, bezier, ball, normal], abs=6e-4)
 
 
+@pytest.mark.source("beyond BK 5")
 @pytest.mark.parametrize("angle", [0.1, 1.0, 2.67, np.pi - 1e-9])
 def test_least_jerk_from_rest_to_rest_is_the_geodesic(angle):
     axis = np.array([0.6, 0, 0.8])

@@ -85,6 +85,7 @@ def test_the_optimum_is_the_textbooks(case):
         assert np.abs(curve(t, order) - want).max() < 1e-9 * max(1, np.abs(want).max())
 
 
+@pytest.mark.source("beyond BK 4")
 @pytest.mark.parametrize("case", PAPER)
 def test_the_least_torque_is_the_textbooks(case):
     turn, w0, w1 = PAPER[case]

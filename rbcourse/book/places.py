@@ -3,7 +3,7 @@
 import re
 from posixpath import dirname, join, normpath, relpath
 
-from rbcourse.course.ledger import KEY, MISPRINTS, SOURCES
+from rbcourse.course.ledger import KEY, MISPRINTS, WHAT
 
 PAGES = {
     "README.md": "install.md",
@@ -73,7 +73,7 @@ def with_keys(text: str, page: str) -> str:
     """Return a text with the keys of the two sources as links to their rows of the ledger."""
 
     def put(key: re.Match[str]) -> str:
-        known = key[0] in SOURCES["entries"] or key[0] in MISPRINTS
+        known = key[0] in WHAT or key[0] in MISPRINTS
         return link(f"ledger.html#{anchor(key[0])}", page, key[0]) if known else key[0]
 
     return KEY.sub(put, text)

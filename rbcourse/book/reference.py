@@ -9,12 +9,13 @@ from pathlib import Path
 
 from rbcourse.book.lessons import Figure
 from rbcourse.book.places import address, anchor, has_page, link, source_of, with_keys
-from rbcourse.course.ledger import MISPRINTS, SOURCES, Entry
+from rbcourse.course.ledger import GROUPS, MISPRINTS, WHAT, Entry
 
 HOUSE = {
     "Rotations and poses": "so3 quaternion conversions se3",
     "Projection, sampling, metrics": "projection sampling metrics",
-    "Curves": "curves projected_line projected_cubic rivals optimum shooting motions paths cost",
+    "Curves": "curves projected_line projected_cubic rivals motions paths cost",
+    "The optimum": "optimum functionals relaxation shooting",
     "The plane": "planar arm",
     "Textbook versions, files, the report": "textbook files report",
 }
@@ -187,10 +188,9 @@ def pictures_of(entry: Entry, key: str, figures: Iterable[Figure]) -> list[Figur
 def ledger_tables(found: dict[str, Entry], figures: list[Figure]) -> str:
     """Return the ledger, each row with an anchor."""
     page, lines = "ledger.md", []
-    for text, title in SOURCES["texts"].items():
-        keys = [key for key in SOURCES["entries"] if key.startswith(text)]
+    for title, keys in GROUPS.items():
         rows = [_row(key, found[key], pictures_of(found[key], key, figures), page) for key in keys]
-        lines += [f"## {text}: {title}", "", *_table(_ENTRIES, rows)]
+        lines += [f"## {title}", "", *_table(_ENTRIES, rows)]
     misprints = [
         (
             _named(key, key.replace("errata", "misprint")),
@@ -210,7 +210,7 @@ def ledger_tables(found: dict[str, Entry], figures: list[Figure]) -> str:
 def _row(key: str, entry: Entry, drawn: list[Figure], page: str) -> tuple[str, ...]:
     return (
         _named(key, key),
-        SOURCES["entries"][key],
+        WHAT[key],
         _lines(to_function(name, page) for name in entry.functions),
         folded("tests", [to_test(name, page) for name in entry.tests]),
         _lines(to_section(place, page) for place in entry.lessons),

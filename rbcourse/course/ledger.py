@@ -14,7 +14,8 @@ import nbformat
 from rbcourse.course.notebooks import lesson_paths
 
 KEY = re.compile(
-    r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)|errata \d+)"
+    r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)"
+    r"|beyond BK \d+|errata \d+)"
     r"(?!\w|\.\d)",
     re.ASCII,
 )
@@ -22,6 +23,13 @@ SOURCES: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("sources.toml").read_text(encoding="utf-8")
 )
 MISPRINTS = {f"errata {i}": row for i, row in enumerate(SOURCES["misprints"], start=1)}
+WHAT: dict[str, str] = SOURCES["entries"] | SOURCES["beyond"]
+"""What each entry is, of the texts and beyond them."""
+GROUPS: dict[str, list[str]] = {
+    f"{text}: {title}": [key for key in SOURCES["entries"] if key.startswith(text)]
+    for text, title in SOURCES["texts"].items()
+} | {"Beyond BK: real bodies, and jerk": list(SOURCES["beyond"])}
+"""The entries by their headings."""
 
 
 @dataclass
@@ -53,7 +61,7 @@ def collect(root: Path) -> dict[str, Entry]:
     Functions come from the References of their docstrings, constants from what stands below them,
     tests from their marks ``source``, lessons from the keys in small type below their headings.
     """
-    found = {key: Entry() for key in [*SOURCES["entries"], *MISPRINTS]}
+    found = {key: Entry() for key in [*WHAT, *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
     for kind, finder in finders.items():
         for place, text in finder(root):
@@ -112,14 +120,13 @@ def render(found: dict[str, Entry]) -> str:
         "by `python3 course.py ledger`, not by hand. The ledger of the book, which",
         "`python3 course.py book` makes, links functions, tests, sections and pictures, too.",
     ]
-    for text, title in SOURCES["texts"].items():
+    for title, keys in GROUPS.items():
         rows = []
-        for key, what in SOURCES["entries"].items():
-            if key.startswith(text):
-                modules = {name.rsplit(".", 1)[0]: None for name in found[key].functions}
-                lessons = {lesson[:2]: None for lesson in found[key].lessons}
-                rows.append((key, what, ", ".join(modules), ", ".join(lessons)))
-        lines += ["", f"## {text}: {title}", ""]
+        for key in keys:
+            modules = {name.rsplit(".", 1)[0]: None for name in found[key].functions}
+            lessons = {lesson[:2]: None for lesson in found[key].lessons}
+            rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
+        lines += ["", f"## {title}", ""]
         lines += _table(("", "what", "modules", "lessons"), rows)
     rows = [
         (key.removeprefix("errata "), row["where"], row["printed"], row["holds"])

@@ -1,11 +1,11 @@
 """Addresses in the book."""
 
 from rbcourse.book.places import anchor, relinked, source_of, with_keys
-from rbcourse.course.ledger import MISPRINTS, SOURCES
+from rbcourse.course.ledger import MISPRINTS, WHAT
 
 
 def test_each_key_has_an_anchor_of_its_own():
-    keys = [*SOURCES["entries"], *MISPRINTS]
+    keys = [*WHAT, *MISPRINTS]
     assert len({anchor(key) for key in keys}) == len(keys)
     assert anchor("BK 1") != anchor("BK (1)")
 

@@ -34,6 +34,15 @@ def test_every_entry_has_function_test_and_lesson(found):
     assert {key: lacks for key in ENTRIES if (lacks := found[key].lacks())} == {}
 
 
+def test_what_is_beyond_the_texts_has_function_and_test(found):
+    wanted = [f"beyond BK {i}" for i in range(1, 10)]
+    assert list(ledger.SOURCES["beyond"]) == wanted
+    for key in wanted:
+        assert found[key].functions
+        assert found[key].tests
+    assert ledger.KEY.findall("beyond BK 3, BK 3") == ["beyond BK 3", "BK 3"]
+
+
 def test_every_misprint_has_a_test(found):
     assert [key for key in ledger.MISPRINTS if not found[key].tests] == []
     assert len(ledger.MISPRINTS) == 22
