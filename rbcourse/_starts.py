@@ -85,12 +85,19 @@ def lowered(
 def _lower(functional: Functional, R: Array, cost: Array, bumps: int) -> tuple[Array, Array]:
     """Take one step: the best of `SHARES` of it, or none."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R, bumps)
-    tried = R @ exp_so3(shares)
+    tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))
     costs = cost_at_nodes(functional.of(number), tried.reshape(-1, *R.shape[1:]))
     tried, costs = np.concatenate([R[None], tried]), np.vstack([cost, costs.reshape(-1, len(R))])
     best = np.fmin(costs, np.inf).argmin(axis=0), np.arange(len(R))
     return tried[best], costs[best]
+
+
+def cayley(turn: Array) -> Array:
+    """Return the rotations about these vectors by 2 atan(a/2) for their length a: Cayley's."""
+    H = hat(turn)
+    share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
+    return np.eye(3) + share[..., None, None] * (H + H @ H / 2)
 
 
 def _best_change(functional: Functional, R: Array, bumps: int) -> Array:

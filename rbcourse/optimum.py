@@ -39,6 +39,7 @@ NEAR = 0.1  # and those with entries of R that differ by less from those of a ch
 FASTER = 24.0  # rad: where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too
 ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
 QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
+ROUGHLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 0.02}
 PATIENTLY: Any = {"bumps": 16, "steps": 200, "worthwhile": 0.0}  # where nothing else does
 Numbers: TypeAlias = NDArray[np.intp]
 NOTHING = Failure(np.inf, 0)
@@ -483,7 +484,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         more = [k for k, i in enumerate(which) if i in curves]
         of_balls = [_on_nodes(curves[which[k]].R[None], n) for k in more]
         problem, R = np.append(problem, np.array(more, int)), np.concatenate([R, *of_balls])
-        R_other, _ = lowered(other.of(which[problem]), R, **QUICKLY)
+        R_other, _ = lowered(other.of(which[problem]), R, **ROUGHLY)
         return np.tile(problem, 2), np.concatenate([R, R_other])
 
     return Task(
