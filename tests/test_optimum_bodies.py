@@ -409,3 +409,17 @@ def test_bad_arguments_are_named():
         with pytest.raises(ValueError, match="order: 0, 1, 2 or 3 wanted, got 4"):
             turn(0.5, 4)
     assert "MinimumTorque on SO(3)" in repr(rb.minimum_torque_so3(*ends, BOOK))
+
+
+@pytest.mark.parametrize(
+    ("what", "which", "cost"),
+    [
+        ("acceleration", 79, 256.965743468),  # from one that is lowered in torque first;
+        ("acceleration", 654, 359.307210288),
+        ("torque", 565, 615.812105282),  # from one that is lowered in acceleration first;
+        ("torque", 177, 314.084506816),  # only after many steps down a valley
+    ],
+)
+def test_the_cheapest_curve_that_is_known_is_found(what, which, cost):
+    curve = OPTIMA[what](*some(random_problems(800, 50), which))
+    assert curve.cost == pytest.approx(cost, rel=1e-9)
