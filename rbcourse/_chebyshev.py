@@ -57,6 +57,8 @@ def grid(n: int) -> Grid:
     series = np.linalg.inv(chebyshev(t, n))
     slopes, sums = chebder(series, scl=2), chebint(series, lbnd=-1, scl=0.5)
     derivative, integral = (chebyshev(t, len(c)) @ c for c in (slopes, sums))
+    for shared in (t, derivative, integral, series):
+        shared.flags.writeable = False
     return Grid(t, derivative, integral, series)
 
 

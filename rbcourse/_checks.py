@@ -120,7 +120,8 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
     if refused.any():
         listed = ", ".join(f"{x:.6g}" for x in moments[refused][0])
         raise ValueError(
-            f"{first_index(name, refused)} is not positive definite: its eigenvalues are {listed}"
+            f"{first_index(name, refused)} is not positive definite, to rounding: its eigenvalues "
+            f"are {listed}"
         )
     return G
 

@@ -11,6 +11,7 @@ from rbcourse._chebyshev import along, chebyshev, grid
 from rbcourse._numerics import Array, blocks
 from rbcourse.curves import Ends
 from rbcourse.functionals import Functional
+from rbcourse.relaxation import cayley
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
 MOST_TURNS = 4  # starts have fewer full turns more than the shortest way
@@ -18,12 +19,13 @@ SHARES = np.array([1.0, 0.25, 3.0])  # of a step that lowers the cost: the best 
 _TOGETHER = 32  # curves that are lowered together, in the cache
 
 
-def starts(ends: Ends, n: int) -> tuple[NDArray[np.intp], Array]:
+def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.intp], Array]:
     """Return curves with these ends at n nodes, and the numbers of the problems they are for.
 
     From Bézier's control point C₁ = R0 exp(ŵ0/3) to the other one, R1 exp(−ŵ1/3), turns v: the
     shortest way and the other way round, and both with k full turns more where the legs ŵ0/3 and
-    ŵ1/3 are together longer than 2k − 1 full turns. With β = 3t² − 2t³ the curve
+    ŵ1/3, and what accelerations `bend` them by, are together longer than 2k − 1 full turns. With
+    β = 3t² − 2t³ the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
 
@@ -35,7 +37,7 @@ def starts(ends: Ends, n: int) -> tuple[NDArray[np.intp], Array]:
     v = log_so3(C1.mT @ ends.R1 @ back)
     along_v = v + 1e-9 * (first + last)  # a direction where v is 0
     full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-300)[:, None]
-    length = np.linalg.norm([first, last], axis=-1).sum(axis=0)
+    length = np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend
     problem, turns = [], []
     for more in range(MOST_TURNS):
         some = np.flatnonzero(length >= (4 * more - 2) * np.pi)
@@ -91,13 +93,6 @@ def _lower(functional: Functional, R: Array, cost: Array, bumps: int) -> tuple[A
     tried, costs = np.concatenate([R[None], tried]), np.vstack([cost, costs.reshape(-1, len(R))])
     best = np.fmin(costs, np.inf).argmin(axis=0), np.arange(len(R))
     return tried[best], costs[best]
-
-
-def cayley(turn: Array) -> Array:
-    """Return the rotations about these vectors by 2 atan(a/2) for their length a: Cayley's."""
-    H = hat(turn)
-    share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
-    return np.eye(3) + share[..., None, None] * (H + H @ H / 2)
 
 
 def _best_change(functional: Functional, R: Array, bumps: int) -> Array:

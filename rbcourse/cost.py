@@ -38,9 +38,9 @@ def acceleration_cost(
         G, the inertia of the body about its centre of mass, body axes: symmetric and positive
         definite; one, or one for each curve. By default 2 I, that of the ball of metric (12).
     mass : float, optional
-        Of the body, more than 0; used on SE(3) only.
+        Of the body, more than 0; on SE(3) only.
     centre : array_like, shape (3,), optional
-        Its centre of mass, in the body frame, in m; used on SE(3) only.
+        Its centre of mass, in the body frame, in m; on SE(3) only.
 
     Returns
     -------
@@ -49,13 +49,15 @@ def acceleration_cost(
         ∫ m ‖d_c''‖² dt, where d_c is the place of the centre of mass. By default this is
         ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. To 1e-10 relative, or 1e-20 absolute,
         unless all of the acceleration falls within a hundredth of the interval, as with an abrupt
-        ``f`` of a `projected_line_so3`.
+        ``f`` of a `projected_line_so3`. With an inertia the absolute bound is 1e-20 times a third
+        of its trace.
 
     Raises
     ------
     ValueError
-        If an argument is not finite or not of its shape, `inertia` is not symmetric and positive
-        definite or does not fit the stack, or `mass` is not positive.
+        If `curve` is no `Curve`, an argument is not finite or not of its shape, `inertia` is not
+        symmetric and positive definite or does not fit the stack, `mass` is not positive, or `mass`
+        or `centre` is given on SO(3).
     RuntimeError
         If the integral does not settle to that, if the curve almost jumps: ``margin`` below 1e-6,
         or if the velocity of a `chain` jumps.
@@ -137,7 +139,10 @@ def acceleration_cost_parts(
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
+    _check_curve(curve, on_so3=False)
     m, r = as_positive("mass", mass), as_single("centre", centre, 3)
+    if curve.size == 3 and (m != 1 or r.any()):
+        raise ValueError("mass, centre: a curve on SO(3) has none of them")
     name = "acceleration cost"
     legs, durations = curve._unit_legs(name, 1)
     functional: Functional = BallAcceleration()
@@ -188,7 +193,7 @@ def torque_cost(curve: Curve, inertia: ArrayLike) -> Array:
     >>> float(torque_cost(c, np.diag([1.0, 2, 2.5])).round(12))
     1.0
     """
-    _check_on_so3(curve)
+    _check_curve(curve)
     legs, durations = curve._unit_legs("torque cost", 1)
     functional = Effort(_inertias(curve, legs, inertia), of_torque=True)
     cost = rotation_cost("torque cost", legs, functional)
@@ -236,15 +241,17 @@ def jerk_cost(curve: Curve) -> Array:
     >>> float(jerk_cost(c).round(9))  # 2 · 720 · 1.5²
     3240.0
     """
-    _check_on_so3(curve)
+    _check_curve(curve)
     legs, durations = curve._unit_legs("jerk cost", 2)
     cost = rotation_cost("jerk cost", legs, Jerk())
     return _summed(curve, legs, cost * (1 / np.asarray(durations, float)) ** 5)
 
 
-def _check_on_so3(curve: Curve) -> None:
-    if curve.size != 3:
-        raise ValueError(f"curve: one on SO(3) is wanted, got {curve!r}; take its rotation")
+def _check_curve(curve: Curve, *, on_so3: bool = True) -> None:
+    if not isinstance(curve, Curve):
+        raise ValueError(f"curve: a Curve wanted, got {curve!r}")
+    if on_so3 and curve.size != 3:
+        raise ValueError(f"curve: one on SO(3) is wanted, got {curve!r}")
 
 
 def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
@@ -279,9 +286,9 @@ def rotation_cost(
         some = functional.of(which)
         rates = [_values(curve, t, which, order)[..., :3] for order in some.needs]
         u = some.deviation(*(np.moveaxis(rate, 0, 1) for rate in rates))
-        return (np.reshape(some.scale, (-1, 1)) * np.sum(u**2, axis=-1)).T
+        return np.sum(u**2, axis=-1).T
 
-    return integral(name, curve, density, ends, tolerance)
+    return functional.scale * integral(name, curve, density, ends, tolerance)
 
 
 def _squared_acceleration(curve: Curve, r: Array, t: Array, which: Chosen) -> Array:

@@ -85,7 +85,7 @@ def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
         or the batches do not broadcast.
     """
     G = as_inertia("inertia", inertia)
-    batch = check_broadcast(R0=(ends.R0, 2), inertia=(G, 2))
+    batch = check_broadcast(ends=(ends.R0, 2), inertia=(G, 2))
     return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
 
 

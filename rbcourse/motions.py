@@ -45,9 +45,9 @@ class RigidMotion(Curve):
 
     def __init__(self, rotation: Curve, *path: Array, centre: Array | None = None) -> None:
         self.centre = np.zeros(3) if centre is None else centre
-        ends = np.stack(np.broadcast_arrays(*path))
-        self.batch_shape = np.broadcast_shapes(rotation.batch_shape, ends.shape[1:-1])
-        self.path = np.broadcast_to(ends, (len(ends), *self.batch_shape, 3))
+        batches = (point.shape[:-1] for point in path)
+        self.batch_shape = np.broadcast_shapes(rotation.batch_shape, *batches)
+        self.path = np.stack([np.broadcast_to(point, (*self.batch_shape, 3)) for point in path])
         numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
         self.rotation = rotation._picked(np.broadcast_to(numbers, self.batch_shape))
 

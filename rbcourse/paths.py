@@ -90,10 +90,11 @@ def chain(
     `projected_line_so3`
     all that ask for velocities: projected and other cubics,    C¹: the acceleration jumps
     Bézier's curves, minimum acceleration
-    `projected_quintic_so3`                                     C²
+    `projected_quintic_so3`, `exponential_quintic_so3`,         C²
+    `minimum_jerk_so3`
     ==========================================================  ==================================
 
-    The accelerations that the quintic asks for are those of the parabolas of `bessel_velocities`,
+    The accelerations that these ask for are those of the parabolas of `bessel_velocities`,
     also where velocities are given; 0 at both ends and where it rests.
 
     A million times take about as long as on one leg: up to three times as long with geodesics,
@@ -238,10 +239,12 @@ class Chain(Curve):
             values /= durations[:, None] ** order
 
     def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
-        """Return the legs; where a velocity jumps at a joint there is no acceleration cost."""
+        """Return the legs, unless a derivative jumps at a joint."""
         moments = np.append(self.times, self.times[:-1] + self.durations / 2)
         for order, what in ((1, "a velocity"), (2, "an acceleration"))[:smooth]:
             jumps, sizes = np.abs(self.jumps(order)), np.abs(self(moments, order))
+            if order == 2:  # a velocity that changes in the time of a leg
+                sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.durations.min()
             for half in (slice(3), slice(3, None)):  # rad and m
                 jump = jumps[:, half].max(initial=0)
                 if jump > 1e-9 * sizes[:, half].max(initial=0):

@@ -211,9 +211,9 @@ def weighted_cubic_so3(
 
     Notes
     -----
-    Near-optimal for small excursions: data s times as large have an excess over the optimum about
-    s⁴ times as large, where that of `projected_cubic_so3` is s² times as large. For large ones it
-    may be far from it, as `projected_cubic_so3` is.
+    Near-optimal for small excursions: data s times as large have a relative excess over the
+    optimum about s⁴ times as large, where that of `projected_cubic_so3` is s² times as large. For
+    large ones it may be far from it, as `projected_cubic_so3` is.
 
     Singular set: as for `projected_cubic_so3`, of M W. With G a multiple of I it is that curve.
 
@@ -315,7 +315,7 @@ def check_ends_of_quintic(
         If an argument is not finite, not of its shape, or the batches do not broadcast.
     """
     ends, a0, a1 = check_ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
-    batch = check_broadcast(R0=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
+    batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     a0, a1 = (np.broadcast_to(a, (*batch, 3)) for a in (a0, a1))
     return ends.broadcast_to(batch), a0, a1
 

@@ -184,7 +184,7 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
         turn, changes = some.of(going).step(now, parts)
         size[active] = np.linalg.norm(turn, axis=-1).max(axis=1)
         share = LONGEST_STEP / np.maximum(size[active], LONGEST_STEP)
-        R[active] = _turned(now[0], share[:, None, None] * turn)
+        R[active] = cayley(share[:, None, None] * turn) @ now[0]
         for x, change in zip(others, changes, strict=True):
             x[active] += share.reshape(-1, *(1 for _ in x.shape[1:])) * change
         steps[active] += 1
@@ -202,12 +202,11 @@ def _verdicts(tail: Array, left: Array, before: Array, size: Array) -> NDArray[n
     return np.where((tail < EXACT) & (left < EXACT), SOLVED, np.where(enough, FINER, FAILED))
 
 
-def _turned(R: Array, turn: Array) -> Array:
-    """Return the rotations R turned, in the fixed frame, by Cayley's formula: 2 tan(a/2) for a."""
+def cayley(turn: Array) -> Array:
+    """Return rotations about the vectors `turn` by 2 atan(‖turn‖/2), Cayley's formula."""
     H = hat(turn)
     share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
-    HR = H @ R
-    return R + share[..., None, None] * (HR + H @ HR / 2)
+    return np.eye(3) + share[..., None, None] * (H + H @ H / 2)
 
 
 def orthogonal(R: Array) -> Array:

@@ -167,7 +167,8 @@ def minimum_torque_so3(
 ) -> tuple[Array, Array]:
     """Return R and w of a body's least torque at the times t, shape (N,), by SciPy's `solve_bvp`.
 
-    Their shapes are (N, 3, 3) and (N, 3). If it fails, a RuntimeError says why.
+    Their shapes are (N, 3, 3) and (N, 3). If it fails, a RuntimeError says why. It starts from the
+    geodesic, and may find another stationary curve than the cheapest.
 
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
     with p = G (τ' + w × τ) − G w × τ, for an unknown c. On the way ‖σ‖ has to stay below 2π.
@@ -204,7 +205,8 @@ def minimum_torque_so3(
     nodes = np.linspace(0, 1, 11)
     guess = np.zeros((9, 11))
     guess[:3], guess[3:6] = np.outer(goal, nodes), np.outer(w0, 1 - nodes) + np.outer(w1, nodes)
-    solution = solve_bvp(rates, misses, nodes, guess, p=np.zeros(3), tol=tol, max_nodes=100_000)
+    with np.errstate(over="ignore", invalid="ignore"):
+        solution = solve_bvp(rates, misses, nodes, guess, p=np.zeros(3), tol=tol, max_nodes=100_000)
     if not solution.success:
         raise RuntimeError(solution.message)
     sigma, w, _ = np.moveaxis(solution.sol(t).reshape(3, 3, -1), -1, 1)

@@ -130,3 +130,12 @@ def test_what_belongs_to_no_body_has_no_weight():
     rb.normal_cubic_so3(I3, I3, REST, REST, np.diag([1.0, 1, 3]))
     with pytest.raises(ValueError, match=r"^a0: shape \(\.\.\., 3\) wanted, got \(2,\)"):
         rb.exponential_quintic_so3(I3, I3, REST, REST, [0, 0], REST)
+
+
+def test_of_rods_the_normal_cubic_meets_its_ends():
+    for moments in ((1e-6, 1, 1), (1, 1, 1e-6), (1e-3, 1, 1)):
+        curve = rb.normal_cubic_so3(I3, rb.exp_so3([0.4, 0.1, 0.3]), REST, REST, np.diag(moments))
+        assert np.abs(curve(1) - rb.exp_so3([0.4, 0.1, 0.3])).max() < 1e-9
+    singular = rb.exp_so3([[0, 0.1, 0], [0, 1 / np.sqrt(0.5 * 0.99 / 2.02), 0]])
+    with pytest.raises(ValueError, match=r"^normal cubic of curve \[1\]: the map from x to y is"):
+        rb.normal_cubic_so3(I3, singular, REST, REST, np.diag([0.01, 1, 1.01]))

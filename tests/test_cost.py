@@ -300,6 +300,35 @@ def test_on_se3_the_centre_of_mass_counts():
     for bad, said in (({"mass": 0}, "^mass is 0.0"), ({"centre": [0, 1]}, r"^centre: shape \(3\)")):
         with pytest.raises(ValueError, match=said):
             rb.acceleration_cost(curve, **bad)
+    for cost in (rb.acceleration_cost, rb.jerk_cost, lambda c: rb.torque_cost(c, BOOK)):
+        with pytest.raises(ValueError, match=r"^curve: a Curve wanted, got None"):
+            cost(None)
+    with pytest.raises(ValueError, match=r"^mass, centre: a curve on SO\(3\) has none of them"):
+        rb.acceleration_cost(curve.rotation, BOOK, m)
     for cost in (rb.jerk_cost, lambda c: rb.torque_cost(c, BOOK)):
         with pytest.raises(ValueError, match=r"^curve: one on SO\(3\) is wanted, got <Projected"):
             cost(curve)
+
+
+@pytest.mark.parametrize(
+    "leg", [rb.exponential_cubic_so3, rb.bezier_so3, rb.minimum_acceleration_so3]
+)
+def test_a_steady_turn_in_legs_has_no_jerk(leg):
+    """What its acceleration jumps by at the joints is rounding only."""
+    times, axis = np.array([0, 1, 2.5, 3]), np.array([0.6, 0, 0.8])
+    R = rb.exp_so3(0.7 * times[:, None] * axis)
+    chain = rb.chain(times, R, velocities=np.tile(0.7 * axis, (4, 1)), leg=leg)
+    assert rb.jerk_cost(chain) < 1e-18
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-8, 1.0, 1e8])
+def test_the_unit_of_inertia_does_not_matter(size):
+    G, w0 = size * np.diag([1.0, 2, 2.9]), np.array([0.8, 0.1, 1.2])
+    A, w = rb.geodesic_flow(G / size, np.eye(3), w0, [0.0, 1.0])
+    free = rb.minimum_torque_so3(np.eye(3), A[1], w0, w[1], G)
+    assert rb.torque_cost(free, G) < 1e-18 * size**2
+    assert rb.acceleration_cost(free, G) < 1e-18 * size
+    other = rb.bezier_so3(np.eye(3), A[1], w0, w[1])
+    for cost, power in ((rb.torque_cost, 2), (rb.acceleration_cost, 1)):
+        want = size**power * cost(other, G / size)
+        assert cost(other, G) == pytest.approx(want, rel=1e-12)

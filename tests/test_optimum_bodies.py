@@ -1,6 +1,8 @@
 """The optima of real bodies and of jerk: `solve_bvp`, direct minimisation, closed forms."""
 
+import copy
 import functools
+import pickle
 import warnings
 
 import numpy as np
@@ -10,6 +12,8 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
+from rbcourse.curves import check_ends
+from rbcourse.optimum import from_guess
 from rbcourse.rivals import CLOSED_FORMS
 
 EPS = np.finfo(float).eps
@@ -388,9 +392,12 @@ def test_bad_arguments_are_named():
         for G, said in (
             (
                 np.diag([1.0, 2, 0]),
-                r"^inertia is not positive definite: its eigenvalues are 0, 1, 2",
+                r"^inertia is not positive definite, to rounding: its eigenvalues are 0, 1, 2",
             ),
-            (np.diag([1.0, 2, -1]), r"^inertia is not positive definite: its eigenvalues are -1"),
+            (
+                np.diag([1.0, 2, -1]),
+                r"^inertia is not positive definite, to rounding: its eigenvalues are -1",
+            ),
             (np.array([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), r"^inertia is not symmetric"),
             (np.diag([1.0, 2, np.nan]), r"^inertia\[2, 2\] is nan"),
             ([1.0, 2, 3], r"^inertia: shape \(\.\.\., 3, 3\) wanted, got \(3,\)"),
@@ -399,11 +406,11 @@ def test_bad_arguments_are_named():
                 make(*ends, G)
         with pytest.raises(ValueError, match=r"^inertia\[1\] is not positive definite"):
             make(*ends, np.stack([I3, -I3]))
-        with pytest.raises(ValueError, match=r"do not broadcast: R0 \(2,\), inertia \(3,\)"):
+        with pytest.raises(ValueError, match=r"do not broadcast: ends \(2,\), inertia \(3,\)"):
             make(np.stack([I3] * 2), *ends[1:], np.stack([I3] * 3))
     with pytest.raises(ValueError, match=r"^a1: shape \(\.\.\., 3\) wanted, got \(2,\)"):
         rb.minimum_jerk_so3(*ends, REST, [0, 0])
-    with pytest.raises(ValueError, match=r"do not broadcast: R0 \(2,\), a0 \(3,\)"):
+    with pytest.raises(ValueError, match=r"do not broadcast: ends \(2,\), a0 \(3,\)"):
         rb.minimum_jerk_so3(np.stack([I3] * 2), *ends[1:], np.zeros((3, 3)), REST)
     for turn in (rb.minimum_torque_so3(*ends, BOOK), rb.minimum_jerk_so3(*ends, REST, REST)):
         with pytest.raises(ValueError, match="order: 0, 1, 2 or 3 wanted, got 4"):
@@ -423,3 +430,52 @@ def test_bad_arguments_are_named():
 def test_the_cheapest_curve_that_is_known_is_found(what, which, cost):
     curve = OPTIMA[what](*some(random_problems(800, 50), which))
     assert curve.cost == pytest.approx(cost, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("turn", "rates", "cost"),
+    [
+        (0.8, (-8, -8, -19, 19), 3405.8885478242787),
+        (-0.6, (5.2, 7.2, 19, -18), 13158.112233979306),
+    ],
+)
+def test_accelerations_add_turns(turn, rates, cost):
+    """About one axis each winding has its quintic; these are the cheapest."""
+    e = np.array([0, 0, 1.0])
+    curve = rb.minimum_jerk_so3(I3, rb.exp_so3(turn * e), *(x * e for x in rates))
+    assert curve.cost == pytest.approx(cost, rel=1e-10)
+
+
+@pytest.mark.parametrize("moments", [(1, 2.22, 3.18), (0.3, 1, 1.28)])
+def test_a_turn_about_the_largest_moment_may_leave_its_axis(moments):
+    """From rest to rest the turn about the axis is a saddle of the torque, if it is large."""
+    G, end = np.diag(moments), rb.exp_so3([0, 0, 3.1])
+    along_the_axis = 12 * (moments[2] * 3.1) ** 2
+    exact = rb.minimum_torque_so3(I3, end, REST, REST, G)
+    assert exact.cost < 0.9 * along_the_axis
+    near = rb.minimum_torque_so3(I3, rb.exp_so3([1e-4, 2e-4, 3.1]), REST, REST, G)
+    assert near.cost == pytest.approx(exact.cost, rel=1e-3)
+    small = rb.minimum_torque_so3(I3, rb.exp_so3([0, 0, 1.0]), REST, REST, G)
+    assert small.cost == pytest.approx(12 * moments[2] ** 2, rel=1e-10)
+
+
+@pytest.mark.parametrize("shape", [(), (6,), (2, 3), (0,)])
+def test_one_guess_is_followed(shape):
+    R0, R1, w0, w1, *_ = random_problems(6, 42, 2.0, 4.0)
+    count = int(np.prod(shape))
+    ends = [
+        x[0] if shape == () else x[:count].reshape(*shape, *x.shape[1:]) for x in (R0, R1, w0, w1)
+    ]
+    found = from_guess(check_ends(*ends), rb.cumulative_bezier_so3(*ends))
+    assert found.batch_shape == shape
+    assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("what", OPTIMA)
+def test_a_copy_is_the_same_curve(what):
+    curves = OPTIMA[what](*random_problems(3, 43, 2.0, 4.0))
+    for other in (copy.copy(curves), copy.deepcopy(curves), pickle.loads(pickle.dumps(curves))):
+        assert np.array_equal(other(0.4, 3), curves(0.4, 3))
+        assert np.array_equal(other.costate(0.4), curves.costate(0.4))
+    assert np.array_equal(curves[[True, False, True]].cost, curves.cost[[0, 2]])
+    assert curves[:0](0.5).shape == (0, 3, 3)
