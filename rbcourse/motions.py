@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_finite, as_positive, as_single, as_unit, check_broadcast
 from rbcourse._numerics import EPS, Array
 from rbcourse.curves import Chosen, Curve, Ends, geodesic_so3, with_inertia
-from rbcourse.optimum import ball, body, solve
+from rbcourse.optimum import solve
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
     hermite_stack,
@@ -20,6 +20,7 @@ from rbcourse.projected_cubic import (
     watched,
 )
 from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
+from rbcourse.search import ball, body
 
 
 class RigidMotion(Curve):

@@ -3,49 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
-from functools import cached_property, partial
-from types import MappingProxyType
-from typing import Any, NamedTuple, Self, TypeAlias
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rbcourse._chebyshev import along, chebyshev, grid, interpolation, primitives
+from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
-from rbcourse._numerics import EPS, Array
-from rbcourse._starts import cost_at_nodes, lowered, starts, with_accelerations
+from rbcourse._numerics import Array
 from rbcourse.curves import Chosen, Curve, Ends, check_ends, combine, with_inertia
-from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.functionals import Functional
 from rbcourse.projected_cubic import check_ends_of_quintic
-from rbcourse.projection import nearest
-from rbcourse.relaxation import (
-    BallStationary,
-    Failure,
-    Solution,
-    Stationary,
-    cayley,
-    cost_of,
-    orthogonal,
-    rates_at_nodes,
-    relax,
-    relax_ball,
-)
-
-COARSE = 17  # nodes, on which curves are started and systems solved;
-FINER_FOR_JERK = 21  # for the jerk, which has higher derivatives;
-LESS_COARSE = 33  # where that does not do
-CLOSE = 1.1  # lowered starts that cost more than this many times the cheapest are dropped,
-NEAR = 0.1  # and those with entries of R that differ by less from those of a cheaper one
-FAST = 24.0  # rad: where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too
-ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
-FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
-ASIDE = 0.5  # rad
-QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
-ROUGHLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 0.02}
-PATIENTLY: Any = {"bumps": 16, "steps": 200, "worthwhile": 0.0}  # where nothing else does
-Numbers: TypeAlias = NDArray[np.intp]
-NOTHING = Failure(np.inf, 0)
+from rbcourse.relaxation import Failure, Solution, orthogonal
+from rbcourse.search import COARSE, Task, ball, body, cheapest, jerk
 
 
 def minimum_acceleration_so3(
@@ -435,112 +406,6 @@ class Optimum(Curve):
         return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 
 
-class Task(NamedTuple):
-    """A stack of problems with one batch axis, and how to solve them.
-
-    Attributes
-    ----------
-    batch : tuple of int
-        The shape of the stack.
-    functional : Functional
-        What is least.
-    equations : Equations
-        When it is: R p = c, and the ends.
-    starts : callable
-        ``starts(which, n)``: curves to start from at n nodes, for some of the problems; and the
-        numbers, among these, of the problems that they are for.
-    solver : callable
-        ``solver(equations, R)``: what is found for some of the equations from these curves.
-    nodes : int
-        On how many nodes curves are started.
-    saddles : bool
-        Whether curves about one axis may be saddles, so that curves bent aside are tried too.
-    known : dict of int to Solution
-        Problems that are solved.
-    """
-
-    batch: tuple[int, ...]
-    functional: Functional
-    equations: BallStationary | Stationary
-    starts: Callable[[Numbers, int], tuple[Numbers, Array]]
-    solver: Callable[[Any, Array], list[Solution | Failure]] = relax
-    nodes: int = COARSE
-    saddles: bool = False
-    known: Mapping[int, Solution] = MappingProxyType({})
-
-
-def ball(given: Ends) -> Task:
-    """Return the problems of minimum acceleration of a ball."""
-    ends, rates = _flat(given, given.w0, given.w1)
-    equations = BallStationary(ends.R0, ends.R1, rates)
-    return Task(
-        given.w0.shape[:-1],
-        BallAcceleration(),
-        equations,
-        lambda which, n: starts(ends.of(which), n),
-        relax_ball,
-    )
-
-
-def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
-    """Return the problems of minimum acceleration, or torque, of bodies of inertia G.
-
-    They are started from the optimum of a ball, too, and from all these curves lowered in the other
-    functional. Where G is a multiple of I the optimum of a ball is theirs.
-    """
-    ends, rates = _flat(given, given.w0, given.w1)
-    G = G.reshape(-1, 3, 3)
-    functional, other = (Effort(G, of_torque=which) for which in (of_torque, not of_torque))
-    of_ball = dict(enumerate(_cheapest(ball(given))))
-    curves = {i: one for i, one in of_ball.items() if isinstance(one, Solution)}
-    round_ones = np.abs(functional.G - np.eye(3)).max(axis=(1, 2)) < 8 * EPS
-
-    def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.of(which), n)
-        more = [k for k, i in enumerate(which) if i in curves]
-        of_balls = [_on_nodes(curves[which[k]].R[None], n) for k in more]
-        problem, R = np.append(problem, np.array(more, int)), np.concatenate([R, *of_balls])
-        R_other, _ = lowered(other.of(which[problem]), R, **ROUGHLY)
-        return np.tile(problem, 2), np.concatenate([R, R_other])
-
-    return Task(
-        given.w0.shape[:-1],
-        functional,
-        Stationary(functional, ends.R0, ends.R1, rates),
-        start,
-        saddles=True,
-        known={i: one for i, one in curves.items() if round_ones[i]},
-    )
-
-
-def jerk(given: Ends, a0: Array, a1: Array) -> Task:
-    """Return the problems of minimum jerk."""
-    ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-
-    # about one axis the cheapest of all turns is by (w0 + w1)/2 + (a0 − a1)/12
-    bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
-
-    def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.of(which), n, bend[which])
-        a = rates[which][problem, 2:]
-        return problem, with_accelerations(R, a[:, 0], a[:, 1])
-
-    equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
-    return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=FINER_FOR_JERK)
-
-
-def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
-    """Return the ends with one batch axis, rotations mended, and the end values (N, m, 3)."""
-    ends = given.flat()
-    R0, R1 = (nearest(R)[0] for R in ends[:2])  # of few digits R p = c would not settle
-    return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
-
-
-def _on_nodes(R: Array, n: int) -> Array:
-    """Return rotations at nodes, shape (N, ..., 3, 3), at n nodes."""
-    return orthogonal(along(interpolation(R.shape[1], n), R))
-
-
 def solve(task: Task) -> Optimum:
     """Return for each problem the cheapest curve that is found from its starts.
 
@@ -554,7 +419,7 @@ def solve(task: Task) -> Optimum:
     RuntimeWarning
         If none is found, for some of a stack.
     """
-    solutions = _cheapest(task)
+    solutions = cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
     curve = Optimum(task.functional, task.equations.ends, solutions, task.batch)
@@ -583,111 +448,3 @@ def _warn_if_not_converged(curve: Optimum) -> None:
             RuntimeWarning,
             stacklevel=4,
         )
-
-
-def _cheapest(task: Task) -> list[Solution | Failure]:
-    """Follow the starts that cost little when lowered; where that is not enough, all of them.
-
-    It is not where nothing is found, or what is found costs more than a start, lowered or not.
-    Where all of them are not enough either, they are lowered farther.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _searched(task)
-
-
-def _searched(task: Task) -> list[Solution | Failure]:
-    ends = task.equations.ends
-    found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
-    which = np.flatnonzero([one is NOTHING for one in found])
-    fast = np.linalg.norm(ends[:, :2], axis=-1).sum(axis=-1)
-    problem, R = _started(task, which, task.nodes)
-    least = partial(_least, len(ends), problem)
-    R, cost = lowered(task.functional.of(problem), R, **QUICKLY)
-    likely = ~(cost > CLOSE * least(cost)) & ~_repeated(problem, cost, R)
-    _follow(task, problem[likely], R[likely], found)
-    dear = _costs(found)[problem] > ABOUT * least(cost)
-    again = np.unique(problem[dear | (fast > FAST)[problem]])
-    if len(again):
-        _follow_on(task, again, problem, R, found)
-    problem, R = _bent_aside(task, found, which if task.saddles else which[:0])
-    if len(problem):
-        R, cost = lowered(task.functional.of(problem), R, **QUICKLY)
-        cheaper = cost < _costs(found)[problem]
-        _follow(task, problem[cheaper], R[cheaper], found)
-    return found
-
-
-def _bent_aside(
-    task: Task, found: list[Solution | Failure], which: Numbers
-) -> tuple[Numbers, Array]:
-    """Return solutions that turn about one axis, nearly, bent to four sides of it.
-
-    Such a curve may be a saddle: all starts, and what lowers them, keep to the axis, and a curve
-    that leaves it costs less.
-    """
-    order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
-    problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
-    for i in which:
-        one = found[i]
-        if isinstance(one, Solution):
-            w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
-            _, size, axes = np.linalg.svd(w)
-            if size[0] > 0 and size[1] < FLAT * size[0]:
-                sides = ASIDE * np.concatenate([axes[1:], -axes[1:]])[:, None]
-                turn = (4 * t * (1 - t))[:, None] ** order * sides
-                bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
-                problem += [i] * len(sides)
-    return np.array(problem, int), np.concatenate(bent)
-
-
-def _follow_on(
-    task: Task, which: Numbers, problem: Numbers, R: Array, found: list[Solution | Failure]
-) -> None:
-    """Follow more starts of some problems, on more nodes, where their costs are better known."""
-    mine = np.isin(problem, which)
-    problem, R = problem[mine], _on_nodes(R[mine], LESS_COARSE)
-    more, as_they_are = _started(task, which, LESS_COARSE)
-    problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
-    functional = task.functional.of(problem)
-    bound = ABOUT * _least(len(found), problem, cost_at_nodes(functional, R))
-    some = _costs(found)[problem] > bound
-    some[-len(more) :] = True
-    _follow(task, problem[some], R[some], found)
-    dear = _costs(found)[problem] > bound
-    if dear.any():
-        R, _ = lowered(functional.of(dear), R[dear], **PATIENTLY)
-        _follow(task, problem[dear], R, found)
-
-
-def _costs(found: list[Solution | Failure]) -> Array:
-    return np.array([cost_of(one) for one in found])
-
-
-def _least(count: int, problem: Numbers, cost: Array) -> Array:
-    """Return, for each start, what the cheapest of its problem costs."""
-    least = np.full(count, np.inf)
-    np.fmin.at(least, problem, cost)
-    return least[problem]
-
-
-def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
-    """Tell which starts are, at all nodes, close to a cheaper one of their problem."""
-    order, repeated = np.lexsort((cost, problem)), np.zeros(len(problem), bool)
-    number, R = problem[order], R[order]
-    for after in range(1, np.bincount(problem, minlength=1).max()):
-        near = np.abs(R[after:] - R[:-after]).max(axis=(1, 2, 3)) < NEAR
-        repeated[order[after:]] |= near & (number[after:] == number[:-after])
-    return repeated
-
-
-def _started(task: Task, which: Numbers, n: int) -> tuple[Numbers, Array]:
-    """Return curves to start from, and the numbers of their problems."""
-    problem, R = task.starts(which, n)
-    return which[problem], R
-
-
-def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Put what is found from these curves into `found`, where it costs less."""
-    for i, one in zip(problem, task.solver(task.equations.of(problem), R), strict=True):
-        if found[i] is NOTHING or cost_of(one) < cost_of(found[i]):
-            found[i] = one

@@ -410,10 +410,10 @@ def exponential_quintic_so3(
 
     Notes
     -----
-    Near-optimal for small excursions. For random ends, uniform in balls, ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 and
-    ‖a0‖, ‖a1‖ < 8, it costs 1.02 times the optimum in the median and less than 2.1 times for nine
-    of ten (of 1,000). With ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9 and ‖a0‖, ‖a1‖ < 20 these are 2.0 and 7.4. From
-    rest to rest it is the optimum.
+    Near-optimal for small excursions. For random ends, uniform in balls, ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4
+    and ‖a0‖, ‖a1‖ < 8, it costs 1.02 times the optimum in the median, and less than 2.1 times for
+    nine of ten (of 1,000). With ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9 and ‖a0‖, ‖a1‖ < 20 these are 2.0 and 7.4.
+    From rest to rest it is the optimum.
 
     Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
     `log_so3` chooses. The curve itself is smooth everywhere. Moved ends give the moved curve; but

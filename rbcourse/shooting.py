@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from rbcourse._chebyshev import grid
 from rbcourse._numerics import Array
 from rbcourse.curves import check_ends
-from rbcourse.optimum import Optimum, ball, solve
+from rbcourse.optimum import Optimum, solve
 from rbcourse.relaxation import (
     BallStationary,
     Failure,
@@ -16,6 +16,7 @@ from rbcourse.relaxation import (
     in_body,
     rates_at_nodes,
 )
+from rbcourse.search import ball
 from rbcourse.so3 import hat_so3, log_so3
 
 NODES = 96

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 import rbcourse as rb
 from rbcourse._chebyshev import grid
 from rbcourse.curves import Ends
-from rbcourse.optimum import ball
 from rbcourse.relaxation import cost_of, relax_ball
 from rbcourse.rivals import CLOSED_FORMS
+from rbcourse.search import ball
 
 REST = np.zeros(3)
 ALONG = np.pi / 6 * np.array([1, 2, 3])
