@@ -126,7 +126,6 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
 def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     """Return the problems of minimum jerk."""
     ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-
     # about one axis the cheapest of all turns is by (w0 + w1)/2 + (a0 − a1)/12
     bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
@@ -175,18 +174,13 @@ def _searched(task: Task) -> list[Solution | Failure]:
     again = np.unique(problem[dear | (fast > FAST)[problem]])
     if len(again):
         _follow_on(task, again, problem, R, found)
-    problem, R = _bent_aside(task, found, which if task.saddles else which[:0])
-    if len(problem):
-        R, cost = lowered(task.functional.of(problem), R, **QUICKLY)
-        cheaper = cost < _costs(found)[problem]
-        _follow(task, problem[cheaper], R[cheaper], found)
+    if task.saddles:
+        _leave_the_axis(task, which, found)
     return found
 
 
-def _bent_aside(
-    task: Task, found: list[Solution | Failure], which: Numbers
-) -> tuple[Numbers, Array]:
-    """Return solutions that turn about one axis, nearly, bent to four sides of it.
+def _leave_the_axis(task: Task, which: Numbers, found: list[Solution | Failure]) -> None:
+    """Bend solutions that turn about one axis, nearly, to four sides of it; follow the cheaper.
 
     Such a curve may be a saddle: all starts, and what lowers them, keep to the axis, and a curve
     that leaves it costs less.
@@ -197,13 +191,16 @@ def _bent_aside(
         one = found[i]
         if isinstance(one, Solution):
             w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
-            _, size, axes = np.linalg.svd(w)
+            _, size, axes = np.linalg.svd(w, full_matrices=False)
             if size[0] > 0 and size[1] < FLAT * size[0]:
                 sides = ASIDE * np.concatenate([axes[1:], -axes[1:]])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
-    return np.array(problem, int), np.concatenate(bent)
+    number = np.array(problem, int)
+    R, cost = lowered(task.functional.of(number), np.concatenate(bent), **QUICKLY)
+    cheaper = cost < _costs(found)[number]
+    _follow(task, number[cheaper], R[cheaper], found)
 
 
 def _follow_on(

@@ -45,6 +45,7 @@ def test_the_weighted_cubic_is_the_nearest_rotation_in_the_metric():
         assert np.abs(curves(t) - rb.project_so_weighted(cubic(t), W)).max() < 1e-13
     plain = rb.weighted_cubic_so3(R0, R1, W0, W1, 5 * I3)
     assert np.abs(plain(TIMES) - rb.projected_cubic_so3(R0, R1, W0, W1)(TIMES)).max() < 1e-14
+    assert plain.margin == pytest.approx(rb.projected_cubic_so3(R0, R1, W0, W1).margin, rel=1e-12)
     flat = rb.weighted_cubic_so3(R0, R1, W0, W1, np.diag([1.0, 2, 3]))
     assert np.abs(flat([0, 1]) - [R0, R1]).max() < 1e-14
 
