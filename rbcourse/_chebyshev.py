@@ -57,9 +57,7 @@ def grid(n: int) -> Grid:
     series = np.linalg.inv(chebyshev(t, n))
     slopes, sums = chebder(series, scl=2), chebint(series, lbnd=-1, scl=0.5)
     derivative, integral = (chebyshev(t, len(c)) @ c for c in (slopes, sums))
-    for shared in (t, derivative, integral, series):
-        shared.flags.writeable = False
-    return Grid(t, derivative, integral, series)
+    return Grid(*map(_shared, (t, derivative, integral, series)))
 
 
 @lru_cache
@@ -79,12 +77,18 @@ def primitives(n: int, m: int) -> Primitives:
     )
     smooth = chebyshev(nodes.t, max(3, n // 2))
     return Primitives(
-        [*from_ends, np.zeros((n, m))],
-        [*from_k, np.eye(n)],
-        [*series_from_ends, np.zeros((n, m))],
-        [*series_from_k, nodes.series],
-        smooth @ np.linalg.pinv(from_k[0] @ smooth),
+        [*map(_shared, from_ends), _shared(np.zeros((n, m)))],
+        [*map(_shared, from_k), _shared(np.eye(n))],
+        [*map(_shared, series_from_ends), _shared(np.zeros((n, m)))],
+        [*map(_shared, series_from_k), nodes.series],
+        _shared(smooth @ np.linalg.pinv(from_k[0] @ smooth)),
     )
+
+
+def _shared(matrix: Array) -> Array:
+    """Return a matrix that all callers have, so that none can change it."""
+    matrix.flags.writeable = False
+    return matrix
 
 
 @lru_cache

@@ -53,8 +53,7 @@ def minimum_acceleration_so3(
         is not symmetric and positive definite.
     ConvergenceError
         For a single problem, if Newton's method converges from none of its starts. Of 1,000 random
-        problems (see Notes) this happened in none with ‖w0‖, ‖w1‖ < 30, and in 29 with less than
-        50.
+        problems (see Notes) with ‖w0‖, ‖w1‖ < 50 this happened in none.
 
     Warns
     -----
@@ -84,10 +83,10 @@ def minimum_acceleration_so3(
     - ‖w0‖, ‖w1‖ < 12, 20,000 problems of two seeds: none costs more than one of the six closed
       forms with the same ends, nor than what Newton's method finds from `cumulative_bezier_so3`
       either way round. Turning the room or the body, or reversing time, changes the cost by less
-      than 1e-11, relatively. Eight random starts found a cheaper curve for 1 of 4,000, by 0.9 %.
-    - ‖w0‖, ‖w1‖ < 20, 3,000 problems: none costs more than a closed form, 5 more than a curve that
-      was found from one way round; reversing time changes the cost of 12. Eight random starts found
-      a cheaper curve for 2 of 1,000.
+      than 1e-11, relatively. Eight random starts found no cheaper curve for any of 4,000.
+    - ‖w0‖, ‖w1‖ < 20, 3,000 problems: none costs more than a closed form, one more than a curve
+      that was found from one way round; reversing time changes the cost of 5. Eight random starts
+      found no cheaper curve for any of 1,000.
     - Bodies whose largest moment is at most ten times the least, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 10,000
       problems: all converge, and none costs more than a closed form or than the optimum of the
       ball. Eight random starts found a cheaper curve for 6 of 1,000, and for none of 1,000 with
