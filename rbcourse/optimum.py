@@ -73,8 +73,8 @@ def minimum_acceleration_so3(
     -----
     Singular set: none is known in closed form. (19) is necessary, not sufficient, and has several
     solutions: a turn by σ and one by σ ± 2π reach the same rotation. There is a start for each way
-    round, and more of them, with full turns more, where ‖w0‖ + ‖w1‖ > 6π; a body has that of the
-    ball's optimum too. Steps of Gauss and Newton lower the cost of each. Newton's method for
+    round, and more of them, with full turns more, where ‖w0‖ + ‖w1‖ > 6π; for a body the optimum of
+    the ball is one, too. Steps of Gauss and Newton lower the cost of each. Newton's method for
     R p = c then goes on from the cheapest and from those that cost up to a tenth more; where that
     does not do, and where ‖w0‖ + ‖w1‖ > 24, from all of them, unlowered, on more nodes. The
     cheapest curve that it finds is returned. It is stationary. That none costs less is not proven,
@@ -95,7 +95,8 @@ def minimum_acceleration_so3(
     End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
     R0ᵀR1, the shortest or one with full turns more or the other way round. Of those the cheapest
     was found for all of 4,800 such problems with velocities up to 40. About a principal axis of a
-    body these curves are stationary, too. Ends that its free motion has cost nothing.
+    body these curves are stationary, too. Where the free motion of a body meets the ends, it costs
+    nothing.
 
     A positive definite G that no body has, with a moment larger than the sum of the other two, may
     have problems that do not converge: 2 of 200 with moments up to (1, 2.2, 3.2).
