@@ -152,8 +152,8 @@ def acceleration_cost_parts(
     translation: Array = np.zeros(legs.count)
     if legs.size == 4:
         translation = m * integral(name, legs, partial(_squared_acceleration, legs, r))
-    rate = (1 / np.asarray(durations, float)) ** 3
-    return _summed(curve, legs, rate * rotation), _summed(curve, legs, rate * translation)
+    whole = partial(_summed, curve, legs, (1 / np.asarray(durations, float)) ** 3)
+    return whole(rotation), whole(translation)
 
 
 def torque_cost(curve: Curve, inertia: ArrayLike) -> Array:
@@ -197,7 +197,7 @@ def torque_cost(curve: Curve, inertia: ArrayLike) -> Array:
     legs, durations = curve._unit_legs("torque cost", 1)
     functional = Effort(_inertias(curve, legs, inertia), of_torque=True)
     cost = rotation_cost("torque cost", legs, functional)
-    return _summed(curve, legs, cost * (1 / np.asarray(durations, float)) ** 3)
+    return _summed(curve, legs, (1 / np.asarray(durations, float)) ** 3, cost)
 
 
 def jerk_cost(curve: Curve) -> Array:
@@ -244,7 +244,7 @@ def jerk_cost(curve: Curve) -> Array:
     _check_curve(curve)
     legs, durations = curve._unit_legs("jerk cost", 2)
     cost = rotation_cost("jerk cost", legs, Jerk())
-    return _summed(curve, legs, cost * (1 / np.asarray(durations, float)) ** 5)
+    return _summed(curve, legs, (1 / np.asarray(durations, float)) ** 5, cost)
 
 
 def _check_curve(curve: Curve, *, on_so3: bool = True) -> None:
@@ -266,8 +266,9 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
     return np.broadcast_to(G, (*legs.batch_shape, 3, 3)).reshape(-1, 3, 3)
 
 
-def _summed(curve: Curve, legs: Curve, costs: Array) -> Array:
-    """Return the costs of the curves from those of their legs, shape (legs.count,)."""
+def _summed(curve: Curve, legs: Curve, rates: Array, costs: Array) -> Array:
+    """Return the costs of the curves: those of their legs on [0, 1] times rates, summed."""
+    costs = rates * costs
     if legs.batch_shape == curve.batch_shape:
         return costs.reshape(curve.batch_shape)[()]
     return np.sum(costs.reshape(legs.batch_shape), axis=-1)[()]
@@ -293,9 +294,12 @@ def rotation_cost(
 
 def _squared_acceleration(curve: Curve, r: Array, t: Array, which: Chosen) -> Array:
     """Return ‖d_c''‖², of the point r of the body: Rᵀ d_c'' = Rᵀ d'' + w' × r + w × (w × r)."""
-    w, a = (_values(curve, t, which, order) for order in (1, 2))
-    w, a, moved = w[..., :3], a[..., :3], a[..., 3:]
-    return np.sum((moved + np.cross(a, r) + np.cross(w, np.cross(w, r))) ** 2, axis=-1)
+    a = _values(curve, t, which, 2)
+    moved = a[..., 3:]
+    if r.any():
+        w = _values(curve, t, which, 1)[..., :3]
+        moved = moved + np.cross(a[..., :3], r) + np.cross(w, np.cross(w, r))
+    return np.sum(moved**2, axis=-1)
 
 
 def _values(curve: Curve, t: Array, which: Chosen, order: int) -> Array:

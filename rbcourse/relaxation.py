@@ -1,7 +1,7 @@
 """R p = c solved for the whole curve at once: Newton's method on rotations at Chebyshev nodes.
 
 `Stationary` is the equation for any functional, `BallStationary` the same for a ball, where it is
-R w'' = c and a step is twenty times as fast.
+R w'' = c, there are fewer unknowns, and a step is quicker.
 """
 
 from __future__ import annotations
