@@ -83,6 +83,7 @@ def main():
     help_ = "where Binder finds the lessons on GitHub"
     book.add_argument("--repository", default="", metavar="OWNER/NAME", help=help_)
     tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
+    tasks.add_parser("atlas", help="compute the atlas of real bodies anew; goes on when stopped")
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")
     known, further = parser.parse_known_args()
@@ -133,6 +134,8 @@ def main():
         run("-m", "rbcourse.book.build", *(words + ["--serve"] * known.serve))
     elif known.task == "ledger":
         run("-m", "rbcourse.course.ledger")
+    elif known.task == "atlas":
+        run("-m", "rbcourse.study.body_atlas")
     elif known.task == "bench":
         set_up_peers()
         run("-m", "benchmarks")

@@ -18,8 +18,7 @@ CASES = {
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
 }
 """The turns and the end velocities of the figures of BK."""
-SIDES = np.array([0.3, 0.2, 0.03])
-BOOK = np.diag(np.sum(SIDES**2) - SIDES**2) / 12
+BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 """The inertia of a book of 1 kg, in kg m²."""
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, as_symmetric, check_broadcast, first_index
+from rbcourse._checks import as_finite, as_positive, as_symmetric, check_broadcast, first_index
 from rbcourse._numerics import EPS, Array, scaled
 from rbcourse.projection import project_se, project_so
 from rbcourse.se3 import BASIS_SE3, hat_se3
@@ -282,6 +282,46 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     X = as_finite("X", X, *A.shape[-2:])
     check_broadcast(A=(A, 2), X=(X, 2))
     return _components(A, X)
+
+
+def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
+    """Return the inertia of a solid box about its centre.
+
+    Parameters
+    ----------
+    sides : array_like, shape (..., 3)
+        Its lengths along the axes of the body, in m, not negative.
+    mass : float, optional
+        In kg.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        diag(b² + c², c² + a², a² + b²) m/12, in kg m², in body axes.
+
+    Raises
+    ------
+    ValueError
+        If `sides` is not finite, not of that shape, or negative, or `mass` is not a positive
+        number.
+
+    See Also
+    --------
+    weight_from_inertia : The weight W of the metric of this body.
+
+    Examples
+    --------
+    >>> box_inertia([1, 2, 3], 12)
+    array([[13.,  0.,  0.],
+           [ 0., 10.,  0.],
+           [ 0.,  0.,  5.]])
+    """
+    sides, mass = as_finite("sides", sides, 3), as_positive("mass", mass)
+    if np.any(sides < 0):
+        raise ValueError(f"sides: lengths from 0 up are wanted, got {sides.min():.6g}")
+    squares = sides**2
+    moments = np.sum(squares, axis=-1, keepdims=True) - squares
+    return mass / 12 * moments[..., None] * np.eye(3)
 
 
 def inertia_from_weight(W: ArrayLike) -> Array:

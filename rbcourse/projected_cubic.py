@@ -232,10 +232,7 @@ def weighted_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends, G = with_inertia(check_ends(R0, R1, w0, w1), inertia)
-    W = weight_of("inertia", G)
-    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
-    return watched(ProjectedPolynomial(*(M @ W for M in projected_cubic(ends).ends)))
+    return watched(weighted_cubic(*with_inertia(check_ends(R0, R1, w0, w1), inertia)))
 
 
 def projected_quintic_so3(
@@ -324,6 +321,13 @@ def projected_cubic(ends: Ends) -> ProjectedPolynomial:
     """Return `projected_cubic_so3` of checked ends, without a warning of its margin."""
     R0, R1, w0, w1 = ends
     return ProjectedPolynomial(R0, R1, R0 @ hat(w0), R1 @ hat(w1))
+
+
+def weighted_cubic(ends: Ends, inertia: Array) -> ProjectedPolynomial:
+    """Return `weighted_cubic_so3` of checked ends and inertias, without that warning."""
+    W = weight_of("inertia", inertia)
+    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
+    return ProjectedPolynomial(*(M @ W for M in projected_cubic(ends).ends))
 
 
 def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:

@@ -24,8 +24,7 @@ PAPER = {
     "4c": (ALONG, ALONG, ALONG + np.array([5.0, 0, 0])),
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
 }
-SIDES = np.array([0.3, 0.2, 0.03])
-BOOK = np.diag(np.sum(SIDES**2) - SIDES**2) / 12
+BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 """The inertia of a book of 1 kg, 30 cm by 20 cm by 3 cm."""
 
 TIMES = np.linspace(0, 1, 101)

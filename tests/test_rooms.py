@@ -25,7 +25,7 @@ LIBRARIES = {
     "core": {"numpy", "scipy"},
     "draw": {"PIL", "matplotlib", "mpl_toolkits"},
     "explore": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
-    "study": {"IPython", "matplotlib"},
+    "study": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
     "report": {"matplotlib"},
     "course": {"jupyter_server", "nbclient", "nbformat", "segno", "tornado", "traitlets", "voila"},
     "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}

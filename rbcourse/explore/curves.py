@@ -11,7 +11,7 @@ from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse.metrics import geodesic_flow
+from rbcourse.metrics import box_inertia, geodesic_flow
 from rbcourse.motions import geodesic_se3, screw_from_pose, screw_se3
 from rbcourse.projected_line import f, line_singular_value, theta
 from rbcourse.se3 import pose_from_components, pose_from_coordinates
@@ -20,7 +20,7 @@ from rbcourse.so3 import angle_between, exp_so3
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8
 _EDGES = np.array([0.20, 0.13, 0.03])  # of a book of half a kilogram, in m
-_MOMENTS = 0.5 / 12 * (_EDGES @ _EDGES - _EDGES**2)
+_MOMENTS = np.diag(box_inertia(_EDGES, 0.5))
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
 _SPINS = {"axis 1": 0, "axis 2": 1, "axis 3": 2}

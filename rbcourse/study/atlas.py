@@ -1,46 +1,39 @@
-"""What near-optimal curves cost above the optimum, for thousands of boundary conditions."""
+"""The atlas: for which ends a closed form is near the optimum, and for which body."""
 
 from __future__ import annotations
 
-import os
-import warnings
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import Rng, as_count, as_generator, as_single
-from rbcourse._numerics import Array, blocks
-from rbcourse.cost import rotation_cost
-from rbcourse.curves import Curve, Ends, check_ends
-from rbcourse.functionals import BallAcceleration
-from rbcourse.optimum import from_guess, minimum_acceleration_so3
-from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic
+from rbcourse._numerics import Array
+from rbcourse.curves import Curve, Ends, check_ends, with_inertia
+from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic, weighted_cubic
 from rbcourse.rivals import (
     CLOSED_FORMS,
     Bezier,
     ExponentialCubic,
     bezier_legs,
+    normal_cubic_so3,
     other_way,
 )
 from rbcourse.sampling import sample_rotation
 from rbcourse.so3 import angle_between, exp_so3, log_so3
 
 Maker = Callable[[Array, Array, Array, Array], Curve]
-Report = Callable[[int, int], object]
 
 CELLS = 10
 """Into so many steps the atlas divides the displacement and the end velocity."""
 FASTEST = 9.0
 """The largest √(‖w0‖² + ‖w1‖²) of the atlas, in rad per unit time."""
 FAMILIES = "along", "across"
-"""Where the end velocities of the atlas point: along the axis of the displacement, or across."""
+"""Where the end velocities of lesson 12 point: along the axis of the displacement, or across."""
 
 NEAR_ZERO = 1e-4
 """What costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖² is not divided by."""
-
-_PART = 1000  # problems between two reports
 
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomial:
@@ -49,17 +42,38 @@ def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomia
 
 
 WAYS: dict[str, Maker] = {**CLOSED_FORMS, "projection": projection}
-"""The closed forms that are compared, with the names that figures and tables have for them."""
+"""The closed forms for a ball, with the names that figures and tables have for them."""
 
 
-def atlas_problems(draws: int, *, rng: Rng = None) -> Ends:
+def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
+    """Return the closed forms that are compared for a body: `WAYS`, and two that know its inertia.
+
+    Those are "weighted", `weighted_cubic_so3`, and "normal", `normal_cubic_so3`.
+    """
+    if inertia is None:
+        return WAYS
+    return WAYS | {
+        "weighted": partial(_weighted, inertia),
+        "normal": partial(_normal, inertia),
+    }
+
+
+def _weighted(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
+    return weighted_cubic(*with_inertia(check_ends(R0, R1, w0, w1), inertia))
+
+
+def _normal(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
+    return normal_cubic_so3(R0, R1, w0, w1, inertia)
+
+
+def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng = None) -> Ends:
     """Return `draws` random problems in every cell of the atlas.
 
     A cell is a family, a step of the displacement ‖σ‖ from 0 to π, and a step of the end velocity
     v = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`; within it both are uniform. v is divided between w0
     and w1 by a random angle. "along": both point along the axis of σ or against it; "across": each
-    in a random direction across it. The problems are in the order family, displacement, end
-    velocity, draw.
+    in a random direction across it; "any": each in a random direction. The problems are in the
+    order family, displacement, end velocity, draw. R0 and the axis of σ are uniform, too.
 
     Examples
     --------
@@ -67,20 +81,28 @@ def atlas_problems(draws: int, *, rng: Rng = None) -> Ends:
     (600, 3)
     """
     draws, rng = as_count("draws", draws), as_generator(rng)
-    family, turn, speed = np.indices((2, CELLS, CELLS, draws))[:3].reshape(3, -1)
+    unknown = set(families) - {"along", "across", "any"}
+    if unknown or not families:
+        raise ValueError(f"families: along, across and any are wanted, got {sorted(unknown)}")
+    family, turn, speed = np.indices((len(families), CELLS, CELLS, draws))[:3].reshape(3, -1)
     count = len(family)
     angle = (turn + rng.random(count)) * np.pi / CELLS
     v = (speed + rng.random(count)) * FASTEST / CELLS
     share, *spins = 2 * np.pi * rng.random((3, count))
     frames, R0 = sample_rotation(count, rng=rng), sample_rotation(count, rng=rng)
     axis, first, second = np.moveaxis(frames, -1, 0)
+
+    def directions(spin: Array) -> Array:
+        ways = {
+            "along": axis,
+            "across": np.cos(spin)[:, None] * first + np.sin(spin)[:, None] * second,
+        }
+        if "any" in families:
+            ways["any"] = sample_rotation(count, rng=rng)[..., 0]
+        return np.choose(family[:, None], [ways[name] for name in families])
+
     w0, w1 = (
-        size[:, None]
-        * np.where(
-            family[:, None] == 0,
-            axis,
-            np.cos(spin)[:, None] * first + np.sin(spin)[:, None] * second,
-        )
+        size[:, None] * directions(spin)
         for size, spin in zip((v * np.cos(share), v * np.sin(share)), spins, strict=True)
     )
     return Ends(R0, R0 @ exp_so3(angle[:, None] * axis), w0, w1)
@@ -106,59 +128,15 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     return Ends(R0, R0 @ exp_so3(sigma), w0, w1)
 
 
-def survey(
-    ends: Ends, report: Report | None = None, ways: Mapping[str, Maker] = WAYS
-) -> dict[str, Array]:
-    """Return the costs ∫ 2 ‖w'‖² dt of N problems, shape (N,), by the names of the curves.
+def starts() -> dict[str, Maker]:
+    """Return guesses that Newton's method is started from, to see how much the start decides.
 
-    They are those of the "optimum", NaN where it is not found, and of the closed forms, to about
-    1e-7 relative. ``report(done, total)`` is called now and then with numbers of problems
-    (BK 1, BK (18), BK 7).
+    They are the closed forms except Cayley's, which seldom leads anywhere when it is far off, and
+    the exponential cubic the long way round.
     """
-    parts = list(blocks(len(ends.w0), _PART)) or [slice(0, 0)]
-
-    def solve(part: slice) -> Array:
-        some = ends.of(part)
-        best = np.asarray(minimum_acceleration_so3(*some).cost)
-        return np.stack([best, *(costs(make, some) for make in ways.values())])
-
-    found = _side_by_side(solve, parts, report)
-    return dict(zip(("optimum", *ways), np.concatenate(found, axis=-1), strict=True))
-
-
-def costs(make: Maker, ends: Ends) -> Array:
-    """Return ∫ 2 ‖w'‖² dt of the curves that ``make`` gives for N problems, to about 1e-7 relative.
-
-    See `acceleration_cost` for 1e-10, and for any curve (BK (18)).
-
-    Examples
-    --------
-    >>> ends = random_problems(2, 1, rng=1)
-    >>> from rbcourse import acceleration_cost
-    >>> bool(np.allclose(costs(projection, ends), acceleration_cost(projection(*ends)), rtol=1e-6))
-    True
-    """
-    panels = np.array([0.0, 0.5, 1.0])
-    return rotation_cost("cost", make(*ends), BallAcceleration(), panels, 1e-6)
-
-
-def several_starts(ends: Ends, report: Report | None = None) -> dict[str, Array]:
-    """Return the costs of the curves that Newton's method finds from several guesses, by guess.
-
-    The guesses are the closed forms except Cayley's, which seldom leads anywhere when it is far
-    off, and the exponential cubic the long way round. The curves are stationary; none is proven to
-    be the best. NaN where none is found (BK (19)).
-    """
-    starts = {way: make for way, make in WAYS.items() if way != "Cayley"}
-    starts["long way round"] = long_way_round
-    parts = list(blocks(len(ends.w0), _PART)) or [slice(0, 0)]
-
-    def solve(part: slice) -> Array:
-        some = ends.of(part)
-        return np.stack([from_guess(some, make(*some)).cost for make in starts.values()])
-
-    found = _side_by_side(solve, parts, report)
-    return dict(zip(starts, np.concatenate(found, axis=-1), strict=True))
+    return {way: make for way, make in WAYS.items() if way != "Cayley"} | {
+        "long way round": long_way_round
+    }
 
 
 def long_way_round(R0: Array, R1: Array, w0: Array, w1: Array) -> ExponentialCubic:
@@ -193,31 +171,41 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
     return {name: float(angle_between(A, curve(t)).max()) for name, (A, curve) in pairs.items()}
 
 
-def near_zero(ends: Ends, optimum: Array) -> NDArray[np.bool_]:
-    """Tell which optima cost so little, compared with their ends, that a ratio is meaningless."""
+def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> NDArray[np.bool_]:
+    """Tell which optima cost so little, compared with their ends, that a ratio is meaningless.
+
+    ‖x‖² stands for ½ xᵀ G x; for a ball G = 2 I.
+    """
+    half = np.eye(3) if inertia is None else np.asarray(inertia) / 2
     sigma = log_so3(ends.R0.mT @ ends.R1)
-    return optimum < NEAR_ZERO * sum(np.sum(x**2, axis=-1) for x in (sigma, ends.w0, ends.w1))
+    size = sum(np.sum(x * (x @ half), axis=-1) for x in (sigma, ends.w0, ends.w1))
+    return optimum < NEAR_ZERO * size
 
 
-def excesses(ends: Ends, found: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the costs of a `survey` over the optimum, minus 1.
+def excesses(
+    ends: Ends, found: Mapping[str, Array], inertia: ArrayLike | None = None
+) -> dict[str, Array]:
+    """Return the costs of a survey over the optimum, minus 1.
 
     NaN where the optimum is near zero or not found.
     """
-    optimum = np.where(near_zero(ends, found["optimum"]), np.nan, found["optimum"])
+    lost = near_zero(ends, found["optimum"], inertia)
+    optimum = np.where(lost, np.nan, found["optimum"])
     return {way: cost / optimum - 1 for way, cost in found.items() if way != "optimum"}
 
 
-def cell_table(excess: Mapping[str, Array], draws: int, share: float) -> dict[str, Array]:
+def cell_table(
+    excess: Mapping[str, Array], draws: int, share: float, families: Sequence[str] = FAMILIES
+) -> dict[str, Array]:
     """Return the quantile `share` of `excesses` in each cell of `atlas_problems`, as a table.
 
     Its columns are the family, the middle of the cell, how many problems count, and a `quantile`
-    for each closed form; a row for each of the 2 × 10 × 10 cells.
+    for each closed form; a row for each cell.
     """
-    family, turn, speed = np.indices((2, CELLS, CELLS)).reshape(3, -1)
+    family, turn, speed = np.indices((len(families), CELLS, CELLS)).reshape(3, -1)
     cells = {way: x.reshape(-1, draws) for way, x in excess.items()}
     return {
-        "family": np.array(FAMILIES)[family],
+        "family": np.array(families)[family],
         "displacement [rad]": (turn + 0.5) * np.pi / CELLS,
         "end velocity [rad]": (speed + 0.5) * FASTEST / CELLS,
         "problems [1]": np.sum(~np.isnan(next(iter(cells.values()))), axis=-1),
@@ -262,21 +250,3 @@ def in_words(excess: float) -> str:
     if excess < 10:
         return f"{100 * excess:.2g} %" if excess < 0.1 else f"{100 * excess:.0f} %"
     return f"{1 + excess:.0f} ×" if excess < 1e4 else "> 10⁴ ×"
-
-
-def _side_by_side(
-    work: Callable[[slice], Array], parts: list[slice], report: Report | None
-) -> list[Array]:
-    """Return the work on each part, done in as many threads as there are processors."""
-    found = []
-    with warnings.catch_warnings(), ThreadPoolExecutor(os.cpu_count()) as pool:
-        warnings.filterwarnings("ignore", ".*did not converge", RuntimeWarning)  # it is NaN
-        try:
-            for part, result in zip(parts, pool.map(work, parts), strict=True):
-                found.append(result)
-                if report:
-                    report(part.stop, parts[-1].stop)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-    return found

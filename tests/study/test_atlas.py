@@ -8,7 +8,6 @@ from rbcourse.study import atlas
 
 DRAWS = 6
 PROBLEMS = atlas.atlas_problems(DRAWS, rng=1)
-FOUND = atlas.survey(PROBLEMS.of(slice(0, None, 12)))
 SOME = atlas.random_problems(60, 3, rng=2)
 
 
@@ -64,75 +63,6 @@ def test_a_seed_gives_the_same_problems_again(make):
 def test_an_impossible_size_is_named(size):
     with pytest.raises(ValueError, match=r"^size"):
         atlas.random_problems(2, size)
-
-
-@pytest.mark.source("BK (18)")
-@pytest.mark.parametrize("way", atlas.WAYS)
-def test_costs_are_the_integral(way):
-    make = atlas.WAYS[way]
-    costs = atlas.costs(make, SOME.of(slice(20)))
-    for k in range(20):
-        exact = rb.acceleration_cost(make(*(x[k] for x in SOME)))
-        assert costs[k] == pytest.approx(exact, rel=1e-6)
-
-
-def test_a_projection_that_all_but_jumps_is_integrated_too():
-    """A turn from rest by a little less than 180°: the margin is 2 cos(89.9°)."""
-    turn, rest = np.radians([[0, 0, 179.8]]), np.zeros((1, 3))
-    ends = atlas.Ends(np.eye(3)[None], rb.exp_so3(turn), rest, rest)
-    curve = rb.projected_cubic_so3(*(x[0] for x in ends))
-    assert curve.margin < 0.004
-    assert atlas.costs(atlas.projection, ends)[0] == pytest.approx(
-        rb.acceleration_cost(curve), rel=1e-6
-    )
-
-
-def test_a_survey_has_the_optimum_and_every_way():
-    assert list(FOUND) == ["optimum", *atlas.WAYS]
-    some = PROBLEMS.of(slice(0, None, 12))
-    assert np.array_equal(FOUND["optimum"], rb.minimum_acceleration_so3(*some).cost)
-    for way, make in atlas.WAYS.items():
-        assert np.array_equal(FOUND[way], atlas.costs(make, some))
-        assert np.all(FOUND[way] > (1 - 1e-6) * FOUND["optimum"])
-
-
-def test_a_survey_tells_how_far_it_is():
-    told = []
-    few = PROBLEMS.of(slice(1100))
-    atlas.survey(few, lambda *done: told.append(done), ways={})
-    assert told == [(1000, 1100), (1100, 1100)]
-
-
-def test_a_survey_of_nothing_is_empty():
-    none = PROBLEMS.of(slice(0))
-    for found in (atlas.survey(none), atlas.several_starts(none)):
-        assert {cost.shape for cost in found.values()} == {(0,)}
-
-
-def test_an_error_ends_a_survey():
-    def refuses(*ends):
-        raise ValueError("no curve")
-
-    with pytest.raises(ValueError, match="no curve"):
-        atlas.survey(SOME, ways={"none": refuses})
-
-
-def test_what_is_not_found_is_nan_and_silent():
-    ends = atlas.Ends(*(x[:3].copy() for x in SOME))
-    ends.w0[1], ends.w1[1] = [1e3, 0, 0], [0, 1e3, 0]
-    found = atlas.survey(ends, ways={"exponential": rb.exponential_cubic_so3})
-    assert np.isnan(found["optimum"]).tolist() == [False, True, False]
-    assert np.isfinite(found["exponential"]).all()
-
-
-@pytest.mark.source("BK (19)")
-def test_the_optimum_is_the_lowest_of_several_starts():
-    """From the projected cubic the solver turns the wrong way round in a good part of them."""
-    used, found = rb.minimum_acceleration_so3(*SOME).cost, atlas.several_starts(SOME)
-    assert list(found) == [*list(atlas.WAYS)[:-1], "long way round"]
-    lowest = np.nanmin(list(found.values()), axis=0)
-    assert used == pytest.approx(np.minimum(used, lowest), rel=1e-9)
-    assert 5 < np.sum(found["projection"] > lowest * (1 + 1e-6)) < 30
 
 
 @pytest.mark.parametrize("make", [atlas.long_way_round, atlas.bezier_other_way])
