@@ -8,6 +8,8 @@ from benchmarks import references
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.references import oracles
 from rbcourse import textbook
+from rbcourse.study.atlas import random_problems
+from rbcourse.study.survey import processes, survey
 
 MOMENTS = np.linspace(0, 1, 101)
 ALONG, E1 = np.pi / 6 * np.array([1, 2, 3]), np.array([1.0, 0, 0])
@@ -182,6 +184,21 @@ def stacked_bodies(problems, rng, bvps=10):
         ),
     ]
     return Contest("optimum of a body, stacked", "random", problems, methods)
+
+
+def surveys(problems, rng):
+    """Return the contest of a survey of the book by two processes and by one, started anew."""
+    ends = random_problems(problems, 3, rng=rng)
+
+    def by(workers):
+        with processes(workers) as pool:
+            return np.stack(list(survey(ends, pool, inertia=BOOK).values()))
+
+    methods = [
+        Method(OURS, "survey, two processes", lambda: by(2)),
+        Method("rbcourse, alone", "survey, one process", lambda: by(1)),
+    ]
+    return Contest("survey of a body", "", problems, methods)
 
 
 def _ball(n, radius, rng):

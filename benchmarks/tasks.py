@@ -14,7 +14,7 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 import rbcourse as rb
 from benchmarks.chains import LEGS, chain_of_poses
 from benchmarks.contest import OURS, Contest, Method
-from benchmarks.optima import CASES, one_body, one_optimum, stacked_bodies, stacked_optimum
+from benchmarks.optima import CASES, one_body, one_optimum, stacked_bodies, stacked_optimum, surveys
 from benchmarks.rivals import closed_forms, closed_forms_with_derivatives
 from benchmarks.rotations import (
     geodesic,
@@ -63,6 +63,7 @@ def all_contests(peers, rng, sizes=SIZES, cases=tuple(CASES), problems=1000, fra
     yield stacked_optimum(problems, rng)
     yield from (one_body(case) for case in cases)
     yield stacked_bodies(problems, rng)
+    yield surveys(2 * problems, rng)
     yield imports()
     yield cubes(frames)
 
@@ -110,7 +111,7 @@ def moving_cubes(frames):
     panes = {"layout": "none", "subplot_kw": {"projection": "space"}}
     fig, axes = plt.subplots(1, 2, figsize=(8, 4), dpi=80, **panes)
     motions = {name: way(t) for name, way in ways.items()}
-    return fig, bodies.moving_cubes(axes, motions, side=2)
+    return fig, bodies.moving_boxes(axes, motions, edges=2)
 
 
 def film(fig, update, frames):

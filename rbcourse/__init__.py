@@ -91,7 +91,7 @@ from rbcourse.so3 import (
     vee_so3,
 )
 
-__version__ = "0.19.0"
+__version__ = "0.20.0"
 
 __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # rotations

@@ -11,9 +11,11 @@ from scipy.integrate import simpson, solve_ivp
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import rbcourse as rb
-from rbcourse.study import atlas
+from rbcourse.study import atlas, body_atlas
+from rbcourse.study.survey import survey
 
 FIGURES = Path(__file__).parents[1] / "figures"
+TABLES = "paper_fig5_costs", "lesson13_intervals"  # without pictures
 NAIVE = rb.sampling.sample_rotation_naive, rb.sampling.sample_quaternion_naive
 HAAR = rb.sample_rotation, rb.sample_quaternion
 
@@ -52,13 +54,15 @@ def test_every_figure_has_its_files_and_units_in_every_column():
     names = {file.stem for file in FIGURES.iterdir() if file.is_file()}
     for name in names:
         files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
-        assert files - {".gif"} == {".png", ".pdf", ".csv"} or name == "paper_fig5_costs"
+        assert files - {".gif"} == {".png", ".pdf", ".csv"} or name in TABLES
         for column in committed(name)[0]:
-            assert re.search(r" \[(1|m²?|rad²?|s|(m|rad)/s²?)\]$", column) or column in (
+            assert re.search(r" \[(1|m²?|rad²?|s|(m|rad)/s²?|N m)\]$", column) or column in (
                 "figure",
                 "curve",
                 "frame",
                 "family",
+                "body",
+                "domain",
             ), column
 
 
@@ -563,3 +567,95 @@ def test_the_excess_of_a_projection_grows_with_the_third_power_of_the_margin():
     slope, _ = np.polyfit(np.log(margin[low]), np.log(excess[low]), 1)
     assert low.sum() > 25
     assert slope == pytest.approx(-3, abs=0.3)
+
+
+@pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
+@pytest.mark.parametrize("body", body_atlas.BODIES)
+def test_a_cell_of_the_atlas_of_bodies_is_what_its_problems_cost(body):
+    table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # 63°, 3.15 rad
+    data = {name: column[table["body"] == body][cell] for name, column in table.items()}
+    middle = [np.radians(63), 3.15, 200]
+    assert [data[x] for x in list(data)[1:4]] == pytest.approx(middle)
+    ends = body_atlas.body_problems(200, 31).of(slice(200 * cell, 200 * cell + 200))
+    G = body_atlas.BODIES[body]
+    best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends, G), G)
+    for curve, make in {
+        "weighted": lambda *few: rb.weighted_cubic_so3(*few, G),
+        "normal": lambda *few: rb.normal_cubic_so3(*few, G),
+        "Bézier": rb.bezier_so3,
+        "projection": rb.projected_cubic_so3,
+        "ball's optimum": rb.minimum_acceleration_so3,
+    }.items():
+        excess = np.sort(rb.acceleration_cost(make(*ends), G) / best - 1)
+        for name, place in (("median", 99), ("90 %", 179)):
+            stored = data[f"{curve} {name} [1]"]
+            assert stored == pytest.approx(excess[place], rel=2e-3, abs=1e-6)
+
+
+def test_the_intervals_are_those_of_the_problems():
+    """All 800 problems of the small domain, for the book and one of the other seeds."""
+    table = body_atlas.stored("intervals")
+    seed, body, domain = (table[key] for key in ("seed [1]", "body", "domain"))
+    here = (seed == 32) & (body == "book") & (domain == "small")
+    rows = [{name: column[k] for name, column in table.items()} for k in np.flatnonzero(here)]
+    assert [row["curve"] for row in rows] == list(body_atlas.CURVES)
+    problems, G = body_atlas.body_problems(200, 32), body_atlas.BODIES["book"]
+    ends = problems.of(body_atlas.domain("small", 200))
+    found = survey(ends, inertia=G, ways=body_atlas.curves_for("book"))
+    excess = body_atlas.with_choices(atlas.excesses(ends, found, G))
+    for row in rows:
+        x = np.sort(excess[row["curve"]])
+        assert row["problems [1]"] == 800
+        assert row["median [1]"] == pytest.approx(np.median(x), rel=1e-3, abs=1e-8)
+        # of 800 independent draws 372 to 428 are below the median, with 95 %
+        low, high = (row[f"median {end} [1]"] for end in ("low", "high"))
+        assert [low, high] == pytest.approx(x[[371, 428]], rel=0.02, abs=1e-7)
+
+
+def test_the_atlas_of_bodies_has_three_seeds_and_all_its_problems():
+    data = body_atlas.stored("intervals")
+    assert sorted(set(data["seed [1]"])) == [31, 32, 33]
+    everything = data["problems [1]"][data["domain"] == "all"]
+    assert everything.tolist() == [20000] * (9 * len(body_atlas.CURVES))
+
+
+@pytest.mark.source("beyond BK 1", "beyond BK 3", "beyond BK 4")
+def test_the_book_of_lesson_13_is_turned_by_its_torques():
+    """Euler's equation with the stored torques, from rest, leads to the stored goal, at rest."""
+    torques, poses = numbers("lesson13_torques"), numbers("lesson13_book")
+    G, t = rb.metrics.box_inertia([0.3, 0.2, 0.03]), torques["t [s]"]
+    diagonal = rb.exp_so3(np.radians(150) * np.ones(3) / np.sqrt(3))
+    for law in ("as if a ball", "least acceleration", "least torque"):
+        columns = [torques[f"{law} {axis} [N m]"] for axis in "xyz"]
+        torque = make_interp_spline(t, np.transpose(columns), k=5)
+
+        def euler(t, y, torque=torque):
+            R, w = y[:9].reshape(3, 3), y[9:]
+            rate = np.linalg.solve(G, torque(t) - np.cross(w, G @ w))
+            return np.concatenate([(R @ rb.hat_so3(w)).ravel(), rate])
+
+        end = solve_ivp(euler, (0, 1), [*np.eye(3).ravel(), 0, 0, 0], rtol=1e-10, atol=1e-12)
+        R, w = end.y[:9, -1].reshape(3, 3), end.y[9:, -1]
+        assert np.abs(R - diagonal).max() < 1e-6, law
+        assert np.abs(w).max() < 1e-6, law
+        stored = [poses[f"{law} R{i}{j} [1]"][-1] for i in "123" for j in "123"]
+        assert np.abs(R.ravel() - stored).max() < 1e-6, law
+
+
+@pytest.mark.source("beyond BK 6", "beyond BK 7")
+def test_what_knows_the_body_has_the_fourth_power():
+    data = numbers("lesson13_growth")
+    powers = {"projection": 2, "Bézier": 2, "weighted": 4, "normal": 4}
+    for way, power in powers.items():
+        median = data[f"{way} median excess [1]"][:3]
+        slope = np.diff(np.log(median)) / np.diff(np.log(data["size [rad]"][:3]))
+        assert slope == pytest.approx([power] * 2, abs=0.5), way
+
+
+@pytest.mark.source("beyond BK 5")
+def test_the_speeds_of_lesson_13_go_the_whole_way():
+    data = numbers("lesson13_jerk")
+    t, angle = data["t [1]"], np.linalg.norm(np.pi / 6 * np.array([1, 4, 3]))
+    exact = angle * 30 * t**2 * (1 - t) ** 2
+    assert np.abs(data["least jerk [rad]"] - exact).max() < 1e-9
+    assert simpson(data["projected quintic [rad]"], x=t) == pytest.approx(angle, abs=1e-6)

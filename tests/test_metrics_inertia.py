@@ -41,6 +41,31 @@ def test_which_inertias_a_weight_reaches():
         rb.metrics.weight_from_inertia([np.eye(3), np.diag([1, 2, 4])])
 
 
+def test_a_box_has_the_inertia_of_its_points():
+    """∫ (p·p I − p pᵀ) dm by the rule of Gauss with two points an axis, exact for squares."""
+    sides = np.array([[0.3, 0.2, 0.03], [1.0, 2, 3], [2.0, 0, 0]])
+    nodes = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / np.sqrt(3)
+    p = sides[:, None] * nodes
+    squares = np.sum(p**2, axis=-1)[..., None, None] * np.eye(3)
+    exact = 5 * np.mean(squares - p[..., :, None] * p[..., None, :], axis=1)
+    assert np.abs(rb.metrics.box_inertia(sides, 5) - exact).max() < 16 * EPS * exact.max()
+    rb.metrics.weight_from_inertia(rb.metrics.box_inertia(sides))  # of a body
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (([1, 2],), r"^sides: shape \(\.\.\., 3\) wanted"),
+        (([1, -2, 3],), r"^sides: lengths from 0 up are wanted, got -2"),
+        (([1, 2, np.nan],), r"^sides"),
+        (([1, 2, 3], 0), r"^mass"),
+    ],
+)
+def test_what_is_no_box_is_named(arguments, said):
+    with pytest.raises(ValueError, match=said):
+        rb.metrics.box_inertia(*arguments)
+
+
 def test_no_inertia_is_too_large_or_too_small():
     for size in (1e-300, 3e307):
         W = rb.metrics.weight_from_inertia(size * np.diag([2.0, 3, 4]))

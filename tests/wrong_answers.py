@@ -1270,6 +1270,117 @@ WRONG = {
         ("This is the sum of the components", "ax.plot(t, np.abs(w).sum(axis=1))"),
         ("Only the numbers of the points", "ax.plot(np.linalg.norm(w, axis=1))"),
     ],
+    ("ps6", "torque"): [
+        ("The second term is missing", "return G @ w1"),
+        ("The sign of the second term", "return G @ w1 + np.cross(G @ w, w)"),
+        ("G multiplies too much", "return G @ (w1 + np.cross(w, G @ w))"),
+        ("This is the acceleration", "return w1 + np.linalg.inv(G) @ np.cross(w, G @ w)"),
+        (
+            "This uses the diagonal",
+            """
+            g = G.diagonal()
+            return g * w1 + np.cross(w, g * w)
+            """,
+        ),
+        ("ω and ω′ are exchanged", "return G @ w + np.cross(w1, G @ w1)"),
+        ("The product has ω′", "return G @ w1 + np.cross(w, G @ w1)"),
+    ],
+    ("ps6", "cost"): [
+        (
+            "This is the other cost",
+            """
+            tau = w1 @ G + np.cross(w, w @ G)
+            return np.mean((tau**2).sum(axis=1))
+            """,
+        ),
+        (
+            "This has G where its inverse",
+            """
+            tau = w1 @ G + np.cross(w, w @ G)
+            return np.mean([x @ G @ x for x in tau])
+            """,
+        ),
+        (
+            "The term ω × Gω is missing",
+            """
+            tau = w1 @ G
+            return np.mean([x @ np.linalg.inv(G) @ x for x in tau])
+            """,
+        ),
+        ("This is the cost for a ball", "return 2 * np.mean((w1**2).sum(axis=1))"),
+        (
+            "The integral is missing its dt",
+            """
+            tau = w1 @ G + np.cross(w, w @ G)
+            return sum(x @ np.linalg.inv(G) @ x for x in tau)
+            """,
+        ),
+        (
+            "This is the mean over all",
+            """
+            tau = w1 @ G + np.cross(w, w @ G)
+            return np.mean(tau * (tau @ np.linalg.inv(G)))
+            """,
+        ),
+        (
+            "There is a root too many",
+            """
+            tau = w1 @ G + np.cross(w, w @ G)
+            return np.sqrt(np.mean([x @ np.linalg.inv(G) @ x for x in tau]))
+            """,
+        ),
+    ],
+    ("ps6", "draw"): [
+        (
+            "x and y are swapped",
+            "ax.plot(np.linalg.norm(w1 @ G + np.cross(w, w @ G), axis=1), t)",
+        ),
+        ("These are the components", "ax.plot(t, w1 @ G + np.cross(w, w @ G))"),
+        (
+            "This is the square of the size",
+            "ax.plot(t, ((w1 @ G + np.cross(w, w @ G)) ** 2).sum(axis=1))",
+        ),
+        ("This is the size of G ω′", "ax.plot(t, np.linalg.norm(w1 @ G, axis=1))"),
+        (
+            "Only the numbers of the points",
+            "ax.plot(np.linalg.norm(w1 @ G + np.cross(w, w @ G), axis=1))",
+        ),
+    ],
+    ("ps6", "nearest"): [
+        ("This is the nearest rotation for a ball", "return project_so(M)"),
+        ("The inertia is not the weight", "return project_so(M @ G)"),
+        ("The half is missing", "return project_so(M @ (np.trace(G) * np.eye(3) - G))"),
+        (
+            "The weight stands on the wrong side",
+            "return project_so((np.trace(G) / 2 * np.eye(3) - G) @ M)",
+        ),
+        (
+            "For some matrices this is a mirror",
+            """
+            U, s, Vt = np.linalg.svd(M @ (np.trace(G) / 2 * np.eye(3) - G))
+            return U @ Vt
+            """,
+        ),
+        ("This is M W itself", "return M @ (np.trace(G) / 2 * np.eye(3) - G)"),
+    ],
+    ("ps6", "constant"): [
+        ("This is p, as the body", "return G @ (v1 + np.cross(w, v)) - np.cross(G @ w, v)"),
+        (
+            "This has the transpose",
+            "return (G @ (v1 + np.cross(w, v)) - np.cross(G @ w, v)) @ R",
+        ),
+        (
+            "The sign of the last term",
+            "return R @ (G @ (v1 + np.cross(w, v)) + np.cross(G @ w, v))",
+        ),
+        ("The last term is missing", "return R @ (G @ (v1 + np.cross(w, v)))"),
+        ("Inside of G the product ω × v", "return R @ (G @ v1 - np.cross(G @ w, v))"),
+        (
+            "Inside of G the product has",
+            "return R @ (G @ (v1 + np.cross(v, w)) - np.cross(G @ w, v))",
+        ),
+        ("This is the constant of a ball", "return R @ (G @ v1)"),
+    ],
 }
 
 # What these bodies call by capital names: a student would have written it out.

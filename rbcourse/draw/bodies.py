@@ -95,6 +95,18 @@ def set_space(ax: Any, places: Array, side: float, view: tuple[float, float] = (
     draw_room(ax, low, high)
 
 
+def set_turning(ax: Any, reach: float) -> None:
+    """Fit the axes to a body that turns about the origin and reaches so far, in m.
+
+    Pale are the axes of the room, with their names.
+    """
+    for name, room in zip("xyz", reach * np.eye(3), strict=True):
+        ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
+        ax.text(*(1.12 * room), name, color="0.5", ha="center", va="center")
+    ax.fit(np.full(3, -reach), np.full(3, reach), zoom=1.3)
+    ax.view_init(elev=20, azim=-55)
+
+
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
     """Draw a floor between two corners, with a line wherever `draw_room` has a number."""
     pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
@@ -191,33 +203,37 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
     )
 
 
-def moving_cubes(
-    axes: Sequence[Any], motions: Mapping[str, Array], side: float
+def moving_boxes(
+    axes: Sequence[Any], motions: Mapping[str, Array], edges: float | Array
 ) -> Callable[[int], list[Any]]:
-    """Draw cubes of edge `side` in m at the start of motions of equal length, each on its axes.
+    """Draw boxes at the start of motions of equal length, each on its axes.
 
-    Return ``update(i)``, which moves all cubes to pose i of their motions and returns them.
+    `edges` are the edges of a box, or the one of a cube, in m. Boxes that stay at the origin are
+    drawn larger, with the axes of the room in place of a floor. Return ``update(i)``, which moves
+    all boxes to pose i of their motions and returns them.
     """
     ways = list(motions.values())
-    cubes = [draw_box(ax, poses[0], side) for ax, poses in zip(axes, ways, strict=True)]
+    boxes = [draw_box(ax, poses[0], edges) for ax, poses in zip(axes, ways, strict=True)]
     for ax, name, poses in zip(axes, motions, ways, strict=True):
-        set_space(ax, poses[:, :3, 3], side)
-        if np.ptp(poses[:, :3, 3], axis=0).any():
+        if poses[:, :3, 3].any():
+            set_space(ax, poses[:, :3, 3], float(np.max(edges)))
             draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
+        else:
+            set_turning(ax, 0.5 * float(np.linalg.norm(edges * np.ones(3))))
         ax.set_title(name)
 
     def update(i: int) -> list[Any]:
-        for cube, poses in zip(cubes, ways, strict=True):
-            move_box(cube, poses[i], side)
-        return cubes
+        for box, poses in zip(boxes, ways, strict=True):
+            move_box(box, poses[i], edges)
+        return boxes
 
     return update
 
 
-def describe_moving_cubes(t: Array, motions: Mapping[str, Array]) -> str:
-    """Return in words what `moving_cubes` shows; the poses are those of the times t."""
+def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
+    """Return in words what `moving_boxes` shows; the poses are those of the times t."""
     (first, poses), *others = motions.items()
-    said = f"Cubes with a square on one face move side by side: {'; '.join(motions)}."
+    said = f"Boxes with a rectangle on one face move side by side: {'; '.join(motions)}."
     for name, other in others:
         apart = np.degrees(angle_between(poses[:, :3, :3], other[:, :3, :3]))
         said += (

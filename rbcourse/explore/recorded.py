@@ -28,8 +28,9 @@ $figure</html>
 _LESSON = "In the lesson, with Python, every control moves, with all of its steps."
 MOVED: dict[str, tuple[str, Any]] = {
     "arm": ("theta1", np.arange(-180, 181, 30)),
+    "body": ("turn", np.arange(25, 176, 25)),
     "chain": ("leg", None),
-    "cube": ("spin", np.arange(-6, 7)),
+    "cube": ("spin", np.arange(-5, 6, 2)),
     "flip": ("axis", None),
     "minimum_acceleration": ("size", np.arange(2, 15, 2) / 10),
     "planar": ("omega1", np.arange(-90, 91, 15)),

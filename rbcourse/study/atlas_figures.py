@@ -1,6 +1,6 @@
 """Still figures of the atlas: heat maps, quantiles over the excursion, excess over the margin."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "cumulative": ("y", "v"),
     "quaternion": ("screw", "D"),
     "Cayley": ("reference", "x"),
+    "weighted": ("path", "p"),
+    "normal": ("optimum", "*"),
 }
 _MARGINS = {
     "projection": (
@@ -50,24 +52,76 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> list[Any
     `quantile` is named beside the colours (BK 1, BK 7).
     """
     axes = fig.subplots(2, 3, sharex=True, sharey=True)
+    cells = of_family(data, family)
+    maps = [
+        _heat_map(ax, way, cells[f"{way} excess [1]"])
+        for ax, way in zip(axes.flat, WAYS, strict=True)
+    ]
+    fig.supylabel(f"end velocity, {family} the axis (rad)", fontsize="medium")
+    _colour_bar(fig, axes, maps[0], quantile, aspect=15)
+    return maps
+
+
+def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> list[Any]:
+    """Draw heat maps of medians: a row for each body, a column for each curve.
+
+    `data` is what `rbcourse.study.body_atlas.maps` gives; `curves` are the names of columns in it,
+    and what stands above them (beyond BK 3).
+    """
+    bodies = list(dict.fromkeys(np.asarray(data["body"])))
+    axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)
+    maps = []
+    for row, body in zip(axes, bodies, strict=True):
+        chosen = np.asarray(data["body"]) == body
+        row[0].set_ylabel(body)
+        for ax, curve in zip(row, curves, strict=True):
+            maps.append(_heat_map(ax, "", np.asarray(data[f"{curve} median [1]"])[chosen]))
+    for ax, title in zip(axes[0], curves.values(), strict=True):
+        ax.set_title(title)
+    fig.supylabel("end velocity, in any direction (rad)", fontsize="medium")
+    _colour_bar(fig, axes, maps[0], "median", aspect=25)
+    return maps
+
+
+def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
+    """Return in words what `draw_body_atlas` shows."""
+    said = []
+    for body in dict.fromkeys(np.asarray(data["body"])):
+        chosen = np.asarray(data["body"]) == body
+        shares = []
+        for curve, title in curves.items():
+            excess = np.asarray(data[f"{curve} median [1]"])[chosen]
+            shares.append(f"{title.replace(chr(10), ' ')} {100 * np.mean(excess < _TENTH):.0f}")
+        said.append(f"{body}: {', '.join(shares)}")
+    return (
+        "What curves cost above the optimum of three bodies, median. A heat map for each body and "
+        "curve: to the right the displacement grows from 0 to 180 degrees, and upwards the end "
+        "velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
+        f"{'; '.join(said)}."
+    )
+
+
+def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
+    """Draw the excess in each cell, in their order, and a dashed line at 10 %."""
     turns, speeds = (np.linspace(0, end, CELLS + 1) for end in (180, FASTEST))
     x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
-    colours: Any = {"norm": BoundaryNorm(_LEVELS, 256, extend="both"), "cmap": "viridis_r"}
-    line: Any = {"linestyles": "--", "linewidths": 2.5, "colors": "black"}
-    cells, maps = of_family(data, family), []
-    for ax, way in zip(axes.flat, WAYS, strict=True):
-        excess = cells[f"{way} excess [1]"].reshape(CELLS, CELLS).T
-        maps.append(ax.pcolormesh(turns, speeds, excess, **colours))
-        if np.nanmin(excess) < _TENTH < np.nanmax(excess):
-            powers = np.log10(np.maximum(excess, min(_LEVELS)))
-            ax.contour(x, y, powers, [np.log10(_TENTH)], **line)
-        ax.set(title=way, xticks=[0, 60, 120, 180], yticks=[0, 3, 6, 9])
+    excess = np.asarray(excess).reshape(CELLS, CELLS).T
+    norm: Any = BoundaryNorm(_LEVELS, 256, extend="both")
+    drawn = ax.pcolormesh(turns, speeds, excess, norm=norm, cmap="viridis_r")
+    if np.nanmin(excess) < _TENTH < np.nanmax(excess):
+        powers = np.log10(np.maximum(excess, min(_LEVELS)))
+        line: Any = {"linestyles": "--", "linewidths": 2.5, "colors": "black"}
+        ax.contour(x, y, powers, [np.log10(_TENTH)], **line)
+    ax.set(title=title, xticks=[0, 60, 120, 180], yticks=[0, 3, 6, 9])
+    return drawn
+
+
+def _colour_bar(fig: Figure, axes: Any, drawn: Any, quantile: str, aspect: float) -> None:
     fig.supxlabel("displacement (°)", fontsize="medium")
-    fig.supylabel(f"end velocity, {family} the axis (rad)", fontsize="medium")
-    bar = fig.colorbar(maps[0], ax=axes, aspect=15, label=f"cost / optimum − 1, {quantile}")
+    label = f"cost / optimum − 1, {quantile}"
+    bar = fig.colorbar(drawn, ax=axes, aspect=aspect, label=label)
     bar.set_ticks(_LEVELS, labels=_percents(_LEVELS))
     bar.ax.axhline(_TENTH, color="black", lw=2.5, ls="--")
-    return maps
 
 
 def _percents(levels: list[float]) -> list[str]:
@@ -99,7 +153,8 @@ def draw_growth(ax: Axes, data: Table) -> list[Any]:
     """
     size = np.asarray(data["size [rad]"])
     medians, highs = [], []
-    for way, (colour, mark) in _LOOKS.items():
+    for way in _compared(data):
+        colour, mark = _LOOKS[way]
         median, high = (np.asarray(data[f"{way} {q} excess [1]"]) for q in ("median", "90 %"))
         style: Any = {"color": COLOURS[colour]}
         medians += ax.plot(size, median, "-", marker=mark, ms=8, label=way, **style)
@@ -118,16 +173,18 @@ def draw_growth(ax: Axes, data: Table) -> list[Any]:
 def describe_growth(data: Table) -> str:
     """Return in words what `draw_growth` shows."""
     size = np.asarray(data["size [rad]"])
-    said = "; ".join(
-        f"{way} from {values[0]:.1e} to {values[-1]:.1e}"
-        for way, values in ((w, np.asarray(data[f"{w} median excess [1]"])) for w in WAYS)
-    )
+    medians = {way: np.asarray(data[f"{way} median excess [1]"]) for way in _compared(data)}
+    said = "; ".join(f"{way} from {x[0]:.1e} to {x[-1]:.1e}" for way, x in medians.items())
     return (
-        "What six closed forms cost above the optimum over the size of the excursion, the median "
+        "What closed forms cost above the optimum over the size of the excursion, the median "
         "and the 90 % quantile, on logarithmic axes. While the size grows from "
         f"{size[0]:g} to {size[-1]:g} rad, the median of the cost over the optimum minus 1 grows: "
         f"{said}."
     )
+
+
+def _compared(data: Table) -> list[str]:
+    return [way for way in _LOOKS if f"{way} median excess [1]" in data]
 
 
 def draw_margins(axes: Sequence[Axes], data: Table) -> list[Any]:

@@ -6,10 +6,12 @@ it was stopped.
 
 from __future__ import annotations
 
+import csv
 import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from tqdm import tqdm
 
 from rbcourse._numerics import Array
 from rbcourse.curves import Ends
-from rbcourse.draw.save import save_table
+from rbcourse.draw.save import csv_text
 from rbcourse.metrics import METRIC_SO3, box_inertia
 from rbcourse.optimum import minimum_acceleration_so3
 from rbcourse.study.atlas import (
@@ -54,6 +56,8 @@ SEEDS = 31, 32, 33
 """Of the problems; the maps are of the first."""
 DRAWS = 200
 """Problems in each of the 10 × 10 cells: 20,000."""
+TABLES = Path(__file__).parent
+"""Where the tables of the atlas are stored."""
 
 _CONFIDENCE = 0.95
 
@@ -172,19 +176,39 @@ def _with_ends(words: str, value: float, low: float, high: float) -> dict[str, f
     return dict(zip(keys, rounded(np.array([value, low, high])).tolist(), strict=True))
 
 
+def stored(table: str) -> dict[str, NDArray[Any]]:
+    """Return a table of the atlas that comes with the package: "maps" or "intervals".
+
+    Examples
+    --------
+    >>> table = stored("intervals")
+    >>> row = (table["body"] == "book") & (table["domain"] == "all") & (table["curve"] == "normal")
+    >>> [float(x) for x in table["median [1]"][row]]  # for three seeds
+    [0.08006, 0.07763, 0.08072]
+    """
+    with (TABLES / f"atlas_{table}.csv").open(encoding="utf-8", newline="") as file:
+        names, *rows = csv.reader(file)
+    columns = dict(zip(names, zip(*rows, strict=True), strict=True))
+    return {
+        name: np.array(column, float if name.endswith("]") else str)
+        for name, column in columns.items()
+    }
+
+
 def make_tables(
-    folder: Path,
+    chunks: Path,
+    tables: Path = TABLES,
     draws: int = DRAWS,
     seeds: Sequence[int] = SEEDS,
     executor: Executor | None = None,
 ) -> None:
-    """Compute the atlas, and save `maps` of the first seed and the `intervals` of each.
+    """Compute the atlas, and write `maps` of the first seed and the `intervals` of each.
 
-    What is done is kept in `folder`; when all is done, `folder` is deleted.
+    What is done is kept in the folder `chunks`, and deleted when the `tables` are written.
     """
     if executor is None:
         with processes() as own:
-            return make_tables(folder, draws, seeds, own)
+            return make_tables(chunks, tables, draws, seeds, own)
     parts, first = [], {}
     for seed in seeds:
         problems = body_problems(draws, seed)
@@ -199,7 +223,7 @@ def make_tables(
                     executor,
                     inertia=inertia,
                     ways=curves_for(body),
-                    folder=folder / f"{body}-{seed}",
+                    folder=chunks / f"{body}-{seed}",
                     report=report,
                 )
             excess = with_choices(excesses(problems, costs, inertia))
@@ -208,9 +232,10 @@ def make_tables(
             table = intervals(excess, draws)
             count = len(table["curve"])
             parts.append({"seed [1]": np.full(count, seed), "body": np.full(count, body), **table})
-    save_table("atlas_bodies", maps(first, draws))
-    save_table("atlas_intervals", _joined(parts))
-    shutil.rmtree(folder)
+    for name, table in {"maps": maps(first, draws), "intervals": _joined(parts)}.items():
+        text = csv_text(table)
+        (tables / f"atlas_{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+    shutil.rmtree(chunks)
 
 
 def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -219,4 +244,4 @@ def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 if __name__ == "__main__":
     make_tables(Path(".atlas"))
-    print("figures/atlas_bodies.csv and figures/atlas_intervals.csv are written.")
+    print(f"{TABLES / 'atlas_maps.csv'} and atlas_intervals.csv are written.")

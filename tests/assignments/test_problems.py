@@ -17,7 +17,7 @@ from rbcourse.assignments.student_code import NotYet
 
 SOURCE = Path(__file__).parents[2] / "notebooks" / "assignments" / "source"
 SETS = {path.stem: nbformat.read(path, as_version=4) for path in sorted(SOURCE.glob("*/*.ipynb"))}
-TOPICS = ("plane", "arm", "rotations", "random", "geodesics", "acceleration")
+TOPICS = ("plane", "arm", "rotations", "random", "geodesics", "acceleration", "bodies")
 TESTS = [
     (name, cell.metadata.nbgrader.grade_id.removesuffix("-test"))
     for name, notebook in SETS.items()

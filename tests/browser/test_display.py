@@ -17,7 +17,7 @@ GOAL = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
 
 def cubes():
     fig, ax = plt.subplots(figsize=(4, 4), dpi=80, subplot_kw={"projection": "space"})
-    return fig, bodies.moving_cubes([ax], {"cube": rb.screw_se3(np.eye(4), GOAL)(TIMES)}, side=1)
+    return fig, bodies.moving_boxes([ax], {"cube": rb.screw_se3(np.eye(4), GOAL)(TIMES)}, edges=1)
 
 
 def book():

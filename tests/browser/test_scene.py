@@ -191,7 +191,7 @@ def test_buttons_and_keys_set_the_view_and_it_is_told(page):
     with plt.style.context(["default", "rbcourse.rbcourse"]):
         fig, axes = plt.subplots(1, 2, dpi=80, subplot_kw={"projection": "space"})
         motions = {name: rb.screw_se3(np.eye(4), GOAL)(TIMES) for name in ("one", "other")}
-        update = bodies.moving_cubes(axes, motions, side=1)
+        update = bodies.moving_boxes(axes, motions, edges=1)
         animation = animate.animate(fig, "player", "Two cubes.", update, 20, still=0)
         plt.close(fig)
     canvas = put(page, animation)

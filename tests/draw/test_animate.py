@@ -23,7 +23,7 @@ def cube():
     fig, ax = plt.subplots(
         figsize=(3, 3), dpi=60, layout="none", subplot_kw={"projection": "space"}
     )
-    return fig, bodies.moving_cubes([ax], {"cube": POSES}, side=1)
+    return fig, bodies.moving_boxes([ax], {"cube": POSES}, edges=1)
 
 
 def save(folder, monkeypatch):

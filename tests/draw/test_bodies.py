@@ -61,8 +61,8 @@ def test_cubes_are_where_the_poses_are(axes):
     assert np.allclose(np.divide(*(axes[0].get_box_aspect()[:2])), np.divide(*(high - low)[:2]))
 
 
-def test_moving_cubes_move(axes):
-    update = bodies.moving_cubes(axes, MOTIONS, side=1.5)
+def test_moving_boxes_move(axes):
+    update = bodies.moving_boxes(axes, MOTIONS, edges=1.5)
     in_body = corners(bodies.draw_box(axes[0], np.eye(4), 1.5))
     for i in (0, 3, 5):
         for cube, curve in zip(update(i), (GEODESIC, SCREW), strict=True):
@@ -71,9 +71,22 @@ def test_moving_cubes_move(axes):
     assert [ax.get_title() for ax in axes] == ["geodesic", "screw"]
 
 
+def test_what_stays_at_the_origin_is_drawn_as_large_as_it_fits(axes):
+    edges, turns = np.array([0.3, 0.2, 0.03]), rb.exp_so3(np.outer(TIMES, [1.0, 2, 3]))
+    still = rb.pose_from_components(turns, np.zeros(3))
+    update = bodies.moving_boxes(axes, {"one": still, "two": still}, edges)
+    reach = np.linalg.norm(edges) / 2
+    for i in (0, 5):
+        places = np.concatenate([corners(box).reshape(-1, 3) for box in update(i)])
+        assert np.linalg.norm(places, axis=-1).max() == pytest.approx(reach, rel=1e-3)
+    for ax in axes:
+        assert ax.get_xlim() == ax.get_ylim() == ax.get_zlim() == (-reach, reach)
+        assert [text.get_text() for text in ax.texts] == ["x", "y", "z"]
+
+
 def test_short_motions_can_be_drawn(axes):
     few = {name: poses[:3] for name, poses in MOTIONS.items()}
-    assert len(bodies.moving_cubes(axes, few, side=1)(2)) == 2
+    assert len(bodies.moving_boxes(axes, few, edges=1)(2)) == 2
 
 
 def test_ways_are_the_paths_and_differ_in_colour_and_dashes(axes):
@@ -115,8 +128,8 @@ def test_descriptions_give_numbers():
     assert "at 6 times on its way from (0, 0, 0) to (4, 5, 3) m" in said
     assert ", ".join([f"{angle / 5:.0f}"] * 5) in said
     same = {"one": MOTIONS["screw"], "two": MOTIONS["screw"]}
-    assert "side by side: one; two." in bodies.describe_moving_cubes(TIMES, same)
-    assert "one and two agree at all times." in bodies.describe_moving_cubes(TIMES, same)
+    assert "side by side: one; two." in bodies.describe_moving_boxes(TIMES, same)
+    assert "one and two agree at all times." in bodies.describe_moving_boxes(TIMES, same)
     t = np.linspace(0, 1, 6)
     bump = 4 * t * (1 - t) ** 2  # most at 1/3, of the six times at 0.4
     turned = rb.exp_so3(np.radians(50) * bump[:, None] * [0, 0.6, 0.8])
@@ -125,7 +138,7 @@ def test_descriptions_give_numbers():
         name: rb.pose_from_components(R, [0, 0, 0])
         for name, R in {"upright": upright, "tilted": turned}.items()
     }
-    said = bodies.describe_moving_cubes(t, both)
+    said = bodies.describe_moving_boxes(t, both)
     assert f"upright and tilted differ most at t = 0.40, by {50 * bump.max():.0f} degrees." in said
 
 

@@ -16,8 +16,8 @@ def explorer(request):
     return getattr(explore, request.param)()
 
 
-def test_there_are_eleven():
-    assert len(explore.__all__) == 11
+def test_there_are_twelve():
+    assert len(explore.__all__) == 12
     assert explore.__all__ == sorted(explore.__all__)
 
 
@@ -42,7 +42,7 @@ def test_every_label_has_its_unit(explorer):
     for control in explorer.controls.values():
         label = control.description
         if isinstance(control, SLIDERS) and label not in WITHOUT_UNIT:
-            assert re.search(r"\((°|°/s|m|m/s|m/time|rad/time|s)\)$", label), label
+            assert re.search(r"\((°|°/s|cm|m|m/s|m/time|rad/time|s)\)$", label), label
 
 
 def test_the_keyboard_reaches_every_control(explorer):

@@ -86,6 +86,32 @@ def test_medians_and_90_percent_quantiles_are_lines_at_their_sizes(fig):
     assert "projection from 3.9e-06 to 8.1e-02" in atlas_figures.describe_growth(GROWTH)
 
 
+def test_only_the_curves_in_the_data_are_drawn(fig):
+    data = {key: x for key, x in GROWTH.items() if key.split()[0] in ("size", "Bézier")}
+    data |= {f"normal {kind} excess [1]": 1e-5 * SIZES**4 for kind in ("median", "90 %")}
+    lines = atlas_figures.draw_growth(fig.subplots(), data)
+    assert [line.get_label() for line in lines[:2]] == ["Bézier", "normal"]
+    assert "normal from 3.9e-08 to 8.1e-04" in atlas_figures.describe_growth(data)
+
+
+def test_each_body_has_a_row_of_maps_and_each_curve_a_column(fig):
+    names = {"one": "curve\none", "two": "another"}
+    data = {"body": np.repeat(["ball", "book"], 100)}
+    data |= {f"{name} median [1]": 10.0 ** RNG.uniform(-5, 3, 200) for name in names}
+    drawn = atlas_figures.draw_body_atlas(fig, data, names)
+    assert [(m.axes.get_ylabel(), m.axes.get_title()) for m in drawn] == [
+        ("ball", "curve\none"),
+        ("", "another"),
+        ("book", ""),
+        ("", ""),
+    ]
+    for k, shown in enumerate(drawn):
+        wanted = data[f"{list(names)[k % 2]} median [1]"].reshape(2, 10, 10)[k // 2]
+        assert np.array_equal(shown.get_array(), wanted.T)
+    share = 100 * np.mean(data["one median [1]"][100:] < 0.1)
+    assert f"book: curve one {share:.0f}," in atlas_figures.describe_body_atlas(data, names)
+
+
 def test_each_problem_is_a_mark_of_its_family(fig):
     axes = fig.subplots(1, 2, sharey=True)
     *marks, line = atlas_figures.draw_margins(axes, MARGINS)

@@ -1,6 +1,5 @@
 """Surveys: what curves cost, on any executor, in chunks that outlive an interruption."""
 
-import os
 import re
 import signal
 import subprocess
@@ -206,9 +205,9 @@ from pathlib import Path
 if __name__ == "__main__":
     survey.CHUNK = 10
     with survey.processes(2) as pool:
-        body_atlas.make_tables(Path(sys.argv[1]), draws=1, seeds=[5, 6], executor=pool)
+        body_atlas.make_tables(*map(Path, sys.argv[1:]), draws=1, seeds=[5, 6], executor=pool)
 """
-TABLES = "atlas_bodies.csv", "atlas_intervals.csv"
+TABLES = "atlas_maps.csv", "atlas_intervals.csv"
 
 
 def runs(process):
@@ -225,9 +224,9 @@ def test_an_atlas_that_was_killed_goes_on_and_gives_the_same_bytes(tmp_path):
     script.write_text(STOPPED)
 
     def start(name):
-        environment = os.environ | {"RBCOURSE_FIGURES": str(tmp_path / name)}
-        words = [sys.executable, str(script), str(tmp_path / f"chunks-{name}")]
-        return subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL)
+        (tmp_path / name).mkdir(exist_ok=True)
+        words = [sys.executable, str(script), str(tmp_path / f"chunks-{name}"), tmp_path / name]
+        return subprocess.Popen(words, stderr=subprocess.DEVNULL)
 
     job, chunks = start("stopped"), tmp_path / "chunks-stopped"
     while len(list(chunks.glob("*/*.npz"))) < 3:
@@ -238,7 +237,7 @@ def test_an_atlas_that_was_killed_goes_on_and_gives_the_same_bytes(tmp_path):
     job.send_signal(signal.SIGKILL)
     job.wait()
     done = {path: path.stat().st_mtime_ns for path in chunks.glob("*/*.npz")}
-    assert not (tmp_path / "stopped").exists()
+    assert not list((tmp_path / "stopped").iterdir())
     patience = time.monotonic() + 60
     while any(map(runs, workers)):
         assert time.monotonic() < patience

@@ -1,0 +1,105 @@
+"""A body turned by several laws: the torque on it, or its speed, over time (beyond BK 1)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from rbcourse._numerics import Array
+from rbcourse.curves import Curve
+from rbcourse.draw.save import COLOURS, Table
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "as if a ball": {"color": COLOURS["reference"], "ls": ":", "lw": 2.5},
+    "least acceleration": {"color": COLOURS["z"], "ls": "-"},
+    "least torque": {"color": COLOURS["x"], "ls": "--"},
+}
+"""Three laws by which a body is turned, and the lines that stand for them."""
+_SPEEDS: dict[str, dict[str, Any]] = {
+    "least jerk": {"color": COLOURS["optimum"], "ls": "-"},
+    "projected quintic": {"color": COLOURS["projection"], "ls": "--"},
+}
+
+
+def torques(curve: Curve, inertia: Array, t: Array) -> Array:
+    """Return the torques G w' + w × G w at the times t, in body axes, shape (times, 3).
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, geodesic_so3
+    >>> c = geodesic_so3(np.eye(3), exp_so3([1.0, 1.0, 0]))
+    >>> torques(c, np.diag([1.0, 2, 2.5]), np.array([0.5])).round(12) + 0.0
+    array([[0., 0., 1.]])
+    """
+    w = curve(t, 1)
+    torque: Array = curve(t, 2) @ inertia + np.cross(w, w @ inertia)
+    return torque
+
+
+def torque_table(t: Array, curves: Mapping[str, Curve], inertia: Array) -> dict[str, Array]:
+    """Return times and the torques of curves in body axes as columns, with their laws."""
+    found = {name: torques(curve, inertia, t) for name, curve in curves.items()}
+    return {"t [s]": t} | {
+        f"{name} {axis} [N m]": column
+        for name, torque in found.items()
+        for axis, column in zip("xyz", torque.T, strict=True)
+    }
+
+
+def draw_torques(axes: Sequence[Axes], data: Table) -> list[Any]:
+    """Draw for each law of a `torque_table` the three components of its torque, and its norm."""
+    lines: list[Any] = []
+    for ax, (law, torque) in zip(axes, _laws(data).items(), strict=True):
+        t = np.asarray(data["t [s]"])
+        ax.axhline(0, color="0.8", lw=1, zorder=0)
+        for axis, column in zip("xyz", torque.T, strict=True):
+            lines += ax.plot(t, column, color=COLOURS[axis], label=f"about {axis}")
+        lines += ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="size")
+        ax.set(title=law, xlabel="time (s)")
+    axes[0].set_ylabel("torque in body axes (N m)")
+    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return lines
+
+
+def describe_torques(data: Table) -> str:
+    """Return in words what `draw_torques` shows."""
+    said = []
+    for law, torque in _laws(data).items():
+        largest = np.linalg.norm(torque, axis=-1).max()
+        each = ", ".join(f"{x:.2g}" for x in np.abs(torque).max(axis=0))
+        said.append(f"{law}: at most {largest:.2g} N m, about x, y, z at most {each}")
+    return f"The torque on a body over time, turned by several laws. {'; '.join(said)}."
+
+
+def speed_table(t: Array, curves: Mapping[str, Curve]) -> dict[str, Array]:
+    """Return times and the angular speeds of curves, by name, as columns."""
+    speeds = {name: np.linalg.norm(curve(t, 1), axis=-1) for name, curve in curves.items()}
+    return {"t [1]": t} | {f"{name} [rad]": speed for name, speed in speeds.items()}
+
+
+def draw_speeds(ax: Axes, data: Table) -> list[Any]:
+    """Draw the speeds of a `speed_table` of the "least jerk" and the "projected quintic"."""
+    t = np.asarray(data["t [1]"])
+    lines = [
+        ax.plot(t, np.asarray(data[f"{name} [rad]"]), label=name, **style)[0]
+        for name, style in _SPEEDS.items()
+    ]
+    ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
+    ax.legend()
+    return lines
+
+
+def describe_speeds(data: Table) -> str:
+    """Return in words what `draw_speeds` shows."""
+    said = (f"{name} at most {np.max(data[f'{name} [rad]']):.1f}" for name in _SPEEDS)
+    return f"Angular speeds over time, in rad per unit time: {', '.join(said)}."
+
+
+def _laws(data: Table) -> dict[str, Array]:
+    """Return the torques by the names of their laws, shape (times, 3)."""
+    names = list(dict.fromkeys(column[: -len(" x [N m]")] for column in list(data)[1:]))
+    return {
+        name: np.stack([np.asarray(data[f"{name} {axis} [N m]"]) for axis in "xyz"], axis=-1)
+        for name in names
+    }
