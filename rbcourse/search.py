@@ -40,6 +40,7 @@ FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside
 ASIDE = 0.5  # rad
 QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
 ROUGHLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 0.02}
+SLOWLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 1e-6}  # where two curves part
 PATIENTLY: Any = {"bumps": 16, "steps": 200, "worthwhile": 0.0}  # where nothing else does
 Numbers: TypeAlias = NDArray[np.intp]
 NOTHING = Failure(np.inf, 0)
@@ -198,7 +199,7 @@ def _leave_the_axis(task: Task, which: Numbers, found: list[Solution | Failure])
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
     number = np.array(problem, int)
-    R, cost = lowered(task.functional.of(number), np.concatenate(bent), **QUICKLY)
+    R, cost = lowered(task.functional.of(number), np.concatenate(bent), **SLOWLY)
     cheaper = cost < _costs(found)[number]
     _follow(task, number[cheaper], R[cheaper], found)
 

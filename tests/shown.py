@@ -19,13 +19,13 @@ __import__("shown").record({folder!r})
 # that is there all the same.
 SHARES = {
     r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # beside what is drawn
-    r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|problems \[1\])": 0,  # order, or colour
+    r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,  # order, or colour
     r".*, (.* )?theta\d? \[rad\]": 0,  # where links and corners are
     r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface of fewer points
     r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, drawn three times
     r"lesson01_straight, .* by the corner .*": 0,  # the corner's way is drawn, not the centre's
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames at the ends only
-    r"lesson12_(median|ninety)_\w+, (displacement|end velocity) \[rad\]": 0,  # where a cell is
+    r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,  # the cell
 }
 
 

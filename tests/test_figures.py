@@ -15,7 +15,7 @@ from rbcourse.study import atlas, body_atlas
 from rbcourse.study.survey import survey
 
 FIGURES = Path(__file__).parents[1] / "figures"
-TABLES = "paper_fig5_costs", "lesson13_intervals"  # without pictures
+TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # without pictures
 NAIVE = rb.sampling.sample_rotation_naive, rb.sampling.sample_quaternion_naive
 HAAR = rb.sample_rotation, rb.sample_quaternion
 

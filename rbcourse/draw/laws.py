@@ -55,7 +55,7 @@ def draw_torques(axes: Sequence[Axes], data: Table) -> list[Any]:
         ax.axhline(0, color="0.8", lw=1, zorder=0)
         for axis, column in zip("xyz", torque.T, strict=True):
             lines += ax.plot(t, column, color=COLOURS[axis], label=f"about {axis}")
-        lines += ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="size")
+        lines += ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="‖τ‖")
         ax.set(title=law, xlabel="time (s)")
     axes[0].set_ylabel("torque in body axes (N m)")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
