@@ -317,10 +317,12 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
            [ 0.,  0.,  5.]])
     """
     sides, mass = as_finite("sides", sides, 3), as_positive("mass", mass)
-    if np.any(sides < 0):
-        raise ValueError(f"sides: lengths from 0 up are wanted, got {sides.min():.6g}")
+    negative = np.asarray(sides < 0).any(axis=-1)
+    if np.any(negative):
+        where = first_index("sides", np.asarray(negative))
+        raise ValueError(f"{where}: lengths from 0 up are wanted, got {sides.min():.6g}")
     squares = sides**2
-    moments = np.sum(squares, axis=-1, keepdims=True) - squares
+    moments = squares[..., [1, 2, 0]] + squares[..., [2, 0, 1]]
     return mass / 12 * moments[..., None] * np.eye(3)
 
 

@@ -43,6 +43,7 @@ def test_which_inertias_a_weight_reaches():
 
 def test_a_box_has_the_inertia_of_its_points():
     """∫ (p·p I − p pᵀ) dm by the rule of Gauss with two points an axis, exact for squares."""
+    assert rb.metrics.box_inertia([1e9, 1, 1], 12)[0, 0] == 2  # nothing cancels
     sides = np.array([[0.3, 0.2, 0.03], [1.0, 2, 3], [2.0, 0, 0]])
     nodes = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / np.sqrt(3)
     p = sides[:, None] * nodes
@@ -57,6 +58,7 @@ def test_a_box_has_the_inertia_of_its_points():
     [
         (([1, 2],), r"^sides: shape \(\.\.\., 3\) wanted"),
         (([1, -2, 3],), r"^sides: lengths from 0 up are wanted, got -2"),
+        (([[1, 2, 3], [1, -2, 3]],), r"^sides\[1\]: lengths from 0 up are wanted, got -2"),
         (([1, 2, np.nan],), r"^sides"),
         (([1, 2, 3], 0), r"^mass"),
     ],

@@ -1307,6 +1307,13 @@ WRONG = {
             return np.mean([x @ np.linalg.inv(G) @ x for x in tau])
             """,
         ),
+        (
+            "The sign of ω × Gω in the torque",
+            """
+            tau = w1 @ G + np.cross(w @ G, w)
+            return np.mean([x @ np.linalg.inv(G) @ x for x in tau])
+            """,
+        ),
         ("This is the cost for a ball", "return 2 * np.mean((w1**2).sum(axis=1))"),
         (
             "The integral is missing its dt",
@@ -1340,6 +1347,17 @@ WRONG = {
             "This is the square of the size",
             "ax.plot(t, ((w1 @ G + np.cross(w, w @ G)) ** 2).sum(axis=1))",
         ),
+        (
+            "This is the size of G⁻¹τ",
+            """
+            u = w1 + np.cross(w, w @ G) @ np.linalg.inv(G)
+            ax.plot(t, np.linalg.norm(u, axis=1))
+            """,
+        ),
+        (
+            "The sign of ω × Gω in the torque",
+            "ax.plot(t, np.linalg.norm(w1 @ G - np.cross(w, w @ G), axis=1))",
+        ),
         ("This is the size of G ω′", "ax.plot(t, np.linalg.norm(w1 @ G, axis=1))"),
         (
             "Only the numbers of the points",
@@ -1361,6 +1379,7 @@ WRONG = {
             return U @ Vt
             """,
         ),
+        ("The unit matrix is missing", "return project_so(M @ (np.trace(G) / 2 - G))"),
         ("This is M W itself", "return M @ (np.trace(G) / 2 * np.eye(3) - G)"),
     ],
     ("ps6", "constant"): [
@@ -1372,6 +1391,10 @@ WRONG = {
         (
             "The sign of the last term",
             "return R @ (G @ (v1 + np.cross(w, v)) + np.cross(G @ w, v))",
+        ),
+        (
+            "In the last term G belongs",
+            "return R @ (G @ (v1 + np.cross(w, v)) - np.cross(w, G @ v))",
         ),
         ("The last term is missing", "return R @ (G @ (v1 + np.cross(w, v)))"),
         ("Inside of G the product ω × v", "return R @ (G @ v1 - np.cross(G @ w, v))"),

@@ -134,16 +134,18 @@ def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
     """Return for each domain and curve what is known of its excess, with 95 % intervals.
 
     The columns: the median and the 90 % quantile, the share of the problems within a tenth of the
-    optimum, and the share for which it is the cheapest of the `CLOSED_FORMS`, NaN for what is none;
-    each with the ends of its interval, "low" and "high". Those of quantiles are numbers of the
-    sample, by the binomial law; those of shares are Clopper and Pearson's. Both hold for
-    independent problems, and are too long, rather than too short, for a sample with the same
-    number of problems in each cell.
+    optimum, and the share for which it is the cheapest of the `CLOSED_FORMS`, the first of equals,
+    NaN for what is none; each with the ends of its interval, "low" and "high". Those of quantiles
+    are numbers of the sample, by the binomial law, NaN where it is too small; those of shares are
+    Clopper and Pearson's. Both hold for independent problems, and are too long, rather than too
+    short, for a sample with the same number of problems in each cell. All are rounded to four
+    digits. Problems with a NaN do not count.
     """
     cheapest = np.argmin([excess[curve] for curve in CLOSED_FORMS], axis=0)
+    known = ~np.isnan([excess[curve] for curve in CURVES]).any(axis=0)
     rows = []
     for name in DOMAINS:
-        inside = domain(name, draws) & ~np.isnan(excess["projection"])
+        inside = domain(name, draws) & known
         for curve in CURVES:
             x = excess[curve][inside]
             row: dict[str, object] = {"domain": name, "curve": curve, "problems [1]": len(x)}
@@ -186,6 +188,8 @@ def stored(table: str) -> dict[str, NDArray[Any]]:
     >>> [float(x) for x in table["median [1]"][row]]  # for three seeds
     [0.08006, 0.07763, 0.08072]
     """
+    if table not in ("maps", "intervals"):
+        raise ValueError(f"table: 'maps' or 'intervals' wanted, got {table!r}")
     with (TABLES / f"atlas_{table}.csv").open(encoding="utf-8", newline="") as file:
         names, *rows = csv.reader(file)
     columns = dict(zip(names, zip(*rows, strict=True), strict=True))
@@ -204,15 +208,17 @@ def make_tables(
 ) -> None:
     """Compute the atlas, and write `maps` of the first seed and the `intervals` of each.
 
-    What is done is kept in the folder `chunks`, and deleted when the `tables` are written.
+    What is done is kept in the folder `chunks`, a folder in it for each body and seed; these are
+    deleted when the `tables` are written.
     """
     if executor is None:
         with processes() as own:
             return make_tables(chunks, tables, draws, seeds, own)
-    parts, first = [], {}
+    parts, first, kept = [], {}, []
     for seed in seeds:
         problems = body_problems(draws, seed)
         for body, inertia in BODIES.items():
+            kept.append(chunks / f"{body}-{seed}")
             with tqdm(desc=f"{body}, seed {seed}", total=len(problems.w0), unit="problem") as bar:
 
                 def report(done: int, total: int, bar: tqdm = bar) -> None:
@@ -223,7 +229,7 @@ def make_tables(
                     executor,
                     inertia=inertia,
                     ways=curves_for(body),
-                    folder=chunks / f"{body}-{seed}",
+                    folder=kept[-1],
                     report=report,
                 )
             excess = with_choices(excesses(problems, costs, inertia))
@@ -235,7 +241,8 @@ def make_tables(
     for name, table in {"maps": maps(first, draws), "intervals": _joined(parts)}.items():
         text = csv_text(table)
         (tables / f"atlas_{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-    shutil.rmtree(chunks)
+    for folder in kept:
+        shutil.rmtree(folder)
 
 
 def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -243,5 +250,7 @@ def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 
 if __name__ == "__main__":
-    make_tables(Path(".atlas"))
+    own = Path(".atlas")
+    make_tables(own)
+    own.rmdir()
     print(f"{TABLES / 'atlas_maps.csv'} and atlas_intervals.csv are written.")

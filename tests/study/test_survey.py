@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse.study import atlas, survey
+from rbcourse.study import atlas, body_atlas, survey
 from rbcourse.study.survey import costs, processes, several_starts
 
 SOME = atlas.random_problems(60, 3, rng=2)
@@ -149,10 +149,61 @@ def refuses(*ends):
 
 
 @pytest.mark.parametrize("chunk", [20, 60])
-def test_an_error_ends_a_survey(monkeypatch, chunk):
+def test_an_error_ends_a_survey_and_names_the_way(monkeypatch, chunk):
     monkeypatch.setattr(survey, "CHUNK", chunk)
-    with pytest.raises(ValueError, match="no curve"):
-        survey.survey(SOME, ways={"none": refuses})
+    said = r"^chunk \d, from problem (0|20|40) on: none: no curve"
+    with pytest.raises(ValueError, match=said):
+        survey.survey(SOME, ways={"projection": atlas.projection, "none": refuses})
+
+
+@pytest.mark.parametrize(
+    ("bad", "said"),
+    [
+        ({"inertia": np.stack([BOOK, BOOK])}, r"^inertia"),
+        ({"inertia": [1, 2, 3]}, r"^inertia"),
+        ({"inertia": -BOOK}, r"^inertia is not positive definite"),
+        ({"ways": {"optimum": rb.bezier_so3}}, r"^ways: 'optimum' is the name"),
+        ({"ways": {"five": 5}}, r"^ways: 'five' is no function"),
+        ({"folder": __file__}, r"^folder: .*test_survey.py cannot be written"),
+    ],
+)
+def test_bad_arguments_are_named_before_anything_is_computed(bad, said):
+    def reported(*done):
+        raise AssertionError
+
+    with pytest.raises(ValueError, match=said):
+        survey.survey(SOME, **bad, report=reported)
+
+
+def test_what_cannot_be_sent_is_refused_and_stays_here(monkeypatch, tmp_path):
+    ways = {"own": lambda *ends: atlas.projection(*ends)}
+    found = survey.survey(SOME, ways=ways)
+    assert np.array_equal(found["own"], costs(atlas.projection, SOME))
+    with pytest.raises(ValueError, match=r"^ways: functions of a module"):
+        survey.survey(SOME, ways=ways, folder=tmp_path)
+    monkeypatch.setattr(survey, "CHUNK", 20)
+    with pytest.raises(ValueError, match=r"^ways: functions of a module"):
+        survey.survey(SOME, ways=ways)
+    with ThreadPoolExecutor(2) as threads:
+        again = survey.survey(SOME, threads, ways=ways)
+    assert again["own"] == pytest.approx(found["own"], rel=1e-12)
+
+
+REST = np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda *ends: rb.retime(rb.exponential_cubic_so3(*ends), 2.0),
+        lambda R0, R1, *w: rb.geodesic_se3(*(rb.pose_from_components(R, REST) for R in (R0, R1))),
+        lambda *ends: rb.bezier_so3(*(x[0] for x in ends)),
+        lambda *ends: None,
+    ],
+)
+def test_what_is_no_curve_for_each_problem_is_refused(make):
+    with pytest.raises(ValueError, match=r"^make: curves on SO\(3\) and \[0, 1\] are wanted"):
+        costs(make, SOME)
 
 
 def test_what_is_on_the_disk_is_not_computed_again(tmp_path, monkeypatch):
@@ -166,7 +217,7 @@ def test_what_is_on_the_disk_is_not_computed_again(tmp_path, monkeypatch):
         chunks[1].unlink()
         told = []
         again = kept(pool, report=lambda *done: told.append(done))
-        assert told == [(60, 60)]
+        assert told == [(40, 60), (60, 60)]
     assert [path.read_bytes() for path in chunks] == content
     for name, x in expected.items():
         assert x.tobytes() == again[name].tobytes()
@@ -179,6 +230,7 @@ def test_what_is_on_the_disk_is_not_computed_again(tmp_path, monkeypatch):
         {"problems": atlas.random_problems(60, 3, rng=3)},
         {"inertia": np.eye(3)},
         {"ways": {"projection": atlas.projection}},
+        {"ways": atlas.closed_forms() | {"projection": rb.projected_cubic_so3}},
     ],
 )
 def test_a_folder_of_another_survey_is_refused(tmp_path, other):
@@ -196,6 +248,35 @@ def test_a_damaged_chunk_is_named(tmp_path, damage):
     with pytest.raises(ValueError, match=f"^folder: {re.escape(str(path))} cannot be read"):
         survey.survey(SOME, folder=tmp_path)
     assert path.read_bytes() == damage
+
+
+def test_two_surveys_share_a_folder_only_if_they_are_the_same(tmp_path, monkeypatch):
+    monkeypatch.setattr(survey, "CHUNK", 20)
+    expected, ways = survey.survey(SOME), atlas.closed_forms()
+
+    def compute(other):
+        def meanwhile(done, _):
+            if done == 20:
+                survey.survey(SOME, threads, ways=other, folder=tmp_path)
+
+        for path in tmp_path.iterdir():
+            path.unlink()
+        with ThreadPoolExecutor(1) as threads:
+            return survey.survey(SOME, Backwards(), folder=tmp_path, report=meanwhile)
+
+    assert np.array_equal(compute(ways)["projection"], expected["projection"])
+    with pytest.raises(ValueError, match="belongs to another survey"):
+        compute(dict(list(ways.items())[:2]))
+    assert {path.suffix for path in tmp_path.iterdir()} == {".npz"}
+
+
+def test_only_its_own_folders_are_deleted(tmp_path, monkeypatch):
+    monkeypatch.setattr(body_atlas, "BODIES", {"book": BOOK})
+    (tmp_path / "thesis.tex").write_text("written")
+    with ThreadPoolExecutor(1) as pool:
+        body_atlas.make_tables(tmp_path, tmp_path, draws=1, seeds=[5], executor=pool)
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["atlas_intervals.csv", "atlas_maps.csv", "thesis.tex"]
 
 
 STOPPED = """

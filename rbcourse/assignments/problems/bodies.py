@@ -81,7 +81,12 @@ def _integral(values: Array) -> float:
 def _squares(G: Array, w: Array, w1: Array) -> Array:
     """Return τᵀ G⁻¹ τ of each sample."""
     torque = _torque(G, w, w1)
-    return np.sum(torque * np.linalg.solve(G, torque.T).T, axis=1)
+    return np.array(np.sum(torque * np.linalg.solve(G, torque.T).T, axis=1))
+
+
+def _squared_over(G: Array, torque: Array) -> float:
+    """Return ∫ τᵀ G⁻¹ τ dt of samples of τ."""
+    return _integral(np.sum(torque * np.linalg.solve(G, torque.T).T, axis=1))
 
 
 BODY_COST = Problem(
@@ -102,6 +107,10 @@ BODY_COST = Problem(
         Mistake(
             "The term ω × Gω is missing in the torque: this takes G ω′ for it.",
             lambda G, w, w1: _integral(np.sum(w1 * (w1 @ G), axis=1)),
+        ),
+        Mistake(
+            "The sign of ω × Gω in the torque is wrong.",
+            lambda G, w, w1: _squared_over(G, w1 @ G - np.cross(w, w @ G)),
         ),
         Mistake(
             "This is the cost for a ball: it does not use G.",
@@ -149,6 +158,16 @@ DRAW_TORQUE = Drawing(
             lambda t, G, w, w1: _curve(t, np.sum(_torque(G, w, w1) ** 2, axis=1)),
         ),
         Mistake(
+            "This is the size of G⁻¹τ, the acceleration. The torque's is asked for.",
+            lambda t, G, w, w1: _curve(
+                t, np.linalg.norm(np.linalg.solve(G, _torque(G, w, w1).T), axis=0)
+            ),
+        ),
+        Mistake(
+            "The sign of ω × Gω in the torque is wrong.",
+            lambda t, G, w, w1: _curve(t, np.linalg.norm(w1 @ G - np.cross(w, w @ G), axis=1)),
+        ),
+        Mistake(
             "This is the size of G ω′: the torque has a second term, ω × Gω.",
             lambda t, G, w, w1: _curve(t, np.linalg.norm(w1 @ G, axis=1)),
         ),
@@ -182,7 +201,8 @@ NEAREST_FOR_BODY = Problem(
     allowed=ALLOWED,
     mistakes=[
         Mistake(
-            "This is the nearest rotation for a ball: the inertia is not used.",
+            "This is the nearest rotation for a ball: the inertia is not used, or M was made a "
+            "rotation before W came in.",
             lambda M, G: project_so(M),
         ),
         Mistake(
@@ -202,6 +222,10 @@ NEAREST_FOR_BODY = Problem(
             "For some matrices this is a mirror, not a rotation: U Vᵀ alone does not look at the "
             "determinant. project_so does.",
             lambda M, G: _unsigned(M @ _weight(G)),
+        ),
+        Mistake(
+            "The unit matrix is missing: ½ tr(G) is a number, and belongs on the diagonal only.",
+            lambda M, G: project_so(M @ (np.trace(G) / 2 - G)),
         ),
         Mistake(
             "This is M W itself: the nearest rotation to it is still to be taken.",
@@ -240,6 +264,10 @@ CONSTANT = Problem(
         Mistake(
             "The sign of the last term is wrong: Gω × v is subtracted.",
             lambda R, G, w, v, v1: R @ (G @ (v1 + np.cross(w, v)) + np.cross(G @ w, v)),
+        ),
+        Mistake(
+            "In the last term G belongs to ω: it is Gω × v.",
+            lambda R, G, w, v, v1: R @ (G @ (v1 + np.cross(w, v)) - np.cross(w, G @ v)),
         ),
         Mistake(
             "The last term is missing: Gω × v, from the variation of ω in ω × Gω.",
