@@ -254,13 +254,17 @@ def test_two_surveys_share_a_folder_only_if_they_are_the_same(tmp_path, monkeypa
     monkeypatch.setattr(survey, "CHUNK", 20)
     expected, ways = survey.survey(SOME), atlas.closed_forms()
 
+    def empty():
+        for path in tmp_path.iterdir():
+            path.unlink()
+
     def compute(other):
         def meanwhile(done, _):
             if done == 20:
+                empty()  # so that the other one finds nothing, and begins
                 survey.survey(SOME, threads, ways=other, folder=tmp_path)
 
-        for path in tmp_path.iterdir():
-            path.unlink()
+        empty()
         with ThreadPoolExecutor(1) as threads:
             return survey.survey(SOME, Backwards(), folder=tmp_path, report=meanwhile)
 
