@@ -22,10 +22,10 @@ _LENGTH, _WIDTH = 0.30, 0.20
 _SCALE = 4.2
 _STRONGEST = 0.3
 _AXES = {
+    "z, through the covers": np.eye(3)[2],
     "the diagonal x + y + z": np.ones(3) / np.sqrt(3),
     "x, along the spine": np.eye(3)[0],
     "y, across the cover": np.eye(3)[1],
-    "z, through the covers": np.eye(3)[2],
 }
 
 
@@ -64,10 +64,8 @@ def body_explorer() -> Explorer:
             artists[f"{law} torque"].set_data(_TIMES, efforts[law])
         artists["now"].set_xdata([t, t])
         return {
-            f"{name} over the least": ", ".join(
-                f"{law} {numbers(cost / min(of_law.values()), 2)}" for law, cost in of_law.items()
-            )
-            for name, of_law in costs.items()
+            name: f"{numbers(np.array(of_laws) / min(of_laws), 2)} × the least"
+            for name, of_laws in costs.items()
         }
 
     return Explorer("A book turned by three laws", fig, artists, controls, show, plays="t")
@@ -76,7 +74,7 @@ def body_explorer() -> Explorer:
 @lru_cache(maxsize=64)
 def _solved(
     about: str, turn: float, thickness: float
-) -> tuple[dict[str, Curve], dict[str, Array], dict[str, dict[str, float]]]:
+) -> tuple[dict[str, Curve], dict[str, Array], dict[str, list[float]]]:
     G = box_inertia([_LENGTH, _WIDTH, thickness / 100])
     rest = np.zeros(3)
     ends = np.eye(3), exp_so3(np.radians(turn) * _AXES[about]), rest, rest
@@ -95,7 +93,7 @@ def _solved(
         law: np.linalg.norm(torques(curve, G, _TIMES), axis=-1) for law, curve in curves.items()
     }
     costs = {
-        "acceleration": {law: float(acceleration_cost(c, G)) for law, c in curves.items()},
-        "torque": {law: float(torque_cost(c, G)) for law, c in curves.items()},
+        "acceleration": [float(acceleration_cost(curve, G)) for curve in curves.values()],
+        "torque": [float(torque_cost(curve, G)) for curve in curves.values()],
     }
     return curves, efforts, costs
