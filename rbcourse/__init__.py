@@ -17,6 +17,7 @@ from rbcourse.conversions import (
 )
 from rbcourse.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
 from rbcourse.curves import Curve, geodesic_so3, retime
+from rbcourse.excess import excess_estimate, leading_excess
 from rbcourse.files import read_path, write_path
 from rbcourse.metrics import METRIC_SE3, METRIC_SO3, geodesic_flow
 from rbcourse.motions import (
@@ -59,6 +60,7 @@ from rbcourse.rivals import (
     CLOSED_FORMS,
     bezier_so3,
     cayley_cubic_so3,
+    corrected_bezier_so3,
     cumulative_bezier_so3,
     exponential_cubic_so3,
     exponential_quintic_so3,
@@ -91,7 +93,7 @@ from rbcourse.so3 import (
     vee_so3,
 )
 
-__version__ = "0.20.0"
+__version__ = "0.21.0"
 
 __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # rotations
@@ -160,6 +162,8 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "shoot_minimum_acceleration_so3",
     "ConvergenceError",
     "acceleration_cost",
+    "excess_estimate",
+    "leading_excess",
     "acceleration_cost_parts",
     "torque_cost",
     "jerk_cost",
@@ -170,6 +174,7 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "cumulative_bezier_so3",
     "quaternion_cubic_so3",
     "cayley_cubic_so3",
+    "corrected_bezier_so3",
     "exponential_quintic_so3",
     "normal_cubic_so3",
     "weighted_cubic_so3",

@@ -50,14 +50,22 @@ def chebyshev(t: Array, count: int) -> Array:
 
 @lru_cache
 def grid(n: int) -> Grid:
-    """Return the grid of n nodes."""
+    """Return the grid of n nodes: to the bit the same, whatever number of threads BLAS has."""
     from numpy.polynomial.chebyshev import chebder, chebint
 
-    t = (1 - np.cos(np.pi * np.arange(n) / (n - 1))) / 2
-    series = np.linalg.inv(chebyshev(t, n))
+    k = np.arange(n)
+    t = (1 - np.cos(np.pi * k / (n - 1))) / 2
+    weight = np.where((k == 0) | (k == n - 1), 0.5, 1.0)
+    cosines = np.cos(np.pi / (n - 1) * (np.outer(k, k) % (2 * n - 2)))
+    series = 2 / (n - 1) * (-1.0) ** k[:, None] * np.outer(weight, weight) * cosines
     slopes, sums = chebder(series, scl=2), chebint(series, lbnd=-1, scl=0.5)
-    derivative, integral = (chebyshev(t, len(c)) @ c for c in (slopes, sums))
+    derivative, integral = (_product(chebyshev(t, len(c)), c) for c in (slopes, sums))
     return Grid(*map(_shared, (t, derivative, integral, series)))
+
+
+def _product(A: Array, B: Array) -> Array:
+    """Return A B, not by BLAS, whose sums depend on its number of threads."""
+    return np.einsum("ij,jk->ik", A, B)
 
 
 @lru_cache
@@ -66,13 +74,15 @@ def primitives(n: int, m: int) -> Primitives:
     from numpy.polynomial.chebyshev import chebint
 
     nodes, few, each = grid(n), grid(m), list(np.eye(m)[:, None])
-    polynomial = [few.series @ hermite(each, few.t[:, None], i) for i in range(m)]
+    polynomial = [_product(few.series, hermite(each, few.t[:, None], i)) for i in range(m)]
     integral = [chebint(nodes.series, m - i, lbnd=-1, scl=0.5) for i in range(m)]
-    ends = np.concatenate([chebyshev(few.t[[0, -1]], len(c)) @ c for c in integral[: m // 2]])
+    ends = np.concatenate(
+        [_product(chebyshev(few.t[[0, -1]], len(c)), c) for c in integral[: m // 2]]
+    )
     series_from_ends = [np.pad(c, ((0, n - i), (0, 0))) for i, c in enumerate(polynomial)]
-    series_from_k = [c - p @ ends for c, p in zip(integral, series_from_ends, strict=True)]
+    series_from_k = [c - _product(p, ends) for c, p in zip(integral, series_from_ends, strict=True)]
     from_ends, from_k = (
-        [chebyshev(nodes.t, len(c)) @ c for c in series]
+        [_product(chebyshev(nodes.t, len(c)), c) for c in series]
         for series in (series_from_ends, series_from_k)
     )
     smooth = chebyshev(nodes.t, max(3, n // 2))
@@ -94,7 +104,7 @@ def _shared(matrix: Array) -> Array:
 @lru_cache
 def interpolation(few: int, many: int) -> Array:
     """Return the matrix that goes from the values at some nodes to those at others."""
-    return chebyshev(grid(many).t, few) @ grid(few).series
+    return _product(chebyshev(grid(many).t, few), grid(few).series)
 
 
 def along(matrix: Array, values: Array) -> Array:

@@ -139,7 +139,7 @@ def acceleration_cost_parts(
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
-    _check_curve(curve, on_so3=False)
+    check_curve(curve, on_so3=False)
     m, r = as_positive("mass", mass), as_single("centre", centre, 3)
     if curve.size == 3 and (m != 1 or r.any()):
         raise ValueError("mass, centre: a curve on SO(3) has none of them")
@@ -152,7 +152,7 @@ def acceleration_cost_parts(
     translation: Array = np.zeros(legs.count)
     if legs.size == 4:
         translation = m * integral(name, legs, partial(_squared_acceleration, legs, r))
-    whole = partial(_summed, curve, legs, (1 / np.asarray(durations, float)) ** 3)
+    whole = partial(summed, curve, legs, (1 / np.asarray(durations, float)) ** 3)
     return whole(rotation), whole(translation)
 
 
@@ -193,11 +193,11 @@ def torque_cost(curve: Curve, inertia: ArrayLike) -> Array:
     >>> float(torque_cost(c, np.diag([1.0, 2, 2.5])).round(12))
     1.0
     """
-    _check_curve(curve)
+    check_curve(curve)
     legs, durations = curve._unit_legs("torque cost", 1)
     functional = Effort(_inertias(curve, legs, inertia), of_torque=True)
     cost = rotation_cost("torque cost", legs, functional)
-    return _summed(curve, legs, (1 / np.asarray(durations, float)) ** 3, cost)
+    return summed(curve, legs, (1 / np.asarray(durations, float)) ** 3, cost)
 
 
 def jerk_cost(curve: Curve) -> Array:
@@ -241,13 +241,14 @@ def jerk_cost(curve: Curve) -> Array:
     >>> float(jerk_cost(c).round(9))  # 2 · 720 · 1.5²
     3240.0
     """
-    _check_curve(curve)
+    check_curve(curve)
     legs, durations = curve._unit_legs("jerk cost", 2)
     cost = rotation_cost("jerk cost", legs, Jerk())
-    return _summed(curve, legs, (1 / np.asarray(durations, float)) ** 5, cost)
+    return summed(curve, legs, (1 / np.asarray(durations, float)) ** 5, cost)
 
 
-def _check_curve(curve: Curve, *, on_so3: bool = True) -> None:
+def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
+    """Raise a ValueError if that is no curve, or not one on SO(3)."""
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve wanted, got {curve!r}")
     if on_so3 and curve.size != 3:
@@ -266,7 +267,7 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
     return np.broadcast_to(G, (*legs.batch_shape, 3, 3)).reshape(-1, 3, 3)
 
 
-def _summed(curve: Curve, legs: Curve, rates: Array, costs: Array) -> Array:
+def summed(curve: Curve, legs: Curve, rates: Array, costs: Array) -> Array:
     """Return the costs of the curves: those of their legs on [0, 1] times rates, summed."""
     costs = rates * costs
     if legs.batch_shape == curve.batch_shape:

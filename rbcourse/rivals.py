@@ -1,4 +1,4 @@
-"""Other closed forms: five with the boundary conditions of the projected cubic (BK section 1).
+"""Other closed forms: six with the boundary conditions of the projected cubic (BK section 1).
 
 Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
 """
@@ -14,7 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import first_index
-from rbcourse._jets import Jet, angular_velocity, cross, exp, multiply, product, rotation, slerp
+from rbcourse._jets import (
+    Jet,
+    angular_velocity,
+    cross,
+    exp,
+    multiply,
+    product,
+    rotation,
+    slerp,
+    times,
+)
 from rbcourse._numerics import EPS, Array
 from rbcourse.conversions import quaternion_from_matrix
 from rbcourse.curves import (
@@ -113,6 +123,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     See Also
     --------
     cumulative_bezier_so3 : From the same control points, quicker.
+    corrected_bezier_so3 : Nearer to the optimum.
     retime : From [0, 1] to T seconds.
 
     Notes
@@ -136,14 +147,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = check_ends(R0, R1, w0, w1)
-    for name, w in (("w0", ends.w0), ("w1", ends.w1)):
-        speed = np.linalg.norm(w, axis=-1)
-        fast = speed >= 3 * np.pi
-        if fast.any():
-            raise ValueError(
-                f"{first_index(name, fast)}: a norm below 3π is wanted, got {speed[fast][0]:.4g}"
-            )
+    ends = _check_slow(check_ends(R0, R1, w0, w1))
     return Bezier(ends, bezier_legs(ends))
 
 
@@ -198,6 +202,66 @@ def cumulative_bezier_so3(
     """
     ends = check_ends(R0, R1, w0, w1)
     return CumulativeBezier(ends, bezier_legs(ends))
+
+
+def corrected_bezier_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> CorrectedBezier:
+    """Return Bézier's curve less its leading deviation from the optimum.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
+
+    Returns
+    -------
+    CorrectedBezier
+        A `Curve` that meets all four ends: R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B Bézier's
+        curve, R_m = R0 exp(σ̂/2) the rotation half-way, and δ(t) of `bezier_deviation`.
+
+    Raises
+    ------
+    ValueError
+        As `bezier_so3`.
+
+    See Also
+    --------
+    bezier_so3 : What is corrected.
+    minimum_acceleration_so3 : The optimum.
+    excess_estimate : How far above the optimum a curve is.
+    retime : From [0, 1] to T seconds.
+
+    Notes
+    -----
+    Near-optimal for small excursions: data s times as large have a relative excess over the
+    optimum about s⁸ times as large, that of the other closed forms s⁴ or s² times. δ is of third
+    order in the data: where the ends are fast it is large, and makes the curve dearer than
+    Bézier's. Of 1,000 problems each, uniform in balls, ‖σ‖ < 3, it was dearer by more than a
+    thousandth in 2 to 4 % where ‖w0‖, ‖w1‖ < 6, and in 29 % where they were < 9.
+
+    σ is the logarithm of R0ᵀ R1, of any length, that is nearest to the sum of Bézier's three legs.
+    Singular set: that of `bezier_so3`, and where two logarithms are equally near.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    beyond BK 10.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = corrected_bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    ends = _check_slow(check_ends(R0, R1, w0, w1))
+    return CorrectedBezier(ends, bezier_legs(ends))
 
 
 def quaternion_cubic_so3(
@@ -439,6 +503,7 @@ CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
     "projection": projected_cubic_so3,
     "exponential": exponential_cubic_so3,
     "Bézier": bezier_so3,
+    "corrected": corrected_bezier_so3,
     "cumulative": cumulative_bezier_so3,
     "quaternion": quaternion_cubic_so3,
     "Cayley": cayley_cubic_so3,
@@ -450,6 +515,80 @@ def bezier_legs(ends: Ends) -> Legs:
     """Return the turns from each of Bézier's control points to the next, the shortest."""
     first, last = ends.w0 / 3, ends.w1 / 3
     return first, log_so3(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
+
+
+def _check_slow(ends: Ends) -> Ends:
+    for name, w in (("w0", ends.w0), ("w1", ends.w1)):
+        speed = np.linalg.norm(w, axis=-1)
+        fast = speed >= 3 * np.pi
+        if fast.any():
+            raise ValueError(
+                f"{first_index(name, fast)}: a norm below 3π is wanted, got {speed[fast][0]:.4g}"
+            )
+    return ends
+
+
+def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
+    """Return of two parallel end velocities the mean less σ, e, and the difference, d.
+
+    The velocities are carried to the rotation half-way, R0 exp(σ̂/2), parallel in a bi-invariant
+    metric: the body axes turn by σ/2 on each half of the way, and what is parallel by half of that.
+
+    Parameters
+    ----------
+    sigma : ndarray, shape (..., 3)
+        A logarithm of R0ᵀ R1.
+    w0, w1 : ndarray, shape (..., 3)
+        Angular velocities at the ends, body frame.
+
+    Returns
+    -------
+    e, d : ndarray, shape (..., 3)
+        0 for the geodesic at constant speed.
+    """
+    quarter = exp_so3(sigma / 4)
+    u0, u1 = (quarter.mT @ w0[..., None])[..., 0], (quarter @ w1[..., None])[..., 0]
+    return (u0 + u1) / 2 - sigma, u1 - u0
+
+
+def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
+    """Return what Bézier's curve is away from the optimum, to third order, as a polynomial.
+
+    The deviation, a rotation vector, is δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴), u = 2t − 1.
+
+    Parameters
+    ----------
+    sigma, e, d : ndarray, shape (..., 3)
+        The displacement, and the velocities of `seen_from_the_middle`.
+
+    Returns
+    -------
+    list of ndarray, shape (..., 3)
+        c₀, …, c₄: sums of triple products a × (b × c); in the code ``sed`` is σ × (e × d).
+
+    References
+    ----------
+    beyond BK 10.
+    """
+    first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
+    second = np.stack([sigma, sigma, e, sigma, sigma, e, sigma, e])
+    third = np.stack([e, d, d, e, d, d, d, d])
+    sse, ssd, sed, ese, esd, eed, dsd, ded = np.cross(first, np.cross(second, third))
+    return [
+        (17 * sed - 10 * ssd - 13 * esd) / 1080 + 97 * eed / 15120,
+        11 * ded / 6048 - sse / 90 - ese / 60 - dsd / 720,
+        sed / 180 - esd / 120 + 3 * eed / 560,
+        17 * ded / 30240 - ese / 90,
+        eed / 504,
+    ]
+
+
+def nearest_turn(turn: Array, way: Array) -> Array:
+    """Return the turns to the same rotations, by full turns more or fewer, nearest to `way`."""
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    axis = turn / np.where(angle == 0, 1, angle)
+    more = (np.sum(way * axis, axis=-1, keepdims=True) - angle) / (2 * np.pi)
+    return turn + 2 * np.pi * np.round(more) * axis
 
 
 def other_way(turn: Array) -> Array:
@@ -611,6 +750,39 @@ class Bezier(QuaternionCurve):
         while len(points) > 1:
             points = [slerp(a, b, share) for a, b in pairwise(points)]
         return points[0]
+
+
+class CorrectedBezier(Bezier):
+    """The `Curve` of de Casteljau's construction, less its leading deviation from the optimum.
+
+    It is seen from the rotation half-way: there moving by −δ is exp(−δ̂/2) on both sides.
+    """
+
+    def __init__(self, ends: Ends, legs: Legs) -> None:
+        super().__init__(ends, legs)
+        sigma = nearest_turn(log_so3(ends.turn), legs[0] + legs[1] + legs[2])
+        deviation = bezier_deviation(sigma, *seen_from_the_middle(sigma, ends.w0, ends.w1))
+        middle, back = (exp([_components(x / 4)])[0] for x in (sigma, -sigma))
+        self._start = multiply(self._start, middle)
+        points = [multiply(back, point) for point in self._controls]
+        pure = [np.insert(_components(c), 0, 0, axis=0) for c in deviation]
+        self._controls = np.stack([*points, *pure])
+
+    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        points, deviation = controls[:4], controls[4:, 1:]
+        moved = exp([x / -4 for x in _clamped(deviation, t, order)])
+        return product(product(moved, super()._quaternion(points, t, order)), moved)
+
+
+def _clamped(coefficients: Array, t: Array, order: int) -> Jet:
+    """Return the jet of t² (1 − t)² (c₀ + c₁ u + …), u = 2t − 1."""
+    s = 1 - t
+    bump: Jet = [t * t * s * s, 2 * t * s * (s - t), 2 - 12 * t * s, 12 * (t - s)]
+    powers: Jet = []
+    for _ in range(order + 1):
+        powers.append(sum(c * (t - s) ** k for k, c in enumerate(coefficients)))
+        coefficients = np.stack([2 * k * c for k, c in enumerate(coefficients)][1:])
+    return times(bump[: order + 1], powers)
 
 
 class NormalizedCubic(QuaternionCurve):

@@ -28,6 +28,8 @@ from rbcourse.relaxation import (
     relax,
     relax_ball,
 )
+from rbcourse.rivals import corrected_bezier_so3
+from rbcourse.so3 import log_so3
 
 COARSE = 17  # nodes, on which curves are started and systems solved;
 FINER_FOR_JERK = 21  # for the jerk, which has higher derivatives;
@@ -36,6 +38,7 @@ CLOSE = 1.1  # lowered starts that cost more than this many times the cheapest a
 NEAR = 0.1  # and those with entries of R that differ by less from those of a cheaper one
 FAST = 24.0  # rad: where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too
 ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
+SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
 ASIDE = 0.5  # rad
 QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
@@ -90,7 +93,26 @@ def ball(given: Ends) -> Task:
         equations,
         lambda which, n: starts(ends.of(which), n),
         relax_ball,
+        known=_of_slow_ends(ends, equations),
     )
+
+
+def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
+    """Return what is found from one start where no other curve can cost as little.
+
+    With entries of σ, w0 and w1 below ½, so norms below 1, the optimum costs about ∫ ‖w'‖² =
+    12 ‖e‖² + ‖d‖² < 52, and a curve the other way round, with such ends and a length of 2π − 1 and
+    more, at least 12 (2π − 2)² > 200.
+    """
+    largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
+    slow = np.flatnonzero(largest < SLOW)
+    if not len(slow):
+        return {}
+    curves = corrected_bezier_so3(*ends.of(slow))
+    R = np.ascontiguousarray(curves(grid(COARSE).t).swapaxes(0, 1))
+    found = relax_ball(equations.of(slow), R)
+    each = zip(slow.tolist(), found, strict=True)
+    return {i: one for i, one in each if isinstance(one, Solution)}
 
 
 def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
@@ -165,6 +187,8 @@ def _searched(task: Task) -> list[Solution | Failure]:
     ends = task.equations.ends
     found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
     which = np.flatnonzero([one is NOTHING for one in found])
+    if not len(which):
+        return found
     fast = np.linalg.norm(ends[:, :2], axis=-1).sum(axis=-1)
     problem, R = _started(task, which, task.nodes)
     least = partial(_least, len(ends), problem)

@@ -48,6 +48,11 @@ _TAKEN = [
     "benchmarks/benchmarks.csv",
     "notebooks/QUESTIONS.md",
     "notebooks/REFERENCES.bib",
+    "notes/near_optimal.md",
+    "notes/near_optimal.py",
+    "rbcourse/leading_excess.csv",
+    "rbcourse/study/atlas_intervals.csv",
+    "rbcourse/study/atlas_maps.csv",
 ]
 _KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|txt|typed)")
 _TO_READ = (

@@ -15,7 +15,7 @@ HOUSE = {
     "Rotations and poses": "so3 quaternion conversions se3",
     "Projection, sampling, metrics": "projection sampling metrics",
     "Curves": "curves projected_line projected_cubic rivals motions paths cost",
-    "The optimum": "optimum functionals relaxation search shooting",
+    "The optimum": "optimum functionals relaxation search shooting excess",
     "The plane": "planar arm",
     "Textbook versions, files, the report": "textbook files report",
 }

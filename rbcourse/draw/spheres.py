@@ -294,3 +294,48 @@ def describe_book(t: Array, R: Array) -> str:
     over = ", ".join(f"{x:.1f}" for x in t[1:][np.diff(height > 0)])
     fate = f"turns over at t = {over}" if over else "stays there"
     return f"A book spins freely, with a pin in its middle axis. It starts {start}, and {fate}."
+
+
+CARRIED = {"constant in the room": ("reference", 0.0), "parallel": ("path", 0.5)}
+CARRIED |= {"constant in the body": ("z", 1.0)}
+"""How an arrow may be carried by a body that turns: its colour, and its share of the turn."""
+
+
+def carried_table(turned: Array) -> dict[str, Array]:
+    """Return the ends of arrows that a body carries three ways, turned by these angles."""
+    data = {"turn [rad]": np.asarray(turned)}
+    for name, (_, share) in CARRIED.items():
+        angle = np.pi / 6 + share * np.asarray(turned)
+        data |= {f"{name} x [1]": np.cos(angle), f"{name} y [1]": np.sin(angle)}
+    return data
+
+
+def draw_carried(axes: Sequence[Axes], turned: Array) -> list[Any]:
+    """Draw a body that turns in the plane, and an arrow carried three ways: BK (9)."""
+    data, arrows = carried_table(turned), []
+    for k, (ax, angle) in enumerate(zip(axes, turned, strict=True)):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        corners = turn @ np.array([[-0.7, 0.7, 0.7, -0.7], [-0.4, -0.4, 0.4, 0.4]])
+        ax.fill(*corners, facecolor="0.93", edgecolor="0.5")
+        ax.plot(*turn @ [[0.55], [0.25]], "o", color="0.5")  # a mark on the body
+        for name, (colour, _) in CARRIED.items():
+            tip = data[f"{name} x [1]"][k], data[f"{name} y [1]"][k]
+            look = {"arrowstyle": "-|>", "color": COLOURS[colour], "lw": 2.5}
+            arrows.append(ax.annotate("", tip, (0, 0), arrowprops=look))
+            ax.plot([], [], color=COLOURS[colour], lw=2.5, label=name)
+        ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), aspect="equal")
+        ax.set_title(f"turned by {np.degrees(angle):.0f}°")
+        ax.set_axis_off()
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return arrows
+
+
+def describe_carried(turned: Array) -> str:
+    """Return in words what `draw_carried` shows."""
+    angles = ", ".join(f"{np.degrees(angle):.0f}" for angle in turned)
+    return (
+        f"A body turns in the plane, by {angles} degrees, and carries an arrow three ways: "
+        "constant in the room it stays, constant in the body it turns along, and parallel it turns "
+        "by half as much."
+    )

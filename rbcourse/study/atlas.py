@@ -132,9 +132,10 @@ def starts() -> dict[str, Maker]:
     """Return guesses that Newton's method is started from, to see how much the start decides.
 
     They are the closed forms except Cayley's, which seldom leads anywhere when it is far off, and
-    the exponential cubic the long way round.
+    the corrected one, which leads where Bézier's does, and the exponential cubic the long way
+    round.
     """
-    return {way: make for way, make in WAYS.items() if way != "Cayley"} | {
+    return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
         "long way round": long_way_round
     }
 
@@ -213,10 +214,10 @@ def cell_table(
     }
 
 
-def quantile(x: Array, share: float) -> Array:
+def quantile(x: Array, share: float, decimals: int = 8) -> Array:
     """Return the smallest number that is not below `share` of the numbers in the last axis.
 
-    NaN does not count. The result is rounded to four digits, and to eight decimals at most.
+    NaN does not count. The result is rounded to four digits, and to so many decimals at most.
 
     Examples
     --------
@@ -225,12 +226,12 @@ def quantile(x: Array, share: float) -> Array:
     """
     ordered, count = np.sort(x, axis=-1), np.sum(~np.isnan(x), axis=-1, keepdims=True)  # NaN last
     place = np.maximum(np.ceil(share * count).astype(int) - 1, 0)
-    return rounded(np.take_along_axis(ordered, place, axis=-1)[..., 0])
+    return rounded(np.take_along_axis(ordered, place, axis=-1)[..., 0], decimals)
 
 
-def rounded(x: Array) -> Array:
-    """Return numbers with four digits, and eight decimals at most."""
-    return np.vectorize(lambda y: round(float(f"{y:.4g}"), 8) + 0.0, otypes=[float])(x)
+def rounded(x: Array, decimals: int = 8) -> Array:
+    """Return numbers with four digits, and so many decimals at most."""
+    return np.vectorize(lambda y: round(float(f"{y:.4g}"), decimals) + 0.0, otypes=[float])(x)
 
 
 def in_words(excess: float) -> str:

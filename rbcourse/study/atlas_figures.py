@@ -18,6 +18,7 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "projection": ("projection", "o"),
     "exponential": ("x", "s"),
     "Bézier": ("z", "^"),
+    "corrected": ("optimum", "P"),
     "cumulative": ("y", "v"),
     "quaternion": ("screw", "D"),
     "Cayley": ("reference", "x"),
@@ -51,12 +52,15 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> list[Any
     A dashed line runs at 10 %. `data` is what `rbcourse.study.atlas.cell_table` gives; its
     `quantile` is named beside the colours (BK 1, BK 7).
     """
-    axes = fig.subplots(2, 3, sharex=True, sharey=True)
+    axes = fig.subplots(2, 4, sharex=True, sharey=True)
     cells = of_family(data, family)
     maps = [
         _heat_map(ax, way, cells[f"{way} excess [1]"])
-        for ax, way in zip(axes.flat, WAYS, strict=True)
+        for ax, way in zip(axes.flat[: len(WAYS)], WAYS, strict=True)
     ]
+    for ax in axes.flat[len(WAYS) :]:
+        ax.set_axis_off()
+    axes[0, -1].tick_params(labelbottom=True)
     fig.supylabel(f"end velocity, {family} the axis (rad)", fontsize="medium")
     _colour_bar(fig, axes, maps[0], quantile, aspect=15)
     return maps
@@ -133,7 +137,7 @@ def describe_atlas(data: Table, family: str, quantile: str) -> str:
     cells = of_family(data, family)
     said = "; ".join(f"{way} {_shares(cells, way)}" for way in WAYS)
     return (
-        f"What six closed forms cost above the optimum, {quantile}, where the end velocities are "
+        f"What seven closed forms cost above the optimum, {quantile}, where the end velocities are "
         f"{family} the axis of the displacement. A heat map each: to the right the displacement "
         "grows from 0 to 180 degrees, and upwards the end velocity from 0 to 9 rad. Share of the "
         f"cells below 1, 10 and 100 %, in percent: {said}."
@@ -162,7 +166,9 @@ def draw_growth(ax: Axes, data: Table) -> list[Any]:
     ax.set(xscale="log", yscale="log", xlabel="size s of the excursion (rad)")
     ax.set_xticks(size, [f"{s:g}" for s in size], minor=False)
     ax.minorticks_off()
-    hundredfold = [1e-6, *_LEVELS[::2]]
+    hundredfold = [1e-12, 1e-10, 1e-8, 1e-6, *_LEVELS[::2]]
+    lowest = min(np.nanmin(line.get_ydata()) for line in medians)
+    hundredfold = [level for level in hundredfold if level > lowest / 30]
     ax.set_yticks(hundredfold, _percents(hundredfold))
     ax.set_ylabel("cost / optimum − 1")
     ax.plot([], [], "--", lw=1, color="black", label="90 % quantile")
@@ -174,12 +180,14 @@ def describe_growth(data: Table) -> str:
     """Return in words what `draw_growth` shows."""
     size = np.asarray(data["size [rad]"])
     medians = {way: np.asarray(data[f"{way} median excess [1]"]) for way in _compared(data)}
-    said = "; ".join(f"{way} from {x[0]:.1e} to {x[-1]:.1e}" for way, x in medians.items())
+    said = "; ".join(
+        f"{way} from {max(x[0], 1e-11):.1e} to {x[-1]:.1e}" for way, x in medians.items()
+    )
     return (
         "What closed forms cost above the optimum over the size of the excursion, the median "
         "and the 90 % quantile, on logarithmic axes. While the size grows from "
         f"{size[0]:g} to {size[-1]:g} rad, the median of the cost over the optimum minus 1 grows: "
-        f"{said}."
+        f"{said}. What is below 1e-11 is told as that."
     )
 
 
@@ -236,3 +244,36 @@ def describe_margins(data: Table) -> str:
 def _margins(data: Table, way: str) -> tuple[Array, Array]:
     margin, excess = (np.asarray(data[f"{way} {name} [1]"]) for name in ("margin", "excess"))
     return margin, excess
+
+
+def draw_deviations(axes: Sequence[Axes], data: Table) -> list[Any]:
+    """Draw by what closed forms differ from the optimum near a geodesic: a panel for d and for e.
+
+    `data` has the time, and a column "way d [1]" and "way e [1]" for each of them (beyond BK 10).
+    """
+    lines: list[Any] = []
+    titles = {"d": "difference d, across the axis", "e": "mean e, across the axis"}
+    for ax, (letter, title) in zip(axes, titles.items(), strict=True):
+        for name in data:
+            if name.endswith(f" {letter} [1]"):
+                way = name[: -len(f" {letter} [1]")]
+                colour, mark = _LOOKS[way]
+                style: Any = {"color": COLOURS[colour], "marker": mark, "markevery": 10}
+                lines += ax.plot(data["t [1]"], data[name], label=way, **style)
+        ax.axhline(0, color="0.8", lw=1, zorder=0)
+        ax.set(title=title, xlabel="time t")
+    axes[0].set_ylabel("deviation / (‖σ‖² ‖d or e‖)")
+    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return lines
+
+
+def describe_deviations(data: Table) -> str:
+    """Return in words what `draw_deviations` shows."""
+    largest = "; ".join(
+        f"{name[:-4]} {np.abs(data[name]).max():.1e}" for name in data if name != "t [1]"
+    )
+    return (
+        "By what closed forms differ from the optimum over time, near a geodesic, for a difference "
+        "d and a mean e of the end velocities across the axis, over the square of the displacement "
+        f"and d or e. Largest: {largest}."
+    )

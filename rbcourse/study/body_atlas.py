@@ -75,8 +75,9 @@ def body_problems(draws: int, seed: int) -> Ends:
 
 def curves_for(body: str) -> dict[str, Maker]:
     """Return the curves that a survey needs for the excesses of `CURVES`."""
+    compared = closed_forms(BODIES[body])
     return {
-        **closed_forms(BODIES[body]),
+        **{name: compared[name] for name in CLOSED_FORMS},
         "other way": bezier_other_way,
         "ball's optimum": minimum_acceleration_so3,
     }

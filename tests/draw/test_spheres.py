@@ -199,3 +199,17 @@ def test_the_description_of_the_book_says_when_it_turns_over():
     assert "It starts up, and stays there." in spheres.describe_book(t, still)
     level = np.broadcast_to(np.eye(3), over.shape)
     assert "It starts down, and stays there." in spheres.describe_book(t, level)
+
+
+@pytest.mark.source("BK (9)")
+def test_a_parallel_arrow_turns_by_half_of_the_body():
+    turned = np.radians([0, 90, 180])
+    fig, axes = plt.subplots(1, 3)
+    arrows = spheres.draw_carried(axes, turned)
+    tips = np.array([arrow.xy for arrow in arrows]).reshape(3, 3, 2)
+    angles = np.degrees(np.arctan2(tips[..., 1], tips[..., 0])) % 360
+    assert angles == pytest.approx(30 + np.outer([0, 90, 180], [0, 0.5, 1]))
+    data = spheres.carried_table(turned)
+    assert data["parallel x [1]"] == pytest.approx(tips[:, 1, 0])
+    assert "0, 90, 180 degrees" in spheres.describe_carried(turned)
+    plt.close(fig)

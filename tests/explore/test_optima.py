@@ -27,6 +27,7 @@ RIVALS = {
     "projection": rb.projected_cubic_so3,
     "exponential": rb.exponential_cubic_so3,
     "Bézier": rb.bezier_so3,
+    "corrected": rb.corrected_bezier_so3,
     "cumulative": rb.cumulative_bezier_so3,
     "quaternion": rb.quaternion_cubic_so3,
     "Cayley": rb.cayley_cubic_so3,

@@ -87,7 +87,7 @@ def test_the_other_way_round_turns_by_what_is_left_of_a_full_turn(make, rate):
 
 @pytest.mark.source("BK Prop. 3")
 def test_which_curves_go_along_with_moved_and_exchanged_ends():
-    reversible = "projection", "Bézier", "quaternion"
+    reversible = "projection", "Bézier", "corrected", "quaternion"
     for way, make in atlas.WAYS.items():
         off = atlas.defects(make, SOME, rng=1)
         assert list(off) == ["left", "right", "reversed"]

@@ -35,7 +35,7 @@ def fig():
 @pytest.mark.parametrize("family", atlas.FAMILIES)
 def test_each_cell_has_its_colour(fig, family):
     maps = atlas_figures.draw_atlas(fig, CELLS, family, "median")
-    assert len(maps) == 6
+    assert len(maps) == 7
     for drawn, way in zip(maps, atlas.WAYS, strict=True):
         wanted = CELLS[f"{way} excess [1]"][CELLS["family"] == family].reshape(10, 10)
         assert drawn.axes.get_title() == way
@@ -74,15 +74,15 @@ def test_the_shares_are_told():
 
 def test_medians_and_90_percent_quantiles_are_lines_at_their_sizes(fig):
     lines = atlas_figures.draw_growth(fig.subplots(), GROWTH)
-    for kind, drawn in (("median", lines[:6]), ("90 %", lines[6:])):
+    for kind, drawn in (("median", lines[:7]), ("90 %", lines[7:])):
         for line, way in zip(drawn, atlas.WAYS, strict=True):
             assert np.array_equal(line.get_xdata(), SIZES)
             assert np.array_equal(line.get_ydata(), GROWTH[f"{way} {kind} excess [1]"])
-    medians, highs = lines[:6], lines[6:]
+    medians, highs = lines[:7], lines[7:]
     assert [line.get_label() for line in medians] == list(atlas.WAYS)
     assert [line.get_color() for line in medians] == [line.get_color() for line in highs]
-    assert len({line.get_color() for line in medians}) == 6
-    assert len({line.get_marker() for line in medians}) == 6
+    assert len({line.get_color() for line in medians}) == 7
+    assert len({line.get_marker() for line in medians}) == 7
     assert "projection from 3.9e-06 to 8.1e-02" in atlas_figures.describe_growth(GROWTH)
 
 
@@ -135,3 +135,15 @@ def test_what_is_said_of_the_margins():
     assert "6.5e+02 where the margin is below 0.2, and 2.0e-01 where it is above 1" in said
     assert "Figure 5: 70 % at 1.700. no turn: 50 % at 2.000, 150 % at 2.000." in said
     assert "least margin of the quaternions is 0.60" in said
+
+
+def test_deviations_are_lines_in_their_panels(fig):
+    t = np.linspace(0, 1, 11)
+    data = {"t [1]": t, "projection d [1]": t**2, "Bézier d [1]": t / 9, "Bézier e [1]": -t}
+    axes = fig.subplots(1, 2)
+    lines = atlas_figures.draw_deviations(axes, data)
+    assert [line.get_label() for line in lines] == ["projection", "Bézier", "Bézier"]
+    assert [line.axes is axes[1] for line in lines] == [False, False, True]
+    for line, name in zip(lines, list(data)[1:], strict=True):
+        assert np.array_equal(line.get_ydata(), data[name])
+    assert "Bézier d 1.1e-01" in atlas_figures.describe_deviations(data)

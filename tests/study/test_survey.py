@@ -101,7 +101,8 @@ def test_what_is_not_found_is_nan_and_silent():
 def test_the_optimum_is_the_lowest_of_several_starts():
     """From the projected cubic the solver turns the wrong way round in a good part of them."""
     used, found = rb.minimum_acceleration_so3(*SOME).cost, several_starts(SOME)
-    assert list(found) == [*list(atlas.WAYS)[:-1], "long way round"]
+    left_out = "corrected", "Cayley"
+    assert list(found) == [*(way for way in atlas.WAYS if way not in left_out), "long way round"]
     lowest = np.nanmin(list(found.values()), axis=0)
     assert used == pytest.approx(np.minimum(used, lowest), rel=1e-9)
     assert 5 < np.sum(found["projection"] > lowest * (1 + 1e-6)) < 30

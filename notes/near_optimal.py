@@ -1,0 +1,234 @@
+"""Derive every number of near_optimal.md, exactly, and write the table of the package.
+
+A problem is three vectors: sigma, the turn from R0 to R1; and of the parallel end velocities u0 and
+u1 the mean less sigma, e, and the difference, d = u1 - u0. What is of third order in them is a sum
+of sigma, e and d with polynomials in t and in their inner products: a list of three.
+"""
+
+import csv
+from itertools import pairwise
+from math import lcm
+from pathlib import Path
+
+from sympy import QQ, ring
+
+RING, t, ss, ee, dd, se, sd, ed = ring("t, ss, ee, dd, se, sd, ed", QQ)
+INNER = [[ss, se, sd], [se, ee, ed], [sd, ed, dd]]
+NAMES = ["ss", "ee", "dd", "se", "sd", "ed"]
+TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
+
+one = RING.one
+sigma = [one, 0 * one, 0 * one]
+u0, u1 = [one, one, -one / 2], [one, one, one / 2]
+# Hermite's cubics: their values and rates at 0 and 1 are 0, but for one that is 1
+TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
+
+
+def add(*vectors):
+    """Return the sum of vectors."""
+    return [sum(parts, 0 * one) for parts in zip(*vectors, strict=True)]
+
+
+def times(share, vector):
+    """Return a polynomial times a vector."""
+    return [share * part for part in vector]
+
+
+def dot(a, b):
+    """Return the inner product."""
+    return sum(a[i] * b[j] * INNER[i][j] for i in range(3) for j in range(3))
+
+
+def triple(a, b, c):
+    """Return a x (b x c), which is b (a.c) - c (a.b)."""
+    return add(times(dot(a, c), b), times(-dot(a, b), c))
+
+
+def rate(x, order=1):
+    """Return a derivative by t."""
+    for _ in range(order):
+        x = [part.diff(t) for part in x]
+    return x
+
+
+def integral(p):
+    """Return the polynomial with this derivative, 0 at t = 0."""
+    return RING.from_dict({(k[0] + 1, *k[1:]): c / (k[0] + 1) for k, c in p.terms()})
+
+
+def at(p, time):
+    """Return the value of a polynomial at a time."""
+    return p.subs(t, time)
+
+
+def energy(x):
+    """Return the integral of |x''|^2 from 0 to 1."""
+    bend = rate(x, 2)
+    return at(integral(dot(bend, bend)), 1)
+
+
+def clamped(load, end_rate):
+    """Return the y with y'''' = load, y = y' = 0 at t = 0, and y = 0 and y' = end_rate at t = 1."""
+    parts = []
+    for p, last in zip(load, end_rate, strict=True):
+        for _ in range(4):
+            p = integral(p)
+        miss, slope = at(p, 1), at(p.diff(t), 1)
+        parts.append(p - miss * TO_GOAL + (last - slope) * LAST_RATE)
+    return parts
+
+
+CUBIC = add(times(TO_GOAL, sigma), times(FIRST_RATE, u0), times(LAST_RATE, u1))
+# in the coordinate y, R = R0 exp(y), the parallel velocity is y' + y (y y')/24 + ...
+END_RATE = times(QQ(-1, 24), triple(sigma, sigma, u1))
+
+
+def optimum():
+    """Return the best curve, third order: w''' + w x w'' = 0 for R = R0 exp(y)."""
+    x, v, a, j = (rate(CUBIC, k) for k in range(4))
+    load = add(
+        times(QQ(-1, 2), triple(a, x, a)),
+        times(QQ(-1, 3), triple(j, x, v)),
+        times(QQ(-1, 3), triple(v, x, j)),
+    )
+    return clamped(load, END_RATE)
+
+
+def exponential():
+    """Return the cubic with the same end rate."""
+    return times(LAST_RATE, END_RATE)
+
+
+def geodesic(a, b, share):
+    """From exp(a) to exp(b): first and third order. Each point is a pair of these."""
+    (a1, a3), (b1, b3) = a, b
+    way = add(b1, times(-1, a1))
+    bend = triple(way, a1, b1)
+    first = add(a1, times(share, way))
+    third = add(times(1 - share, a3), times(share, b3), times(share * (1 - share) / 12, bend))
+    return first, third
+
+
+def bezier():
+    """Return the construction of de Casteljau, by geodesics."""
+    last = times(QQ(-1, 3), u1)  # from R1 back to the third point
+    back = add(
+        times(QQ(-1, 24), triple(sigma, sigma, last)), times(QQ(-1, 12), triple(last, sigma, last))
+    )
+    zero = times(0, sigma)
+    points = [(zero, zero), (times(QQ(1, 3), u0), zero), (add(sigma, last), back), (sigma, zero)]
+    while len(points) > 1:
+        points = [geodesic(a, b, t) for a, b in pairwise(points)]
+    return points[0][1]
+
+
+def quaternion():
+    """Return the direction of a cubic from (1, 0) to (cos, sin), rates half the velocities."""
+    real = -TO_GOAL * ss / 8 - LAST_RATE * dot(sigma, u1) / 4
+    imaginary = add(
+        times(-TO_GOAL * ss / 48, sigma), times(-LAST_RATE * dot(sigma, u1) / 16, sigma)
+    )
+    half = times(QQ(1, 2), CUBIC)
+    shorter = times(-real - dot(half, half) / 3, half)
+    return times(2, add(imaginary, shorter))
+
+
+def cayley():
+    """Return the curve of a cubic in g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...)."""
+    goal = times(ss / 24, sigma)
+    end = add(END_RATE, times(ss / 12, u1), times(dot(sigma, u1) / 6, sigma))
+    g = times(QQ(1, 2), CUBIC)
+    third = add(times(TO_GOAL, goal), times(LAST_RATE / 2, end))
+    return times(2, add(third, times(-dot(g, g) / 3, g)))
+
+
+def projection():
+    """Return the nearest rotation to I + skew + symmetric + skew, first to third order."""
+    skew = add(
+        times(-TO_GOAL * ss / 6, sigma),
+        times(-LAST_RATE * ss / 8, u1),
+        times(-3 * LAST_RATE * dot(sigma, u1) / 8, sigma),
+    )
+
+    def stretched(a, b, v):
+        """(tr S - S) v for S = (a b + b a)/2, a and b with hats."""
+        return add(times(-dot(a, b), v), times(-dot(b, v) / 2, a), times(-dot(a, v) / 2, b))
+
+    turned = add(
+        times(TO_GOAL / 2, stretched(sigma, sigma, CUBIC)),
+        times(LAST_RATE, stretched(sigma, u1, CUBIC)),
+    )
+    return add(skew, times(QQ(-1, 2), turned), times(-dot(CUBIC, CUBIC) / 3, CUBIC))
+
+
+def cumulative_energy():
+    """Return the same of second order, for the cumulative curve."""
+    # what differs from the optimum, in the basis sigma x e, sigma x d, e x d
+    first, last = times(QQ(1, 3), u0), times(QQ(1, 3), u1)
+    middle = add(sigma, times(-1, first), times(-1, last))
+    shares = 1 - (1 - t) ** 3, TO_GOAL, t**3
+
+    def cross(a, b):
+        pairs = (0, 1), (0, 2), (1, 2)
+        return [a[i] * b[j] - a[j] * b[i] for i, j in pairs]
+
+    # body velocities: w1 = u1 - sigma x u1/2, so the last turn has a part of second order, and
+    # the middle one that of exp(-first) exp(sigma) exp(-last)
+    of_last = times(QQ(-1, 2), cross(sigma, last))
+    of_middle = add(
+        times(QQ(-1, 2), cross(first, sigma)),
+        times(QQ(1, 2), cross(first, last)),
+        times(QQ(-1, 2), cross(sigma, last)),
+        times(-1, of_last),
+    )
+    y = add(times(shares[1], of_middle), times(shares[2], of_last))
+    for (p, a), (q, b) in [
+        ((shares[0], first), (shares[1], middle)),
+        ((shares[0], first), (shares[2], last)),
+        ((shares[1], middle), (shares[2], last)),
+    ]:
+        y = add(y, times(p * q / 2, cross(a, b)))
+    bend = rate(y, 2)
+    pairs = (0, 1), (0, 2), (1, 2)
+    squared = 0 * one
+    for x, (i, j) in zip(bend, pairs, strict=True):
+        for z, (k, m) in zip(bend, pairs, strict=True):
+            squared += x * z * (INNER[i][k] * INNER[j][m] - INNER[i][m] * INNER[j][k])
+    return at(integral(squared), 1)
+
+
+def deviations():
+    """Return what each closed form is away from the optimum, of third order."""
+    best = times(-1, optimum())
+    curves = {
+        "projection": projection(),
+        "exponential": exponential(),
+        "Bézier": bezier(),
+        "quaternion": quaternion(),
+        "Cayley": cayley(),
+    }
+    return {way: add(curve, best) for way, curve in curves.items()}
+
+
+def forms():
+    """Return the numerator of the leading excess of each closed form."""
+    found = {way: energy(away) for way, away in deviations().items()}
+    return {**found, "cumulative": cumulative_energy()}
+
+
+def write(table=TABLE):
+    """Write the table: powers of the inner products, and whole numbers over a denominator."""
+    found = forms()
+    over = {way: lcm(*(int(c.denominator) for c in form.coeffs())) for way, form in found.items()}
+    powers = sorted({term for form in found.values() for term in form.monoms()}, reverse=True)
+    with open(table, "w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow([*NAMES, *found])
+        rows.writerow([""] * 5 + ["over", *over.values()])
+        for power in powers:
+            row = [form.get(power, 0) * over[way] for way, form in found.items()]
+            rows.writerow([*power[1:], *row])
+
+
+if __name__ == "__main__":
+    write()

@@ -1,0 +1,226 @@
+import importlib.util
+import itertools
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbcourse import excess
+from rbcourse.curves import Ends
+from rbcourse.rivals import bezier_deviation
+from rbcourse.study import atlas
+
+ROOT = Path(__file__).parents[1]
+SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "notes/near_optimal.py")
+exact = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(exact)
+POWERS = {"cumulative": 2, "corrected": 8}
+TABULATED = [name for name in rb.CLOSED_FORMS if name != "corrected"]
+pytestmark = pytest.mark.source("beyond BK 10")
+
+
+def scaled(ends, s):
+    """Return the problems with σ, w0 and w1 s times as large."""
+    turn = s * rb.log_so3(ends.turn)
+    return Ends(ends.R0, ends.R0 @ rb.exp_so3(turn), s * ends.w0, s * ends.w1)
+
+
+def excesses(name, ends):
+    """Return cost over optimum, minus 1, by Gauss's rule: smooth curves only."""
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    best, cost = (
+        weights @ np.sum(curve((nodes + 1) / 2, 2) ** 2, axis=-1)
+        for curve in (rb.minimum_acceleration_so3(*ends), atlas.WAYS[name](*ends))
+    )
+    return cost / best - 1
+
+
+def test_the_table_is_what_is_derived(tmp_path):
+    exact.write(tmp_path / "table.csv")
+    stored = ROOT / "rbcourse/leading_excess.csv"
+    assert (tmp_path / "table.csv").read_bytes() == stored.read_bytes()
+
+
+def near_a_geodesic(form):
+    """Return the terms of second order in e and d, or of first order in both for the cumulative."""
+    few = {}
+    for power, factor in form.terms():
+        _, _, ee, dd, se, sd, ed = power
+        if 2 * ee + 2 * dd + se + sd + 2 * ed == 2:
+            few[power] = factor
+    return exact.RING.from_dict(few)
+
+
+def test_the_constants_near_a_geodesic():
+    ss, ee, dd, se, sd, Q = exact.ss, exact.ee, exact.dd, exact.se, exact.sd, exact.QQ
+    across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |sigma x e|², |sigma x d|²
+    projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
+    wanted = {
+        "projection": projection,
+        "quaternion": projection * Q(1, 16),
+        "exponential": ss * across_e * Q(1, 175),
+        "Bézier": ss * (across_d * Q(1, 14580) + across_e * Q(1, 14175)),
+        "cumulative": across_e * Q(1, 7) + across_d * Q(47, 11340),
+    }
+    forms = exact.forms()
+    for name, form in wanted.items():
+        assert near_a_geodesic(forms[name]) == form, name
+
+
+def test_what_the_note_says_of_directions():
+    """81 across; along Bézier's pays nothing; 9 and 25 times; the means over all directions."""
+    Q = exact.QQ
+    d = Q(1, 180), Q(9, 180), Q(1, 14580)  # projection across, along; Bézier across
+    e = Q(1, 175), Q(25, 175), Q(1, 14175)
+    for (across, along, bezier), times, mean in ((d, 9, Q(891, 2)), (e, 25, Q(2187, 2))):
+        assert (across / bezier, along / across) == (81, times)
+        assert (2 * across + along) / (2 * bezier) == mean
+
+
+def test_rest_to_rest_and_about_one_axis():
+    """6401/180180 a⁴ for the projection, and a sixteenth for quaternions; others are exact."""
+    ss = exact.ss
+    at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
+    forms = exact.forms()
+    found = {
+        name: form.compose(list(at_rest.items())).exquo(12 * ss) for name, form in forms.items()
+    }
+    assert found["projection"] == exact.QQ(6401, 180180) * ss**2
+    assert found["quaternion"] == exact.QQ(6401, 16 * 180180) * ss**2
+    for name in ("exponential", "Bézier", "cumulative"):
+        assert found[name] == 0
+
+
+def test_the_deviation_in_the_package_is_the_derived_one():
+    """Exactly, with fractions, as polynomials in t."""
+    rng = np.random.default_rng(5)
+    sigma, e, d = vectors = [
+        np.array([Fraction(int(n), 3) for n in row]) for row in rng.integers(-9, 9, (3, 3))
+    ]
+    u = exact.RING(2) * exact.t - 1
+    ours = [exact.RING(0)] * 3
+    for k, c in enumerate(bezier_deviation(sigma, e, d)):
+        for i in range(3):
+            ours[i] += exact.QQ(c[i].numerator, c[i].denominator) * u**k
+    bump = exact.t**2 * (1 - exact.t) ** 2
+    inner = {}
+    pairs = itertools.combinations_with_replacement(range(3), 2)
+    symbols = exact.ss, exact.se, exact.sd, exact.ee, exact.ed, exact.dd
+    for (i, j), symbol in zip(pairs, symbols, strict=True):
+        value = Fraction(sum(vectors[i] * vectors[j]))
+        inner[symbol] = exact.QQ(value.numerator, value.denominator)
+    theirs = exact.deviations()["Bézier"]
+    for i in range(3):
+        total = exact.RING(0)
+        for share, vector in zip(theirs, vectors, strict=True):
+            factor = exact.QQ(vector[i].numerator, vector[i].denominator)
+            total += factor * share.subs(list(inner.items()))
+        assert total == bump * ours[i]
+
+
+@pytest.mark.parametrize("name", TABULATED)
+def test_the_leading_term_against_the_solver(name):
+    """Its relative error falls with the next power: the second, for the cumulative the first."""
+    ends = atlas.random_problems(20, 1.0, rng=6)
+    errors = []
+    for s in (0.4, 0.2, 0.1):
+        some = scaled(ends, s)
+        errors.append(np.median(np.abs(excesses(name, some) / rb.leading_excess(name, *some) - 1)))
+    assert errors[0] < 0.1
+    least = 1.6 if name == "cumulative" else 3.4
+    assert min(errors[0] / errors[1], errors[1] / errors[2]) > least
+
+
+@pytest.mark.parametrize("name", TABULATED)
+def test_the_power(name):
+    ends = atlas.random_problems(20, 0.2, rng=7)
+    power = np.log2(excesses(name, ends) / excesses(name, scaled(ends, 0.5)))
+    assert np.all(np.abs(power - POWERS.get(name, 4)) < 0.5)
+
+
+def test_the_corrected_curve_has_the_eighth_power():
+    """By the solver in the median; by the estimate, which sees smaller ones, for each problem."""
+    ends = atlas.random_problems(20, 1.0, rng=7)
+    large, small = (excesses("corrected", scaled(ends, s)) for s in (0.9, 0.6))
+    assert 7.5 < np.median(np.log(large / small) / np.log(1.5)) < 8.5
+    large, small = (
+        rb.excess_estimate(rb.corrected_bezier_so3(*scaled(ends, s))) for s in (0.6, 0.4)
+    )
+    power = np.log(large / small) / np.log(1.5)
+    assert 7.5 < power.min() <= power.max() < 8.5
+
+
+@pytest.mark.parametrize("name", rb.CLOSED_FORMS)
+@pytest.mark.source("beyond BK 11")
+def test_the_estimate_within_a_fifth_or_none(name):
+    for size in (0.5, 1, 2):
+        ends = atlas.random_problems(150, size, rng=8)
+        curves = atlas.WAYS[name](*ends)
+        estimate, true = rb.excess_estimate(curves), excesses(name, ends)
+        fastest = np.linalg.norm(curves(np.linspace(0, 1, 33), 1), axis=-1).max(axis=0)
+        assert np.all(np.isnan(estimate[(fastest > 2.51) | (true > 1.25)]))
+        assert np.all(np.isfinite(estimate[(fastest < 2.49) & (true < 0.8)]))
+        holds = np.isfinite(estimate)
+        assert holds.sum() > (0 if size == 2 else 100)
+        assert np.all(np.abs(estimate - true)[holds] < 0.2 * true[holds] + 1e-11)
+
+
+@pytest.mark.source("beyond BK 11")
+@pytest.mark.parametrize("bend", [0.3, 3.0])
+def test_the_estimate_of_other_curves(bend):
+    """Quintics with random accelerations at their ends, some much dearer than the optimum."""
+    ends = atlas.random_problems(200, 0.7, rng=3)
+    curves = rb.exponential_quintic_so3(
+        *ends, *bend * np.random.default_rng(4).normal(size=(2, 200, 3))
+    )
+    true = (
+        rb.acceleration_cost(curves) / rb.acceleration_cost(rb.minimum_acceleration_so3(*ends)) - 1
+    )
+    estimate = rb.excess_estimate(curves)
+    assert np.isfinite(estimate).sum() > 100
+    assert np.nanmax(np.abs(estimate / true - 1)) < 0.2
+
+
+def test_the_estimate_of_the_optimum_is_zero():
+    curve = rb.minimum_acceleration_so3(*atlas.random_problems(50, 0.6, rng=9))
+    assert np.all(np.abs(rb.excess_estimate(curve)) < 1e-13)
+
+
+def test_stacks_and_time():
+    ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in atlas.random_problems(6, 0.5, rng=1)))
+    curves = rb.bezier_so3(*ends)
+    estimate = rb.excess_estimate(curves)
+    assert estimate.shape == rb.leading_excess("Bézier", *ends).shape == (2, 3)
+    one = rb.bezier_so3(*ends.of((1, 2)))
+    assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
+    assert rb.excess_estimate(rb.retime(one, 20.0)) == pytest.approx(estimate[1, 2], rel=1e-9)
+
+
+def test_where_there_is_nothing_to_compare_with():
+    ends = np.eye(3), rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
+    assert np.isnan(rb.leading_excess("projection", *ends))
+    assert np.isnan(rb.excess_estimate(rb.geodesic_so3(*ends[:2])))
+
+
+def test_a_curve_that_is_not_smooth_has_no_estimate():
+    def jolt(t, order):
+        x = 400 * (t - 0.4)
+        bump = np.exp(-(x**2)) / 1e5
+        bumps = bump, -2 * x * bump, (4 * x**2 - 2) * bump, (12 * x - 8 * x**3) * bump
+        return [t, 1, 0, 0][order] + 400**order * bumps[order]
+
+    line = rb.projected_line_so3(np.eye(3), rb.exp_so3([0, 0, 0.5]), jolt)
+    assert np.isnan(rb.excess_estimate(line))
+
+
+def test_what_is_refused():
+    ends = np.eye(3), np.eye(3), [0, 0, 1], [0, 0, 1]
+    with pytest.raises(ValueError, match=r"way: one of projection.* is wanted, got 'corrected'"):
+        rb.leading_excess("corrected", *ends)
+    with pytest.raises(ValueError, match="curve: a Curve wanted"):
+        rb.excess_estimate(np.eye(3))
+    with pytest.raises(ValueError, match=r"on SO\(3\)"):
+        rb.excess_estimate(rb.geodesic_se3(np.eye(4), np.eye(4)))
+    assert set(excess._forms()) == set(TABULATED)
