@@ -24,6 +24,7 @@ SHARES = {
     r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface of fewer points
     r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, drawn three times
     r"lesson01_straight, .* by the corner .*": 0,  # the corner's way is drawn, not the centre's
+    r"lesson08_half, turn \[rad\]": 0,  # of the body
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames at the ends only
     r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,  # the cell
 }

@@ -312,17 +312,18 @@ def carried_table(turned: Array) -> dict[str, Array]:
 
 def draw_carried(axes: Sequence[Axes], turned: Array) -> list[Any]:
     """Draw a body that turns in the plane, and an arrow carried three ways: BK (9)."""
-    data, arrows = carried_table(turned), []
+    data = carried_table(turned)
+    arrows: list[Any] = []
     for k, (ax, angle) in enumerate(zip(axes, turned, strict=True)):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         corners = turn @ np.array([[-0.7, 0.7, 0.7, -0.7], [-0.4, -0.4, 0.4, 0.4]])
         ax.fill(*corners, facecolor="0.93", edgecolor="0.5")
         ax.plot(*turn @ [[0.55], [0.25]], "o", color="0.5")  # a mark on the body
         for name, (colour, _) in CARRIED.items():
-            tip = data[f"{name} x [1]"][k], data[f"{name} y [1]"][k]
-            look = {"arrowstyle": "-|>", "color": COLOURS[colour], "lw": 2.5}
-            arrows.append(ax.annotate("", tip, (0, 0), arrowprops=look))
-            ax.plot([], [], color=COLOURS[colour], lw=2.5, label=name)
+            x, y = data[f"{name} x [1]"][k], data[f"{name} y [1]"][k]
+            arrows += ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
+            head = (3, 0, np.degrees(np.arctan2(y, x)) - 90)
+            ax.plot(x, y, marker=head, ms=12, color=COLOURS[colour])
         ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), aspect="equal")
         ax.set_title(f"turned by {np.degrees(angle):.0f}°")
         ax.set_axis_off()

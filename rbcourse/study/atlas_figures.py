@@ -181,13 +181,14 @@ def describe_growth(data: Table) -> str:
     size = np.asarray(data["size [rad]"])
     medians = {way: np.asarray(data[f"{way} median excess [1]"]) for way in _compared(data)}
     said = "; ".join(
-        f"{way} from {max(x[0], 1e-11):.1e} to {x[-1]:.1e}" for way, x in medians.items()
+        f"{way} from {f'{x[0]:.1e}' if x[0] > 1e-11 else 'less than 1e-11'} to {x[-1]:.1e}"
+        for way, x in medians.items()
     )
     return (
         "What closed forms cost above the optimum over the size of the excursion, the median "
         "and the 90 % quantile, on logarithmic axes. While the size grows from "
         f"{size[0]:g} to {size[-1]:g} rad, the median of the cost over the optimum minus 1 grows: "
-        f"{said}. What is below 1e-11 is told as that."
+        f"{said}."
     )
 
 

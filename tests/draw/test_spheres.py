@@ -206,7 +206,7 @@ def test_a_parallel_arrow_turns_by_half_of_the_body():
     turned = np.radians([0, 90, 180])
     fig, axes = plt.subplots(1, 3)
     arrows = spheres.draw_carried(axes, turned)
-    tips = np.array([arrow.xy for arrow in arrows]).reshape(3, 3, 2)
+    tips = np.array([arrow.get_xydata()[1] for arrow in arrows]).reshape(3, 3, 2)
     angles = np.degrees(np.arctan2(tips[..., 1], tips[..., 0])) % 360
     assert angles == pytest.approx(30 + np.outer([0, 90, 180], [0, 0.5, 1]))
     data = spheres.carried_table(turned)
