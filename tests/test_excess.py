@@ -133,6 +133,20 @@ def test_the_leading_term_against_the_solver(name):
     assert min(errors[0] / errors[1], errors[1] / errors[2]) > least
 
 
+@pytest.mark.parametrize(
+    ("name", "over"), [("projection", 6300), ("quaternion", 256 * 6300), ("Cayley", 2800)]
+)
+def test_what_curves_cost_that_are_not_the_geodesic(name, over):
+    """With e = d = 0 they deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
+    sizes = np.array([0.2, 0.4])
+    sigma = sizes[:, None] * [0, 0, 1.0]
+    start = np.broadcast_to(np.eye(3), (2, 3, 3))
+    curves = atlas.WAYS[name](start, rb.exp_so3(sigma), sigma, sigma)
+    found = rb.acceleration_cost(curves) / 2 * over / sizes**10
+    assert found == pytest.approx(1, abs=0.1)
+    assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # a relative error of second order
+
+
 @pytest.mark.parametrize("name", TABULATED)
 def test_the_power(name):
     ends = atlas.random_problems(20, 0.2, rng=7)

@@ -10,6 +10,7 @@ PAGES = {
     "CONVENTIONS.md": "conventions.md",
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
+    "notes/near_optimal.md": "near_optimal.md",
     "notebooks/QUESTIONS.md": "teach/questions.md",
     "notebooks/assignments/README.md": "teach/problem_sets.md",
 }
