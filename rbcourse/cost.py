@@ -248,7 +248,7 @@ def jerk_cost(curve: Curve) -> Array:
 
 
 def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
-    """Raise a ValueError if that is no curve, or not one on SO(3)."""
+    """Raise a ValueError unless that is a `Curve`, on SO(3) if `on_so3`."""
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve wanted, got {curve!r}")
     if on_so3 and curve.size != 3:

@@ -21,7 +21,7 @@ from rbcourse.so3 import exp_so3, log_so3
 
 _NODES = 33
 _SMOOTH = 1e-6  # of w', what its last two Chebyshev coefficients may be
-FASTEST = 2.5
+SPEED_LIMIT = 2.5
 """In rad over the whole time: for a curve that turns as fast there is no estimate."""
 
 
@@ -90,7 +90,8 @@ def leading_excess(way: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: Ar
     powers, coefficients = forms[way]
     E = np.prod(inner[..., None, :] ** powers, axis=-1) @ coefficients
     optimum = 12 * inner[..., 1] + inner[..., 2]
-    return np.divide(np.maximum(E, 0), optimum, out=np.full_like(E, np.nan), where=optimum > 0)[()]
+    E = np.maximum(E, 0)  # but for rounding it is not negative
+    return np.divide(E, optimum, out=np.full_like(E, np.nan), where=optimum > 0)[()]
 
 
 @lru_cache
@@ -122,8 +123,8 @@ def excess_estimate(curve: Curve) -> Array:
     -------
     ndarray, shape curve.batch_shape
         About cost over optimum, minus 1; of a `chain` over the optima between its knots. NaN where
-        there is no estimate: where a curve turns at `FASTEST` or faster at some time, costs more
-        than about twice the optimum, is not smooth enough for 33 nodes, or costs nothing.
+        there is no estimate: where a curve turns at `SPEED_LIMIT` or faster at some time, costs
+        more than about twice the optimum, is not smooth enough for 33 nodes, or costs nothing.
 
     Raises
     ------
@@ -175,7 +176,7 @@ def excess_estimate(curve: Curve) -> Array:
     for line in (np.ones(_NODES), np.sqrt(3) * (2 * t - 1)):  # of norm 1, and orthogonal
         bend -= np.multiply.outer(line, np.tensordot(integral[-1] * line, bend, axes=1))
     saved, cost = (integral[-1] @ np.sum(x**2, axis=-1).reshape(_NODES, -1) for x in (bend, a))
-    fast = np.linalg.norm(w, axis=-1).max(axis=0).ravel() >= FASTEST
+    fast = np.linalg.norm(w, axis=-1).max(axis=0).ravel() >= SPEED_LIMIT
     rough = tails(np.moveaxis(a.reshape(_NODES, -1, 3), 1, 0)) > _SMOOTH * np.sqrt(cost)
     saved[fast | rough | (saved > cost / 2)] = np.nan
     rates = (1 / np.asarray(durations, float)) ** 3

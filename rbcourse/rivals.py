@@ -529,7 +529,7 @@ def _check_slow(ends: Ends) -> Ends:
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
-    """Return of two parallel end velocities the mean less σ, e, and the difference, d.
+    """Return e, the mean of two end velocities less σ, and d, their difference.
 
     The velocities are carried to the rotation half-way, R0 exp(σ̂/2), parallel in a bi-invariant
     metric: the body axes turn by σ/2 on each half of the way, and what is parallel by half of that.

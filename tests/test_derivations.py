@@ -68,10 +68,14 @@ def test_the_rate_of_a_rotation_changes_by_its_variation_and_the_turning_of_the_
 @pytest.mark.source("BK (19)")
 def test_what_is_constant_along_an_optimum():
     """With w''' = −w × w'': R w'' by its rate in the body, and the number w·w'' − ‖w'‖²/2."""
-    w, a, b = vector("w"), vector("a"), vector("b")  # w, w', w''
-    c = -w.cross(b)
-    assert sp.expand(c + w.cross(b)) == sp.zeros(3, 1)
-    assert sp.expand(a.dot(b) + w.dot(c) - a.dot(b)) == 0
+    w = sp.Matrix([sp.Function(f"w{i}")(T) for i in range(3)])
+    R = sp.Matrix(3, 3, lambda i, j: sp.Function(f"r{i}{j}")(T))
+    b = w.diff(T, 2)
+    third = dict(zip(w.diff(T, 3), -w.cross(b), strict=True))
+    rates = dict(zip(R.diff(T), R * hat(w), strict=True))
+    assert sp.expand((R * b).diff(T).subs(third).subs(rates)) == sp.zeros(3, 1)
+    number = w.dot(b) - w.diff(T).dot(w.diff(T)) / 2
+    assert sp.expand(number.diff(T).subs(third)) == 0
 
 
 @pytest.mark.source("RR 2.1")

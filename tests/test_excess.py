@@ -181,6 +181,19 @@ def test_the_estimate_within_a_fifth_or_none(name):
         assert np.all(np.abs(estimate - true)[holds] < 0.2 * true[holds] + 1e-11)
 
 
+def test_the_correction_turns_the_way_that_bezier_turns():
+    """Ends that want the other way round: by σ of the short way it would cost far more."""
+    rng = np.random.default_rng(2)
+    turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))
+    w = [0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3))
+    ends = np.broadcast_to(np.eye(3), (20, 3, 3)), rb.exp_so3(turn), *w
+    plain, mended = (
+        rb.acceleration_cost(make(*ends)) for make in (rb.bezier_so3, rb.corrected_bezier_so3)
+    )
+    best = rb.minimum_acceleration_so3(*ends).cost
+    assert np.all(mended - best < 0.5 * (plain - best) + 1e-9 * best)
+
+
 @pytest.mark.source("beyond BK 11")
 @pytest.mark.parametrize("bend", [0.3, 3.0])
 def test_the_estimate_of_other_curves(bend):
@@ -194,6 +207,7 @@ def test_the_estimate_of_other_curves(bend):
     )
     estimate = rb.excess_estimate(curves)
     assert np.isfinite(estimate).sum() > 100
+    assert np.all(np.isnan(estimate[true > 1.25]))
     assert np.nanmax(np.abs(estimate / true - 1)) < 0.2
 
 
@@ -220,13 +234,17 @@ def test_where_there_is_nothing_to_compare_with():
 
 def test_a_curve_that_is_not_smooth_has_no_estimate():
     def jolt(t, order):
-        x = 400 * (t - 0.4)
-        bump = np.exp(-(x**2)) / 1e5
+        x = 40 * (t - 0.4)
+        bump = 5e-4 * np.exp(-(x**2))
         bumps = bump, -2 * x * bump, (4 * x**2 - 2) * bump, (12 * x - 8 * x**3) * bump
-        return [t, 1, 0, 0][order] + 400**order * bumps[order]
+        smooth = 3 * t**2 - 2 * t**3, 6 * t - 6 * t**2, 6 - 12 * t, -12
+        return smooth[order] + 40**order * bumps[order]
 
     line = rb.projected_line_so3(np.eye(3), rb.exp_so3([0, 0, 0.5]), jolt)
     assert np.isnan(rb.excess_estimate(line))
+    rest = [0, 0, 0]
+    best = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3([0, 0, 0.5]), rest, rest)
+    assert rb.acceleration_cost(line) < 1.5 * best.cost  # neither dear nor fast
 
 
 def test_what_is_refused():
