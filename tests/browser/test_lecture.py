@@ -74,6 +74,19 @@ WHOLE = """() => {
 }"""
 
 
+# a busy machine: the renderer of widgets looks for one every 100 ms, here only once in two seconds
+LATE = """() => {
+  const soon = window.setTimeout;
+  window.setTimeout = (todo, ms, ...rest) => soon(todo, ms === 100 ? 2500 : ms, ...rest);
+}"""
+
+
+def test_widgets_are_shown_however_seldom_their_renderer_looks(show, page):
+    page.add_init_script(f"({LATE})()")
+    show("01")
+    assert "model not found" not in page.inner_text("#rendered_cells")
+
+
 def test_the_keys_of_a_remote_control_turn_the_pages(show, page):
     show("02")
     places, unseen = [], None

@@ -61,6 +61,19 @@ const showError = (error) => {
   }
 };
 
+// A renderer looks for its widget for two seconds. On a busy machine that is too short: widgets are
+// rendered when all of them have arrived from Python.
+const showWidgets = () => {
+  const manager = window.jupyterapp?.widgetManager;
+  if (!manager?.restoredStatus) return void setTimeout(showWidgets, 50);
+  for (const script of document.querySelectorAll(".lecture-widget")) {
+    const renderer = manager.rendermime.createRenderer("application/vnd.jupyter.widget-view+json");
+    renderer.addClass("jp-OutputArea-output");
+    renderer.constructor.attach(renderer, script.parentElement, script);
+    renderer.renderModel(JSON.parse(script.text));
+  }
+};
+
 const askForPython = async (address) => {
   const answer = await fetch(address).catch(() => null);
   page.classList.toggle("lecture-gone", !answer?.ok);
@@ -70,6 +83,7 @@ window.addEventListener("load", () => {
   const error = document.querySelector(".lecture-error");
   if (error) showError(error);
   pages.begin();
+  showWidgets();
   const { baseUrl, kernelId } = JSON.parse(document.querySelector("#jupyter-config-data").text);
   setInterval(askForPython, 5000, `${baseUrl}api/kernels/${kernelId}${location.search}`);
   const end = `${baseUrl}voila/api/shutdown/${kernelId}${location.search}`;
