@@ -22,7 +22,7 @@ from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from nbgrader import preprocessors as nbgrader
-from traitlets import Bool, default
+from traitlets import Integer
 from traitlets.config import Config
 
 from rbcourse.assignments import sandbox
@@ -148,11 +148,7 @@ class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
 class BoxedExecute(BoundedClient, nbgrader.Execute):
     """Run a notebook in a new folder, and in a box where there is one."""
 
-    boxed = Bool(help="whether there is a box; without, it is tried").tag(config=True)
-
-    @default("boxed")
-    def _default_boxed(self) -> bool:
-        return not sandbox.missing()
+    seconds = Integer(600, help="for all cells together, in a box").tag(config=True)
 
     def preprocess(
         self, nb: NotebookNode, resources: dict[str, Any], km: Any = None
@@ -194,8 +190,8 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
     def create_kernel_manager(self) -> Any:
         """Return a manager of a kernel in a box."""
         manager = super().create_kernel_manager()
-        if self.boxed:
-            sandbox.put_in_box(manager, self.folder)
+        if not sandbox.missing():
+            sandbox.put_in_box(manager, self.folder, self.seconds)
         return manager
 
     def start_new_kernel(self, **kwargs: Any) -> None:
@@ -210,6 +206,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             return super().preprocess_cell(cell, resources, index)
         except DeadKernelError as error:
             where = name_cell(self.nb.cells, index)
-            raise RefusedError(f"Python ended in or before {where}: grade by hand") from error
+            over = f"or {self.seconds} s were over: grade by hand"
+            raise RefusedError(f"Python ended in or before {where}, {over}") from error
         except CellTimeoutError as error:
             raise RefusedError(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error

@@ -12,12 +12,11 @@ import re
 import unicodedata
 import zipfile
 import zlib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any
+from typing import NamedTuple
 
 from rbcourse.assignments.restore import decode, grade_id, read_notebook
 from rbcourse.assignments.writing import write_csv, write_whole
@@ -37,20 +36,18 @@ BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, Value
 Rows = list[tuple[str, str, str]]
 
 
-@dataclass
-class Upload:
-    """A notebook that a student handed in: what its name tells, its date and its text."""
+class Upload(NamedTuple):
+    """A notebook that a student handed in, named so that the one to take sorts last.
 
+    Canvas gives numbers that rise; of an upload the file that was made to be submitted is taken.
+    """
+
+    number: int
+    date: str
+    prepared: bool
     file: str
     about: dict[str, str]
-    date: str
-    text: str
-    note: str
-
-    def order(self) -> tuple[Any, ...]:
-        """Sort by the numbers that Canvas gives, which rise, by date, and by name in an upload."""
-        prepared = "/to_submit/" in f"/{self.about['file']}"
-        return int(self.about.get("number") or 0), self.date, prepared, self.file
+    content: bytes
 
 
 def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Rows:
@@ -63,31 +60,31 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
         raise ValueError(f"{folder}: there is no such folder")
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
     submitted, rows = assignments / "submitted", Rows()
-    groups = defaultdict[tuple[str, str], dict[str, list[Upload]]](lambda: defaultdict(list))
+    groups = defaultdict[tuple[str, str, str], list[Upload]](list)
     for upload in find(folder, rows):
         name, why = _match(upload, sets)
         if name:
-            groups[name, _student(upload.about, roster)][upload.about["id"]].append(upload)
+            groups[name, _student(upload.about, roster), upload.about["id"]].append(upload)
         else:
             rows.append(("unmatched", upload.file, why))
-    there: dict[str, dict[str, str]] = {name: {} for name, _ in sorted(groups)}
-    for (name, student), people in sorted(groups.items()):
-        if len(people) > 1 and (submitted / student / name).exists():
-            why = f"{len(people)} have this name, and now their numbers too; delete this folder"
+    namesakes = Counter((name, student) for name, student, _ in groups)
+    for (name, student), number in namesakes.items():
+        if number > 1 and (submitted / student / name).exists():
+            why = f"{number} have this name, and now their numbers too; delete this folder"
             rows.append(("duplicates", f"submitted/{student}/{name}", why))
-        for number, uploads in sorted(people.items()):
-            *others, best = sorted(uploads, key=Upload.order)
-            who = f"{student}_{_plain(number)}" if len(people) > 1 else student
-            there[name][who] = f"{best.about['name']} ({number})"
-            rows += [("duplicates", other.file, f"{best.file} is taken") for other in others]
-            rows.append(_take(best, submitted / who / name))
-            rows += _tell_late(best, f"{who}, {name}", due)
-    for name, students in there.items() if roster else ():
-        ids = {row["id"]: row for row in roster}
-        rows += [("not on the roster", who, students[who]) for who in sorted(students.keys() - ids)]
-        for who in [who for who in ids if not (submitted / who / name / f"{name}.ipynb").exists()]:
-            words = f"{ids[who].get('first_name', '')} {ids[who].get('last_name', '')}".strip()
-            rows.append(("missing", f"{who}, {name}", words))
+    for (name, student, number), uploads in sorted(groups.items()):
+        *others, best = sorted(uploads, key=lambda upload: upload[:4])
+        who = student if namesakes[name, student] == 1 else f"{student}_{_plain(number)}"
+        rows += [("duplicates", other.file, f"{best.file} is taken") for other in others]
+        rows.append(_take(best, submitted / who / name))
+        rows += _tell_late(best, f"{who}, {name}", due)
+        if roster and who not in {row["id"] for row in roster}:
+            rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
+    for name in sorted({name for name, *_ in groups}):
+        for row in roster:
+            if not (submitted / row["id"] / name / f"{name}.ipynb").exists():
+                words = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()
+                rows.append(("missing", f"{row['id']}, {name}", words))
     lines = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
     write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": ""}])
     return rows
@@ -100,9 +97,8 @@ def find(folder: Path, rows: Rows) -> Iterator[Upload]:
         if path.is_symlink():
             rows.append(("refused", name, "a link"))
         elif path.is_file():
-            with path.open("rb") as stream:
-                date = datetime.fromtimestamp(path.stat().st_mtime)
-                yield from _look(name, name, stream, date, rows)
+            date = datetime.fromtimestamp(path.stat().st_mtime)
+            yield from _look(name, name, path.read_bytes(), date, rows)
 
 
 def _shown(name: str) -> str:
@@ -113,26 +109,28 @@ def _shown(name: str) -> str:
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
 
 
-def _look(label: str, name: str, stream: IO[bytes], date: datetime, rows: Rows) -> Iterator[Upload]:
+def _owner(name: str) -> re.Match[str] | None:
+    return MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
+
+
+def _look(label: str, name: str, content: bytes, date: datetime, rows: Rows) -> Iterator[Upload]:
     """Look at a file; its name, with the zips that it was in, tells the student."""
-    suffix, owner = Path(name).suffix.lower(), MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
+    suffix, owner = Path(name).suffix.lower(), _owner(name)
     try:
         if JUNK.search(f"/{owner['file'] if owner else name}"):
             rows.append(("ignored", label, "not to be submitted"))
         elif suffix == ".zip":
-            with zipfile.ZipFile(stream) as archive:
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
                 yield from _look_into(archive, label, name, date, rows)
         elif suffix != ".ipynb":
             rows.append(("ignored", label, "no notebook, and no zip"))
         elif not owner:
             rows.append(("unmatched", label, "its name names no student"))
         else:
-            content = stream.read()
             read_notebook(content, "it")
-            text, about = decode(content), {k: v or "" for k, v in owner.groupdict().items()}
-            changed = content != text.encode()
-            note = "; it is stored in UTF-8, which it was not" * changed
-            yield Upload(label, about, _written(date), text, note)
+            about = {key: value or "" for key, value in owner.groupdict().items()}
+            number, prepared = int(about.get("number", 0)), "/to_submit/" in f"/{about['file']}"
+            yield Upload(number, _written(date), prepared, label, about, content)
     except BROKEN as error:
         rows.append(("refused", label, str(error)))
 
@@ -142,24 +140,22 @@ def _look_into(
 ) -> Iterator[Upload]:
     entries = [(_shown(e.filename), e) for e in archive.infolist() if not e.is_dir()]
     # the name of a whole download may look like that of an upload
-    owned = any(MOODLE.fullmatch(inner) or CANVAS.fullmatch(inner) for inner, _ in entries)
-    upload = bool(MOODLE.fullmatch(name) or (CANVAS.fullmatch(name) and not owned))
+    upload = _owner(name) and not any(_owner(inner) for inner, _ in entries)
     size = sum(entry.file_size for _, entry in entries)
     if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
         raise ValueError("it holds a zip, or too much; unpack it by hand")
     for inner, entry in entries:
-        wanted, content = inner.lower().endswith((".ipynb", ".zip")), b""
         try:
-            if wanted and entry.file_size > FILE_BYTES:
+            if entry.file_size > FILE_BYTES:
                 raise ValueError("too large")
-            content = archive.read(entry) if wanted else b""
+            content = archive.read(entry)
             # what a student packed has the dates of the student's machine
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:
             rows.append(("refused", f"{label}: {inner}", str(error)))
         else:
             full = f"{name}/{inner}" if upload else inner
-            yield from _look(f"{label}: {inner}", full, io.BytesIO(content), when, rows)
+            yield from _look(f"{label}: {inner}", full, content, when, rows)
 
 
 def _written(date: datetime) -> str:
@@ -198,7 +194,7 @@ def _read_roster(path: Path) -> list[dict[str, str]]:
 
 def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
     """Return the set that a file is of, by its cells and by its name, or why there is none."""
-    cells, stem = read_notebook(upload.text.encode(), "it").cells, Path(upload.about["file"]).stem
+    cells, stem = read_notebook(upload.content, "it").cells, Path(upload.about["file"]).stem
     shared = {name: len({grade_id(cell) for cell in cells} & own) for name, own in sets.items()}
     named = [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", stem, re.IGNORECASE)]
     best = max(sets, key=lambda name: (shared[name], name in named))
@@ -235,16 +231,18 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
 def _take(best: Upload, place: Path) -> tuple[str, str, str]:
     """Put a file in its place, unless what is there is newer."""
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
-    why = f"{place.parent.name}, {place.name}{best.note}"
+    text = decode(best.content).encode()
+    note = "; it is stored in UTF-8, which it was not" * (text != best.content)
+    why = f"{place.parent.name}, {place.name}{note}"
     if target.exists():
         # without a stamp it was put there by other means
         old = stamp.read_text(encoding="utf-8").strip() if stamp.exists() else "later"
-        if target.read_bytes() == best.text.encode() or best.date == old:
+        if target.read_bytes() == text or best.date == old:
             return "unchanged", best.file, why
         if best.date < old:
             return "duplicates", best.file, f"{why}: what was collected before is newer"
         why += ": replaces what was collected before"
-    write_whole(target, best.text.encode())
+    write_whole(target, text)
     write_whole(stamp, f"{best.date}\n".encode())
     return "collected", best.file, why
 

@@ -6,12 +6,9 @@ import os
 import re
 import shutil
 import sys
-import tempfile
-import time
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -28,19 +25,12 @@ from rbcourse.assignments.handout import find_set, read_config
 from rbcourse.assignments.restore import grade_id, is_answer, marks_of, read_notebook
 from rbcourse.assignments.writing import write_csv
 
-SECONDS = 600  # for a student, all in all
-MEMORY = 1_500_000_000  # bytes, for each process of a student
+WORKERS = 2  # so many students are graded at once
+MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
 
 
-def grade(
-    name: str,
-    assignments: Path,
-    *,
-    seconds: float = SECONDS,
-    memory: int = MEMORY,
-    workers: int = 2,
-) -> Path:
+def grade(name: str, assignments: Path) -> Path:
     """Grade all submissions of a set, write the feedback and a table; a line a student is printed.
 
     What a human has given points for is kept. A submission that is refused loses the points that
@@ -54,10 +44,7 @@ def grade(
     if not students:
         raise ValueError(f"There is no submission of {name}: submitted/STUDENT/{name}/{name}.ipynb")
     table = assignments / f"{name}-grades.csv"
-    try:
-        table.open("a").close()
-    except PermissionError as error:
-        raise ValueError(f"{table} cannot be written: close it where it is open") from error
+    table.open("a").close()  # here, and not at the end, it is told when it is open elsewhere
     before = Path(course.root, "gradebook.db")
     if before.exists():
         shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
@@ -66,29 +53,27 @@ def grade(
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
     with Gradebook(course.db_url) as gradebook:
         known, rows = _points(gradebook), dict[str, dict[str, Any]]()
-    pool = ThreadPoolExecutor(workers)
-    try:
-        works = {
-            pool.submit(_grade_apart, name, assignments, student, seconds, memory): student
-            for student in students
-        }
-        for work in as_completed(works):
-            student = works.pop(work)
-            with Gradebook(course.db_url) as gradebook:
-                now = _points(gradebook)
-                begun = {works[other] for other in works if other.running() or other.done()}
-                at_work = sorted({student, *begun})
-                for other in sorted({*known, *now} - set(at_work)):
-                    if known.get(other) != now.get(other):
-                        raise ValueError(
-                            f"The points of {other} changed while {' and '.join(at_work)} was "
-                            f"graded. gradebook.before-{name}.db holds what they were"
-                        )
-                rows[student] = _row(gradebook, course, student, work.result())
-                known = now | {student: _points(gradebook).get(student)}
-            print(f"{student}: {_summary(rows[student])}", flush=True)
-    finally:
-        pool.shutdown(cancel_futures=True)
+    todo, works = students[::-1], dict[Future[dict[str, Any]], str]()
+    with ProcessPoolExecutor(WORKERS, get_context("spawn"), _begin, (MEMORY,)) as pool:
+        while todo or works:
+            while todo and len(works) < WORKERS:
+                student = todo.pop()
+                works[pool.submit(grade_one, name, assignments, student)] = student
+            at_work = sorted(works.values())
+            for work in wait(works, return_when=FIRST_COMPLETED).done:
+                student = works.pop(work)
+                found = _result(work, student)
+                with Gradebook(course.db_url) as gradebook:
+                    now = _points(gradebook)
+                    for other in sorted({*known, *now} - set(at_work)):
+                        if known.get(other) != now.get(other):
+                            raise ValueError(
+                                f"The points of {other} changed while {' and '.join(at_work)} was "
+                                f"graded. gradebook.before-{name}.db holds what they were"
+                            )
+                    rows[student] = _row(gradebook, course, student, found)
+                    known = now | {student: _points(gradebook).get(student)}
+                print(f"{student}: {_summary(rows[student])}", flush=True)
     first = {"set": name, "boxed": "no" if sandbox.missing() else "yes"}
     write_csv(table, [{"student": student} | first | rows[student] for student in students])
     return table
@@ -131,60 +116,31 @@ def _points(gradebook: Any) -> dict[str, Any]:
     }
 
 
-def _grade_apart(
-    name: str, assignments: Path, student: str, seconds: float, memory: int
-) -> dict[str, Any]:
-    """Grade a submission in a process of its own, which is ended when it takes too long.
-
-    With it, where there is a box, all ends that it started.
-    """
-    # on Linux it is copied from one that has loaded nbgrader, which takes seconds
-    context: Any = get_context("forkserver" if sys.platform == "linux" else "spawn")
-    context.set_forkserver_preload(["rbcourse.assignments.grade"])
-    result, send = context.Pipe(duplex=False)
-    folder, of = tempfile.mkdtemp(), (name, assignments, student, not sandbox.missing())
-    worker = context.Process(target=_work, args=(send, folder, memory, of))
-    worker.start()
-    send.close()
-    try:
-        if result.poll(seconds):
-            return dict(result.recv())
-        return {"refused": f"not done after {seconds:g} s"}
-    except EOFError:
-        return {"refused": "its process ended, or took too much memory"}
-    finally:
-        worker.kill()
-        worker.join()
-        for _ in range(50):  # a kernel that is ended may still write
-            sandbox.delete(Path(folder))
-            if not os.path.exists(folder):
-                break
-            time.sleep(0.1)
-
-
-def _work(send: Connection, folder: str, memory: int, of: tuple[str, Path, str, bool]) -> None:
-    """Grade a submission in this process, under limits and with nothing printed."""
+def _begin(memory: int) -> None:
+    """Let this process, and what it starts, print nothing; bound the memory of each."""
     with open(os.devnull, "r+b") as nowhere:
         for stream in (0, 1, 2):
             os.dup2(nowhere.fileno(), stream)
-    tempfile.tempdir = folder  # which is deleted, also when this process is ended
     if sys.platform == "linux":  # others have the limit, and do not keep it
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+
+
+def _result(work: Future[dict[str, Any]], student: str) -> dict[str, Any]:
     try:
-        found = grade_one(*of)
+        return work.result()
     except RefusedError as error:
-        found = {"refused": str(error)}
+        return {"refused": str(error)}
+    except BrokenExecutor as error:
+        raise ValueError(f"Python ended while it graded {student}, or another") from error
     except Exception as error:  # told, and the others are graded
-        found = {"refused": f"{type(error).__name__}: {error}"}
-    send.send(found)
+        return {"refused": f"{type(error).__name__}: {error}"}
 
 
-def grade_one(name: str, folder: Path, student: str, boxed: bool) -> dict[str, Any]:
-    """Grade one submission in this process."""
+def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
+    """Grade one submission."""
     config = course_config(name, folder)
-    config.BoxedExecute.boxed = boxed
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)

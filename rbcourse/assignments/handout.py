@@ -13,16 +13,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import nbformat
 from nbformat import NotebookNode
+from nbgrader import preprocessors as nbgrader
 from nbgrader.nbgraderformat import ValidationError
-from nbgrader.preprocessors import (
-    CheckCellMetadata,
-    ClearHiddenTests,
-    ClearMarkScheme,
-    ClearOutput,
-    ClearSolutions,
-    ComputeChecksums,
-    LockCells,
-)
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
@@ -38,13 +30,10 @@ LEFTOVER = re.compile(
     r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
     re.IGNORECASE,
 )
-REGION = re.compile(
-    r"BEGIN (SOLUTION|HIDDEN TESTS|MARK SCHEME).*?\n(.*?)^[^\n]*END \1", re.M | re.S
-)
-
-
-STEPS = [LockCells, ClearSolutions, ClearOutput, CheckCellMetadata, ClearHiddenTests]
-STEPS += [ClearMarkScheme, ComputeChecksums]
+# as `nbgrader generate_assignment` does
+STEPS = [nbgrader.LockCells, nbgrader.ClearSolutions, nbgrader.ClearOutput]
+STEPS += [nbgrader.CheckCellMetadata, nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme]
+STEPS += [nbgrader.ComputeChecksums]
 
 
 def find_set(name: str, assignments: Path) -> Path:
@@ -84,34 +73,28 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
     return files
 
 
-def _refuse_leaks(name: str, source: NotebookNode, files: dict[str, bytes]) -> None:
-    """Raise a ValueError if a file contains solutions, hidden tests or mark schemes."""
-    secrets = _secret_lines(source)
+def _refuse_leaks(name: str, given: NotebookNode, files: dict[str, bytes]) -> None:
+    """Raise a ValueError if a file has solutions, hidden tests or mark schemes of a notebook."""
+    notebook = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
+    common = ("import ", "from ", "raise ")
+    taken = _lines(given) - _lines(notebook)
+    secrets = sorted(line for line in taken if len(line) >= 12 and not line.startswith(common))
     for path, content in files.items():
         texts = [content.decode("utf-8", errors="replace")]
         if path == f"{name}.ipynb":
-            cells = nbformat.reads(texts[0], as_version=4).cells
-            texts = [cell.source for cell in cells] + [str(cell.metadata) for cell in cells]
-            if any(cell.get("attachments") and is_answer(cell) for cell in cells):
+            texts = [text for cell in notebook.cells for text in (cell.source, str(cell.metadata))]
+            if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
                 raise ValueError(f"{name}: nbgrader leaves the attachment of an answer there")
         elif path.endswith(".ipynb"):
             raise ValueError(f"{name}: {path} is a second notebook; a set has one")
         for text in texts:
-            if shown := [
-                *(secret for secret in secrets if secret in text),
-                *LEFTOVER.findall(text),
-            ]:
+            shown = [*(line for line in secrets if line in text), *LEFTOVER.findall(text)]
+            if shown:
                 raise ValueError(f"{name}: {path} gives away {shown[0]!r}")
 
 
-def _secret_lines(notebook: NotebookNode) -> list[str]:
-    """Return the lines inside the regions that nbgrader removes, except short and common ones."""
-    texts = [cell.source for cell in notebook.cells]
-    outside = {line.strip() for text in texts for line in REGION.sub("", text).splitlines()}
-    regions = [region for text in texts for _, region in REGION.findall(text)]
-    inside = {line.strip() for region in regions for line in region.splitlines()} - outside
-    common = ("import ", "from ", "raise ")
-    return sorted(line for line in inside if len(line) >= 12 and not line.startswith(common))
+def _lines(notebook: NotebookNode) -> set[str]:
+    return {line.strip() for cell in notebook.cells for line in cell.source.splitlines()}
 
 
 def student_requirements(environment: str, wheel: str) -> str:
@@ -125,13 +108,10 @@ def student_requirements(environment: str, wheel: str) -> str:
 def build_wheel(course: Path) -> tuple[str, bytes]:
     """Build the package, the same byte for byte each time; nothing is asked for outside."""
     with tempfile.TemporaryDirectory() as folder:
-        code = "import sys; from flit_core import buildapi; buildapi.build_wheel(sys.argv[1])"
+        words = [sys.executable, "-m", "flit_core.wheel", "--outdir", folder]
+        first = {"SOURCE_DATE_EPOCH": "315532800"}  # the first day a zip knows
         subprocess.run(
-            [sys.executable, "-c", code, folder],
-            cwd=course,
-            env={**os.environ, "SOURCE_DATE_EPOCH": "315532800"},  # the first day a zip knows
-            check=True,
-            capture_output=True,
+            words, cwd=course, env={**os.environ, **first}, check=True, capture_output=True
         )
         (built,) = Path(folder).glob("*.whl")
         return built.name, built.read_bytes()
@@ -172,7 +152,7 @@ def make_solutions(name: str, assignments: Path) -> Path:
     Hidden tests and mark schemes are left out.
     """
     notebook = nbformat.read(find_set(name, assignments) / f"{name}.ipynb", as_version=4)
-    for step in (ClearHiddenTests(), ClearMarkScheme()):
+    for step in (nbgrader.ClearHiddenTests(), nbgrader.ClearMarkScheme()):
         notebook, _ = step.preprocess(notebook, {})
     for cell in notebook.cells:
         cell.source = re.sub(r"^.*### (BEGIN|END) SOLUTION.*\n?", "", cell.source, flags=re.M)

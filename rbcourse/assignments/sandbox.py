@@ -13,6 +13,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -57,11 +58,15 @@ def prepare(folder: Path) -> None:
 
 def delete(folder: Path) -> None:
     """Delete a folder, whatever a kernel left there: locked, deep, or links to elsewhere."""
-    if os.name == "nt":
-        shutil.rmtree(folder, ignore_errors=True)
-        return
-    for words in (["chmod", "-R", "u+rwX"], ["rm", "-rf"]):
-        subprocess.run([*words, "--", str(folder)], capture_output=True)
+    for _ in range(50):  # a kernel that is ended may still write
+        if os.name == "nt":
+            shutil.rmtree(folder, ignore_errors=True)
+        else:
+            words = ["sh", "-c", 'chmod -R u+rwX "$0"; rm -rf "$0"', str(folder)]
+            subprocess.run(words, capture_output=True)
+        if not folder.exists():
+            return
+        time.sleep(0.1)
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -134,10 +139,11 @@ def _bound(path: str) -> list[str]:
     return ["--ro-bind", path, path]
 
 
-def put_in_box(manager: Any, folder: Path) -> None:
-    """Let a manager start its kernel in a box; it listens at files of the folder."""
+def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
+    """Let a manager start its kernel in a box, for some seconds; it listens in the folder."""
     spec = manager.kernel_spec
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()
-    spec.argv = [*box(folder), sys.executable, *spec.argv[1:]]
+    words = ["timeout", "--signal=KILL", str(seconds), *box(folder)]
+    spec.argv = [*words, sys.executable, *spec.argv[1:]]
     spec.interrupt_mode = "message"  # a signal would end the box

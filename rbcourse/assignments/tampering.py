@@ -7,7 +7,7 @@ what an expert takes pains to hide.
 import ast
 import builtins
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from IPython.core.inputtransformer2 import TransformerManager
@@ -38,9 +38,10 @@ MAGICS = re.compile(
     re.MULTILINE,
 )
 CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
+LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast.comprehension
 
 
-def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
+def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
     """Find where the student's cells of a notebook override what its locked cells rely on.
 
     Returns
@@ -48,24 +49,24 @@ def find_in_cells(cells: Iterable[NotebookNode]) -> list[tuple[int, int, str]]:
     list of (int, int, str)
         The index of the cell, the line in it, and what it does.
     """
-    code = {at: cell for at, cell in enumerate(cells) if cell.cell_type == "code"}
-    trees = {at: _parsed(cell.source) for at, cell in code.items()}
-    own = [at for at, cell in code.items() if is_answer(cell) or not grade_id(cell)]
-    names, attributes = _relied_on(tree for at, tree in trees.items() if at not in own)
-    imported, found = set[str](), []
-    for at, tree in trees.items():
-        for node in ast.walk(tree):  # names of modules, and of what is in them
-            if isinstance(node, ast.Import | ast.ImportFrom):
-                imported |= {_bound(alias) for alias in node.names}
-            elif isinstance(node, ast.Assign) and _root(node.value) in imported:
-                imported |= {target.id for target in node.targets if isinstance(target, ast.Name)}
-        if at in own:
-            rebound = [(line, name) for line, name in _bindings(tree) if name in names]
-            said = {(line, f"gives {name} another meaning") for line, name in rebound}
-            for node in ast.walk(tree):
-                for what in _suspicious(node, attributes, imported):
-                    said.add((getattr(node, "lineno", 0), what))
-            found += [(at, *what) for what in sorted(said)]
+    trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
+    own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
+    given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
+    names = {_defines(node) for node in given}
+    attributes = ATTRIBUTES | METHODS | {n.attr for n in given if isinstance(n, ast.Attribute)}
+    modules = set[str]()  # and what is in them
+    for node in (node for tree in trees.values() for node in ast.walk(tree)):
+        if isinstance(node, ast.alias):
+            modules.add(_defines(node))
+        elif isinstance(node, ast.Assign) and _root(node.value) in modules:
+            modules |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+    found = []
+    for at in own:
+        said = {(line, f"gives {name} another meaning") for line, name in _bound(trees[at], names)}
+        for node in ast.walk(trees[at]):
+            line = getattr(node, "lineno", 0)
+            said |= {(line, what) for what in _suspicious(node, attributes, modules)}
+        found += [(at, *what) for what in sorted(said)]
     return found
 
 
@@ -81,23 +82,13 @@ def _parsed(source: str) -> ast.Module:
     return ast.Module([], [])
 
 
-def _relied_on(trees: Iterable[ast.Module]) -> tuple[set[str], set[str]]:
-    """Return the names, and the attributes, that students may not give a new meaning."""
-    relied, attributes = set[str](), METHODS | ATTRIBUTES
-    for node in (node for tree in trees for node in ast.walk(tree)):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            relied |= {_bound(alias) for alias in node.names}
-        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
-            relied.add(node.name)
-        elif isinstance(node, ast.Name) and hasattr(builtins, node.id):
-            relied.add(node.id)
-        elif isinstance(node, ast.Attribute):
-            attributes |= {node.attr}
-    return relied - {"*"}, attributes
-
-
-def _bound(alias: ast.alias) -> str:
-    return alias.asname or alias.name.split(".")[0]
+def _defines(node: ast.AST) -> str:
+    """Return the name to which a node of a locked cell gives a meaning, or nothing."""
+    if isinstance(node, ast.alias):
+        return node.asname or node.name.partition(".")[0]
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return node.name
+    return node.id if isinstance(node, ast.Name) and hasattr(builtins, node.id) else ""
 
 
 def _root(node: ast.AST) -> str:
@@ -107,49 +98,46 @@ def _root(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _bindings(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    """Yield the names that the notebook binds, except imports under customary names."""
-    todo: list[tuple[Any, bool]] = [(tree, False)]
-    while todo:
-        node, local = todo.pop()
-        # of definitions, and in match
-        names: list[Any] = [] if local else [getattr(node, "name", None)]
-        if isinstance(node, ast.Name):
-            names = [node.id] * (not local and not isinstance(node.ctx, ast.Load))
-        elif isinstance(node, ast.NamedExpr):  # also in a comprehension
-            names = [node.target.id]
+def _bound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
+    """Yield which of the names the notebook binds, except by customary imports."""
+    todo: list[Any] = [tree]
+    for node in todo:
+        local = isinstance(node, LOCAL)
+        inner = ast.walk(node) if local else ast.iter_child_nodes(node)
+        todo += [n for n in inner if not local or isinstance(n, ast.Global | ast.NamedExpr)]
+        found = [getattr(node, "name", "")]  # of definitions, and in match
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            found = [node.id]
+        elif isinstance(node, ast.NamedExpr):
+            found = [node.target.id]
         elif isinstance(node, ast.Global):
-            names = node.names
-        elif isinstance(node, ast.alias) and not local:
+            found = node.names
+        elif isinstance(node, ast.alias):
             usual = CUSTOMARY.get(node.asname or "", node.asname or "").rpartition(".")[2]
-            names = [node.asname] * (usual != node.name.rpartition(".")[2])
-        yield from ((getattr(node, "lineno", 0), name) for name in names if name)
-        local |= isinstance(
-            node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef
-        )
-        local |= isinstance(node, ast.comprehension)
-        todo += [(child, local) for child in ast.iter_child_nodes(node)]
+            found = [node.asname] * (usual != node.name.rpartition(".")[2])
+        yield from ((node.lineno, name) for name in names.intersection(found) - {""})
 
 
-def _suspicious(node: Any, relied: set[str], imported: set[str]) -> Iterator[str]:
-    if isinstance(node, ast.Attribute):
-        own = _root(node) == "self"  # of an object that the student describes
-        if isinstance(node.ctx, ast.Load):
-            yield from [f"uses {node.attr}"] * (node.attr in ATTRIBUTES)
-        elif _root(node) in imported or (node.attr in relied and not own):
-            yield f"replaces {ast.unparse(node)}"
-    elif isinstance(node, ast.Name) and node.id in NAMES:
-        yield "uses a magic or a shell" if node.id == "get_ipython" else f"uses {node.id}"
-    elif (name := getattr(node, "id", getattr(node, "name", ""))) in METHODS:
-        yield f"defines {name}"
-    elif isinstance(node, ast.Call) and getattr(node.func, "id", "") == "getattr":
-        if [type(name) for name in node.args[1:2]] != [ast.Constant]:
-            yield f"uses {ast.unparse(node)}"
-    elif isinstance(node, ast.Constant) and node.value in (ATTRIBUTES | METHODS) - {"modules"}:
-        yield f"names {node.value}"
-    elif isinstance(node, ast.Import | ast.ImportFrom):
-        place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
-        for parts in ((place + alias.name).split(".") for alias in node.names):
-            dark = {parts[0], parts[-1]} & (MODULES | NAMES | ATTRIBUTES)
-            harmless = parts[:2] == ["IPython", "display"] or parts[1:3] == ["core", "display"]
-            yield from () if harmless else (f"imports {name}" for name in sorted(dark))
+def _suspicious(node: Any, attributes: set[str], modules: set[str]) -> Iterator[str]:
+    """Yield what a node does that leads round the tests."""
+    match node:
+        case ast.Name(id=name) if name in NAMES:
+            yield "uses a magic or a shell" if name == "get_ipython" else f"uses {name}"
+        case ast.Name(id=name) | ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+            yield from [f"defines {name}"] * (name in METHODS)
+        case ast.Attribute(attr=name, ctx=ast.Load()):
+            yield from [f"uses {name}"] * (name in ATTRIBUTES)
+        case ast.Attribute(attr=name):  # `self` is an object that the student describes
+            if _root(node) in modules or (name in attributes and _root(node) != "self"):
+                yield f"replaces {ast.unparse(node)}"
+        case ast.Call(func=ast.Name(id="getattr"), args=args):
+            plain = any(isinstance(name, ast.Constant) for name in args[1:2])
+            yield from [f"uses {ast.unparse(node)}"] * (not plain)
+        case ast.Constant(value=str(name)) if name in (ATTRIBUTES | METHODS) - {"modules"}:
+            yield f"names {name}"
+        case ast.Import() | ast.ImportFrom():
+            place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+            for parts in ((place + alias.name).split(".") for alias in node.names):
+                dark = {parts[0], parts[-1]} & (MODULES | NAMES | ATTRIBUTES)
+                harmless = parts[:2] == ["IPython", "display"] or parts[1:3] == ["core", "display"]
+                yield from () if harmless else (f"imports {name}" for name in sorted(dark))

@@ -15,11 +15,9 @@ from tiny_class import Class, cell, make_template
 from tiny_set import ANSWERS, write_tiny_set
 from traitlets.config import Config
 
+from rbcourse.assignments import grade as grading
 from rbcourse.assignments.autograding import configure
-from rbcourse.assignments.grade import (
-    grade,
-    grade_all,
-)
+from rbcourse.assignments.grade import grade, grade_all
 from rbcourse.assignments.handout import read_config
 
 ROOT = Path(__file__).parents[2]
@@ -123,7 +121,9 @@ def course(tmp_path_factory, template):
     """All of them graded at once."""
     course = Class(tmp_path_factory.mktemp("a course"), template)
     hand_in_all(course)
-    grade("ps0", course.folder, memory=MEMORY)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(grading, "MEMORY", MEMORY)
+        grade("ps0", course.folder)
     return course
 
 
@@ -162,7 +162,7 @@ def test_points_and_remarks(rows, student, square, half, remarks):
     ("student", "why"),
     [
         ("replaces", "cell 3, answer of “A tiny set”, line 3 replaces math.isclose: grade by hand"),
-        ("dies", "Python ended in or before cell 5, answer of “A tiny set”: grade by hand"),
+        ("dies", "Python ended in or before cell 5, answer of “A tiny set”, or 600 s were over"),
         ("stripped", "the cells are not those of this problem set"),
         ("other set", "the cells are not those of this problem set"),
         ("pdf", "ps0.ipynb is no notebook, but a PDF or an archive; hand in the notebook"),
@@ -279,10 +279,13 @@ def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(
     tmp_path, template, monkeypatch
 ):
     course, places = Class(tmp_path, template), Path(tempfile.mkdtemp())
-    monkeypatch.setattr(tempfile, "tempdir", str(places))
+    with (tmp_path / "nbgrader_config.py").open("a") as config:
+        config.write("c.BoxedExecute.seconds = 9\n")
+    monkeypatch.setenv("TMPDIR", str(places))
     course.submit("ann", half="import time\nwhile True:\n    time.sleep(9)")
-    grade("ps0", tmp_path, seconds=1)
-    assert course.rows()["ann"]["remarks"] == "refused: not done after 1 s"
+    grade("ps0", tmp_path)
+    why = "refused: Python ended in or before cell 5, answer of “A tiny set”, or 9 s were over"
+    assert course.rows()["ann"]["remarks"].startswith(why)
     assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
 
 

@@ -265,9 +265,9 @@ def course(tmp_path_factory, template, monkeypatch_module):
     hand_in_all(course, server.getsockname()[1])
     course.before = state(course.folder)
     places = Path(tempfile.mkdtemp())
-    monkeypatch_module.setattr(tempfile, "tempdir", str(places))
-    grade("ps0", course.folder, seconds=120)
-    monkeypatch_module.setattr(tempfile, "tempdir", None)
+    monkeypatch_module.setenv("TMPDIR", str(places))
+    grade("ps0", course.folder)
+    monkeypatch_module.delenv("TMPDIR")
     assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
     assert not asked
     return course
@@ -428,17 +428,18 @@ def test_points_that_a_submission_writes_are_found(tmp_path, template, who, monk
         f'("{who}"))\')\nbook.commit()\n'
     )
     course.submit("bob")
-    plain = grading._grade_apart
+    plain = grading._result
 
-    def harmed(name, assignments, student, *limits):
-        found = plain(name, assignments, student, *limits)
+    def harmed(work, student):
+        found = plain(work, student)
         if student == "bob":
             subprocess.run([sys.executable, str(script)], check=True)
         return found
 
-    monkeypatch.setattr(grading, "_grade_apart", harmed)
+    monkeypatch.setattr(grading, "WORKERS", 1)
+    monkeypatch.setattr(grading, "_result", harmed)
     said = "bob has .* points" if who == "bob" else "The points of ann changed while bob"
     with pytest.raises(ValueError, match=said):
-        grading.grade("ps0", course.folder, workers=1)
+        grading.grade("ps0", course.folder)
     assert "bob" not in course.rows()  # of the table before
     assert (course.folder / "gradebook.before-ps0.db").exists()
