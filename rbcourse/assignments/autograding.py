@@ -27,12 +27,28 @@ from traitlets.config import Config
 
 from rbcourse.assignments import sandbox
 from rbcourse.assignments.client import CUT, BoundedClient
-from rbcourse.assignments.restore import is_answer, is_test, marks_of, name_cell, restore
+from rbcourse.assignments.restore import Refused, is_answer, is_test, marks_of, name_cell, restore
 from rbcourse.assignments.tampering import find_in_cells
 
+Resources = dict[str, Any]
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
 # what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
-TAGS = {"b", "blockquote", "br", "code", "dd", "del", "div", "dl", "dt", "em", "hr", "i", "img"}
+TAGS = {
+    "a",
+    "b",
+    "blockquote",
+    "br",
+    "code",
+    "dd",
+    "del",
+    "div",
+    "dl",
+    "dt",
+    "em",
+    "hr",
+    "i",
+    "img",
+}
 TAGS |= {"h1", "h2", "h3", "h4", "h5", "h6", "li", "ol", "p", "pre", "s", "span", "strong", "ul"}
 TAGS |= {"sub", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr"}
 LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
@@ -40,16 +56,12 @@ SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
 
-class RefusedError(ValueError):
-    """A submission that is not graded by machine; the message says why."""
-
-
 def configure(config: Config) -> None:
     """Set what nbgrader does with submissions and feedback, and where it finds its tools."""
     # to make a gradebook it calls alembic by name, which a shell finds in an activated environment
     if not shutil.which("alembic"):
-        tools = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
-        os.environ["PATH"] = os.pathsep.join(tools)
+        path = os.environ.get("PATH", os.defpath)
+        os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
     end = nbgrader.CheckCellMetadata
     config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
     config.Autograde.autograde_preprocessors = [
@@ -73,9 +85,8 @@ def configure(config: Config) -> None:
     ]
     # in the feedback and in the formgrader
     config.HTMLExporter.sanitize_html = True
-    here = "rbcourse.assignments.autograding"
-    filters = {"clean_html": f"{here}.inert_html", "markdown2html": f"{here}.inert_markdown"}
-    config.HTMLExporter.filters = filters
+    filters = {"clean_html": "inert_html", "markdown2html": "inert_markdown"}
+    config.HTMLExporter.filters = {key: f"{__name__}.{name}" for key, name in filters.items()}
 
 
 def inert_html(content: object) -> str:
@@ -96,10 +107,7 @@ def _is_inert(tag: str, name: str, value: str) -> bool:
 
 
 class _Renderer(IPythonRenderer):
-    """A renderer of Markdown that writes the address of a link instead of making one."""
-
-    def link(self, text: str, url: str, title: str | None = None) -> str:
-        return f"{text} ({html.escape(url)})"
+    """A renderer of Markdown that does not stumble over a picture that is missing."""
 
     def image(self, text: str, url: str, title: str | None = None) -> str:
         if url.startswith("attachment:") and url.partition(":")[2] not in self.attachments:
@@ -118,17 +126,12 @@ def inert_markdown(context: Any, source: str) -> str:
 class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
     """Restore the cells that students must not change; refuse what overrides what tests rely on."""
 
-    def preprocess(
-        self, nb: NotebookNode, resources: dict[str, Any]
-    ) -> tuple[NotebookNode, dict[str, Any]]:
+    def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Restore the notebook as it was released; what was changed is noted in its metadata."""
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
-        try:
-            remarks = restore(nb, original)
-        except ValueError as error:
-            raise RefusedError(str(error)) from error
+        remarks = restore(nb, original)
         if len(remarks) > 2:
             remarks[1:] = [f"and {len(remarks) - 1} more changes"]
         for cell in nb.cells:
@@ -137,10 +140,7 @@ class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
                 cell.source = re.sub(regions, r"\1-\2", cell.source)
         nb, resources = super().preprocess(nb, resources)
         for at, line, what in find_in_cells(nb.cells):
-            where = f"{name_cell(nb.cells, at)}, line {line} {what}"
-            if not what.startswith("defines "):  # as classes do, in earnest
-                raise RefusedError(f"{where}: grade by hand")
-            remarks.append(f"{where}: look at it")
+            raise Refused(f"{name_cell(nb.cells, at)}, line {line} {what}: grade by hand")
         nb.metadata = NotebookNode({"remarks": remarks})
         return nb, resources
 
@@ -150,9 +150,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
 
     seconds = Integer(600, help="for all cells together, in a box").tag(config=True)
 
-    def preprocess(
-        self, nb: NotebookNode, resources: dict[str, Any], km: Any = None
-    ) -> tuple[NotebookNode, dict[str, Any]]:
+    def preprocess(self, nb: NotebookNode, resources: Resources, km: Any = None) -> Any:
         """Run all cells; errors are among the outputs."""
         remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
         step: Any = self.parent
@@ -198,15 +196,13 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         """Start the kernel."""
         super().start_new_kernel(env=sandbox.environment(self.folder), **kwargs)
 
-    def preprocess_cell(
-        self, cell: NotebookNode, resources: dict[str, Any], index: int
-    ) -> tuple[NotebookNode, dict[str, Any]]:
+    def preprocess_cell(self, cell: NotebookNode, resources: Resources, index: int) -> Any:
         """Run a cell."""
         try:
             return super().preprocess_cell(cell, resources, index)
         except DeadKernelError as error:
             where = name_cell(self.nb.cells, index)
             over = f"or {self.seconds} s were over: grade by hand"
-            raise RefusedError(f"Python ended in or before {where}, {over}") from error
+            raise Refused(f"Python ended in or before {where}, {over}") from error
         except CellTimeoutError as error:
-            raise RefusedError(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error
+            raise Refused(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error

@@ -34,7 +34,6 @@ from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
 
 CELL_SECONDS = 60
-LARGE_BYTES = 20_000_000
 
 
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
@@ -53,10 +52,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     print(f"checking {path.name}, last saved {saved}", flush=True)
     if path.name != name:
         print(f"it is to be submitted under the name {name}")
-    number = len(notebook.cells)
     _list(restore(notebook, original))
-    if len(notebook.cells) != number:
-        print("cells are counted in the file to submit")
     for at, line, what in find_in_cells(notebook.cells):  # it could be meant to deceive the tests
         where = f"{name_cell(notebook.cells, at)}, line {line}"
         _list([f"{where} {what}: change it, or a person has to look"])
@@ -67,9 +63,6 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     nbformat.validate(notebook)
     content = (nbformat.writes(notebook) + "\n").encode()
     target = write_whole(path.parent / "to_submit" / name, content)
-    if len(content) > LARGE_BYTES:
-        size = f"{len(content) / 1e6:.0f} MB"
-        _list([f"the file has {size}: are there pictures in its text? Make them smaller"])
     print(
         f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run when it is graded; "
         f"the file to submit is {target}"
@@ -94,8 +87,7 @@ def _find_original(path: Path) -> tuple[str, bytes]:
     same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
     if len(same) != 1:
         raise ValueError(
-            f"{folder / path.name} is missing; unpack the handout again, put {path.name} into "
-            "its folder, and check it there"
+            f"{folder / path.name} is missing; unpack the handout again, and work there"
         )
     return same[0].name, same[0].read_bytes()
 
@@ -121,15 +113,13 @@ def _run(notebook: NotebookNode, folder: Path, own: str, seconds: int) -> list[s
         client.execute(env={**os.environ, "IPYTHONDIR": own})
     except (DeadKernelError, CellTimeoutError) as error:
         if isinstance(error, DeadKernelError):
-            died = f"the kernel died in cell {client.at + 1}: it called exit, or used up the memory"
-            remarks.append(died)
+            why = "it called exit, or used up the memory"
+            remarks.append(f"the kernel died in cell {client.at + 1}: {why}")
         cells[client.at].execution_count = None
         remarks.append(f"the cells after cell {client.at + 1} were not run")
     except (OSError, RuntimeError, KeyError) as error:
-        raise ValueError(
-            f"Python could not be started for the notebook ({error}); install what "
-            "requirements.txt of the handout lists"
-        ) from error
+        why = f"Python could not be started ({error})"
+        raise ValueError(f"{why}; install what requirements.txt of the handout lists") from error
     print(flush=True)
     long = f"took longer than {seconds} s and was stopped"
     remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
@@ -186,9 +176,8 @@ def main() -> None:
     """Check a problem set: ``python -m rbcourse.assignments.check FILE.ipynb``."""
     parser = argparse.ArgumentParser(prog="python -m rbcourse.assignments.check")
     parser.add_argument("file", type=Path, help="the notebook to be handed in: ps1.ipynb")
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a console may not know every letter
-            stream.reconfigure(errors="replace")
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
+        sys.stdout.reconfigure(errors="replace")
     try:
         check(parser.parse_args().file.absolute())
     except (OSError, ValueError, nbformat.ValidationError) as error:

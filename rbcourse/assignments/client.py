@@ -11,7 +11,6 @@ from traitlets import Integer
 
 from rbcourse.course.notebooks import kernel_address
 
-STOP_SECONDS = 20  # that an interrupted cell may take to stop
 PRINTED, DISPLAYED = 100_000, 2_000_000  # characters of a cell: in print, and of pictures and pages
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
@@ -27,15 +26,14 @@ class BoundedClient(NotebookClient):
     `cut` are the indices of the cells that took too long, and of which not all output is kept.
     """
 
-    iopub_timeout = Integer(STOP_SECONDS).tag(config=True)
+    iopub_timeout = Integer(20, help="an interrupted cell has so many seconds").tag(config=True)
     folder = Path()
 
     def __init__(self, *args: Any, **settings: Any) -> None:
         super().__init__(*args, **settings)
-        self.error_on_timeout, self.shutdown_kernel = SLOW, "immediate"
-        self.extra_arguments = ["--log-level=CRITICAL"]
         self.allow_errors = self.interrupt_on_timeout = self.coalesce_streams = True
-        self.record_timing = False
+        self.error_on_timeout, self.shutdown_kernel = SLOW, "immediate"
+        self.extra_arguments, self.record_timing = ["--log-level=CRITICAL"], False
 
     def reset_execution_trackers(self) -> None:
         """Begin to count."""
@@ -50,17 +48,12 @@ class BoundedClient(NotebookClient):
             setattr(manager, name, value)
         return manager
 
-    async def _async_handle_timeout(
-        self, timeout: int, cell: NotebookNode | None = None
-    ) -> dict[str, Any] | None:
+    async def _async_handle_timeout(self, timeout: int, cell: NotebookNode | None = None) -> Any:
         self.slow.append(self._at)
         self.raise_on_iopub_timeout = True  # what does not stop now cannot be stopped
-        reply: dict[str, Any] | None = await super()._async_handle_timeout(timeout, cell)
-        return reply
+        return await super()._async_handle_timeout(timeout, cell)
 
-    def process_message(
-        self, msg: dict[str, Any], cell: NotebookNode, cell_index: int
-    ) -> NotebookNode | None:
+    def process_message(self, msg: dict[str, Any], cell: NotebookNode, cell_index: int) -> Any:
         """Add an output to its cell, unless the cell has too many."""
         if cell_index != self._at:
             self._at, self.raise_on_iopub_timeout = cell_index, False
@@ -85,17 +78,13 @@ class BoundedClient(NotebookClient):
             self._left -= size
         return super().process_message(msg, cell, cell_index)
 
-    def handle_comm_msg(
-        self, outs: list[NotebookNode], msg: dict[str, Any], cell_index: int
-    ) -> None:
+    def handle_comm_msg(self, outs: Any, msg: dict[str, Any], cell_index: int) -> None:
         """Follow no widget: what an Output holds stands in its cell, and nothing is sent back.
 
         What nbclient sends back for an Output can keep it from seeing the reply of the cell.
         """
 
-    def on_cell_executed(
-        self, cell: NotebookNode, cell_index: int, execute_reply: dict[str, Any]
-    ) -> None:
+    def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
         """Keep the error that the reply names: without it a test would seem to pass."""
         reply = execute_reply["content"]
         if reply["status"] != "ok":

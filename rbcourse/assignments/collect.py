@@ -5,18 +5,17 @@ Canvas give. The date of a file in a download is often that of the download: one
 the due date shows that the file was in time, and a later one shows nothing.
 """
 
-import contextlib
 import csv
 import io
 import re
 import unicodedata
-import zipfile
 import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
+from zipfile import BadZipFile, ZipFile
 
 from rbcourse.assignments.restore import decode, grade_id, read_notebook
 from rbcourse.assignments.writing import write_csv, write_whole
@@ -30,24 +29,24 @@ CANVAS = re.compile(
     r"_(?P<number>\d+)_(?P<file>.+)"
 )
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
-FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
+FILE_BYTES = 30_000_000
 # RuntimeError is raised for a password, NotImplementedError, one of them, for a method
-BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
+BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
 Rows = list[tuple[str, str, str]]
 
 
 class Upload(NamedTuple):
-    """A notebook that a student handed in, named so that the one to take sorts last.
+    """A notebook that a student handed in; of several the one to take sorts last."""
 
-    Canvas gives numbers that rise; of an upload the file that was made to be submitted is taken.
-    """
-
-    number: int
+    number: int  # of Canvas, where they rise
     date: str
-    prepared: bool
+    prepared: bool  # made to be submitted
     file: str
     about: dict[str, str]
     content: bytes
+
+
+Uploads = Iterator[Upload]
 
 
 def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Rows:
@@ -68,16 +67,20 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
         else:
             rows.append(("unmatched", upload.file, why))
     namesakes = Counter((name, student) for name, student, _ in groups)
-    for (name, student), number in namesakes.items():
-        if number > 1 and (submitted / student / name).exists():
-            why = f"{number} have this name, and now their numbers too; delete this folder"
+    for (name, student), several in namesakes.items():
+        if several > 1 and (submitted / student / name).exists():
+            why = f"{several} have this name, and now their numbers too; delete this folder"
             rows.append(("duplicates", f"submitted/{student}/{name}", why))
     for (name, student, number), uploads in sorted(groups.items()):
         *others, best = sorted(uploads, key=lambda upload: upload[:4])
         who = student if namesakes[name, student] == 1 else f"{student}_{_plain(number)}"
         rows += [("duplicates", other.file, f"{best.file} is taken") for other in others]
         rows.append(_take(best, submitted / who / name))
-        rows += _tell_late(best, f"{who}, {name}", due)
+        if best.about.get("late"):
+            rows.append(("late", f"{who}, {name}", "Canvas marks it"))
+        elif due and "number" not in best.about and best.date > _written(due):
+            why = f"perhaps: dated {best.date}, which may be the download; look in Moodle"
+            rows.append(("late", f"{who}, {name}", why))
         if roster and who not in {row["id"] for row in roster}:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
     for name in sorted({name for name, *_ in groups}):
@@ -90,7 +93,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
     return rows
 
 
-def find(folder: Path, rows: Rows) -> Iterator[Upload]:
+def find(folder: Path, rows: Rows) -> Uploads:
     """Find the notebooks in a folder, in the zips in it, and in the zips of students."""
     for path in sorted(folder.rglob("*")):
         name = _shown(path.relative_to(folder).as_posix())
@@ -103,8 +106,6 @@ def find(folder: Path, rows: Rows) -> Iterator[Upload]:
 
 def _shown(name: str) -> str:
     """Return a name in composed letters that can be written and stand in a line."""
-    with contextlib.suppress(UnicodeError):  # many zips are in UTF-8 and do not say so
-        name = name.encode("cp437").decode("utf-8")
     name = name.encode("utf-8", "replace").decode("utf-8")
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
 
@@ -113,15 +114,15 @@ def _owner(name: str) -> re.Match[str] | None:
     return MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
 
 
-def _look(label: str, name: str, content: bytes, date: datetime, rows: Rows) -> Iterator[Upload]:
+def _look(label: str, name: str, content: bytes, date: datetime, rows: Rows) -> Uploads:
     """Look at a file; its name, with the zips that it was in, tells the student."""
     suffix, owner = Path(name).suffix.lower(), _owner(name)
     try:
         if JUNK.search(f"/{owner['file'] if owner else name}"):
             rows.append(("ignored", label, "not to be submitted"))
         elif suffix == ".zip":
-            with zipfile.ZipFile(io.BytesIO(content)) as archive:
-                yield from _look_into(archive, label, name, date, rows)
+            with ZipFile(io.BytesIO(content)) as zipped:
+                yield from _look_into(zipped, label, name, date, rows)
         elif suffix != ".ipynb":
             rows.append(("ignored", label, "no notebook, and no zip"))
         elif not owner:
@@ -135,20 +136,17 @@ def _look(label: str, name: str, content: bytes, date: datetime, rows: Rows) -> 
         rows.append(("refused", label, str(error)))
 
 
-def _look_into(
-    archive: zipfile.ZipFile, label: str, name: str, date: datetime, rows: Rows
-) -> Iterator[Upload]:
-    entries = [(_shown(e.filename), e) for e in archive.infolist() if not e.is_dir()]
+def _look_into(zipped: ZipFile, label: str, name: str, date: datetime, rows: Rows) -> Uploads:
+    entries = [(_shown(e.filename), e) for e in zipped.infolist() if not e.is_dir()]
     # the name of a whole download may look like that of an upload
     upload = _owner(name) and not any(_owner(inner) for inner, _ in entries)
-    size = sum(entry.file_size for _, entry in entries)
-    if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
-        raise ValueError("it holds a zip, or too much; unpack it by hand")
+    if upload and ".zip/" in name.lower():
+        raise ValueError("it is a zip in a zip; unpack it by hand")
     for inner, entry in entries:
         try:
             if entry.file_size > FILE_BYTES:
                 raise ValueError("too large")
-            content = archive.read(entry)
+            content = zipped.read(entry)
             # what a student packed has the dates of the student's machine
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:
@@ -245,12 +243,3 @@ def _take(best: Upload, place: Path) -> tuple[str, str, str]:
     write_whole(target, text)
     write_whole(stamp, f"{best.date}\n".encode())
     return "collected", best.file, why
-
-
-def _tell_late(upload: Upload, who: str, due: datetime | None) -> Rows:
-    if upload.about.get("late"):
-        return [("late", who, "Canvas marks it")]
-    if due and "number" not in upload.about and upload.date > _written(due):
-        why = f"dated {upload.date}, which may be the download; look in Moodle"
-        return [("late", who, f"perhaps: {why}")]
-    return []

@@ -20,14 +20,15 @@ from nbgrader.utils import capture_log, rmtree
 from traitlets.config import Config
 
 from rbcourse.assignments import sandbox
-from rbcourse.assignments.autograding import RefusedError, configure
+from rbcourse.assignments.autograding import configure
 from rbcourse.assignments.handout import find_set, read_config
-from rbcourse.assignments.restore import grade_id, is_answer, marks_of, read_notebook
+from rbcourse.assignments.restore import Refused, grade_id, is_answer, marks_of, read_notebook
 from rbcourse.assignments.writing import write_csv
 
 WORKERS = 2  # so many students are graded at once
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
+Work = Future[list[str]]
 
 
 def grade(name: str, assignments: Path) -> Path:
@@ -53,7 +54,7 @@ def grade(name: str, assignments: Path) -> Path:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
     with Gradebook(course.db_url) as gradebook:
         known, rows = _points(gradebook), dict[str, dict[str, Any]]()
-    todo, works = students[::-1], dict[Future[dict[str, Any]], str]()
+    todo, works = students[::-1], dict[Work, str]()
     with ProcessPoolExecutor(WORKERS, get_context("spawn"), _begin, (MEMORY,)) as pool:
         while todo or works:
             while todo and len(works) < WORKERS:
@@ -62,16 +63,14 @@ def grade(name: str, assignments: Path) -> Path:
             at_work = sorted(works.values())
             for work in wait(works, return_when=FIRST_COMPLETED).done:
                 student = works.pop(work)
-                found = _result(work, student)
                 with Gradebook(course.db_url) as gradebook:
                     now = _points(gradebook)
                     for other in sorted({*known, *now} - set(at_work)):
                         if known.get(other) != now.get(other):
-                            raise ValueError(
-                                f"The points of {other} changed while {' and '.join(at_work)} was "
-                                f"graded. gradebook.before-{name}.db holds what they were"
-                            )
-                    rows[student] = _row(gradebook, course, student, found)
+                            when = f"while {' and '.join(at_work)} was graded"
+                            where = f"gradebook.before-{name}.db holds what they were"
+                            raise ValueError(f"The points of {other} changed {when}. {where}")
+                    rows[student] = _row(gradebook, course, student, work)
                     known = now | {student: _points(gradebook).get(student)}
                 print(f"{student}: {_summary(rows[student])}", flush=True)
     first = {"set": name, "boxed": "no" if sandbox.missing() else "yes"}
@@ -102,8 +101,9 @@ def run_step(converter: Any, config: Config) -> dict[str, Any]:
 
 def last_line(done: dict[str, str]) -> str:
     """Return what went wrong in a run of nbgrader, as one line."""
-    raised = re.findall(r"^ *([\w.]+(?:Error|Exception|Entry)): (.*)$", done.get("log", ""), re.M)
-    refused = [what for kind, what in raised if kind.endswith("RefusedError")]
+    log, kinds = done.get("log", ""), "Error|Exception|Entry|Refused"
+    raised = re.findall(rf"(?m)^ *[\w.]*({kinds}): (.*)$", log)
+    refused = [what for kind, what in raised if kind == "Refused"]
     lines = refused or [what for _, what in raised] or done["error"].strip().splitlines()[-1:]
     return lines[0]
 
@@ -127,38 +127,27 @@ def _begin(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
 
 
-def _result(work: Future[dict[str, Any]], student: str) -> dict[str, Any]:
-    try:
-        return work.result()
-    except RefusedError as error:
-        return {"refused": str(error)}
-    except BrokenExecutor as error:
-        raise ValueError(f"Python ended while it graded {student}, or another") from error
-    except Exception as error:  # told, and the others are graded
-        return {"refused": f"{type(error).__name__}: {error}"}
-
-
-def grade_one(name: str, folder: Path, student: str) -> dict[str, Any]:
-    """Grade one submission."""
+def grade_one(name: str, folder: Path, student: str) -> list[str]:
+    """Grade one submission; return remarks on it."""
     config = course_config(name, folder)
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)
     if glob.escape(student) != student:  # nbgrader would take it for a pattern
-        raise RefusedError("the name of the folder holds [, * or ?: give it another")
+        raise Refused("the name of the folder holds [, * or ?: give it another")
     given = {path.name for path in find_set(name, folder).iterdir()}
     check_submission(folder / "submitted" / student / name, name, given)
     done = run_step(Autograde, config)
     if not done["success"]:
-        raise RefusedError(last_line(done))
-    remarks = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
+        raise Refused(last_line(done))
+    remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
     for key, words in _words(graded).items():
         if words != before.get(key, words):
             remarks.append(f"{key} is another answer than when it was graded before")
     done = run_step(GenerateFeedback, config)
     if not done["success"]:
         remarks.append(f"no feedback: {last_line(done)}")
-    return {"remarks": remarks}
+    return remarks
 
 
 def _words(path: Path) -> dict[str, str]:
@@ -169,37 +158,32 @@ def _words(path: Path) -> dict[str, str]:
 
 
 def check_submission(folder: Path, name: str, given: set[str]) -> None:
-    """Refuse what is no notebook of the right name, not as nbgrader reads it, or not alone.
-
-    nbgrader copies what lies beside it, and follows links; files of the set may lie there.
-    """
+    """Refuse what nbgrader does not read, or copies with it: links, files that were not given."""
     wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
     path = folder / wanted
     if wanted not in there:
-        raise RefusedError(f"there is no {wanted}, but {', '.join(there) or 'nothing'}")
+        raise Refused(f"there is no {wanted}, but {', '.join(there) or 'nothing'}")
     if any(place.is_symlink() for place in (folder, folder.parent, *folder.rglob("*"))):
-        raise RefusedError(f"{wanted}, or what is beside it, is a link")
+        raise Refused(f"{wanted}, or what is beside it, is a link")
     if others := sorted(set(there) - given - {wanted, "timestamp.txt"}):
-        raise RefusedError(f"there is more than {wanted}: take away {', '.join(others)}")
+        raise Refused(f"there is more than {wanted}: take away {', '.join(others)}")
     if path.stat().st_size > LARGEST:
-        raise RefusedError(f"{wanted} has more than {LARGEST:,} bytes")
+        raise Refused(f"{wanted} has more than {LARGEST:,} bytes")
     content = path.read_bytes()
-    try:
-        read_notebook(content, wanted)
-    except ValueError as error:
-        raise RefusedError(str(error)) from error
+    read_notebook(content, wanted)
     if content.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
-        raise RefusedError(f"{wanted} is not plain UTF-8: collect it again, or save it in Jupyter")
+        raise Refused(f"{wanted} is not plain UTF-8: collect it again, or save it in Jupyter")
 
 
-def _row(
-    gradebook: Any, course: CourseDirectory, student: str, found: dict[str, Any]
-) -> dict[str, Any]:
+def _row(gradebook: Any, course: CourseDirectory, student: str, work: Work) -> dict[str, Any]:
     """Return the row of a student in the table."""
-    name = course.assignment_id
-    if "refused" in found:
+    name, error = course.assignment_id, work.exception()
+    if isinstance(error, BrokenExecutor):
+        raise ValueError(f"Python ended while it graded {student}, or another") from error
+    if error:  # the others are graded
         _withdraw(gradebook, Path(course.root), name, student)
-        return {"remarks": f"refused: {_tidy(found['refused'])}"}
+        kind = "" if isinstance(error, Refused) else f"{type(error).__name__}: "
+        return {"remarks": f"refused: {_tidy(f'{kind}{error}')}"}
     submission = gradebook.find_submission_notebook(name, name, student)
     order = [cell.name for cell in submission.notebook.source_cells]
     grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))
@@ -215,7 +199,7 @@ def _row(
     row["maximum"] = f"{submission.max_score:g}"
     row["by hand"] = " ".join(to_do)
     row["late"] = f"{late / 3600:.1f} h" if late else ""
-    return row | {"remarks": "; ".join(map(_tidy, found["remarks"]))}
+    return row | {"remarks": "; ".join(map(_tidy, work.result()))}
 
 
 def _tidy(words: str) -> str:
@@ -239,11 +223,9 @@ def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:
 
 
 def _summary(row: dict[str, Any]) -> str:
-    if "total" not in row:
-        return str(row["remarks"])
-    parts = [f"graded, {row['total']} of {row['maximum']}"]
-    parts += [f"by hand: {row['by hand']}"] if row["by hand"] else []
-    return "; ".join([*parts, row["remarks"]] if row["remarks"] else parts)
+    points = f"graded, {row['total']} of {row['maximum']}" if "total" in row else ""
+    by_hand = f"by hand: {row['by hand']}" if row.get("by hand") else ""
+    return "; ".join(filter(None, [points, by_hand, row["remarks"]]))
 
 
 def grade_all(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:

@@ -14,43 +14,34 @@ from typing import Any
 import nbformat
 from nbformat import NotebookNode
 
-MERGE = re.compile(r"^(<{7}|>{7}) ", re.MULTILINE)
+
+class Refused(ValueError):
+    """What cannot be graded by machine; the message says why."""
 
 
 def decode(content: bytes) -> str:
-    r"""Return the text of a file in UTF-8 or, with its mark at the beginning, in UTF-16.
-
-    Examples
-    --------
-    >>> decode("ü".encode("utf-16")) == decode("ü".encode("utf-8-sig")) == "ü"
-    True
-    """
+    """Return the text of a file in UTF-8 or, with its mark at the beginning, in UTF-16."""
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     return content.decode("utf-16" if marked else "utf-8-sig")
 
 
 def read_notebook(content: bytes, name: str) -> NotebookNode:
-    """Return the notebook in a file; a ValueError says what the file is instead, and what helps."""
+    """Return the notebook in a file; the error says what the file is instead, and what helps."""
     if not content.strip():
-        raise ValueError(f"{name} is empty; open it in JupyterLab and save it, or start anew")
+        raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start anew")
     if content.startswith((b"%PDF", b"PK")):
-        raise ValueError(f"{name} is no notebook, but a PDF or an archive; hand in the notebook")
+        raise Refused(f"{name} is no notebook, but a PDF or an archive; hand in the notebook")
     logging.disable()  # nbformat logs and warns of cells without ids, which get them later
     try:
-        text = decode(content)
-        if MERGE.search(text):
-            raise ValueError("merge marks, <<<<<<< and >>>>>>>, are left in it")
         with warnings.catch_warnings(action="ignore"):
-            notebook = nbformat.reads(text, as_version=4)
+            notebook = nbformat.reads(decode(content), as_version=4)
             nbformat.validate(notebook)
         if not notebook.cells:
             raise ValueError("it has no cells")
     except Exception as error:  # whatever nbformat stumbles over
         why = (str(error).splitlines() or [type(error).__name__])[0][:80]
-        raise ValueError(
-            f"{name} is damaged or no notebook ({why}); take an earlier copy, or open it in "
-            "JupyterLab and save it again"
-        ) from error
+        cure = "take an earlier copy, or open it in JupyterLab and save it again"
+        raise Refused(f"{name} is damaged or no notebook ({why}); {cure}") from error
     finally:
         logging.disable(logging.NOTSET)
     return notebook
@@ -87,8 +78,8 @@ def title_of(cells: list[NotebookNode], at: int) -> str:
 def name_cell(cells: list[NotebookNode], at: int) -> str:
     """Return words by which a person finds a cell."""
     cell, title = cells[at], title_of(cells, at)
-    kind = "answer" if is_answer(cell) else "test" if is_test(cell) else "locked cell"
-    kind = kind if grade_id(cell) else "added cell"
+    given = "answer" if is_answer(cell) else "test" if is_test(cell) else "locked cell"
+    kind = given if grade_id(cell) else "added cell"
     return f"cell {at + 1}, {kind}" + f" of “{title}”" * bool(title)
 
 
@@ -101,10 +92,8 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     cells, wanted = notebook.cells, {grade_id(c): c for c in original.cells if grade_id(c)}
     last = {grade_id(cell): at for at, cell in enumerate(cells) if grade_id(cell)}
     if len(last.keys() & wanted.keys()) <= len(last.keys() - wanted.keys()):
-        raise ValueError(
-            "the cells are not those of this problem set; check that this is the right file, and "
-            "that it is the notebook handed out, not a new one"
-        )
+        why = "the cells are not those of this problem set"
+        raise Refused(f"{why}; check that this is the notebook handed out, not a new one")
     remarks = []
     for at, cell in enumerate(cells):
         name = grade_id(cell)

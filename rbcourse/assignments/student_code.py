@@ -8,7 +8,6 @@ import sys
 import textwrap
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from itertools import chain
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -68,9 +67,6 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             names = _names(value.__code__)
             # imported inside, a name is not among the globals
             found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
-            found += value.__defaults__ or ()
-            with suppress(ValueError):  # an enclosed name that has no value yet
-                found += [cell.cell_contents for cell in value.__closure__ or ()]
         elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
             found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
         elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:

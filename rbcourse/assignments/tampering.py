@@ -27,9 +27,6 @@ ATTRIBUTES |= {"attrgetter", "methodcaller"}
 MODULES = {"builtins", "ctypes", "gc", "importlib", "inspect", "IPython", "ipykernel", "pkgutil"}
 MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq", "jupyter_client", "pickle"}
 MODULES |= {"code", "codeop", "cProfile", "profile"}
-# an object that equals everything passes every test
-METHODS = {f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "bool", "array_ufunc")}
-METHODS |= {"__array_function__"}
 # magics and help that do no harm; of those that run code only their names are left out
 MAGICS = re.compile(
     r"(^%%capture\b[ \w-]*$|^[ \t]*%%?time(?:it)?\b(?: +-[nr] *\d+)*)"
@@ -42,30 +39,20 @@ LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast
 
 
 def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
-    """Find where the student's cells of a notebook override what its locked cells rely on.
-
-    Returns
-    -------
-    list of (int, int, str)
-        The index of the cell, the line in it, and what it does.
-    """
+    """Return the cell, its line, and what is done where a student overrides what tests rely on."""
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
     names = {_defines(node) for node in given}
-    attributes = ATTRIBUTES | METHODS | {n.attr for n in given if isinstance(n, ast.Attribute)}
-    modules = set[str]()  # and what is in them
+    attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
+    modules, found = set[str](), []  # modules and what is in them
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))
         elif isinstance(node, ast.Assign) and _root(node.value) in modules:
             modules |= {target.id for target in node.targets if isinstance(target, ast.Name)}
-    found = []
     for at in own:
-        said = {(line, f"gives {name} another meaning") for line, name in _bound(trees[at], names)}
-        for node in ast.walk(trees[at]):
-            line = getattr(node, "lineno", 0)
-            said |= {(line, what) for what in _suspicious(node, attributes, modules)}
+        said = {*_rebound(trees[at], names), *_suspicious(trees[at], attributes, modules)}
         found += [(at, *what) for what in sorted(said)]
     return found
 
@@ -98,8 +85,8 @@ def _root(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _bound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
-    """Yield which of the names the notebook binds, except by customary imports."""
+def _rebound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
+    """Yield where the notebook binds one of the names, except by customary imports."""
     todo: list[Any] = [tree]
     for node in todo:
         local = isinstance(node, LOCAL)
@@ -115,29 +102,34 @@ def _bound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
         elif isinstance(node, ast.alias):
             usual = CUSTOMARY.get(node.asname or "", node.asname or "").rpartition(".")[2]
             found = [node.asname] * (usual != node.name.rpartition(".")[2])
-        yield from ((node.lineno, name) for name in names.intersection(found) - {""})
+        for name in names.intersection(found) - {""}:
+            yield node.lineno, f"gives {name} another meaning"
 
 
-def _suspicious(node: Any, attributes: set[str], modules: set[str]) -> Iterator[str]:
-    """Yield what a node does that leads round the tests."""
-    match node:
-        case ast.Name(id=name) if name in NAMES:
-            yield "uses a magic or a shell" if name == "get_ipython" else f"uses {name}"
-        case ast.Name(id=name) | ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
-            yield from [f"defines {name}"] * (name in METHODS)
-        case ast.Attribute(attr=name, ctx=ast.Load()):
-            yield from [f"uses {name}"] * (name in ATTRIBUTES)
-        case ast.Attribute(attr=name):  # `self` is an object that the student describes
-            if _root(node) in modules or (name in attributes and _root(node) != "self"):
-                yield f"replaces {ast.unparse(node)}"
-        case ast.Call(func=ast.Name(id="getattr"), args=args):
-            plain = any(isinstance(name, ast.Constant) for name in args[1:2])
-            yield from [f"uses {ast.unparse(node)}"] * (not plain)
-        case ast.Constant(value=str(name)) if name in (ATTRIBUTES | METHODS) - {"modules"}:
-            yield f"names {name}"
-        case ast.Import() | ast.ImportFrom():
-            place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
-            for parts in ((place + alias.name).split(".") for alias in node.names):
-                dark = {parts[0], parts[-1]} & (MODULES | NAMES | ATTRIBUTES)
-                harmless = parts[:2] == ["IPython", "display"] or parts[1:3] == ["core", "display"]
-                yield from () if harmless else (f"imports {name}" for name in sorted(dark))
+def _suspicious(
+    tree: ast.Module, attributes: set[str], modules: set[str]
+) -> Iterator[tuple[int, str]]:
+    """Yield what leads round the tests."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name) if name in NAMES:
+                what = f"uses {name}" if name != "get_ipython" else "uses a magic or a shell"
+                yield node.lineno, what
+            case ast.Attribute(attr=name, ctx=ast.Load()) if name in ATTRIBUTES:
+                yield node.lineno, f"uses {name}"
+            case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
+                root = _root(node)  # `self` is an object that the student describes
+                if root in modules or (name in attributes and root != "self"):
+                    yield node.lineno, f"replaces {ast.unparse(node)}"
+            case ast.Call(func=ast.Name(id="getattr"), args=args):
+                if not any(isinstance(name, ast.Constant) for name in args[1:2]):
+                    yield node.lineno, f"uses {ast.unparse(node)}"
+            case ast.Constant(value=str(name)) if name in ATTRIBUTES - {"modules"}:
+                yield node.lineno, f"names {name}"
+            case ast.Import() | ast.ImportFrom():
+                place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+                for parts in ((place + alias.name).split(".") for alias in node.names):
+                    shown = parts[:2] == ["IPython", "display"] or parts[1:3] == ["core", "display"]
+                    dark = {parts[0], parts[-1]} & (MODULES | NAMES | ATTRIBUTES)
+                    for name in set() if shown else dark:
+                        yield node.lineno, f"imports {name}"

@@ -16,13 +16,7 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def quoted(cell: str) -> str:
-    """Return a cell that no spreadsheet takes for a formula.
-
-    Examples
-    --------
-    >>> quoted("=1+1"), quoted("ann")
-    ("'=1+1", 'ann')
-    """
+    """Return a cell that no spreadsheet takes for a formula."""
     return f"'{cell}" if cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell
 
 

@@ -300,7 +300,7 @@ def test_a_notebook_of_another_set_is_refused(release):
         (b'{"cells": 3}', "damaged or no notebook"),
         (b"\xff\xfe", "damaged or no notebook"),
         (b"%PDF-1.7", "a PDF or an archive"),
-        (b'{\n<<<<<<< HEAD\n"a": 1\n=======\n>>>>>>> b\n}', "merge marks"),
+        (b'{\n<<<<<<< HEAD\n"a": 1\n=======\n>>>>>>> b\n}', "damaged or no notebook"),
     ],
 )
 def test_what_is_no_notebook_is_refused_in_one_line(content, word, handout):

@@ -21,13 +21,10 @@ BORROWED = {
     "through its module": "import rbcourse as rb\ndef answer(w): return rb.exp_so3(w)",
     "through its submodule": "import rbcourse.so3\ndef answer(w): return rbcourse.so3.exp_so3(w)",
     "imported inside": "def answer(w):\n    from rbcourse import exp_so3\n    return exp_so3(w)",
-    "as a default": "from rbcourse import exp_so3\ndef answer(w, f=exp_so3): return f(w)",
     "by way of a helper": "from rbcourse import exp_so3\n"
     "def helper(w): return exp_so3(w)\ndef answer(w): return helper(w)",
     "by way of NumPy": "import numpy as np, rbcourse\n"
     "def answer(w): return np.apply_along_axis(rbcourse.exp_so3, 0, w)",
-    "in a closure": "import rbcourse\ndef make(f):\n    return lambda w: f(w)\n"
-    "answer = make(rbcourse.exp_so3)",
     "from the problem": "from rbcourse.assignments.problems.rotations import TURN_ABOUT\n"
     "def answer(w): return TURN_ABOUT.answer(w, 1.0)",
 }

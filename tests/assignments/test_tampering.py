@@ -58,8 +58,6 @@ def found(source, locked=LOCKED):
         ("getattr(x, 'mod' + 'ules')", "uses getattr(x, 'mod' + 'ules')"),
         ("setattr(P, 'accepts', print)", "uses setattr"),
         ("print(In[-1])", "uses In"),
-        ("class Yes(int): pass\nYes.__eq__ = print", "replaces Yes.__eq__"),
-        ("class Yes(int):\n    __eq__ = print", "defines __eq__"),
         ("put = setattr\nput(math, 'isclose', print)", "uses setattr"),
         ("setattr(*[math, 'isclose', print])", "uses setattr"),
         ("vars()['math'] = None", "uses vars"),
@@ -67,9 +65,7 @@ def found(source, locked=LOCKED):
         ("match 1:\n    case math: pass", "gives math another meaning"),
         ("import operator\noperator.attrgetter('x')", "uses attrgetter"),
         ("import pickle", "imports pickle"),
-        ("type('Y', (), {'__eq__': print})", "names __eq__"),
-        ("class Yes:\n    async def __eq__(self, other): pass", "defines __eq__"),
-        ("class Yes:\n    def __eq__(self, other):\n        return True", "defines __eq__"),
+        ("type('Y', (), {'__code__': print})", "names __code__"),
     ],
 )
 def test_what_replaces_the_means_of_the_tests_is_found(source, what):
@@ -103,6 +99,7 @@ def test_what_replaces_the_means_of_the_tests_is_found(source, what):
         "from ipywidgets import interact\ninteract(print, x=(0, 1))",
         "from tqdm.auto import tqdm\nfor i in tqdm(range(3)): pass",
         "from threading import Thread\nThread(target=print).start()",
+        "class Vector:\n    def __eq__(self, other):\n        return True",
         "class Body:\n    def accepts(self):\n        self.accepts = 1",
         "getattr(plt, 'figure')()",
         "import re\nre.compile('a')",

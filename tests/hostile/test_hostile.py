@@ -87,17 +87,6 @@ SNEAKS = {
     "mounts": "import subprocess\n"
     "subprocess.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
-# The kernel of Linux keeps keys beyond a process, and a machine inside another asks it by a socket.
-SNEAKS["keeps a key"] = """
-import platform
-import numpy
-ctypes = numpy.ctypeslib.ctypes
-libc = ctypes.CDLL(None, use_errno=True)
-number = {"x86_64": 248, "aarch64": 217}[platform.machine()]
-if libc.syscall(number, b"user", b"note", b"hidden", 6, -4) < 0:
-    raise OSError(ctypes.get_errno(), "no key is kept")
-"""
-SNEAKS["asks the machine outside"] = "import socket\nsocket.socket(40, socket.SOCK_STREAM)"
 # These do what they want, in the box; the points are those of their answers.
 LOUD = {
     "leaves daemons": "import subprocess\nfor _ in range(50):\n"
@@ -148,8 +137,6 @@ TRICKS = {
     "an alias": ("m = [math][0]\nm.isclose = print", "line 2 replaces m.isclose"),
     "locals": ("locals()['math'] = None", "line 1 uses locals"),
     "globals": ("globals()['math'] = None", "line 1 uses globals"),
-    "equal to all": ("class Y(int): pass\nY.__eq__ = print", "line 2 replaces Y.__eq__"),
-    "equal by name": ("type('Y', (), {'__eq__': print})", "line 1 names __eq__"),
     "reads what was run": ("print(In[-1])", "line 1 uses In"),
     "code in a text": ("exec('import math; math.isclose = print')", "line 1 uses exec"),
     "import by name": ("__import__('builtins').abs = print", "line 1 uses __import__"),
@@ -217,9 +204,6 @@ def hand_in_all(course, port):
     course.submit("tells", square=TELLS)
     course.submit("writes words", write_words)
     course.submit("forges remarks", forge_remarks)
-    course.submit(
-        "is equal", square="class Y(int):\n    def __eq__(self, other):\n        return True"
-    )
     course.submit("loops", half=loops(course.begin))
     course.submit("floods", half=f"{course.begin}\nwhile True: print('x' * 9**4)  # endless")
     course.submit("takes memory", half="x = bytearray(3 * 10**9)")
@@ -330,7 +314,6 @@ def test_ways_round_the_tests_are_named(course, rows, student):
         ("prints", "2", "1", "cell 5, answer of “A tiny set”: the output is too large"),
         ("raises", "0", "1", ""),
         ("forges remarks", "2", "1", "cell 1, locked cell of “A tiny set” was changed; it is put"),
-        ("is equal", "0", "1", "cell 3, answer of “A tiny set”, line 2 defines __eq__: look at it"),
         ("returns points", "2", "0", ""),
         ("changes tests", "2", "0", "cell 4, test of “A tiny set” was changed and has other"),
         ("drops tests", "0", "0", "cell 4, test of “A tiny set” was missing; it is put back"),
@@ -428,16 +411,16 @@ def test_points_that_a_submission_writes_are_found(tmp_path, template, who, monk
         f'("{who}"))\')\nbook.commit()\n'
     )
     course.submit("bob")
-    plain = grading._result
+    plain = grading.wait
 
-    def harmed(work, student):
-        found = plain(work, student)
-        if student == "bob":
+    def harmed(works, **how):
+        found = plain(works, **how)
+        if "bob" in works.values():
             subprocess.run([sys.executable, str(script)], check=True)
         return found
 
     monkeypatch.setattr(grading, "WORKERS", 1)
-    monkeypatch.setattr(grading, "_result", harmed)
+    monkeypatch.setattr(grading, "wait", harmed)
     said = "bob has .* points" if who == "bob" else "The points of ann changed while bob"
     with pytest.raises(ValueError, match=said):
         grading.grade("ps0", course.folder)
