@@ -25,6 +25,7 @@ def cell(notebook, grade_id):
 
 
 CONFIG = """
+import re
 import tempfile
 import time
 from pathlib import Path
@@ -41,7 +42,9 @@ ENDLESS = "endless"
 def limit(cell):
     if ENDLESS not in cell.source:
         return None
-    while not (begun := list(Path(tempfile.gettempdir()).glob("*/work/BEGUN"))):
+    own = re.search(r"BEGUN-\\w+", cell.source)
+    name = own[0] if own else "BEGUN-*"
+    while not (begun := list(Path(tempfile.gettempdir()).glob(f"*/work/{name}"))):
         time.sleep(0.01)
     begun[0].unlink()
     return 1
@@ -55,22 +58,27 @@ def make_template(folder):
     """Write a course folder with the tiny set and its gradebook.
 
     Only cells whose source says that they are endless have a limit, a second from when they write
-    the file that says that they have begun. Returned are the folder, the set as it is handed out,
-    and what writes that file.
+    a file that says that they have begun. Returned are the folder, the set as it is handed out,
+    and how the names of these files begin.
     """
     begun = f"begun-{uuid.uuid4().hex}"
     write_tiny_set(folder)
     (folder / "nbgrader_config.py").write_text(CONFIG.replace("BEGUN", begun))
     assert run_step(GenerateAssignment, course_config("ps0", folder))["success"]
-    return folder, release("ps0", folder)["ps0.ipynb"], f"open({begun!r}, 'w').close()"
+    return folder, release("ps0", folder)["ps0.ipynb"], begun
 
 
 class Class:
     """A course folder with the tiny set, and students who hand in."""
 
     def __init__(self, folder, template):
-        made, self.given, self.begin = template
+        made, self.given, self.begun = template
         self.folder = shutil.copytree(made, folder, dirs_exist_ok=True)
+
+    @property
+    def begin(self):
+        """What a cell writes when it begins; each has its own."""
+        return f"open('{self.begun}-{uuid.uuid4().hex}', 'w').close()"
 
     def gradebook(self):
         return Gradebook(f"sqlite:///{self.folder / 'gradebook.db'}")
