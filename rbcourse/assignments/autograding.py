@@ -30,27 +30,11 @@ from rbcourse.assignments.client import CUT, BoundedClient
 from rbcourse.assignments.restore import Refused, is_answer, is_test, marks_of, name_cell, restore
 from rbcourse.assignments.tampering import find_in_cells
 
-Resources = dict[str, Any]
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
 # what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
-TAGS = {
-    "a",
-    "b",
-    "blockquote",
-    "br",
-    "code",
-    "dd",
-    "del",
-    "div",
-    "dl",
-    "dt",
-    "em",
-    "hr",
-    "i",
-    "img",
-}
-TAGS |= {"h1", "h2", "h3", "h4", "h5", "h6", "li", "ol", "p", "pre", "s", "span", "strong", "ul"}
-TAGS |= {"sub", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr"}
+TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "div", "dl", "dt", "em", "hr", "i"}
+TAGS |= {"h1", "h2", "h3", "h4", "h5", "h6", "img", "li", "ol", "p", "pre", "s", "span", "strong"}
+TAGS |= {"sub", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr", "ul"}
 LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
@@ -64,25 +48,15 @@ def configure(config: Config) -> None:
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
     end = nbgrader.CheckCellMetadata
     config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
-    config.Autograde.autograde_preprocessors = [
-        BoxedExecute,
-        nbgrader.IgnorePattern,
-        nbgrader.SaveAutoGrades,
-        nbgrader.AssignLatePenalties,
-        end,
-    ]
+    run = [BoxedExecute, nbgrader.IgnorePattern, nbgrader.SaveAutoGrades]
+    config.Autograde.autograde_preprocessors = [*run, nbgrader.AssignLatePenalties, end]
     # nbgrader gives no points where anything is written to stderr, be it a mere warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."
     # the feedback is of a run that never held the hidden tests; the scores are in the gradebook
-    config.GenerateFeedback.preprocessors = [
-        nbgrader.GetGrades,
-        nbgrader.ClearHiddenTests,
-        nbgrader.ClearMarkScheme,
-        nbgrader.ClearOutput,
-        BoxedExecute,
-        CSSHTMLHeaderPreprocessor,
-    ]
+    clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
+    shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
+    config.GenerateFeedback.preprocessors = shown
     # in the feedback and in the formgrader
     config.HTMLExporter.sanitize_html = True
     filters = {"clean_html": "inert_html", "markdown2html": "inert_markdown"}
@@ -126,7 +100,7 @@ def inert_markdown(context: Any, source: str) -> str:
 class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
     """Restore the cells that students must not change; refuse what overrides what tests rely on."""
 
-    def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
+    def preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
         """Restore the notebook as it was released; what was changed is noted in its metadata."""
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
@@ -150,7 +124,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
 
     seconds = Integer(600, help="for all cells together, in a box").tag(config=True)
 
-    def preprocess(self, nb: NotebookNode, resources: Resources, km: Any = None) -> Any:
+    def preprocess(self, nb: NotebookNode, resources: Any, km: Any = None) -> Any:
         """Run all cells; errors are among the outputs."""
         remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
         step: Any = self.parent
@@ -196,7 +170,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         """Start the kernel."""
         super().start_new_kernel(env=sandbox.environment(self.folder), **kwargs)
 
-    def preprocess_cell(self, cell: NotebookNode, resources: Resources, index: int) -> Any:
+    def preprocess_cell(self, cell: NotebookNode, resources: Any, index: int) -> Any:
         """Run a cell."""
         try:
             return super().preprocess_cell(cell, resources, index)

@@ -39,8 +39,7 @@ CELL_SECONDS = 60
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
 
-    What is found is printed. The file of the student is only read; the file to submit has the
-    locked cells as in the original.
+    It runs in the student's folder. In the file to submit locked cells are as in the original.
     """
     if not path.exists():
         raise ValueError(f"{path} is missing: there is no such file")
@@ -52,13 +51,15 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     print(f"checking {path.name}, last saved {saved}", flush=True)
     if path.name != name:
         print(f"it is to be submitted under the name {name}")
-    _list(restore(notebook, original))
+    remarks = restore(notebook, original)
     for at, line, what in find_in_cells(notebook.cells):  # it could be meant to deceive the tests
         where = f"{name_cell(notebook.cells, at)}, line {line}"
-        _list([f"{where} {what}: change it, or a person has to look"])
+        remarks.append(f"{where} {what}: change it, or a person has to look")
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
-        _list(_run(notebook, path.parent, own, seconds))
+        remarks += _run(notebook, path.parent, own, seconds)
+    for what in remarks:
+        print(f"- {what}")
     passed = _print_problems(notebook, original)
     nbformat.validate(notebook)
     content = (nbformat.writes(notebook) + "\n").encode()
@@ -70,11 +71,6 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     return target
 
 
-def _list(remarks: list[str]) -> None:
-    for what in remarks:
-        print(f"- {what}", flush=True)
-
-
 def _find_original(path: Path) -> tuple[str, bytes]:
     """Return the name and the content of the set as it was handed out; the course can make it."""
     folder, course = path.parent / "original", Path("notebooks", "assignments")
@@ -82,7 +78,7 @@ def _find_original(path: Path) -> tuple[str, bytes]:
         from rbcourse.assignments.handout import release  # a student does not have nbgrader
 
         sets = [place.parent.name for place in course.glob("*/*/*.ipynb")]
-        name = next((own for own in sets if path.stem.startswith(own)), path.stem)
+        name = max((s for s in sets if path.stem.startswith(s)), key=len, default=path.stem)
         return f"{name}.ipynb", release(name, course)[f"{name}.ipynb"]
     same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
     if len(same) != 1:
@@ -118,7 +114,7 @@ def _run(notebook: NotebookNode, folder: Path, own: str, seconds: int) -> list[s
         cells[client.at].execution_count = None
         remarks.append(f"the cells after cell {client.at + 1} were not run")
     except (OSError, RuntimeError, KeyError) as error:
-        why = f"Python could not be started ({error})"
+        why = f"Python could not be started, or stopped ({error})"
         raise ValueError(f"{why}; install what requirements.txt of the handout lists") from error
     print(flush=True)
     long = f"took longer than {seconds} s and was stopped"

@@ -5,6 +5,7 @@ Canvas give. The date of a file in a download is often that of the download: one
 the due date shows that the file was in time, and a later one shows nothing.
 """
 
+import contextlib
 import csv
 import io
 import re
@@ -29,7 +30,7 @@ CANVAS = re.compile(
     r"_(?P<number>\d+)_(?P<file>.+)"
 )
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
-FILE_BYTES = 30_000_000
+FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
 # RuntimeError is raised for a password, NotImplementedError, one of them, for a method
 BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
 Rows = list[tuple[str, str, str]]
@@ -106,6 +107,8 @@ def find(folder: Path, rows: Rows) -> Uploads:
 
 def _shown(name: str) -> str:
     """Return a name in composed letters that can be written and stand in a line."""
+    with contextlib.suppress(UnicodeError):  # many zips are in UTF-8 and do not say so
+        name = name.encode("cp437").decode("utf-8")
     name = name.encode("utf-8", "replace").decode("utf-8")
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
 
@@ -138,15 +141,17 @@ def _look(label: str, name: str, content: bytes, date: datetime, rows: Rows) -> 
 
 def _look_into(zipped: ZipFile, label: str, name: str, date: datetime, rows: Rows) -> Uploads:
     entries = [(_shown(e.filename), e) for e in zipped.infolist() if not e.is_dir()]
-    # the name of a whole download may look like that of an upload
-    upload = _owner(name) and not any(_owner(inner) for inner, _ in entries)
-    if upload and ".zip/" in name.lower():
-        raise ValueError("it is a zip in a zip; unpack it by hand")
+    # the name of a whole download may look like that of an upload to Canvas
+    whole = label == name and not MOODLE.fullmatch(name) and any(_owner(n) for n, _ in entries)
+    upload, size = _owner(name) and not whole, sum(entry.file_size for _, entry in entries)
+    if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
+        raise ValueError("it is a zip in a zip, or too much; unpack it by hand")
     for inner, entry in entries:
+        wanted = inner.lower().endswith((".ipynb", ".zip"))
         try:
-            if entry.file_size > FILE_BYTES:
+            if wanted and entry.file_size > FILE_BYTES:
                 raise ValueError("too large")
-            content = zipped.read(entry)
+            content = zipped.read(entry) if wanted else b""
             # what a student packed has the dates of the student's machine
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:

@@ -5,11 +5,15 @@ import logging
 import os
 import re
 import shutil
+import signal
 import sys
 from collections.abc import Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_context
+from contextlib import ExitStack
+from functools import partial
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import nbformat
@@ -45,7 +49,10 @@ def grade(name: str, assignments: Path) -> Path:
     if not students:
         raise ValueError(f"There is no submission of {name}: submitted/STUDENT/{name}/{name}.ipynb")
     table = assignments / f"{name}-grades.csv"
-    table.open("a").close()  # here, and not at the end, it is told when it is open elsewhere
+    try:
+        table.open("a").close()
+    except PermissionError as error:
+        raise ValueError(f"{table} cannot be written: close it where it is open") from error
     before = Path(course.root, "gradebook.db")
     if before.exists():
         shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
@@ -54,26 +61,31 @@ def grade(name: str, assignments: Path) -> Path:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
     with Gradebook(course.db_url) as gradebook:
         known, rows = _points(gradebook), dict[str, dict[str, Any]]()
-    todo, works = students[::-1], dict[Work, str]()
-    with ProcessPoolExecutor(WORKERS, get_context("spawn"), _begin, (MEMORY,)) as pool:
+    boxed = not sandbox.missing()
+    todo, works = students[::-1], dict[Work, tuple[str, ProcessPoolExecutor]]()
+    worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY,))
+    with ExitStack() as stack:
+        free = [stack.enter_context(worker()) for _ in range(WORKERS)]
         while todo or works:
-            while todo and len(works) < WORKERS:
-                student = todo.pop()
-                works[pool.submit(grade_one, name, assignments, student)] = student
-            at_work = sorted(works.values())
+            while todo and free:
+                student, pool = todo.pop(), free.pop()
+                works[pool.submit(grade_one, name, assignments, student, boxed)] = student, pool
+            at_work = sorted(student for student, _ in works.values())
             for work in wait(works, return_when=FIRST_COMPLETED).done:
-                student = works.pop(work)
+                student, pool = works.pop(work)
+                broken = isinstance(work.exception(), BrokenExecutor)
+                free.append(stack.enter_context(worker()) if broken else pool)
                 with Gradebook(course.db_url) as gradebook:
                     now = _points(gradebook)
                     for other in sorted({*known, *now} - set(at_work)):
                         if known.get(other) != now.get(other):
-                            when = f"while {' and '.join(at_work)} was graded"
+                            when = f"during the grading of {' and '.join(at_work)}"
                             where = f"gradebook.before-{name}.db holds what they were"
                             raise ValueError(f"The points of {other} changed {when}. {where}")
                     rows[student] = _row(gradebook, course, student, work)
                     known = now | {student: _points(gradebook).get(student)}
                 print(f"{student}: {_summary(rows[student])}", flush=True)
-    first = {"set": name, "boxed": "no" if sandbox.missing() else "yes"}
+    first = {"set": name, "boxed": "yes" if boxed else "no"}
     write_csv(table, [{"student": student} | first | rows[student] for student in students])
     return table
 
@@ -102,10 +114,10 @@ def run_step(converter: Any, config: Config) -> dict[str, Any]:
 def last_line(done: dict[str, str]) -> str:
     """Return what went wrong in a run of nbgrader, as one line."""
     log, kinds = done.get("log", ""), "Error|Exception|Entry|Refused"
-    raised = re.findall(rf"(?m)^ *[\w.]*({kinds}): (.*)$", log)
-    refused = [what for kind, what in raised if kind == "Refused"]
-    lines = refused or [what for _, what in raised] or done["error"].strip().splitlines()[-1:]
-    return lines[0]
+    raised = re.findall(rf"(?m)^ *([\w.]*({kinds}))(?:: (.*))?$", log)
+    refused = [what for _, kind, what in raised if kind == "Refused"]
+    others = [what or name for name, _, what in raised]
+    return (refused or others or done["error"].strip().splitlines()[-1:])[0]
 
 
 def _points(gradebook: Any) -> dict[str, Any]:
@@ -117,7 +129,9 @@ def _points(gradebook: Any) -> dict[str, Any]:
 
 
 def _begin(memory: int) -> None:
-    """Let this process, and what it starts, print nothing; bound the memory of each."""
+    """Print nothing, with a bound on memory, in this process, which ends with its parent."""
+    parent: Any = parent_process()
+    Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
     with open(os.devnull, "r+b") as nowhere:
         for stream in (0, 1, 2):
             os.dup2(nowhere.fileno(), stream)
@@ -127,8 +141,12 @@ def _begin(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
 
 
-def grade_one(name: str, folder: Path, student: str) -> list[str]:
+def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
     """Grade one submission; return remarks on it."""
+    if hasattr(signal, "alarm"):
+        signal.alarm(1500)  # seconds, should all else fail
+    if boxed and sandbox.missing():
+        raise Refused(f"there is no box any more: {sandbox.missing()}")
     config = course_config(name, folder)
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
@@ -158,7 +176,7 @@ def _words(path: Path) -> dict[str, str]:
 
 
 def check_submission(folder: Path, name: str, given: set[str]) -> None:
-    """Refuse what nbgrader does not read, or copies with it: links, files that were not given."""
+    """Refuse what nbgrader cannot read, and what it would copy: links, files not handed out."""
     wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
     path = folder / wanted
     if wanted not in there:
@@ -178,12 +196,11 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
 def _row(gradebook: Any, course: CourseDirectory, student: str, work: Work) -> dict[str, Any]:
     """Return the row of a student in the table."""
     name, error = course.assignment_id, work.exception()
-    if isinstance(error, BrokenExecutor):
-        raise ValueError(f"Python ended while it graded {student}, or another") from error
     if error:  # the others are graded
         _withdraw(gradebook, Path(course.root), name, student)
-        kind = "" if isinstance(error, Refused) else f"{type(error).__name__}: "
-        return {"remarks": f"refused: {_tidy(f'{kind}{error}')}"}
+        why = str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
+        why = "its process ended, or took too long" if isinstance(error, BrokenExecutor) else why
+        return {"remarks": f"refused: {_tidy(why)}"}
     submission = gradebook.find_submission_notebook(name, name, student)
     order = [cell.name for cell in submission.notebook.source_cells]
     grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))

@@ -64,6 +64,7 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
     except (RuntimeError, ValidationError) as error:
         raise ValueError(f"{name} cannot be released: {error}") from error
     paths = sorted(path for path in source.rglob("*") if path.is_file())
+    paths = [path for path in paths if ".ipynb_checkpoints" not in path.parts]
     files = {path.relative_to(source).as_posix(): path.read_bytes() for path in paths}
     files[f"{name}.ipynb"] = (nbformat.writes(notebook) + "\n").encode()
     _refuse_leaks(name, given, files)
@@ -73,8 +74,7 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
 def _refuse_leaks(name: str, given: NotebookNode, files: dict[str, bytes]) -> None:
     """Raise a ValueError if a file has solutions, hidden tests or mark schemes of a notebook."""
     notebook = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
-    common = ("import ", "from ", "raise ")
-    taken = _lines(given) - _lines(notebook)
+    taken, common = _lines(given) - _lines(notebook), ("import ", "from ", "raise ")
     secrets = sorted(line for line in taken if len(line) >= 12 and not line.startswith(common))
     for path, content in files.items():
         texts = [content.decode("utf-8", errors="replace")]
@@ -82,6 +82,8 @@ def _refuse_leaks(name: str, given: NotebookNode, files: dict[str, bytes]) -> No
             texts = [text for cell in notebook.cells for text in (cell.source, str(cell.metadata))]
             if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
                 raise ValueError(f"{name}: nbgrader leaves the attachment of an answer there")
+        elif path.endswith(".ipynb"):
+            raise ValueError(f"{name}: {path} is a second notebook; a set has one")
         for text in texts:
             shown = [*(line for line in secrets if line in text), *LEFTOVER.findall(text)]
             if shown:
@@ -140,10 +142,7 @@ def pack(files: dict[str, bytes]) -> bytes:
 
 
 def make_solutions(name: str, assignments: Path) -> Path:
-    """Write ``handouts/NAME-solutions.ipynb``: the model answers, run, for after the deadline.
-
-    Hidden tests and mark schemes are left out.
-    """
+    """Write ``handouts/NAME-solutions.ipynb``: model answers, run, without hidden tests."""
     notebook = nbformat.read(find_set(name, assignments) / f"{name}.ipynb", as_version=4)
     for step in (nbgrader.ClearHiddenTests(), nbgrader.ClearMarkScheme()):
         notebook, _ = step.preprocess(notebook, {})

@@ -50,10 +50,7 @@ def _trouble(error: Exception) -> str:
 
 
 def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
-    """Yield what a function refers to, itself or by the student's other functions, of libraries.
-
-    The names of a function do not tell where they stand: of a module all is taken that has one.
-    """
+    """Yield what a function refers to, itself or by the student's other functions, of libraries."""
     permitted = [("rbcourse", name) for name in allowed]
     waiting, known = [(function, list[str]())], set[tuple[Any, ...]]()
     while waiting:
@@ -68,6 +65,7 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             # imported inside, a name is not among the globals
             found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
         elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
+            # a name does not tell where it stands: all that a module has is taken
             found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
         elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:
             yield f"{own}.{name}"

@@ -31,7 +31,7 @@ MODULES |= {"code", "codeop", "cProfile", "profile"}
 MAGICS = re.compile(
     r"(^%%capture\b[ \w-]*$|^[ \t]*%%?time(?:it)?\b(?: +-[nr] *\d+)*)"
     r"|^[ \t]*(?:%(?:matplotlib|precision|(?:load_ext +)?autoreload)\b[ \w.-]*"
-    r"|%config +InlineBackend\.\w+ *=[\w'\"{}\[\], -]*|\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+) *$",
+    r"|%config +InlineBackend\.\w+ *=[\w'\"{}\[\], -]*|(?:\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+) *)$",
     re.MULTILINE,
 )
 CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
@@ -39,7 +39,7 @@ LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast
 
 
 def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
-    """Return the cell, its line, and what is done where a student overrides what tests rely on."""
+    """Return where a student overrides what tests rely on: the cell, the line, what is done."""
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
@@ -89,9 +89,9 @@ def _rebound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
     """Yield where the notebook binds one of the names, except by customary imports."""
     todo: list[Any] = [tree]
     for node in todo:
-        local = isinstance(node, LOCAL)
-        inner = ast.walk(node) if local else ast.iter_child_nodes(node)
-        todo += [n for n in inner if not local or isinstance(n, ast.Global | ast.NamedExpr)]
+        todo += [] if isinstance(node, LOCAL) else ast.iter_child_nodes(node)
+    inner = (node for node in ast.walk(tree) if isinstance(node, ast.Global | ast.NamedExpr))
+    for node in {*todo, *inner}:
         found = [getattr(node, "name", "")]  # of definitions, and in match
         if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
             found = [node.id]

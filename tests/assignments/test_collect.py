@@ -176,10 +176,14 @@ def test_what_is_of_no_set_is_unmatched_and_says_why(course):
     assert students(course) == []
 
 
-def test_names_in_composed_letters_and_in_parts_are_one_student(course):
-    whole = "Jörg Müller_1_assignsubmission_file/ps1.ipynb"
+def test_names_in_utf8_that_is_not_declared_and_in_parts_are_one_student(course):
+    plain = "Jörg Müller_1_assignsubmission_file/ps1.ipynb"
+    content = answered(course)
+    undeclared = bytearray(packed({plain: content}))
+    for mark, at in ((b"PK\x03\x04", 7), (b"PK\x01\x02", 9)):
+        undeclared[undeclared.index(mark) + at] &= ~0x08
     parts = "Jo\u0308rg Mu\u0308ller_1_assignsubmission_file/ps1.ipynb"
-    rows = collected(course, {f"{w[2]}.zip": packed({w: answered(course)}) for w in (whole, parts)})
+    rows = collected(course, {"a.zip": bytes(undeclared), "b.zip": packed({parts: content})})
     assert students(course) == ["jörg_müller/ps1/ps1.ipynb"]
     assert len(of("duplicates", rows)) == 1
     assert all("Jörg Müller" in what for _, what, _ in rows)
@@ -258,6 +262,26 @@ def test_of_the_zip_of_a_student_what_was_made_to_be_submitted_is_taken(course):
     )
     collected(course, {"ek_5_6_up.zip": upload})
     assert words_of(course, "ek_5") == "to submit"
+
+
+@pytest.mark.parametrize(
+    "inner",
+    ["Bob Bee_2_assignsubmission_file/ps1.ipynb", "ps1_2026_11_final.ipynb", "img/plot_2026_11_20"],
+)
+def test_what_a_student_packs_is_of_that_student_whatever_its_name(course, inner):
+    upload = packed({"ps1.ipynb": answered(course), inner: answered(course)}, (2030, 1, 1, 0, 0, 0))
+    theirs = {"Ann Ay_1_assignsubmission_file/ps1.zip": upload}
+    collected(course, {"all.zip": packed(theirs)})
+    assert students(course) == ["ann_ay/ps1/ps1.ipynb"]
+    collected(course, theirs)
+    assert students(course) == ["ann_ay/ps1/ps1.ipynb"]
+
+
+def test_an_upload_that_holds_too_much_is_refused_at_once(course):
+    much = packed({f"{k}.mp4": bytes(10**7) for k in range(11)})
+    rows = collected(course, {"Ann Ay_1_assignsubmission_file/ps1.zip": much})
+    ((_, why),) = of("refused", rows)
+    assert why == "it is a zip in a zip, or too much; unpack it by hand"
 
 
 def _linked():

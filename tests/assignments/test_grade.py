@@ -5,10 +5,13 @@ import re
 import shutil
 import sys
 import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from textwrap import dedent
 
 import nbformat
+import psutil
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 from tiny_class import Class, cell, make_template
@@ -16,9 +19,11 @@ from tiny_set import ANSWERS, write_tiny_set
 from traitlets.config import Config
 
 from rbcourse.assignments import grade as grading
+from rbcourse.assignments import sandbox
 from rbcourse.assignments.autograding import configure
 from rbcourse.assignments.grade import grade, grade_all
 from rbcourse.assignments.handout import read_config
+from rbcourse.assignments.restore import Refused
 
 ROOT = Path(__file__).parents[2]
 HIDDEN = ["square(-3)==9", "isclose(half,0.5)"]
@@ -294,3 +299,49 @@ def test_the_commands_of_nbgrader_are_set_in_the_same_way():
     wanted = Config()
     configure(wanted)
     assert read_config(ROOT / "notebooks" / "assignments") == wanted
+
+
+class Killed(ProcessPoolExecutor):
+    """A worker that is killed when it begins with a student."""
+
+    def submit(self, work, name, folder, student, boxed):
+        if student == "bob":
+            work, name = os._exit, 1
+            return super().submit(work, name)
+        return super().submit(work, name, folder, student, boxed)
+
+
+def test_a_worker_that_dies_is_told_and_the_others_are_graded(tmp_path, template, monkeypatch):
+    course = Class(tmp_path, template)
+    for student in ("ann", "bob", "cyd", "dan"):
+        course.submit(student)
+    monkeypatch.setattr(grading, "ProcessPoolExecutor", Killed)
+    grade("ps0", tmp_path)
+    rows = course.rows()
+    assert rows["bob"]["remarks"] == "refused: its process ended, or took too long"
+    assert [rows[student]["total"] for student in ("ann", "cyd", "dan")] == ["3", "3", "3"]
+
+
+def test_nothing_runs_on_without_a_box_that_was_there(tmp_path, template, monkeypatch):
+    monkeypatch.setattr(sandbox, "missing", lambda: "it failed")
+    course = Class(tmp_path, template)
+    course.submit("ann")
+    with pytest.raises(Refused, match="there is no box any more: it failed"):
+        grading.grade_one("ps0", tmp_path, "ann", boxed=True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no box")
+def test_a_box_and_its_worker_end_with_the_process_that_grades(tmp_path, template):
+    course = Class(tmp_path, template)
+    asleep = f"8{os.getpid():08d}"
+    course.submit("ann", half=f"import subprocess\nsubprocess.run(['sleep', '{asleep}'])")
+    code = "from pathlib import Path; from rbcourse.assignments.grade import grade\n"
+    code += f"if __name__ == '__main__': grade('ps0', Path({str(tmp_path)!r}))\n"
+    (tmp_path / "begin.py").write_text(code)
+    job = psutil.Popen([sys.executable, str(tmp_path / "begin.py")], cwd=ROOT)
+    while not (begun := [p for p in psutil.process_iter(["cmdline"]) if asleep in str(p.info)]):
+        assert job.poll() is None
+        time.sleep(0.1)
+    family = [*job.children(recursive=True), *begun]
+    job.kill()
+    assert psutil.wait_procs(family, timeout=60)[1] == []

@@ -154,8 +154,16 @@ def test_a_file_with_a_solution_and_a_second_notebook_are_refused(tmp_path):
         release("ps0", tmp_path)
     (folder / "helper.py").unlink()
     (folder / "key.ipynb").write_bytes((folder / "ps0.ipynb").read_bytes())
-    with pytest.raises(ValueError, match=r"key\.ipynb gives away"):
+    with pytest.raises(ValueError, match=r"key\.ipynb is a second notebook"):
         release("ps0", tmp_path)
+
+
+def test_what_jupyter_leaves_there_is_left_out(tmp_path):
+    path = write_tiny_set(tmp_path)
+    left = path.parent / ".ipynb_checkpoints" / "ps0-checkpoint.ipynb"
+    left.parent.mkdir()
+    left.write_bytes(path.read_bytes())
+    assert set(release("ps0", tmp_path)) == {"ps0.ipynb"}
 
 
 def test_an_unknown_set_and_a_folder_without_sets_are_told_in_a_line(course, tmp_path):

@@ -125,3 +125,9 @@ def test_pyplot_may_be_imported_in_either_way():
 
 def test_what_the_locked_cells_do_themselves_is_in_order():
     assert found("x = 1", ["import math\nmath.tau = 6"]) == []
+
+
+def test_long_and_deep_code_is_read_in_a_moment():
+    """A second would be years if the time grew with the square of the length, or doubled."""
+    assert found("%matplotlib" + " " * 10**6 + ";")
+    assert found("f = " + "lambda: (a := " * 40 + "1" + ")" * 40) == []

@@ -108,18 +108,31 @@ LOUD = {
     "display({'image/png': '', 'text/plain': ''}, raw=True,\n"
     "    metadata={'filenames': {'image/png': 'https://evil.example/x.png'}})",
 }
+# It leaves what it has read for the next run: in a file, and with the keys that Linux keeps.
 TELLS = """
-import base64, linecache
+import base64, linecache, platform
+import numpy
+ctypes = numpy.ctypeslib.ctypes
+call = ctypes.CDLL(None).syscall
+add_key, keyctl = {"x86_64": (248, 250), "aarch64": (217, 219)}[platform.machine()]
 def square(x):
     code = "".join("".join(entry[2]) for entry in list(linecache.cache.values()))
     for text in (code, code[::-1], base64.b64encode(code.encode()).decode()):
         print(text)
+    for ring in (-3, -4):  # of the session, of the user
+        call(add_key, b"user", b"note", code[-5000:].encode(), len(code[-5000:].encode()), ring)
     try:
         with open('/tmp/kept', 'a') as file:
             file.write(code)
     except OSError:
         pass
     return x * x
+call(keyctl, 8, -4, -2)  # what the process has it may read
+for ring in (-3, -4):
+    key = call(keyctl, 10, ring, b"user", b"note", 0)
+    text = ctypes.create_string_buffer(9999)
+    if key > 0 and call(keyctl, 11, key, text, 9999) > 0:
+        print(text.value.decode())
 try:
     print(open('/tmp/kept').read())
 except OSError:
@@ -415,13 +428,14 @@ def test_points_that_a_submission_writes_are_found(tmp_path, template, who, monk
 
     def harmed(works, **how):
         found = plain(works, **how)
-        if "bob" in works.values():
+        if "bob" in [student for student, _ in works.values()]:
             subprocess.run([sys.executable, str(script)], check=True)
         return found
 
     monkeypatch.setattr(grading, "WORKERS", 1)
     monkeypatch.setattr(grading, "wait", harmed)
-    said = "bob has .* points" if who == "bob" else "The points of ann changed while bob"
+    changed = "The points of ann changed during the grading of bob"
+    said = "bob has .* points" if who == "bob" else changed
     with pytest.raises(ValueError, match=said):
         grading.grade("ps0", course.folder)
     assert "bob" not in course.rows()  # of the table before
