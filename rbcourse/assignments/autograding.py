@@ -81,7 +81,10 @@ def _is_inert(tag: str, name: str, value: str) -> bool:
 
 
 class _Renderer(IPythonRenderer):
-    """A renderer of Markdown that does not stumble over a picture that is missing."""
+    """A renderer of Markdown that writes the addresses of links and of missing pictures."""
+
+    def link(self, text: str, url: str, title: str | None = None) -> str:
+        return f"{text} ({html.escape(url)})"
 
     def image(self, text: str, url: str, title: str | None = None) -> str:
         if url.startswith("attachment:") and url.partition(":")[2] not in self.attachments:

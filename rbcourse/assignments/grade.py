@@ -143,10 +143,10 @@ def _begin(memory: int) -> None:
 
 def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
     """Grade one submission; return remarks on it."""
-    if hasattr(signal, "alarm"):
-        signal.alarm(1500)  # seconds, should all else fail
     if boxed and sandbox.missing():
         raise Refused(f"there is no box any more: {sandbox.missing()}")
+    if hasattr(signal, "alarm"):
+        signal.alarm(1500)  # seconds, should all else fail
     config = course_config(name, folder)
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"

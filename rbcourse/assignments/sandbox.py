@@ -40,7 +40,7 @@ def missing() -> str:
         return "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
-        words = [*box(Path(folder)), sys.executable, "-c", "import ipykernel, rbcourse"]
+        words = [*box(Path(folder), 60), sys.executable, "-c", "import ipykernel, rbcourse"]
         tried = subprocess.run(words, capture_output=True, text=True, errors="replace")
     if tried.returncode:
         said = (tried.stderr.strip() or f"it ended with {tried.returncode}").splitlines()[-1]
@@ -78,13 +78,15 @@ def environment(folder: Path) -> dict[str, str]:
     return kept | own | {"MPLCONFIGDIR": str(folder / "matplotlib")}
 
 
-def box(folder: Path) -> list[str]:
-    """Return the words that, before a command, run it in a box that can write to a folder only."""
+def box(folder: Path, seconds: int) -> list[str]:
+    """Return the words that run a command in a box, which can write to a folder only."""
     python = [sys.prefix, sys.base_prefix, str(Path(rbcourse.__file__).parent)]
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
     is_root = os.geteuid() == 0
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
-    words = ["bwrap", *(f"--unshare-{kind}" for kind in kinds), "--die-with-parent"]
+    # it ends with this process, and after some seconds
+    words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
+    words += ["bwrap", *(f"--unshare-{kind}" for kind in kinds), "--die-with-parent"]
     words += ["--new-session", "--cap-drop", "ALL", "--unsetenv", "JPY_PARENT_PID"]
     for power in ("SETUID", "SETGID", "DAC_READ_SEARCH"):  # until it becomes nobody
         words += ["--cap-add", f"CAP_{power}"] * is_root
@@ -114,8 +116,7 @@ def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
     spec = manager.kernel_spec
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()
-    # it ends with this process, and has keys (of keyctl, in Linux) of its own
-    words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
-    spec.argv = [*words, *box(folder), sys.executable, *spec.argv[1:]]
+    spec.argv = [*box(folder, seconds), sys.executable, *spec.argv[1:]]
+    # the keys of a session are kept by Linux: each kernel has its own session
     ctypes.CDLL(None).syscall(KEYCTL.get(platform.machine(), -1), 1, None)
     spec.interrupt_mode = "message"  # a signal would end the box

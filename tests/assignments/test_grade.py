@@ -344,4 +344,5 @@ def test_a_box_and_its_worker_end_with_the_process_that_grades(tmp_path, templat
         time.sleep(0.1)
     family = [*job.children(recursive=True), *begun]
     job.kill()
+    job.wait()
     assert psutil.wait_procs(family, timeout=60)[1] == []
