@@ -6,7 +6,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from rbcourse.assignments.handout import REGION
+from rbcourse.assignments.handout import LEFTOVER
 from rbcourse.book import build
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +41,7 @@ def test_problem_sets_come_without_solutions(written):
         assert "YOUR CODE HERE" in text
         assert "SOLUTION" not in text
         assert "HIDDEN" not in text
-        assert not REGION.search(text)
+        assert not LEFTOVER.search(text)
 
 
 def test_the_course_comes_along_without_the_notebooks_of_teachers(written):
