@@ -62,7 +62,7 @@ def test_a_lesson_can_be_shown_to_a_class(lesson, show, page, pictures):
 WHOLE = """() => {
   const top = document.querySelector(".lecture-above").getBoundingClientRect().bottom;
   const bottom = document.querySelector(".lecture-below").getBoundingClientRect().top;
-  const parts = "h1, h2, h3, p, li, tr, pre, figure, .rbcourse-explorer";
+  const parts = "h1, h2, h3, p, li, table, pre, figure, .rbcourse-explorer";
   window.seen ??= new Set();
   const all = [...document.querySelectorAll("#rendered_cells :is(" + parts + ")")]
     .filter((part) => part.checkVisibility() && part.getBoundingClientRect().height);
@@ -87,8 +87,9 @@ def test_widgets_are_shown_however_seldom_their_renderer_looks(show, page):
     assert "model not found" not in page.inner_text("#rendered_cells")
 
 
-def test_the_keys_of_a_remote_control_turn_the_pages(show, page):
-    show("02")
+@pytest.mark.parametrize("number", ["02", "13"])
+def test_the_keys_of_a_remote_control_turn_the_pages(number, show, page):
+    show(number)
     places, unseen = [], None
     while len(places) < 60 and (len(places) < 2 or places[-1] != places[-2]):
         if len(places) == 4:

@@ -24,6 +24,13 @@ const pages = (() => {
   const findBlocks = () =>
     everything().filter((block) => block.getBoundingClientRect().height && block.checkVisibility());
 
+  // The whole of a table is not cut, if a page has room for it.
+  const toStayWith = (block) => {
+    const table = block.closest("table");
+    const whole = table?.rows[0] === block && table.offsetHeight < screen() - 2 * margin();
+    return whole ? table : block;
+  };
+
   const isHeading = (block) => /^H[1-4]$/.test(block.tagName);
 
   // Headings that follow each other at once share a page, an answer begins below its question, and a
@@ -45,7 +52,7 @@ const pages = (() => {
         (i && isHeading(blocks[i - 1])) ||
         (part && top - last.top < 0.3 * screen() && fits(bottomOf(blocks.at(next - 1))));
       const begins = heading && !below;
-      if (begins || !fits(bottom)) {
+      if (begins || !fits(bottomOf(toStayWith(block)))) {
         last = { block, top, headings: [] };
         found.push(last);
         const step = 0.85 * screen();
