@@ -8,6 +8,7 @@ import io
 import logging
 import os
 import re
+import shutil
 import sys
 import tempfile
 import time
@@ -39,7 +40,7 @@ CELL_SECONDS = 60
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
 
-    It runs in the student's folder. In the file to submit locked cells are as in the original.
+    The student's files are only read. In the file to submit locked cells are as in the original.
     """
     if not path.exists():
         raise ValueError(f"{path} is missing: there is no such file")
@@ -57,7 +58,10 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
         remarks.append(f"{where} {what}: change it, or a person has to look")
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
-        remarks += _run(notebook, path.parent, own, seconds)
+        for file in path.parent.iterdir():
+            if file.is_file() and file.suffix not in (".whl", ".zip"):
+                shutil.copy(file, own)
+        remarks += _run(notebook, own, seconds)
     for what in remarks:
         print(f"- {what}")
     passed = _print_problems(notebook, original)
@@ -98,13 +102,13 @@ class _Client(BoundedClient):
         print(f"\rrunning cell {self.at + 1} of {len(self.nb.cells)} ", end="", flush=True)
 
 
-def _run(notebook: NotebookNode, folder: Path, own: str, seconds: int) -> list[str]:
+def _run(notebook: NotebookNode, own: str, seconds: int) -> list[str]:
     """Run all cells; say what did not go well, except in a problem."""
     log = logging.getLogger(__name__)
     log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
     cells, remarks = notebook.cells, list[str]()
     client = _Client(notebook, log=log, kernel_name=KERNEL["name"], timeout=seconds)
-    client.folder, client.resources = Path(own), {"metadata": {"path": str(folder)}}
+    client.folder, client.resources = Path(own), {"metadata": {"path": own}}
     try:
         client.execute(env={**os.environ, "IPYTHONDIR": own})
     except (DeadKernelError, CellTimeoutError) as error:

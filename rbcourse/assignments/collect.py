@@ -15,7 +15,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 from zipfile import BadZipFile, ZipFile
 
 from rbcourse.assignments.restore import decode, grade_id, read_notebook
@@ -101,8 +101,9 @@ def find(folder: Path, rows: Rows) -> Uploads:
         if path.is_symlink():
             rows.append(("refused", name, "a link"))
         elif path.is_file():
-            date = datetime.fromtimestamp(path.stat().st_mtime)
-            yield from _look(name, name, path.read_bytes(), date, rows)
+            with path.open("rb") as stream:
+                date = datetime.fromtimestamp(path.stat().st_mtime)
+                yield from _look(name, name, stream, date, rows)
 
 
 def _shown(name: str) -> str:
@@ -117,21 +118,21 @@ def _owner(name: str) -> re.Match[str] | None:
     return MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
 
 
-def _look(label: str, name: str, content: bytes, date: datetime, rows: Rows) -> Uploads:
+def _look(label: str, name: str, stream: IO[bytes], date: datetime, rows: Rows) -> Uploads:
     """Look at a file; its name, with the zips that it was in, tells the student."""
     suffix, owner = Path(name).suffix.lower(), _owner(name)
     try:
         if JUNK.search(f"/{owner['file'] if owner else name}"):
             rows.append(("ignored", label, "not to be submitted"))
         elif suffix == ".zip":
-            with ZipFile(io.BytesIO(content)) as zipped:
+            with ZipFile(stream) as zipped:
                 yield from _look_into(zipped, label, name, date, rows)
         elif suffix != ".ipynb":
             rows.append(("ignored", label, "no notebook, and no zip"))
         elif not owner:
             rows.append(("unmatched", label, "its name names no student"))
         else:
-            read_notebook(content, "it")
+            read_notebook(content := stream.read(), "it")
             about = {key: value or "" for key, value in owner.groupdict().items()}
             number, prepared = int(about.get("number", 0)), "/to_submit/" in f"/{about['file']}"
             yield Upload(number, _written(date), prepared, label, about, content)
@@ -158,7 +159,7 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime, rows: Row
             rows.append(("refused", f"{label}: {inner}", str(error)))
         else:
             full = f"{name}/{inner}" if upload else inner
-            yield from _look(f"{label}: {inner}", full, content, when, rows)
+            yield from _look(f"{label}: {inner}", full, io.BytesIO(content), when, rows)
 
 
 def _written(date: datetime) -> str:

@@ -92,8 +92,7 @@ def grade(name: str, assignments: Path) -> Path:
 
 def course_config(name: str, assignments: Path) -> Config:
     """Return the settings of nbgrader for a set."""
-    source = find_set(name, assignments)
-    config = Config()
+    source, config = find_set(name, assignments), Config()
     configure(config)
     config.merge(read_config(assignments))
     config.CourseDirectory.root = os.path.realpath(assignments)
@@ -129,7 +128,7 @@ def _points(gradebook: Any) -> dict[str, Any]:
 
 
 def _begin(memory: int) -> None:
-    """Print nothing, with a bound on memory, in this process, which ends with its parent."""
+    """Silence this process, bound its memory, and let it end with its parent."""
     parent: Any = parent_process()
     Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
     with open(os.devnull, "r+b") as nowhere:
@@ -145,9 +144,9 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
     """Grade one submission; return remarks on it."""
     if boxed and sandbox.missing():
         raise Refused(f"there is no box any more: {sandbox.missing()}")
-    if hasattr(signal, "alarm"):
-        signal.alarm(1500)  # seconds, should all else fail
     config = course_config(name, folder)
+    if hasattr(signal, "alarm"):  # should all else fail, in two runs
+        signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)

@@ -5,7 +5,6 @@ and the package, and nothing else of the disk; it has no network and few environ
 What it starts ends with it. Outside Linux, and where bubblewrap does not work, there is no box.
 """
 
-import ctypes
 import functools
 import os
 import platform
@@ -25,7 +24,10 @@ import rbcourse
 PROCESSES = 128  # and threads
 FILE_BYTES = 100_000_000
 NOBODY = 2**30  # and above: who is nobody else; where root grades, limits would not hold
-KEYCTL = {"x86_64": 250, "aarch64": 219}  # the number of a call of Linux
+# Linux keeps the keys of a session beyond its processes: a command begins a session of its own
+KEYCTL = {"x86_64": 250, "aarch64": 219}.get(platform.machine(), -1)
+ALONE = f"import ctypes, os, sys; ctypes.CDLL(None).syscall({KEYCTL}, 1, None); "
+ALONE += "os.execvp(sys.argv[1], sys.argv[1:])"
 KEPT = ("PATH", "LANG", "LC_ALL", "LC_CTYPE", "TZ", "SYSTEMROOT", "PATHEXT")
 SYSTEM = ["/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32"]
 SYSTEM += ["/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtime", "/nix/store"]
@@ -86,11 +88,11 @@ def box(folder: Path, seconds: int) -> list[str]:
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
     # it ends with this process, and after some seconds
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
-    words += ["bwrap", *(f"--unshare-{kind}" for kind in kinds), "--die-with-parent"]
-    words += ["--new-session", "--cap-drop", "ALL", "--unsetenv", "JPY_PARENT_PID"]
+    words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]
+    words += [*(f"--unshare-{kind}" for kind in kinds), "--cap-drop", "ALL"]
     for power in ("SETUID", "SETGID", "DAC_READ_SEARCH"):  # until it becomes nobody
         words += ["--cap-add", f"CAP_{power}"] * is_root
-    words += ["--dir", "/etc", "--proc", "/proc", "--dev", "/dev"]
+    words += ["--unsetenv", "JPY_PARENT_PID", "--dir", "/etc", "--proc", "/proc", "--dev", "/dev"]
     for path in SYSTEM:
         link = os.path.islink(path)
         words += ["--symlink", os.readlink(path), path] if link else ["--ro-bind-try", path, path]
@@ -117,6 +119,4 @@ def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()
     spec.argv = [*box(folder, seconds), sys.executable, *spec.argv[1:]]
-    # the keys of a session are kept by Linux: each kernel has its own session
-    ctypes.CDLL(None).syscall(KEYCTL.get(platform.machine(), -1), 1, None)
     spec.interrupt_mode = "message"  # a signal would end the box

@@ -35,6 +35,7 @@ MAGICS = re.compile(
     re.MULTILINE,
 )
 CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
+Said = Iterator[tuple[int, str]]  # the line, and what is done
 LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast.comprehension
 
 
@@ -85,7 +86,7 @@ def _root(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _rebound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
+def _rebound(tree: ast.Module, names: set[str]) -> Said:
     """Yield where the notebook binds one of the names, except by customary imports."""
     todo: list[Any] = [tree]
     for node in todo:
@@ -106,15 +107,12 @@ def _rebound(tree: ast.Module, names: set[str]) -> Iterator[tuple[int, str]]:
             yield node.lineno, f"gives {name} another meaning"
 
 
-def _suspicious(
-    tree: ast.Module, attributes: set[str], modules: set[str]
-) -> Iterator[tuple[int, str]]:
+def _suspicious(tree: ast.Module, attributes: set[str], modules: set[str]) -> Said:
     """Yield what leads round the tests."""
     for node in ast.walk(tree):
         match node:
             case ast.Name(id=name) if name in NAMES:
-                what = f"uses {name}" if name != "get_ipython" else "uses a magic or a shell"
-                yield node.lineno, what
+                yield node.lineno, f"uses {'a magic or a shell' if name == 'get_ipython' else name}"
             case ast.Attribute(attr=name, ctx=ast.Load()) if name in ATTRIBUTES:
                 yield node.lineno, f"uses {name}"
             case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):

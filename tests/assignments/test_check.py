@@ -98,7 +98,7 @@ def test_an_answered_set_is_run_and_written(handout):
 
 def test_failing_tests_are_named_with_their_hint_and_do_not_keep_from_handing_in(handout, capsys):
     def edit(notebook):
-        notebook.cells.append(new_code_cell("nowhere"))
+        notebook.cells.append(new_code_cell("open('made_by_a_run', 'w').close(); nowhere"))
 
     edited(handout, edit, **{"square-answer": "def square(x):\n    return x"})
     check.check(handout / "ps0.ipynb")
@@ -106,6 +106,7 @@ def test_failing_tests_are_named_with_their_hint_and_do_not_keep_from_handing_in
     assert "FAILED  A tiny set: cell 4 AssertionError: times itself; cell 8 is graded by" in said
     assert "1 of 2 visible tests passed" in said
     assert "NameError: name 'nowhere' is not defined" in said
+    assert not (handout / "made_by_a_run").exists()
 
 
 def test_a_changed_test_does_not_help_and_the_name_is_put_right(handout, capsys):

@@ -24,7 +24,7 @@ const pages = (() => {
   const findBlocks = () =>
     everything().filter((block) => block.getBoundingClientRect().height && block.checkVisibility());
 
-  // The whole of a table is not cut, if a page has room for it.
+  // A table is not cut where a page has room for the whole of it.
   const toStayWith = (block) => {
     const table = block.closest("table");
     const whole = table?.rows[0] === block && table.offsetHeight < screen() - 2 * margin();
