@@ -9,11 +9,11 @@ from pathlib import Path
 
 import nbval.kernel
 import pytest
-from freshness import changed_lines, stale_figures
 from nbformat import NotebookNode
 from nbval.plugin import IPyNbFile
 from shown import not_shown, start_recording
 
+from rbcourse.course.agreement import changed_lines, stale_figures
 from rbcourse.course.notebooks import kernel_address, lesson_paths, normalised
 
 ROOT = Path(__file__).parent
@@ -98,9 +98,10 @@ class Remains(pytest.Item):
             for output in cell.test_outputs:
                 if "execution_count" in output:  # nbval does not count
                     output.execution_count = cell.cell.execution_count
+        stale = stale_figures(Path(lesson.figures.name), ROOT / "figures")
         changes = [
             *changed_lines(lesson.path.read_text("utf-8"), normalised(lesson.nb)),
-            *stale_figures(Path(lesson.figures.name), ROOT / "figures"),
+            *(f"{name} is not stored as it is drawn" for name in stale),
             *not_shown(Path(lesson.figures.name), Path(lesson.shown.name)),
         ]
         if changes:

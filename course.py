@@ -49,7 +49,8 @@ def main():
     """Read the command line, set up what is missing, do the task."""
     parser = argparse.ArgumentParser(prog="course.py", description=__doc__.splitlines()[0])
     tasks = parser.add_subparsers(dest="task", required=True, metavar="TASK")
-    tasks.add_parser("figures", help="run every lesson and explorer; rewrite outputs and figures/")
+    figures = tasks.add_parser("figures", help="run lessons again; rewrite what has changed")
+    figures.add_argument("lessons", nargs="*", metavar="LESSON", help="03; without, all, and the explorers")
     test = tasks.add_parser("test", help="run every test, lessons too; further words go to pytest")
     releases = test.add_mutually_exclusive_group()
     for name in ("oldest", "newest"):
@@ -86,6 +87,9 @@ def main():
     tasks.add_parser("atlas", help="compute the atlas of real bodies anew; goes on when stopped")
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")
+    if len(sys.argv) == 1:
+        parser.print_help()
+        return
     known, further = parser.parse_known_args()
     # the tests start about a hundred processes, which would all compile what they import
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -99,8 +103,9 @@ def main():
         return
     set_up()
     if known.task == "figures":
-        run("-m", "rbcourse.course.notebooks", "regenerate")
-        run("-m", "rbcourse.explore.recorded", "figures/explorers")
+        run("-m", "rbcourse.course.notebooks", "regenerate", *known.lessons)
+        if not known.lessons:
+            run("-m", "rbcourse.explore.recorded", "figures/explorers")
     elif known.task == "test":
         test_in(VENV, *further)
     elif known.task == "lab":
@@ -274,22 +279,29 @@ def make(venv, wanted, *words):
     if found == wanted and python(venv).exists():
         return
     if found is None and os.path.lexists(venv):
+        delete = "Remove-Item -Recurse" if os.name == "nt" else "rm -r"
         sys.exit(
-            "%s was not made by course.py: move it away or delete it, then try again." % venv.name
+            "%s was not made by course.py. Move it away, or delete it with '%s %s'; then try again."
+            % (venv.name, delete, venv.name)
         )
     if Path(sys.prefix).resolve() == venv.resolve():
-        sys.exit("The environment has to be made anew: leave it first with 'deactivate'.")
+        sys.exit(
+            "The environment has to be made anew, and this Python is in it: leave it with "
+            "'deactivate', or call %s course.py." % getattr(sys, "_base_executable", "python3")
+        )
     print("Setting up %s; about a minute" % venv.name, end="", flush=True)
     try:
         if venv.exists():
             shutil.rmtree(venv)
     except OSError as error:
         sys.exit("\n%s is in use (%s). Close JupyterLab and try again." % (venv.name, error))
+    venv.mkdir()
+    stamp.write_text("unfinished")  # first, so that the next call knows what was interrupted
     if UV:
-        patiently(UV, "venv", "--seed", "--python", sys.executable, str(venv))
+        how = ("--seed", "--allow-existing", "--python", sys.executable)
+        patiently(UV, "venv", *(how + (str(venv),)))
     else:
         patiently(sys.executable, "-m", "venv", str(venv))
-    stamp.write_text("unfinished")
     install(venv, *words)
     patiently(str(python(venv)), "-c", "import matplotlib.pyplot")  # looks for fonts, once
     stamp.write_text(wanted)

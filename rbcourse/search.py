@@ -41,6 +41,7 @@ ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bo
 SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
 ASIDE = 0.5  # rad
+TIE = 1e-9  # costs that differ by less, as a share, are equal: the first curve found is kept
 QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
 ROUGHLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 0.02}
 SLOWLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 1e-6}  # where two curves part
@@ -216,16 +217,30 @@ def _leave_the_axis(task: Task, which: Numbers, found: list[Solution | Failure])
         one = found[i]
         if isinstance(one, Solution):
             w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
-            _, size, axes = np.linalg.svd(w, full_matrices=False)
+            size = np.linalg.svd(w, compute_uv=False)
             if size[0] > 0 and size[1] < FLAT * size[0]:
-                sides = ASIDE * np.concatenate([axes[1:], -axes[1:]])[:, None]
+                sides = ASIDE * _across(w / size[0], task.functional.of(np.array([i])).G[0])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
     number = np.array(problem, int)
     R, cost = lowered(task.functional.of(number), np.concatenate(bent), **SLOWLY)
-    cheaper = cost < _costs(found)[number]
+    cheaper = cost < (1 - TIE) * _costs(found)[number]
     _follow(task, number[cheaper], R[cheaper], found)
+
+
+def _across(w: Array, G: Array) -> Array:
+    """Return four sides of the axis that w (n, 3) turns about, nearly: shape (4, 3).
+
+    They are those to which w leans. Where it does not, the body decides, and where all its axes are
+    alike, their order: never rounding, nor the sign that the SVD gives.
+    """
+    leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
+    axes = np.linalg.svd(leans, full_matrices=False)[2][1:]
+    size = np.abs(axes)
+    largest = np.argmax(size > (1 - TIE) * size.max(axis=1, keepdims=True), axis=1)
+    axes *= np.sign(axes[[0, 1], largest])[:, None]
+    return np.concatenate([axes, -axes])
 
 
 def _follow_on(
@@ -275,7 +290,10 @@ def _started(task: Task, which: Numbers, n: int) -> tuple[Numbers, Array]:
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Put what is found from these curves into `found`, where it costs less."""
+    """Put what is found from these curves into `found`, where it costs less.
+
+    Of curves that cost the same the first one stays, so that rounding does not decide.
+    """
     for i, one in zip(problem, task.solver(task.equations.of(problem), R), strict=True):
-        if found[i] is NOTHING or cost_of(one) < cost_of(found[i]):
+        if found[i] is NOTHING or cost_of(one) < (1 - TIE) * cost_of(found[i]):
             found[i] = one

@@ -9,10 +9,10 @@ from pathlib import Path
 import nbformat
 import numpy as np
 import pytest
-from freshness import BASE64
 from PIL import Image
 
 from rbcourse.course import notebooks
+from rbcourse.course.agreement import BASE64
 
 ROOT = Path(__file__).parents[1]
 LESSONS = notebooks.lesson_paths(ROOT / "notebooks")

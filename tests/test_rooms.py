@@ -14,7 +14,7 @@ PACKAGE = Path(rbcourse.__file__).parent
 MAY_IMPORT = {  # the rooms, beside the core and itself, that a room may import
     "core": set(),
     "draw": set(),
-    "explore": {"draw"},
+    "explore": {"draw", "course"},
     "study": {"draw"},
     "report": {"draw"},
     "course": None,  # not even the core
@@ -27,7 +27,8 @@ LIBRARIES = {
     "explore": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "study": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
     "report": {"matplotlib"},
-    "course": {"jupyter_server", "nbclient", "nbformat", "segno", "tornado", "traitlets", "voila"},
+    "course": {"PIL", "jupyter_server", "nbclient", "nbformat", "numpy", "segno", "tornado"}
+    | {"traitlets", "voila"},
     "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}
     | {"nbformat", "nbgrader", "traitlets"},
     "book": {"nbformat", "pygments", "sphinx"},

@@ -10,7 +10,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from itertools import count
 from pathlib import Path
@@ -20,6 +20,8 @@ import nbformat
 from nbclient import NotebookClient
 from nbformat import NotebookNode
 from nbformat.sign import NotebookNotary
+
+from rbcourse.course.agreement import reconciled_notebook, stale_figures
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # what JupyterLab writes into a notebook that it opens, and marks as changed if it was not there
@@ -121,30 +123,43 @@ def _with_numbered_ids(ran: list[Any]) -> list[Any]:
     return [nbformat.from_dict(part) for part in json.loads(text)]
 
 
-def regenerate(lessons: Path, figures: Path) -> None:
-    """Execute every lesson, then rewrite the stored outputs and the figures.
+def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
+    """Execute lessons, then rewrite what has changed of the stored outputs and the figures.
 
-    Nothing is rewritten unless every lesson ran; figures that no lesson draws are removed.
+    All lessons, or those whose names begin with one of `names`. What is the same as far as
+    processors agree stays as it is. Nothing is rewritten unless every lesson ran. Figures that no
+    lesson draws are removed.
     """
-    if not lesson_paths(lessons):
+    every = lesson_paths(lessons)
+    if not every:
         raise ValueError(f"{lessons}: no lessons here; this is run in the folder of the course")
+    if unknown := [name for name in names if not any(p.stem.startswith(name) for p in every)]:
+        raise ValueError(f"no lesson's name begins with {unknown[0]!r}")
+    chosen = [path for path in every if not names or path.stem.startswith(tuple(names))]
     with tempfile.TemporaryDirectory() as folder:
         texts = {}
-        for path in lesson_paths(lessons):
+        for path in chosen:
             print(f"{path.stem} ...", end=" ", flush=True)
             start = time.perf_counter()
             texts[path] = execute(path, Path(folder))
             print(f"{time.perf_counter() - start:.1f} s", flush=True)
+        changed = 0
         for path, text in texts.items():
-            path.write_text(text, encoding="utf-8", newline="\n")
+            stored = path.read_text("utf-8")
+            if stored != (text := reconciled_notebook(stored, text)):
+                path.write_text(text, encoding="utf-8", newline="\n")
+                changed += 1
         figures.mkdir(exist_ok=True)
-        drawn = {file.name: file for file in Path(folder).iterdir()}
-        for name, file in drawn.items():
-            shutil.copyfile(file, figures / name)
+        drawn = sorted(Path(folder).iterdir())
+        stale = {Path(name).stem for name in stale_figures(Path(folder), figures)}
+        for file in drawn:
+            if file.stem in stale:  # all files of a figure belong together
+                shutil.copyfile(file, figures / file.name)
+        others = "".join(path.read_text("utf-8") for path in every if path not in chosen)
         for file in [file for file in figures.iterdir() if file.is_file()]:
-            if file.name not in drawn:
+            if file.name not in {each.name for each in drawn} and f'\\"{file.stem}\\"' not in others:
                 file.unlink()
-    print(f"{len(texts)} lessons, {len(drawn)} files in {figures.name}/")
+    print(f"{len(texts)} lessons run, {changed} changed; figures changed: {len(stale)}")
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
@@ -225,10 +240,11 @@ def main() -> None:
     """Run a task from the command line, in the folder of the course."""
     parser = argparse.ArgumentParser(prog="python -m rbcourse.course.notebooks")
     parser.add_argument("task", choices=["regenerate", "copy"])
-    task = parser.parse_args().task
+    parser.add_argument("lessons", nargs="*", help="how their names begin: 03; without, all")
+    words = parser.parse_args()
     try:
-        if task == "regenerate":
-            regenerate(Path("notebooks"), Path("figures"))
+        if words.task == "regenerate":
+            regenerate(Path("notebooks"), Path("figures"), words.lessons)
         else:
             copy_lessons(Path("notebooks"), Path("work"))
     except (OSError, ValueError) as error:

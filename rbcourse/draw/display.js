@@ -92,7 +92,7 @@ const rbcourseDisplay = {
   // Tell screen readers what is drawn: when they ask, and when nothing has moved for a while.
   tell(canvas, said) {
     const text = canvas.seen ? `${said} ${canvas.seen}` : said, news = canvas.said === said ? canvas.seen : text;
-    const style = "position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";
+    const style = "position: absolute; top: 0; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";
     canvas.live ??= Object.assign(document.createElement("span"), { role: "status", style });
     if (canvas.ariaLabel && canvas.ariaLabel !== text) {
       canvas.after(canvas.live);

@@ -106,8 +106,9 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
 
     The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
     then what is in the plane, by its zorder, then what is on the side of the eye; and so on with
-    the next face, on both sides. What no face parts is drawn by its zorder, and then by its mean
-    depth. `eye` is the direction to the eye, shape (3,).
+    the next face, on both sides. What no face parts is drawn by its zorder, then by its mean depth
+    in whole pixels, so that rounding does not decide between lines that coincide, and then in the
+    given order. `eye` is the direction to the eye, shape (3,).
     """
     drawn: list[Piece] = []
     todo = [(False, pieces)]  # whether they are in order, the next ones last
@@ -117,7 +118,9 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
         if ready:
             drawn += group
         elif wall is None:
-            drawn += sorted(group, key=lambda one: (one.zorder, (one.places[:, :3] @ eye).mean()))
+            depths = [round((piece.places[:, :3] @ eye).mean()) for piece in group]
+            order = sorted(range(len(group)), key=lambda i: (group[i].zorder, depths[i]))
+            drawn += [group[i] for i in order]
         else:
             normal = eye if wall.normal is None else wall.normal
             normal = normal if normal @ eye >= 0 else -normal

@@ -229,7 +229,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         still = (
             f'<figure><img style="max-width: 100%" alt="{html.escape(repr(self))}" '
             f'src="data:image/png;base64,{source}"/><figcaption>{html.escape(self.name)}: '
-            "run this cell (Shift + Enter) to get its sliders</figcaption></figure>"
+            "a still. Run this cell (Shift + Enter) to get its sliders</figcaption></figure>"
         )
         return {"text/html": still, **super()._repr_mimebundle_(**kwargs)}
 

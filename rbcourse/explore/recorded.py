@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rbcourse import explore
+from rbcourse.course.agreement import reconciled
 from rbcourse.draw.display import Player
 from rbcourse.explore.explorer import Explorer, numbers
 
@@ -98,7 +99,10 @@ def main(folder: Path) -> None:
         chosen = list(explorer.controls[moved].options) if values is None else values.tolist()
         figure = record(explorer, f"{name}_explorer", moved, chosen)._repr_html_()
         page = _PAGE.substitute(title=html.escape(explorer.name), figure=figure)
-        (folder / f"{name}.html").write_text(page, encoding="utf-8", newline="\n")
+        file = folder / f"{name}.html"
+        if file.exists():
+            page = reconciled(file.read_text("utf-8"), page)
+        file.write_text(page, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -3,11 +3,11 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from displays import polygons, split
 from matplotlib.patches import Annulus, Rectangle
 
 from rbcourse.draw import bodies
 from rbcourse.draw.display import PARTS, Display, joined
+from rbcourse.course.agreement import polygons, split
 
 
 @pytest.fixture

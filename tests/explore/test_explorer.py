@@ -7,7 +7,6 @@ import warnings
 import ipywidgets
 import numpy as np
 import pytest
-from displays import polygons, split
 from ipywidgets.widgets.widget import _remove_buffers
 from PIL import Image
 from sweeps import notice, tell
@@ -15,6 +14,7 @@ from traitlets import TraitError
 
 from rbcourse.explore.explorer import LABELS, Explorer, look, new_figure, new_line
 from rbcourse.explore.widgets import choice, slider, stepped
+from rbcourse.course.agreement import polygons, split
 
 FAR, WARN = 9.0, 8.0
 

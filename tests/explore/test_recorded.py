@@ -11,11 +11,11 @@ from pathlib import Path
 import ipywidgets
 import numpy as np
 import pytest
-from displays import polygons, split
 from PIL import Image
 
 from rbcourse import explore
 from rbcourse.explore import recorded
+from rbcourse.course.agreement import polygons, split
 
 FOLDER = Path(__file__).parents[2] / "figures" / "explorers"
 
