@@ -33,7 +33,7 @@ from rbcourse.optimum import (
     minimum_jerk_so3,
     minimum_torque_so3,
 )
-from rbcourse.paths import bessel_velocities, chain
+from rbcourse.paths import Chain, bessel_velocities, chain
 from rbcourse.projected_cubic import (
     projected_cubic_so3,
     projected_quintic_so3,
@@ -50,6 +50,7 @@ from rbcourse.projection import (
     project_so_weighted,
 )
 from rbcourse.quaternion import (
+    continuous_quaternions,
     is_unit_quaternion,
     project_quaternion,
     quaternion_multiply,
@@ -109,6 +110,7 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "quaternion_multiply",
     "rotate_by_quaternion",
     "slerp",
+    "continuous_quaternions",
     "quaternion_from_matrix",
     "matrix_from_quaternion",
     "quaternion_from_rotation_vector",
@@ -181,6 +183,7 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # paths through many poses, and files
     "retime",
     "chain",
+    "Chain",
     "bessel_velocities",
     "read_path",
     "write_path",

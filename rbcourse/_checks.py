@@ -142,6 +142,8 @@ def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
 def as_time(t: ArrayLike, batch_ndim: int, domain: tuple[float, float] = (0.0, 1.0)) -> Array:
     """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
 
+    A time that is outside by rounding only, by 8 eps of the larger end, becomes that end.
+
     Raises
     ------
     ValueError
@@ -151,7 +153,9 @@ def as_time(t: ArrayLike, batch_ndim: int, domain: tuple[float, float] = (0.0, 1
     if not (times.min(initial=start) >= start and times.max(initial=end) <= end):
         times = as_finite("t", t)
         wanted = f"a time in [{start:.17g}, {end:.17g}]"
-        _check_all((times >= start) & (times <= end), "t", times, wanted)
+        slack = 8 * EPS * max(abs(start), abs(end))
+        _check_all((times >= start - slack) & (times <= end + slack), "t", times, wanted)
+        times = np.clip(times, start, end)
     return times.reshape(times.shape + (1,) * batch_ndim)
 
 

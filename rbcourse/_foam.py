@@ -11,14 +11,13 @@ where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁) f
 An error in λ or ζ leaves R times another symmetric matrix, near λζ I; one step of Newton's method
 for the polar factor, X ← (X + X⁻ᵀ)/2, squares its relative distance.
 
-`nearest_rotation` implements this for one matrix. `nearest_rotations` does the same for many, entry
-by entry: its arrays have the shape (3, 3, N).
+`nearest_rotations` does this entry by entry: its arrays have the shape (3, 3, N). Of few matrices the
+SVD is faster, see `rbcourse.projection`.
 """
 
 import math
 import threading
 from collections.abc import Sequence
-from operator import mul
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,65 +25,8 @@ from numpy.typing import NDArray
 from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
 LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; below, digits are lost, and matrices are rare
-_FEW = 10  # matrices, for which it is faster to take them one by one
 _BLOCK = 5128  # matrices that fit into the cache; with rows of 4096 bytes they would collide there
 _SAFE = 1e-30, 1e30  # squares of norms that can be taken to the sixth power
-
-
-def nearest_rotation(M: Sequence[float]) -> list[float] | None:
-    """Return the nearest rotation to M, both as nine numbers, row by row.
-
-    s₁² is the largest root of x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, by Viète's formula
-    x = a + 2 r cos(arccos(q)/3), with a = ‖M‖²/3, r² = a² − ‖cof M‖²/3 and
-    q = (a (3 r² − a²) + det²)/(2 r³); and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
-
-    None is returned where ζ is less than `LEAST_ZETA` s₁ ‖M‖², near the singular set of
-    `project_so`; and where ‖M‖² is not within 1e-30 and 1e30.
-
-    References
-    ----------
-    BK Prop. 2; F. L. Markley, Attitude determination using vector observations: a fast optimal
-    matrix algorithm, J. Astronautical Sciences 41, 1993.
-
-    Examples
-    --------
-    >>> nearest_rotation([0, -2, 0, 3, 0, 0, 0, 0, 1])
-    [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    """
-    C = _cofactors(M)
-    norm2, cof2, det = _dot(M, M), _dot(C, C), _dot(M[:3], C[:3])
-    if not _SAFE[0] < norm2 < _SAFE[1]:
-        return None
-    a = norm2 / 3
-    r2 = max(a * a - cof2 / 3, 1e-200)
-    r = math.sqrt(r2)
-    q = (a * (3 * r2 - a * a) + det * det) / (2 * r * r2)
-    s1 = math.sqrt(a + 2 * r * math.cos(math.acos(max(-1.0, min(1.0, q))) / 3))
-    gap = math.sqrt(max(norm2 - s1 * s1 + 2 * det / s1, 0.0))
-    lam = s1 + gap
-    zeta = gap * (s1 * lam + det / s1)
-    if not zeta > LEAST_ZETA * s1 * norm2:
-        return None
-    X = _add(zeta, M, 1.0, _cofactors(_add(lam, M, 1.0, C)))
-    C = _cofactors(X)
-    return _add(0.5 / (lam * zeta), X, 0.5 * lam * zeta / _dot(X[:3], C[:3]), C)
-
-
-def _cofactors(M: Sequence[float]) -> Sequence[float]:
-    a, b, c, d, e, f, g, h, i = M
-    return [
-        *(e * i - f * h, f * g - d * i, d * h - e * g),
-        *(h * c - i * b, i * a - g * c, g * b - h * a),
-        *(b * f - c * e, c * d - a * f, a * e - b * d),
-    ]
-
-
-def _dot(x: Sequence[float], y: Sequence[float]) -> float:
-    return sum(map(mul, x, y))
-
-
-def _add(a: float, x: Sequence[float], b: float, y: Sequence[float]) -> list[float]:
-    return [a * p + b * q for p, q in zip(x, y, strict=True)]
 
 
 class _Workspace(threading.local):
@@ -101,27 +43,31 @@ _KEPT = _Workspace()
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
     """Write the nearest rotations to M into R, both of shape (3, 3, N); return which are right.
 
-    Entries that fail are left undefined: near the singular set of `project_so` (see
-    `nearest_rotation`), where an entry of M is not finite, and perhaps where ‖M‖ is extreme.
+    s₁² is the largest root of x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, by Viète's formula
+    x = a + 2 r cos(arccos(q)/3), with a = ‖M‖²/3, r² = a² − ‖cof M‖²/3 and
+    q = (a (3 r² − a²) + det²)/(2 r³); and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
+
+    Entries that fail are left undefined: where ζ is less than `LEAST_ZETA` s₁ ‖M‖², near the
+    singular set of `project_so`; where an entry of M is not finite; and perhaps where ‖M‖ is
+    extreme.
 
     References
     ----------
-    BK Prop. 2, as `nearest_rotation`.
+    BK Prop. 2; F. L. Markley, Attitude determination using vector observations: a fast optimal
+    matrix algorithm, J. Astronautical Sciences 41, 1993.
 
     Examples
     --------
-    >>> M, R = np.random.default_rng(1).normal(size=(2, 3, 3, 100))
-    >>> right = nearest_rotations(M, R)
-    >>> bool(right.all()), np.allclose(R[..., 7].ravel(), nearest_rotation(M[..., 7].ravel()))
-    (True, True)
+    >>> M = np.array([[0.0, -2, 0], [3, 0, 0], [0, 0, 1]])[..., None]
+    >>> R = np.empty((3, 3, 1))
+    >>> nearest_rotations(M, R), R[..., 0].round(12) + 0.0
+    (array([ True]), array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]]))
     """
     count = M.shape[-1]
     right = np.zeros(count, bool)
-    if count < _FEW:
-        for k in range(count):
-            found = nearest_rotation(M[..., k].ravel().tolist())
-            if found:
-                R[..., k], right[k] = np.reshape(found, (3, 3)), True
+    if not count:
         return right
     size = 8 * math.ceil(count / 8 / math.ceil(count / _BLOCK))
     for block in blocks(count, size):

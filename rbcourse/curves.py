@@ -102,9 +102,10 @@ class SingularTime(ValueError):
 
 
 class Curve:
-    """A rotation or a pose over time; called as SciPy's splines are.
+    """A rotation or a pose over time: ``c(t)``, with derivatives ``c(t, 1)`` and ``c(t, 2)``.
 
-    The time t is in [0, 1], except for what `retime` and `chain` return.
+    On SO(3) ``c(t, 2)`` is the derivative of ``c(t, 1)``; on SE(3) it is not, see below. Times t
+    are in [0, 1], except for the curves that `retime` and `chain` return.
 
     On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w, ``c(t, 2)``
     the angular acceleration w' and ``c(t, 3)`` the angular jerk w'', all three in the body frame:

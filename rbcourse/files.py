@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rbcourse._numerics import Array
 from rbcourse.conversions import matrix_from_quaternion, quaternion_from_matrix
 from rbcourse.planar import Commands, Plan, as_command, as_plan
-from rbcourse.quaternion import project_quaternion
+from rbcourse.quaternion import continuous_quaternions, project_quaternion
 from rbcourse.se3 import check_path, join
 
 Rows = Iterator[tuple[str, list[float]]]
@@ -89,7 +89,7 @@ def write_path(
     True
     """
     times, poses, velocities = check_path(times, poses, velocities)
-    q = _continuous(quaternion_from_matrix(poses[:, :3, :3]))
+    q = continuous_quaternions(quaternion_from_matrix(poses[:, :3, :3]))
     d = poses[:, :3, 3:].reshape(len(poses), -1)
     if _is_tum(file):
         if velocities is not None:
@@ -232,13 +232,6 @@ def _is_tum(file: str | Path) -> bool:
     if suffix not in (".csv", ".tum", ".txt"):
         raise ValueError(f"file: a name wanted that ends in .csv, .tum or .txt, got {file}")
     return suffix != ".csv"
-
-
-def _continuous(q: Array) -> Array:
-    """Return quaternions in an order, each with the sign that is nearer to the one before."""
-    turned = np.sum(q[1:] * q[:-1], axis=-1) < 0
-    signs = np.cumprod(np.where(turned, -1.0, 1.0))
-    return q * np.append(1.0, signs)[:, None] + 0.0
 
 
 def _csv_rows(file: str | Path) -> tuple[bool, Rows]:

@@ -43,8 +43,8 @@ def chain(
         Poses, or rotation matrices, to 1e-9, one for each time.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists (ω, v), or angular velocities ω, body frame, per unit of the times: what the curve
-        has at each pose. By default it starts and ends at rest, rests where a pose equals its
-        neighbour, to rounding, and has the `bessel_velocities` elsewhere.
+        has at each pose. By default it starts and ends at rest, stops wherever two successive poses
+        are equal, and has the `bessel_velocities` elsewhere.
     leg : callable, optional
         What joins two poses: a function of this package that returns two-point curves, or one of
         your own that returns a stack of them. It is called once for all legs, with keyword
@@ -57,7 +57,8 @@ def chain(
     Returns
     -------
     Chain
-        A `Curve` on [times[0], times[-1]], with ``legs``, ``velocities`` and ``jumps``.
+        A `Curve` on [times[0], times[-1]], with the attributes ``legs`` and ``velocities`` and the
+        method ``jumps(order)``.
 
     Raises
     ------

@@ -18,6 +18,7 @@ from rbcourse._checks import (
 from rbcourse._foam import nearest_rotations
 from rbcourse._numerics import EPS, Array, scaled
 
+MANY = 20  # matrices from which on FOAM is faster than the SVD
 NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see margin)"
 
 
@@ -135,8 +136,9 @@ def project_so(M: ArrayLike) -> Array:
 
     References
     ----------
-    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. For n = 3 it is computed by
-    FOAM (see `rbcourse._foam`), and near the singular set, as for other n, by the SVD.
+    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. Many 3 × 3 matrices are
+    projected by FOAM (see `rbcourse._foam`); few, those near the singular set, and those of other
+    sizes by the SVD.
 
     Examples
     --------
@@ -303,7 +305,7 @@ def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
     """
     flat = M.reshape(-1, *M.shape[-2:])
     R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
-    if M.shape[-1] == 3:
+    if M.shape[-1] == 3 and len(flat) >= MANY:
         unique = nearest_rotations(flat.transpose(1, 2, 0), R.transpose(1, 2, 0))
     if not unique.all():
         left = np.flatnonzero(~unique)

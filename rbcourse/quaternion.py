@@ -230,6 +230,48 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     return np.concatenate([np.where(half_turn, 0.0, w), v], axis=-1) * np.where(sign < 0, -1.0, 1.0)
 
 
+def continuous_quaternions(q: ArrayLike) -> Array:
+    """Return quaternions along a path, each with the sign that is nearer to the one before.
+
+    Parameters
+    ----------
+    q : array_like, shape (N, ..., 4) or (4,)
+        Quaternions; the first axis is time. A single one is returned as it is.
+
+    Returns
+    -------
+    ndarray, shape (N, ..., 4) or (4,)
+        ± q, the first ones with the sign that they have: no component jumps where w passes
+        through 0.
+
+    Raises
+    ------
+    ValueError
+        If `q` is not finite or not of that shape.
+
+    See Also
+    --------
+    quaternion_from_matrix : Its quaternions have w ≥ 0, and so jump there.
+
+    Notes
+    -----
+    Singular set: successive quaternions with the scalar product 0, rotations that differ by a
+    half-turn. There the sign stays as it is.
+
+    Examples
+    --------
+    >>> continuous_quaternions([[0.28, 0.96, 0, 0], [0.28, -0.96, 0, 0]])
+    array([[ 0.28,  0.96,  0.  ,  0.  ],
+           [-0.28,  0.96,  0.  ,  0.  ]])
+    """
+    q = as_finite("q", q, 4)
+    if q.ndim < 2:
+        return q
+    turned = np.sum(q[1:] * q[:-1], axis=-1, keepdims=True) < 0
+    q[1:] *= np.cumprod(np.where(turned, -1.0, 1.0), axis=0)
+    return q + 0.0
+
+
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 

@@ -698,9 +698,9 @@ def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Arra
             miss = x - (inverse @ np.cross(x, h)[..., None])[..., 0] / 2 - goal
             _check_normal(np.linalg.det(by_x) == 0, "the map from x to y is singular")
             x = x - np.linalg.solve(by_x, miss[..., None])[..., 0]
-    size = 1 + np.abs(y).max(axis=-1, initial=0) + np.abs(x - y).max(axis=-1, initial=0)
+    size = 1 + np.abs(y).max(axis=-1) + np.abs(x - y).max(axis=-1)
     thin = np.linalg.cond(G)
-    found = np.abs(miss).max(axis=-1, initial=0) < 16 * EPS * thin * size + 1e-13 * size
+    found = np.abs(miss).max(axis=-1) < 16 * EPS * thin * size + 1e-13 * size
     _check_normal(~found, "x is not found for the goal, to rounding")
     _check_normal(~(np.abs(np.linalg.det(by_x)) > 1e-9), "the map from x to y is singular")
     return x, by_x

@@ -224,3 +224,10 @@ def test_bad_arguments_are_named(function, name, core):
     bad[(0,) * len(core)] = np.nan
     with pytest.raises(ValueError, match=rf"{name}\[0.*\] is nan"):
         function(bad)
+
+
+@pytest.mark.parametrize(("steps", "locked"), [(17, True), (19, False)])
+def test_zyx_from_quaternion_counts_as_locked_what_is_within_16_eps(steps, locked):
+    """|β| misses π/2 by twice the ratio of 17, or 19, times 2⁻⁵³ to √1.25: by 15 or 17 eps."""
+    angles = rb.conversions.zyx_from_quaternion([0.5 + steps * 2.0**-53, -0.25, 0.5, 0.25])
+    assert bool(angles[2] == 0) is locked

@@ -450,3 +450,12 @@ def test_bad_arguments_are_named():
         rb.project_se([[1]])
     with pytest.raises(ValueError, match=r"M\[0, 1\] is nan"):
         rb.project_so([[1, np.nan], [0, 1]])
+
+
+def test_is_so_is_se_and_is_unit_quaternion_pass_defects_up_to_1e_9():
+    for share, passes in ((0.98, True), (1.02, False)):
+        longer = 1 + share * 1e-9
+        stretched = np.diag([longer**0.5, 1 / longer**0.5, 1])  # det 1, defect of MᵀM as wanted
+        assert rb.is_so(stretched) == passes
+        assert rb.is_se(rb.pose_from_components(stretched, [1, 2, 3])) == passes
+        assert rb.is_unit_quaternion([longer, 0, 0, 0]) == passes

@@ -32,9 +32,9 @@ from rbcourse.assignments.tampering import find_in_cells
 
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
 # what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
-TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "div", "dl", "dt", "em", "hr", "i"}
-TAGS |= {"h1", "h2", "h3", "h4", "h5", "h6", "img", "li", "ol", "p", "pre", "s", "span", "strong"}
-TAGS |= {"sub", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr", "ul"}
+TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt", "em", "hr"}
+TAGS |= {"i", "h1", "h2", "h3", "h4", "h5", "h6", "img", "li", "ol", "p", "pre", "s", "span", "strong"}
+TAGS |= {"sub", "summary", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr", "ul"}
 LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
@@ -150,6 +150,11 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             what = [f"stopped after {self.timeout} s"] * (at in self.slow)
             what += [CUT] * (at in self.cut)
             what += ["takes too much memory"] * ("MemoryError" in errors)
+            if at in self.slow:  # in place of where in the tests it was interrupted
+                outputs = [output for output in outputs if output.output_type != "error"]
+                said = f"This cell took longer than {self.timeout} s and was stopped."
+                outputs.append(new_output("error", ename="Timeout", evalue="", traceback=[said]))
+                cell.outputs = outputs
             remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in what]
             for output in (output for output in outputs if "data" in output):
                 output.metadata = NotebookNode()

@@ -14,12 +14,13 @@ import tempfile
 import time
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
 import nbformat
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 
-from rbcourse.assignments.client import CUT, BoundedClient
+from rbcourse.assignments.client import CELL_SECONDS, CUT, BoundedClient
 from rbcourse.assignments.restore import (
     grade_id,
     is_answer,
@@ -33,9 +34,6 @@ from rbcourse.assignments.restore import (
 from rbcourse.assignments.tampering import find_in_cells
 from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
-
-CELL_SECONDS = 60
-
 
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
@@ -93,13 +91,18 @@ def _find_original(path: Path) -> tuple[str, bytes]:
 
 
 class _Client(BoundedClient):
-    """A client that tells where it is."""
+    """A client that tells where it is, and how long each cell took."""
 
-    at = 0
+    at, began, took = 0, 0.0, dict[int, float]()
 
     def on_cell_start(self, cell: NotebookNode, cell_index: int) -> None:
-        self.at = cell_index
+        self.at, self.began = cell_index, time.monotonic()
         print(f"\rrunning cell {self.at + 1} of {len(self.nb.cells)} ", end="", flush=True)
+
+    def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
+        """Note the time."""
+        super().on_cell_executed(cell, cell_index, execute_reply)
+        self.took = self.took | {cell_index: time.monotonic() - self.began}
 
 
 def _run(notebook: NotebookNode, own: str, seconds: int) -> list[str]:
@@ -123,6 +126,9 @@ def _run(notebook: NotebookNode, own: str, seconds: int) -> list[str]:
     print(flush=True)
     long = f"took longer than {seconds} s and was stopped"
     remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
+    near = f"took more than half of the {seconds} s that grading allows: make it faster"
+    slow = {at for at, took in client.took.items() if took > seconds / 2} - {*client.slow}
+    remarks += [f"{name_cell(cells, at)} {near}" for at in sorted(slow)]
     remarks += [f"{name_cell(cells, at)}: {CUT}" for at in client.cut]
     for at, cell in enumerate(cells):
         if _error(cell) and not (is_test(cell) or is_answer(cell) or at in client.slow):

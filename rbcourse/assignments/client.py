@@ -11,6 +11,7 @@ from traitlets import Integer
 
 from rbcourse.course.notebooks import kernel_address
 
+CELL_SECONDS = 30  # for a cell, at home and in grading
 PRINTED, DISPLAYED = 100_000, 2_000_000  # characters of a cell: in print, and of pictures and pages
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
@@ -26,6 +27,7 @@ class BoundedClient(NotebookClient):
     `cut` are the indices of the cells that took too long, and of which not all output is kept.
     """
 
+    timeout = Integer(CELL_SECONDS, help="a cell has so many seconds").tag(config=True)
     iopub_timeout = Integer(20, help="an interrupted cell has so many seconds").tag(config=True)
     folder = Path()
 

@@ -1,13 +1,16 @@
 """Grade problem sets: each submission on its own, with feedback and a table of the points."""
 
+import csv
 import glob
+import html
+import io
 import logging
 import os
 import re
 import shutil
 import signal
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import ExitStack
 from functools import partial
@@ -26,7 +29,14 @@ from traitlets.config import Config
 from rbcourse.assignments import sandbox
 from rbcourse.assignments.autograding import configure
 from rbcourse.assignments.handout import find_set, read_config
-from rbcourse.assignments.restore import Refused, grade_id, is_answer, marks_of, read_notebook
+from rbcourse.assignments.restore import (
+    Refused,
+    grade_id,
+    is_answer,
+    marks_of,
+    read_notebook,
+    title_of,
+)
 from rbcourse.assignments.writing import write_csv
 
 WORKERS = 2  # so many students are graded at once
@@ -86,8 +96,28 @@ def grade(name: str, assignments: Path) -> Path:
                     known = now | {student: _points(gradebook).get(student)}
                 print(f"{student}: {_summary(rows[student])}", flush=True)
     first = {"set": name, "boxed": "yes" if boxed else "no"}
-    write_csv(table, [{"student": student} | first | rows[student] for student in students])
+    lines = [{"student": student} | first | rows[student] for student in students]
+    for what, why in _not_collected(name, assignments, students):
+        lines.append({"student": _tidy(what), "set": name, "remarks": _tidy(why)})
+        print(f"{lines[-1]['student']}: {lines[-1]['remarks']}", flush=True)
+    write_csv(table, lines)
     return table
+
+
+def _not_collected(name: str, assignments: Path, students: list[str]) -> Iterator[tuple[str, str]]:
+    """Yield the files that `collect` could not use, perhaps for this set, and who is missing."""
+    report = assignments / "submitted" / "report.csv"
+    if not report.exists():
+        return
+    sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
+    for row in csv.DictReader(io.StringIO(report.read_text("utf-8-sig"), newline="")):
+        what, student = row["what"], row["what"].removesuffix(f", {name}")
+        if row["list"] == "missing" and student != what and student not in students:
+            yield student, "nothing was collected"
+        elif row["list"] in ("refused", "unmatched"):
+            named = {each for each in sets if each in what.casefold()}
+            if name in named or not named:
+                yield what, f"not collected: {row['why']}"
 
 
 def course_config(name: str, assignments: Path) -> Config:
@@ -162,9 +192,24 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
         if words != before.get(key, words):
             remarks.append(f"{key} is another answer than when it was graded before")
     done = run_step(GenerateFeedback, config)
-    if not done["success"]:
+    if done["success"]:
+        page = folder / "feedback" / student / name / f"{name}.html"
+        page.write_text(_with_titles(page.read_text("utf-8"), graded), "utf-8")
+    else:
         remarks.append(f"no feedback: {last_line(done)}")
     return remarks
+
+
+def _with_titles(page: str, graded: Path) -> str:
+    """Return a page of feedback whose list names problems, where nbgrader has "Test cell"."""
+    cells = nbformat.read(graded, as_version=4).cells
+    for at, cell in enumerate(cells):
+        link = f'<a href="#{grade_id(cell)}">'
+        kind = "in words" if is_answer(cell) else "tests"
+        title = re.sub(r" \(\d+ points?\)$", "", title_of(cells, at))
+        name = f"{link}{html.escape(title)}, {kind}</a>"
+        page = re.sub(f"{re.escape(link)}[^<]*</a>", lambda _, name=name: name, page)
+    return page
 
 
 def _words(path: Path) -> dict[str, str]:

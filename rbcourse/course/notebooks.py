@@ -20,6 +20,7 @@ import nbformat
 from nbclient import NotebookClient
 from nbformat import NotebookNode
 from nbformat.sign import NotebookNotary
+from tornado.web import HTTPError
 
 from rbcourse.course.agreement import reconciled_notebook, stale_figures
 
@@ -107,10 +108,21 @@ def keep_stills(notebook: Any) -> None:
                 data.pop("application/vnd.jupyter.widget-view+json", None)
 
 
-def before_saving(model: Any, **_: Any) -> None:
-    """Keep the stills of what JupyterLab saves."""
-    if model["type"] == "notebook" and model.get("content"):
-        keep_stills(model["content"])
+def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> None:
+    """Keep the stills of what JupyterLab saves, and the lessons as they are stored.
+
+    Without ``course.py lab --edit`` a lesson in ``notebooks/`` that was only opened or run keeps
+    its stored outputs; one that was changed is not saved, and its reader is told where copies are.
+    """
+    if model["type"] != "notebook" or not model.get("content"):
+        return
+    if re.fullmatch(r"notebooks/\d\d_[^/]*", path) and not os.environ.get("RBCOURSE_EDIT"):
+        stored = nbformat.read(Path(contents_manager.root_dir, path), as_version=4)
+        if _sources(stored) != _sources(nbformat.from_dict(model["content"])):
+            why = "this is an original. Your copy is in work/; authors call 'course.py lab --edit'"
+            raise HTTPError(403, f"{path} is not saved: {why}", reason=f"Not saved: {why}")
+        model["content"] = stored
+    keep_stills(model["content"])
 
 
 def _with_numbered_ids(ran: list[Any]) -> list[Any]:
@@ -226,10 +238,13 @@ def _digest(content: bytes) -> str:
 def _cells(content: bytes) -> bytes:
     """Return what a person writes in a notebook; all of it where it cannot be read as one."""
     try:
-        cells = nbformat.reads(content.decode(), as_version=4).cells
-        return json.dumps([(cell.cell_type, cell.source) for cell in cells]).encode()
+        return json.dumps(_sources(nbformat.reads(content.decode(), as_version=4))).encode()
     except Exception:
         return content
+
+
+def _sources(notebook: Any) -> list[tuple[str, str]]:
+    return [(cell.cell_type, cell.source) for cell in notebook.cells]
 
 
 def _numbered(path: Path) -> Iterator[Path]:

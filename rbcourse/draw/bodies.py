@@ -31,10 +31,11 @@ def pose_table(first: Table, poses: Array) -> Table:
     return {**first, **position, **entries}
 
 
-def motion_table(t: Array, motion: Curve, drawn: Array) -> Table:
+def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Table:
     """Return times, which of them are drawn, and the poses, twists and accelerations of a motion.
 
     The twists (w, v) and the accelerations (w', a), a = Rᵀ d'', are in the body frame (BK 6.3).
+    `unit` is that of the time: "1", or "s" for what `chain` and `retime` return.
 
     Examples
     --------
@@ -43,8 +44,10 @@ def motion_table(t: Array, motion: Curve, drawn: Array) -> Table:
     >>> motion_table(t, geodesic_se3(np.eye(4), np.eye(4)), t[::2])["drawn [1]"]
     array([1, 0, 1, 0, 1, 0, 1])
     """
-    first = {"t [1]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
-    parts = {"w{} [rad]": (1, 0), "v{} [m]": (1, 3), "w{}' [rad]": (2, 0), "a{} [m]": (2, 3)}
+    first = {f"t [{unit}]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
+    per, per2 = ("", "") if unit == "1" else (f"/{unit}", f"/{unit}²")
+    parts = {f"w{{}} [rad{per}]": (1, 0), f"v{{}} [m{per}]": (1, 3)}
+    parts |= {f"w{{}}' [rad{per2}]": (2, 0), f"a{{}} [m{per2}]": (2, 3)}
     rates = {
         name.format(i + 1): motion(t, order)[:, start + i]
         for name, (order, start) in parts.items()

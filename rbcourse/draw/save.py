@@ -26,6 +26,8 @@ from rbcourse.draw.pictures import drawn, few_colours, png
 from rbcourse.draw.space import scenes
 
 Table = Mapping[str, ArrayLike]
+UNITS = ("1", "m", "m²", "rad", "rad²", "s", "m/s", "rad/s", "m/s²", "rad/s²", "N m")
+"""With one of these, in brackets, the name of each column of numbers ends."""
 SHOWN = 120
 """Pixels on a page for an inch of a figure."""
 
@@ -145,6 +147,10 @@ def csv_text(data: Table) -> str:
     if len({column.shape for column in columns.values()}) > 1:
         shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
         raise ValueError(f"data: columns of one shape wanted, got {shapes}")
+    for name, column in columns.items():
+        if column.dtype.kind != "U" and not name.endswith(tuple(f" [{unit}]" for unit in UNITS)):
+            units = ", ".join(f"[{unit}]" for unit in UNITS)
+            raise ValueError(f"data: {name!r} has to end with a space and a unit: one of {units}")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

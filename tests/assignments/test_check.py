@@ -6,6 +6,7 @@ import sys
 import time
 from functools import partial
 from hashlib import sha256
+from inspect import signature
 from textwrap import dedent
 
 import nbformat
@@ -16,6 +17,7 @@ from tiny import MODULE
 from tiny_set import ANSWERS, write_tiny_set
 
 from rbcourse.assignments import check, client
+from rbcourse.assignments.autograding import BoxedExecute
 from rbcourse.assignments.restore import restore
 
 
@@ -157,6 +159,14 @@ def test_an_endless_loop_is_stopped_and_named_and_its_output_is_cut(
     assert "the output is too large" in said
     assert "1 of 2 visible tests passed" in said
     assert (handout / "to_submit" / "ps0.ipynb").stat().st_size < 3_000_000
+
+
+def test_a_slow_cell_is_named_and_the_limit_is_that_of_grading(handout, capsys):
+    edited(handout, lambda notebook: None, **{"square-answer": "import time\ntime.sleep(1.2)"})
+    check.check(handout / "ps0.ipynb", seconds=2)
+    said = capsys.readouterr().out
+    assert "cell 3, answer of “A tiny set” took more than half of the 2 s that grading" in said
+    assert BoxedExecute().timeout == signature(check.check).parameters["seconds"].default
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there interrupts are no signals")

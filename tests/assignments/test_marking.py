@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_student_code import student
 
-from rbcourse.assignments.marking import Drawing, Mistake, Problem, curves_of
+from rbcourse.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem, curves_of
 from rbcourse.assignments.student_code import NotYet
 
 DOUBLE = Problem(
@@ -67,6 +67,11 @@ def test_a_function_with_other_arguments_is_told_so():
     assert "takes 1 positional argument but 2 were given" in told(DOUBLE, "def answer(x): return x")
 
 
+def test_a_mistake_made_in_degrees_gets_both_hints():
+    text = told(DOUBLE, "import numpy as np\ndef answer(x, k): return np.degrees(-2 * k * x)")
+    assert text == f"{IN_RADIANS} And: sign"
+
+
 def test_full_turns_do_not_count_where_the_problem_says_so():
     problem = Problem(lambda x: x, [(np.array([1.0]),)], [], read=lambda a: np.exp(1j * a).real)
     assert problem.accepts(student("import numpy as np\ndef answer(x): return x + 2 * np.pi"))
@@ -105,7 +110,11 @@ def test_a_drawing_is_judged_by_its_points(drawing):
     [
         ("ax.plot(t**2, t)", "swapped"),
         ("pass", "Nothing was drawn on the axes that your function was given."),
-        ("ax.plot(t[1:], t[1:])", "A curve of 5 points is wanted; you drew curves of [4] points."),
+        ("ax.plot(t[1:], t[1:])", "Draw one line through 5 points; you drew 1 line of 4 points."),
+        (
+            "for x in t: ax.plot(x, x**2, '.')",
+            "Draw one line through 5 points; you drew 5 lines of 1 point.",
+        ),
         ("ax.plot(t, t)", "Point 2 of the curve should be [0.5, 0.25]; yours is [0.5, 0.5]."),
         ("ax.plot(t, t**2)", "The curves are right. The x axis needs a label"),
         ("ax.plot(t, t**2)\n    ax.set_xlabel('t')", "The curves are right. The y axis needs"),

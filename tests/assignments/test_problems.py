@@ -8,6 +8,7 @@ from textwrap import dedent, indent
 
 import matplotlib.pyplot as plt
 import nbformat
+import numpy as np
 import pytest
 from wrong_answers import HELP, WRONG
 
@@ -66,6 +67,61 @@ def test_the_stub_is_told_that_nothing_is_written(name, slug):
     stub = head(cells(name)[f"{slug}-answer"].source) + "    raise NotImplementedError()"
     with pytest.raises(NotYet, match="Nothing is written here yet"):
         try_answer(name, slug, stub)
+
+
+def answers(name):
+    """The reference answers of a set, by the names of the functions."""
+    sources = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
+    space = {"__name__": "__main__"}
+    for key, text in sources.items():
+        if key == "setup" or key.endswith("-answer"):
+            exec(compile(text, "<cell>", "exec"), space)
+    return space
+
+
+def in_tex(matrix):
+    rows = (" & ".join(f"{x:.3g}" for x in row) for row in np.round(matrix, 3) + 0.0)
+    return rf"$\begin{{pmatrix}}" + r"\\ ".join(rows) + r"\end{pmatrix}$"
+
+
+def place(numbers, form="g"):
+    return f"({', '.join(f'{x:{form}}' for x in np.asarray(numbers) + 0.0)})"
+
+
+def examples():
+    """What each question gives as an example, from the reference answers."""
+    one, two = answers("ps1"), answers("ps2")
+    plan = [(np.array([1, 0, 0]), 3), (np.array([0, 0, 0.5]), 2)]
+    poses = one["run_plan"](np.zeros(3), plan)
+    seen = one["seen_from_body"](np.array([4, 2, np.pi / 2]), np.array([4.0, 5]))
+    short = [
+        np.degrees(one["short_way"](*np.radians(ends), 0.5)) for ends in ([170, -170], [20, 385])
+    ]
+    arm = one["arm_angles"](np.array([1.0, 2]), np.array([2, 1.5]))
+    mirror = np.diag([1.0, 1, -1])
+    return {
+        ("ps1", "pose-matrix"): in_tex(one["pose_matrix"](np.array([4, 2, np.pi / 6]))),
+        ("ps1", "seen"): f"the result is ${place(np.round(seen, 9))}$",
+        ("ps1", "plan"): ", ".join(f"${place(pose)}$" for pose in poses),
+        ("ps1", "short"): "half-way: {:.4g}. From 20 to 385, half-way: {:.4g}.".format(*short),
+        ("ps1", "angles"): f"the result is, rounded, ${place(arm, '.2f')}$",
+        ("ps2", "turn"): in_tex(two["turn_about"](np.ones(3), 2 * np.pi / 3)),
+        ("ps2", "far"): f"is at the distance {two['how_far'](mirror):.9g}",
+    }
+
+
+def test_the_examples_in_the_questions_are_right():
+    wanted = examples()
+    asked = {
+        (name, key.removesuffix("-question")): cell.source
+        for name in SETS
+        for key, cell in cells(name).items()
+        if key.endswith("-question")
+    }
+    for key, text in wanted.items():
+        assert text in asked[key], key
+    given = re.compile(r"Examples?[:,]|rounded|\bit is \$|at the distance")
+    assert {key for key, text in asked.items() if given.search(text)} == set(wanted)
 
 
 @pytest.mark.parametrize(("key", "hint", "body"), FAILING)

@@ -5,9 +5,11 @@ import os
 import nbformat
 import nbval.kernel
 import pytest
+from jupyter_server.services.contents.largefilemanager import LargeFileManager
 from nbclient.exceptions import CellExecutionError
 from nbformat.sign import NotebookNotary, SQLiteSignatureStore
-from nbformat.v4 import new_code_cell, new_notebook
+from nbformat.v4 import new_code_cell, new_notebook, new_output
+from tornado.web import HTTPError
 
 from rbcourse.course import notebooks
 
@@ -212,8 +214,60 @@ def test_what_is_saved_keeps_the_stills_of_widgets_and_drops_the_widgets():
         {"cell_type": "code", "outputs": [{"data": still}, {"name": "stdout", "text": "1"}]},
         {"cell_type": "code", "outputs": [{"data": dict(alone)}]},
     ]
-    notebooks.before_saving({"type": "notebook", "content": {"cells": cells}}, path="a.ipynb")
+    model = {"type": "notebook", "content": {"cells": cells}}
+    notebooks.before_saving(model, path="work/a.ipynb", contents_manager=None)
     assert cells[1]["outputs"][0]["data"] == {"text/html": "<img>"}
     assert cells[2]["outputs"][0]["data"] == alone
-    notebooks.before_saving({"type": "file", "content": "text"}, path="a.txt")
-    notebooks.before_saving({"type": "notebook", "content": None}, path="a.ipynb")
+    for model in ({"type": "file", "content": "text"}, {"type": "notebook", "content": None}):
+        notebooks.before_saving(model, path="work/a", contents_manager=None)
+
+
+def test_an_original_that_was_run_keeps_its_bytes_and_one_that_was_changed_is_not_saved(
+    folders, monkeypatch
+):
+    lesson, (place, _) = "notebooks/01_plane.ipynb", folders
+    manager = LargeFileManager(root_dir=str(place.parent))
+    manager.pre_save_hook = notebooks.before_saving
+    stored = (place / "01_plane.ipynb").read_bytes()
+    model = manager.get(lesson)
+    cells = model["content"]["cells"]
+    cells[0]["outputs"] = [new_output("stream", text="1")]
+    manager.save(model, lesson)
+    assert (place / "01_plane.ipynb").read_bytes().rstrip() == stored.rstrip()
+    model["content"] = new_notebook(cells=[new_code_cell("2")])
+    with pytest.raises(HTTPError, match=r"Not saved: .* Your copy is in work/"):
+        manager.save(model, lesson)
+    manager.save(model, "work.ipynb")
+    monkeypatch.setenv("RBCOURSE_EDIT", "1")
+    manager.save(model, lesson)
+    assert '"2"' in (place / "01_plane.ipynb").read_text()
+
+
+DRAW = """
+import os, pathlib
+def save_figure(fig, name):
+    pathlib.Path(os.environ["RBCOURSE_FIGURES"], name + ".png").write_text(name)
+fig = None
+save_figure(fig, "NAME")
+"""
+
+
+def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path):
+    figures = tmp_path / "figures"
+    figures.mkdir()
+    for file in ("arm.png", "old.png"):
+        (figures / file).write_text("as it was")
+    paths = [
+        notebook_at(tmp_path / f"0{k}_{name}.ipynb", DRAW.replace("NAME", name))
+        for k, name in ((1, "plane"), (2, "arm"))
+    ]
+    before = [path.read_text() for path in paths]
+    notebooks.regenerate(tmp_path, figures, ["01"])
+    assert [path.read_text() != text for path, text in zip(paths, before, strict=True)] == [True, False]
+    # what another lesson draws stays; what none draws goes
+    assert {file.name: file.read_text() for file in figures.iterdir()} == {
+        "arm.png": "as it was",
+        "plane.png": "plane",
+    }
+    with pytest.raises(ValueError, match="no lesson's name begins with '03'"):
+        notebooks.regenerate(tmp_path, figures, ["03"])
