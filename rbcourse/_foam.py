@@ -11,8 +11,8 @@ where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁) f
 An error in λ or ζ leaves R times another symmetric matrix, near λζ I; one step of Newton's method
 for the polar factor, X ← (X + X⁻ᵀ)/2, squares its relative distance.
 
-`nearest_rotations` does this entry by entry: its arrays have the shape (3, 3, N). Of few matrices the
-SVD is faster, see `rbcourse.projection`.
+`nearest_rotations` does this entry by entry: its arrays have the shape (3, 3, N). For few matrices
+the SVD is faster, see `rbcourse.projection`.
 """
 
 import math

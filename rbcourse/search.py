@@ -68,8 +68,8 @@ class Task(NamedTuple):
         ``solver(equations, R)``: what is found for some of the equations from these curves.
     nodes : int
         On how many nodes curves are started.
-    saddles : bool
-        Whether curves about one axis may be saddles, so that curves bent aside are tried too.
+    inertia : ndarray, shape (N, 3, 3), optional
+        Of bodies. Their curves about one axis may be saddles: curves bent aside are tried too.
     known : dict of int to Solution
         Problems that are solved.
     """
@@ -80,7 +80,7 @@ class Task(NamedTuple):
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = COARSE
-    saddles: bool = False
+    inertia: Array | None = None
     known: Mapping[int, Solution] = MappingProxyType({})
 
 
@@ -142,7 +142,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         functional,
         Stationary(functional, ends.R0, ends.R1, rates),
         start,
-        saddles=True,
+        inertia=functional.G,
         known={i: one for i, one in curves.items() if round_ones[i]},
     )
 
@@ -200,12 +200,14 @@ def _searched(task: Task) -> list[Solution | Failure]:
     again = np.unique(problem[dear | (fast > FAST)[problem]])
     if len(again):
         _follow_on(task, again, problem, R, found)
-    if task.saddles:
-        _leave_the_axis(task, which, found)
+    if task.inertia is not None:
+        _leave_the_axis(task, task.inertia, which, found)
     return found
 
 
-def _leave_the_axis(task: Task, which: Numbers, found: list[Solution | Failure]) -> None:
+def _leave_the_axis(
+    task: Task, inertia: Array, which: Numbers, found: list[Solution | Failure]
+) -> None:
     """Bend solutions that turn about one axis, nearly, to four sides of it; follow the cheaper.
 
     Such a curve may be a saddle: all starts, and what lowers them, keep to the axis, and a curve
@@ -219,7 +221,7 @@ def _leave_the_axis(task: Task, which: Numbers, found: list[Solution | Failure])
             w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
             size = np.linalg.svd(w, compute_uv=False)
             if size[0] > 0 and size[1] < FLAT * size[0]:
-                sides = ASIDE * _across(w / size[0], task.functional.of(np.array([i])).G[0])[:, None]
+                sides = ASIDE * _across(w / size[0], inertia[i])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)

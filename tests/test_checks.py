@@ -58,9 +58,20 @@ def test_symmetric_but_for_rounding():
 
 def test_times_outside_the_unit_interval_are_named():
     assert checks.as_time([0, 1], 2).shape == (2, 1, 1)
-    for bad in (-1e-16, 1.0000000000000002):
+    for bad in (-2e-15, 1.000000000000002):
         with pytest.raises(ValueError, match=re.escape(f"t[1] is {bad}, a time in [0, 1]")):
             checks.as_time([0, bad], 0)
+
+
+def test_times_that_are_outside_by_rounding_become_the_end():
+    accumulated = np.cumsum(np.full(100, 0.07))  # the last one is 7.000000000000009
+    assert accumulated[-1] > 7
+    assert np.array_equal(checks.as_time(accumulated, 0, (0.0, 7.0)), np.minimum(accumulated, 7))
+    assert checks.as_time(-1e-15, 0, (0.0, 7.0)) == 0
+    with pytest.raises(ValueError, match=r"t is 7\.0000000000000\d+, a time in \[0, 7\] is wanted"):
+        checks.as_time(7 * (1 + 10 * EPS), 0, (0.0, 7.0))
+    with pytest.raises(ValueError, match="t is -1e-13"):
+        checks.as_time(-1e-13, 0, (0.0, 7.0))
 
 
 def test_angles_outside_0_to_pi_are_named():

@@ -491,7 +491,8 @@ def test_a_stack_is_indexed_as_an_array_is(stack_of_six, index):
     for order, value in enumerate(values):
         want = value.reshape(5, 6, *value.shape[3:])[:, numbers]
         assert picked(times, order).shape == want.shape
-        assert np.abs(picked(times, order) - want).max(initial=0) < 1e-12
+        largest = max(1, np.abs(value).max())  # the stack is projected by FOAM, few by the SVD
+        assert np.abs(picked(times, order) - want).max(initial=0) < 1e-12 * largest
 
 
 def test_a_curve_says_what_it_is(stack_of_six):

@@ -109,7 +109,9 @@ def test_a_matrix_gets_what_it_gets_alone_by_the_svd():
     assert np.abs(alone - R[right])[far].max() <= 64 * EPS * 100
 
 
-@pytest.mark.parametrize("count", [0, 1, MANY - 1, MANY, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 1])
+@pytest.mark.parametrize(
+    "count", [0, 1, MANY - 1, MANY, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 1]
+)
 def test_every_matrix_of_a_stack_is_projected(count):
     M = rotations(np.random.default_rng(count), count)
     R, right = project(3 * M)

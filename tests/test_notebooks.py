@@ -77,7 +77,7 @@ def faults(notebook):
             yield "a skipped cell gives no reason"
     for number, cell in enumerate(code_cells(notebook), start=1):
         if cell.execution_count != number:
-            yield "a cell is not executed, or not in order"
+            yield "a cell is not executed, or not in order: run course.py figures with its number"
         if len(cell.source.splitlines()) > 10:
             yield "a cell is longer than ten lines"
         if any(out.output_type == "error" or out.get("name") == "stderr" for out in cell.outputs):

@@ -478,3 +478,18 @@ def test_a_copy_is_the_same_curve(what):
         assert np.array_equal(other.costate(0.4), curves.costate(0.4))
     assert np.array_equal(curves[[True, False, True]].cost, curves.cost[[0, 2]])
     assert curves[:0](0.5).shape == (0, 3, 3)
+
+
+@pytest.mark.parametrize("turn", [110, 120, 140, 170])
+def test_of_two_best_curves_rounding_does_not_choose(turn):
+    """From rest about the axis of the largest moment: a half-turn about it carries one into the
+    other."""
+    axes = rb.exp_so3([0.3, -0.5, 0.2])
+    for frame in (np.eye(3), axes):
+        G, axis = frame @ BOOK @ frame.T, frame[:, 2]
+        R1, rest, t = rb.exp_so3(np.radians(turn) * axis), np.zeros(3), np.linspace(0, 1, 5)
+        first = rb.minimum_torque_so3(np.eye(3), R1, rest, rest, G)(t, 1)
+        assert np.abs(np.cross(first, axis)).max() > 0.1  # it leaves the axis
+        for nudge in np.random.default_rng(turn).normal(scale=1e-15, size=(8, 3)):
+            again = rb.minimum_torque_so3(np.eye(3), R1 @ rb.exp_so3(nudge), rest, rest, G)(t, 1)
+            assert np.abs(again - first).max() < 1e-6

@@ -219,3 +219,27 @@ def test_the_long_way_near_its_singular_sets():
     half_turn = np.array([0, 0, 0, 1.0])  # both ways are as long, and they differ
     assert np.abs(rb.quaternion.slerp_long(one, half_turn, 1) + half_turn).max() < 4 * EPS
     assert np.abs(rb.quaternion.slerp_long(one, -half_turn, 1) - half_turn).max() < 4 * EPS
+
+
+def test_continuous_quaternions_are_the_same_rotations_without_jumps():
+    t = np.linspace(0, 4, 401)
+    R = rb.exp_so3(t[:, None] * [[0.3, -1, 2]])  # w passes through 0 three times
+    q = rb.quaternion_from_matrix(R)
+    jumping = np.abs(np.diff(q, axis=0)).max()
+    smooth = rb.continuous_quaternions(q)
+    assert jumping > 1
+    assert np.abs(np.diff(smooth, axis=0)).max() < np.linalg.norm([0.3, -1, 2]) * t[1] / 2
+    assert np.array_equal(smooth[0], q[0])
+    assert np.array_equal(np.abs(smooth), np.abs(q))
+
+
+def test_continuous_quaternions_take_each_path_of_a_stack_and_change_no_argument():
+    q = rb.sample_quaternion((50, 3), rng=8)
+    before, signs = q.copy(), rb.continuous_quaternions(q)
+    assert np.array_equal(q, before)
+    assert np.all(np.sum(signs[1:] * signs[:-1], axis=-1) >= 0)
+    for k in range(3):
+        assert np.array_equal(signs[:, k], rb.continuous_quaternions(q[:, k]))
+    assert np.array_equal(rb.continuous_quaternions(q[0, 0]), q[0, 0])
+    assert np.array_equal(rb.continuous_quaternions(-q[:1]), -q[:1])
+    assert rb.continuous_quaternions(np.empty((0, 4))).shape == (0, 4)

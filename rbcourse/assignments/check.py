@@ -35,6 +35,7 @@ from rbcourse.assignments.tampering import find_in_cells
 from rbcourse.assignments.writing import write_whole
 from rbcourse.course.notebooks import KERNEL
 
+
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
 

@@ -207,8 +207,8 @@ def _with_titles(page: str, graded: Path) -> str:
         link = f'<a href="#{grade_id(cell)}">'
         kind = "in words" if is_answer(cell) else "tests"
         title = re.sub(r" \(\d+ points?\)$", "", title_of(cells, at))
-        name = f"{link}{html.escape(title)}, {kind}</a>"
-        page = re.sub(f"{re.escape(link)}[^<]*</a>", lambda _, name=name: name, page)
+        name = f"{html.escape(title)}, {kind}".replace("\\", "\\\\")  # re.sub reads it
+        page = re.sub(f"({re.escape(link)})[^<]*</a>", rf"\g<1>{name}</a>", page)
     return page
 
 

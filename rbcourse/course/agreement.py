@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 import nbformat
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageSequence
 
 Numbers: TypeAlias = NDArray[np.int_]
 Polygon: TypeAlias = tuple[Any, bool, NDArray[np.float64]]
@@ -38,8 +38,8 @@ def changed_lines(stored: str, again: str) -> Iterator[str]:
         re.sub(BASE64, lambda picture: f"base64 ({zlib.crc32(picture[1].encode()):08x})", text)
         for text in (stored, reconciled_notebook(stored, again))
     )
-    parts = (text.split("\n") for text in lines)
-    for line in difflib.unified_diff(*parts, "stored", "again", n=0, lineterm=""):
+    before, after = (text.split("\n") for text in lines)
+    for line in difflib.unified_diff(before, after, "stored", "again", n=0, lineterm=""):
         yield line if len(line) < 2000 else f"{line[:500]} ... {line[-200:]}"
 
 
@@ -234,10 +234,9 @@ def differing_pixels(one: bytes, other: bytes) -> tuple[float, float]:
 
 def _frames(file: Path) -> Iterator[bytes]:
     with Image.open(file) as picture:
-        for i in range(picture.n_frames):
-            picture.seek(i)
+        for frame in ImageSequence.Iterator(picture):
             content = io.BytesIO()
-            picture.convert("RGB").save(content, "png")
+            frame.convert("RGB").save(content, "png")
             yield content.getvalue()
 
 

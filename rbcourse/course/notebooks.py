@@ -169,7 +169,10 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
                 shutil.copyfile(file, figures / file.name)
         others = "".join(path.read_text("utf-8") for path in every if path not in chosen)
         for file in [file for file in figures.iterdir() if file.is_file()]:
-            if file.name not in {each.name for each in drawn} and f'\\"{file.stem}\\"' not in others:
+            if (
+                file.name not in {each.name for each in drawn}
+                and f'\\"{file.stem}\\"' not in others
+            ):
                 file.unlink()
     print(f"{len(texts)} lessons run, {changed} changed; figures changed: {len(stale)}")
 

@@ -4,14 +4,11 @@ import os
 import re
 import shutil
 import sys
-import tempfile
-import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from textwrap import dedent
 
 import nbformat
-import psutil
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 from tiny_class import Class, cell, make_template

@@ -81,7 +81,7 @@ def answers(name):
 
 def in_tex(matrix):
     rows = (" & ".join(f"{x:.3g}" for x in row) for row in np.round(matrix, 3) + 0.0)
-    return rf"$\begin{{pmatrix}}" + r"\\ ".join(rows) + r"\end{pmatrix}$"
+    return r"$\begin{pmatrix}" + r"\\ ".join(rows) + r"\end{pmatrix}$"
 
 
 def place(numbers, form="g"):

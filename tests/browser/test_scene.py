@@ -26,7 +26,7 @@ SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
 def book():
     """A book with its three axes through it."""
     fig, ax = plt.subplots(figsize=(4, 4), dpi=100, subplot_kw={"projection": "space"})
-    R = rb.sample_rotation(rng=np.random.default_rng())
+    R = rb.sample_rotation(rng=np.random.default_rng(1))
     bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), np.array([0.2, 0.13, 0.03]))
     for axis, colour in zip(R.T, ("red", "green", "blue"), strict=True):
         ax.plot(*np.outer(axis, [-0.16, 0.16]), color=colour, lw=3.5)
@@ -38,7 +38,7 @@ def sphere():
     """A sphere with points, and a line that goes through it."""
     fig, ax = plt.subplots(figsize=(4, 4), dpi=100, subplot_kw={"projection": "space"})
     spheres.draw_sphere(ax)
-    ax.plot(*rb.sample_rotation(80, rng=np.random.default_rng())[:, :, 0].T, "o", color="red")
+    ax.plot(*rb.sample_rotation(80, rng=np.random.default_rng(2))[:, :, 0].T, "o", color="red")
     ax.plot([-1.2, 1.2], [0.3, -0.3], [0, 0], color="blue", lw=3)
     return fig, ax
 

@@ -263,7 +263,10 @@ def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path):
     ]
     before = [path.read_text() for path in paths]
     notebooks.regenerate(tmp_path, figures, ["01"])
-    assert [path.read_text() != text for path, text in zip(paths, before, strict=True)] == [True, False]
+    assert [path.read_text() != text for path, text in zip(paths, before, strict=True)] == [
+        True,
+        False,
+    ]
     # what another lesson draws stays; what none draws goes
     assert {file.name: file.read_text() for file in figures.iterdir()} == {
         "arm.png": "as it was",

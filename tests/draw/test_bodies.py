@@ -212,3 +212,20 @@ def test_the_room_has_names_with_units_and_numbers_where_they_are(ax3d):
     for line in ax3d.lines:
         places = np.transpose(line.get_data_3d())
         assert ((places >= low) & (places <= high)).all()
+
+
+def test_a_motion_in_seconds_has_its_units():
+    poses = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0]])
+    motion, t = rb.chain([0, 2], poses), np.linspace(0, 2, 5)
+    plain, timed = bodies.motion_table(t, motion, t[:1]), bodies.motion_table(t, motion, t[:1], "s")
+    assert [name.split(" [")[0] for name in plain] == [name.split(" [")[0] for name in timed]
+    for name in (
+        "t [s]",
+        "drawn [1]",
+        "x [m]",
+        "w1 [rad/s]",
+        "v3 [m/s]",
+        "w2' [rad/s²]",
+        "a1 [m/s²]",
+    ):
+        assert name in timed

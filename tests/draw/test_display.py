@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from matplotlib.patches import Annulus, Rectangle
 
+from rbcourse.course.agreement import polygons, split
 from rbcourse.draw import bodies
 from rbcourse.draw.display import PARTS, Display, joined
-from rbcourse.course.agreement import polygons, split
 
 
 @pytest.fixture

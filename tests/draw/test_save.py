@@ -1,5 +1,6 @@
 """Figures as files: the same bytes each time, colours for all eyes."""
 
+import re
 from itertools import combinations
 
 import matplotlib.pyplot as plt
@@ -97,4 +98,14 @@ def test_columns_of_different_shapes_are_refused_and_nothing_is_written(tmp_path
     with pytest.raises(ValueError, match=r"one shape wanted, got t \[1\] \(2,\), x \[m\] \(3,\)"):
         save.save_figure(fig, "bad", {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "")
     assert list(tmp_path.iterdir()) == []
+    plt.close(fig)
+
+
+@pytest.mark.parametrize("name", ["pitch [deg]", "t", "angle (rad)", "x[m]"])
+def test_a_column_without_a_unit_of_the_course_is_refused(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+    fig, _ = plt.subplots()
+    with pytest.raises(ValueError, match=re.escape(f"data: {name!r} has to end with")):
+        save.save_figure(fig, "pitch", {"body": ["a"], name: [1.0]}, "A pitch.")
+    assert not list(tmp_path.iterdir())
     plt.close(fig)

@@ -52,7 +52,7 @@ def faces_over(parts, place, sight, least):
 def test_it_is_seen_as_matplotlib_sees_it_without_perspective(ax):
     ax.view_init(elev=33, azim=-71)
     ax.figure.canvas.draw()
-    places, sight = np.random.default_rng().uniform(-1, 1, (20, 3)), ax.sight()
+    places, sight = np.random.default_rng(1).uniform(-1, 1, (20, 3)), ax.sight()
     x, y, _ = proj_transform(*places.T, ax.get_proj())
     want = ax.transData.transform(np.stack([x, y], axis=-1))
     assert np.abs(sight.flat(sight.scale * (places - sight.middle)) - want).max() < 1e-9
@@ -89,7 +89,7 @@ def test_views_that_the_browser_has_not_are_refused(ax, view):
 def test_of_triangles_that_pass_through_one_another_the_nearest_is_on_top(ax, side):
     """At random places the faces are drawn from the farthest to the nearest."""
     ax.view_init(*side)
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(2)
     for _ in range(12):
         ax.add_artist(space.Faces(rng.uniform(-1, 1, (1, 3, 3)), ["red"]))
     parts, sight = drawn(ax)
@@ -108,7 +108,7 @@ def test_the_axes_of_a_book_end_where_they_leave_it(ax, side):
     """Of a line through a box what is inside, or behind, is drawn before the face that hides it."""
     ax.fit(np.full(3, -0.15), np.full(3, 0.15))
     ax.view_init(*side)
-    R = rb.sample_rotation(rng=np.random.default_rng())
+    R = rb.sample_rotation(rng=np.random.default_rng(3))
     bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), BOOK)
     for i in range(3):
         ax.plot(*np.outer(R[:, i], [-0.14, 0.14]), lw=3, zorder=7)
@@ -138,7 +138,7 @@ def test_the_axes_of_a_book_end_where_they_leave_it(ax, side):
 
 def test_what_is_on_the_far_side_of_a_ball_is_behind_its_disc(ax):
     spheres.draw_sphere(ax)
-    points = rb.sample_rotation(100, rng=np.random.default_rng())[:, :, 0]
+    points = rb.sample_rotation(100, rng=np.random.default_rng(4))[:, :, 0]
     ax.plot(*points.T, "o")
     for side in SIDES:
         ax.view_init(*side)
@@ -168,7 +168,7 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
 
 def test_a_face_is_lightest_where_it_is_turned_to_the_light(ax):
     shades = {}
-    for R in rb.sample_rotation(50, rng=np.random.default_rng()):
+    for R in rb.sample_rotation(50, rng=np.random.default_rng(5)):
         box = bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), 1.0)
         box = space.Faces(box.corners[:6], 6 * ["1"])
         for face, corners in zip(box.pieces(1.0, np.zeros(3)), box.corners, strict=True):

@@ -12,9 +12,9 @@ from PIL import Image
 from sweeps import notice, tell
 from traitlets import TraitError
 
+from rbcourse.course.agreement import polygons, split
 from rbcourse.explore.explorer import LABELS, Explorer, look, new_figure, new_line
 from rbcourse.explore.widgets import choice, slider, stepped
-from rbcourse.course.agreement import polygons, split
 
 FAR, WARN = 9.0, 8.0
 
