@@ -119,8 +119,9 @@ def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> Non
     if re.fullmatch(r"notebooks/\d\d_[^/]*", path) and not os.environ.get("RBCOURSE_EDIT"):
         stored = nbformat.read(Path(contents_manager.root_dir, path), as_version=4)
         if _sources(stored) != _sources(nbformat.from_dict(model["content"])):
-            why = "this is an original. Your copy is in work/; authors call 'course.py lab --edit'"
-            raise HTTPError(403, f"{path} is not saved: {why}", reason=f"Not saved: {why}")
+            why = f"{path} is an original, and is not saved. Your copy is in work/"
+            keep = "to keep this one, choose File > Save Notebook As, and a name there"
+            raise HTTPError(403, f"{why}; {keep}", reason="Not saved: this is an original")
         model["content"] = stored
     keep_stills(model["content"])
 

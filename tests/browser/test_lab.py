@@ -99,6 +99,53 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(home, lab, page, pi
     pictures("lab_02_two_link_arm", lambda: centre(explorer))
 
 
+# The boxes of an explorer that scroll up and down: their classes and heights.
+SCROLLING = """(explorer) => [explorer, ...explorer.querySelectorAll("*")]
+  .filter((box) => box.scrollHeight > box.clientHeight + 0.5)
+  .filter((box) => ["auto", "scroll"].includes(getComputedStyle(box).overflowY))
+  .map((box) => [box.className, box.scrollHeight, box.clientHeight])"""
+
+
+def test_the_cell_of_a_still_is_run_alone_and_its_explorer_does_not_scroll(
+    home, lab, page, pictures
+):
+    """As the still tells its reader."""
+    lesson = home[0] / "work" / "06_geodesics.ipynb"
+    shutil.copy(lesson, lesson.with_stem("alone"))
+    cells = json.loads(lesson.read_text("utf-8"))["cells"]
+    number = next(i for i, cell in enumerate(cells) if "_explorer()" in "".join(cell["source"]))
+    open_in_lab(page, lab("workspaces/alone/tree/alone.ipynb"))
+    page.get_by_text(IDLE).wait_for()
+    page.evaluate(f"jupyterapp.shell.currentWidget.content.activeCellIndex = {number}")
+    page.evaluate("jupyterapp.commands.execute('notebook:run-cell')")
+    explorer = explorer_in_lab(page)
+    explorer.locator(".noUi-handle").first.press("ArrowRight")
+    explorer.locator("span[role=status]").wait_for(state="attached")
+    assert explorer.evaluate(SCROLLING) == []
+    pictures("lab_alone", lambda: centre(explorer))
+
+
+def test_an_original_that_was_changed_is_not_saved_and_says_where_the_copy_is(
+    home, lab, page, pictures
+):
+    original = home[0] / "work" / "notebooks" / "01_plane.ipynb"
+    original.parent.mkdir()
+    stored = (home[0] / "work" / original.name).read_bytes()
+    original.write_bytes(stored)
+    open_in_lab(page, lab("workspaces/original/tree/notebooks/01_plane.ipynb"))
+    page.get_by_text(IDLE).wait_for()
+    model = "jupyterapp.shell.currentWidget.context.model"
+    page.evaluate(f"{model}.setMetadata('touched', true)")
+    page.evaluate("jupyterapp.commands.execute('docmanager:save')")
+    page.wait_for_function(f"!{model}.dirty")
+    assert original.read_bytes() == stored
+    page.evaluate(f"{model}.cells.get(0).sharedModel.setSource('# Mine')")
+    page.evaluate("void jupyterapp.commands.execute('docmanager:save')")
+    page.get_by_text("Your copy is in work/").first.wait_for()
+    pictures("lab_original", lambda: None)
+    assert original.read_bytes() == stored
+
+
 def settled(page, text):
     """What a text is when the kernel has nothing more to do."""
     now = None
