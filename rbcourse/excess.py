@@ -122,7 +122,8 @@ def excess_estimate(curve: Curve) -> Array:
     Returns
     -------
     ndarray, shape curve.batch_shape
-        About cost over optimum, minus 1; of a `chain` over the optima between its knots. NaN where
+        About cost over optimum, minus 1. A `chain` is compared with the best legs that have the
+        same velocities at its poses; the best motion through the poses is cheaper still. NaN where
         there is no estimate: where a curve turns at `SPEED_LIMIT` or faster at some time, costs
         more than about twice the optimum, is not smooth enough for 33 nodes, or costs nothing.
 

@@ -242,8 +242,9 @@ def _csv_rows(file: str | Path) -> tuple[bool, Rows]:
     if kind is None:
         wanted = ", ".join(HEADERS[True, True])
         raise ValueError(
-            f"{place}: {wanted} wanted, without positions or velocities for less, "
-            f"got {', '.join(header)[:200]!r}"
+            f"{place}: the columns must be {wanted}; those of positions or velocities may be left "
+            f"out. Got {', '.join(header)[:200]!r}. For other files use numpy.loadtxt and "
+            "pose_from_components"
         )
     return kind[0], (_row(place, header, cells) for place, cells in lines)
 

@@ -235,7 +235,9 @@ def test_an_original_that_was_run_keeps_its_bytes_and_one_that_was_changed_is_no
     manager.save(model, lesson)
     assert (place / "01_plane.ipynb").read_bytes().rstrip() == stored.rstrip()
     model["content"] = new_notebook(cells=[new_code_cell("2")])
-    with pytest.raises(HTTPError, match=r"is an original, and is not saved\. Your copy is in work/"):
+    with pytest.raises(
+        HTTPError, match=r"is an original, and is not saved\. Your copy is in work/"
+    ):
         manager.save(model, lesson)
     manager.save(model, "work.ipynb")
     monkeypatch.setenv("RBCOURSE_EDIT", "1")
