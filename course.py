@@ -50,9 +50,8 @@ def main():
     parser = argparse.ArgumentParser(prog="course.py", description=__doc__.splitlines()[0])
     tasks = parser.add_subparsers(dest="task", required=True, metavar="TASK")
     figures = tasks.add_parser("figures", help="run lessons again; rewrite what has changed")
-    figures.add_argument(
-        "lessons", nargs="*", metavar="LESSON", help="03; without, all, and the explorers"
-    )
+    help_ = "its number, such as 03; by default all lessons and the explorers"
+    figures.add_argument("lessons", nargs="*", metavar="LESSON", help=help_)
     test = tasks.add_parser("test", help="run every test, lessons too; further words go to pytest")
     releases = test.add_mutually_exclusive_group()
     for name in ("oldest", "newest"):
@@ -287,8 +286,8 @@ def make(venv, wanted, *words):
     if found is None and os.path.lexists(venv):
         delete = "Remove-Item -Recurse" if os.name == "nt" else "rm -r"
         sys.exit(
-            "%s was not made by course.py. Move it away, or delete it with '%s %s'; then try again."
-            % (venv.name, delete, venv.name)
+            "%s was not made by course.py. Move it away, or delete it with '%s \"%s\"'; then try "
+            "again." % (venv.name, delete, venv)
         )
     if Path(sys.prefix).resolve() == venv.resolve():
         sys.exit(

@@ -155,7 +155,8 @@ class Curve:
         Raises
         ------
         ValueError
-            If a time is not finite or outside the domain, or `order` is another.
+            If a time is not finite or outside the domain, by more than 8 eps of the larger end, or
+            `order` is another.
 
         Examples
         --------

@@ -44,7 +44,7 @@ def chain(
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists (ω, v), or angular velocities ω, body frame, per unit of the times: what the curve
         has at each pose. By default it starts and ends at rest, stops wherever two successive poses
-        are equal, and has the `bessel_velocities` elsewhere.
+        are equal to rounding, and has the `bessel_velocities` elsewhere.
     leg : callable, optional
         What joins two poses: a function of this package that returns two-point curves, or one of
         your own that returns a stack of them. It is called once for all legs, with keyword

@@ -256,7 +256,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     Notes
     -----
     Singular set: successive quaternions with the scalar product 0, rotations that differ by a
-    half-turn. There the sign stays as it is.
+    half-turn: there the sign changes where that of the one before was changed.
 
     Examples
     --------
@@ -266,7 +266,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     """
     q = as_finite("q", q, 4)
     if q.ndim < 2:
-        return q
+        return q + 0.0
     turned = np.sum(q[1:] * q[:-1], axis=-1, keepdims=True) < 0
     q[1:] *= np.cumprod(np.where(turned, -1.0, 1.0), axis=0)
     return q + 0.0

@@ -69,7 +69,8 @@ class Task(NamedTuple):
     nodes : int
         On how many nodes curves are started.
     inertia : ndarray, shape (N, 3, 3), optional
-        Of bodies. Their curves about one axis may be saddles: curves bent aside are tried too.
+        Inertia of the bodies. If it is given, solutions about one axis, which may be saddles, are
+        bent aside too.
     known : dict of int to Solution
         Problems that are solved.
     """
@@ -234,8 +235,8 @@ def _leave_the_axis(
 def _across(w: Array, G: Array) -> Array:
     """Return four sides of the axis that w (n, 3) turns about, nearly: shape (4, 3).
 
-    They are those to which w leans. Where it does not, the body decides, and where all its axes are
-    alike, their order: never rounding, nor the sign that the SVD gives.
+    The sides are the directions in which w deviates from its axis. Where it does not deviate, the
+    inertia decides, and for equal inertias the order of the axes.
     """
     leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
     axes = np.linalg.svd(leans, full_matrices=False)[2][1:]

@@ -195,7 +195,9 @@ def test_set_up_is_done_anew_when_needed(setting_up, disturb):
 def test_an_environment_of_somebody_else_is_left_alone(setting_up):
     module, done = setting_up
     (module.VENV / "lib").mkdir(parents=True)
-    with pytest.raises(SystemExit, match=r"\.venv was not made by course\.py.* 'rm -r \.venv'"):
+    with pytest.raises(
+        SystemExit, match=r"\.venv was not made by course\.py.* 'rm -r \"/.*\.venv\"'"
+    ):
         module.set_up()
     assert (module.VENV / "lib").exists()
     assert done == []

@@ -32,25 +32,10 @@ from rbcourse.assignments.tampering import find_in_cells
 
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
 # what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
-TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt", "em", "hr"}
-TAGS |= {
-    "i",
-    "h1",
-    "h2",
-    "h3",
-    "h4",
-    "h5",
-    "h6",
-    "img",
-    "li",
-    "ol",
-    "p",
-    "pre",
-    "s",
-    "span",
-    "strong",
-}
-TAGS |= {"sub", "summary", "sup", "table", "tbody", "td", "tfoot", "th", "thead", "tr", "ul"}
+TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt"}
+TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
+TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
+TAGS |= {"th", "thead", "tr", "ul"}
 LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}

@@ -6,7 +6,6 @@ agrees with one of them everywhere gets its hint.
 """
 
 import copy
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from inspect import signature
@@ -100,7 +99,7 @@ class Problem:
         given_degrees = [_in_radians(value) for value in given]
         for mistake in self.mistakes:  # two at once
             if any(all(map(self.same, given_degrees, self.results(f))) for f in mistake.answers):
-                raise NotYet(f"{IN_RADIANS} And: {mistake.hint}")
+                raise NotYet(f"{IN_RADIANS} There is a second mistake: {mistake.hint}")
         first = right.index(False)
         called = f"For {_named(self.answer, self.inputs[first])}"
         raise NotYet(self._describe(called, given[first], wanted[first]))
@@ -174,9 +173,11 @@ class Drawing(Problem):
         lost = next(curve for curve in wanted if not self.same(got, [curve]))
         near = next((curve for curve in got if curve.shape == lost.shape), None)
         if near is None:
-            numbers = Counter(len(curve) for curve in got).items()
-            drawn = ", ".join(f"{_count(n, 'line')} of {_count(k, 'point')}" for k, n in numbers)
-            return f"Draw one line through {_count(len(lost), 'point')}; you drew {drawn}."
+            sizes = sorted({len(curve) for curve in got})
+            if sizes == [1]:
+                drawn = f"you drew {len(got)} lines of 1 point"
+                return f"Draw one line through {len(lost)} points; {drawn}."
+            return f"A curve of {len(lost)} points is wanted; you drew curves of {sizes} points."
         i = int(np.argmax(np.abs(near - lost).max(axis=1)))
         return f"Point {i} of the curve should be {show(lost[i])}; yours is {show(near[i])}."
 
@@ -224,10 +225,6 @@ def show(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > 16:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" + "s" * (number != 1)
 
 
 def _in_radians(value: Any) -> Any:

@@ -111,19 +111,33 @@ def keep_stills(notebook: Any) -> None:
 def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> None:
     """Keep the stills of what JupyterLab saves, and the lessons as they are stored.
 
-    Without ``course.py lab --edit`` a lesson in ``notebooks/`` that was only opened or run keeps
-    its stored outputs; one that was changed is not saved, and its reader is told where copies are.
+    Without ``course.py lab --edit`` a lesson that has a copy in ``work/`` and was only opened or
+    run keeps its stored outputs; one that was changed is not saved, and its reader is told where
+    the copy is.
     """
     if model["type"] != "notebook" or not model.get("content"):
         return
-    if re.fullmatch(r"notebooks/\d\d_[^/]*", path) and not os.environ.get("RBCOURSE_EDIT"):
-        stored = nbformat.read(Path(contents_manager.root_dir, path), as_version=4)
-        if _sources(stored) != _sources(nbformat.from_dict(model["content"])):
-            why = f"{path} is an original, and is not saved. Your copy is in work/"
-            keep = "to keep this one, choose File > Save Notebook As, and a name there"
-            raise HTTPError(403, f"{why}; {keep}", reason="Not saved: this is an original")
-        model["content"] = stored
+    folder, _, name = path.rpartition("/")
+    if folder == "notebooks" and not os.environ.get("RBCOURSE_EDIT"):
+        root = Path(contents_manager.root_dir)
+        if name in _read_record(root / "work" / ".copied.json"):
+            model["content"] = _as_stored(root / path, model["content"])
     keep_stills(model["content"])
+
+
+def _as_stored(path: Path, content: Any) -> Any:
+    """Return a lesson as it is stored, or raise an error for JupyterLab if its cells differ."""
+    try:
+        stored = nbformat.read(path, as_version=4)
+        now = nbformat.from_dict(content)
+        same = _sources(stored) == _sources(now) and _tags(stored) == _tags(now)
+    except Exception as error:  # of others JupyterLab would say nothing, and save
+        raise HTTPError(500, f"{path.name} is not saved: {error}") from error
+    if not same:
+        why = f"{path.name} is an original, and is not saved. Your copy is in work/"
+        keep = "to keep this one, choose File > Save Notebook As and enter a path such as work/mine"
+        raise HTTPError(403, f"{why}; {keep}.ipynb", reason="Not saved: this is an original")
+    return stored
 
 
 def _with_numbered_ids(ran: list[Any]) -> list[Any]:
@@ -140,8 +154,8 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
     """Execute lessons, then rewrite what has changed of the stored outputs and the figures.
 
     All lessons, or those whose names begin with one of `names`. What is the same as far as
-    processors agree stays as it is. Nothing is rewritten unless every lesson ran. Figures that no
-    lesson draws are removed.
+    processors agree stays as it is. Nothing is rewritten unless every lesson ran. When all lessons
+    run, figures that none of them draws are removed.
     """
     every = lesson_paths(lessons)
     if not every:
@@ -154,28 +168,23 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
         for path in chosen:
             print(f"{path.stem} ...", end=" ", flush=True)
             start = time.perf_counter()
-            texts[path] = execute(path, Path(folder))
+            text = execute(path, Path(folder))
+            texts[path] = reconciled_notebook(path.read_text("utf-8"), text)
             print(f"{time.perf_counter() - start:.1f} s", flush=True)
-        changed = 0
-        for path, text in texts.items():
-            stored = path.read_text("utf-8")
-            if stored != (text := reconciled_notebook(stored, text)):
-                path.write_text(text, encoding="utf-8", newline="\n")
-                changed += 1
-        figures.mkdir(exist_ok=True)
         drawn = sorted(Path(folder).iterdir())
         stale = {Path(name).stem for name in stale_figures(Path(folder), figures)}
+        changed = [path for path, text in texts.items() if path.read_text("utf-8") != text]
+        for path in changed:
+            path.write_text(texts[path], encoding="utf-8", newline="\n")
+        figures.mkdir(exist_ok=True)
         for file in drawn:
             if file.stem in stale:  # all files of a figure belong together
                 shutil.copyfile(file, figures / file.name)
-        others = "".join(path.read_text("utf-8") for path in every if path not in chosen)
-        for file in [file for file in figures.iterdir() if file.is_file()]:
-            if (
-                file.name not in {each.name for each in drawn}
-                and f'\\"{file.stem}\\"' not in others
-            ):
-                file.unlink()
-    print(f"{len(texts)} lessons run, {changed} changed; figures changed: {len(stale)}")
+        if chosen == every:
+            for file in {file for file in figures.iterdir() if file.is_file()}:
+                if file.name not in {each.name for each in drawn}:
+                    file.unlink()
+    print(f"{len(texts)} lessons run, {len(changed)} changed; figures changed: {len(stale)}")
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
@@ -249,6 +258,10 @@ def _cells(content: bytes) -> bytes:
 
 def _sources(notebook: Any) -> list[tuple[str, str]]:
     return [(cell.cell_type, cell.source) for cell in notebook.cells]
+
+
+def _tags(notebook: Any) -> list[Any]:
+    return [cell.metadata.get("tags", []) for cell in notebook.cells]
 
 
 def _numbered(path: Path) -> Iterator[Path]:

@@ -51,7 +51,7 @@ const rbcourseScene = {
   // hides, what is in it, and what is on the side of the eye; on both sides so with the next face.
   order(pieces, eye) {
     const { dot, cut } = rbcourseScene, drawn = [], todo = [[false, pieces]];
-    const mean = ({ places }) => Math.round(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
+    const mean = ({ places }) => Math.floor(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length + 0.3);
     while (todo.length) {
       const [ready, group] = todo.pop();
       const wall = group.find(({ kind }) => kind === "face" || kind === "ball");

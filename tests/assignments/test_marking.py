@@ -69,7 +69,7 @@ def test_a_function_with_other_arguments_is_told_so():
 
 def test_a_mistake_made_in_degrees_gets_both_hints():
     text = told(DOUBLE, "import numpy as np\ndef answer(x, k): return np.degrees(-2 * k * x)")
-    assert text == f"{IN_RADIANS} And: sign"
+    assert text == f"{IN_RADIANS} There is a second mistake: sign"
 
 
 def test_full_turns_do_not_count_where_the_problem_says_so():
@@ -110,7 +110,7 @@ def test_a_drawing_is_judged_by_its_points(drawing):
     [
         ("ax.plot(t**2, t)", "swapped"),
         ("pass", "Nothing was drawn on the axes that your function was given."),
-        ("ax.plot(t[1:], t[1:])", "Draw one line through 5 points; you drew 1 line of 4 points."),
+        ("ax.plot(t[1:], t[1:])", "A curve of 5 points is wanted; you drew curves of [4] points."),
         (
             "for x in t: ax.plot(x, x**2, '.')",
             "Draw one line through 5 points; you drew 5 lines of 1 point.",

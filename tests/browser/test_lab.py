@@ -132,6 +132,8 @@ def test_an_original_that_was_changed_is_not_saved_and_says_where_the_copy_is(
     original.parent.mkdir()
     stored = (home[0] / "work" / original.name).read_bytes()
     original.write_bytes(stored)
+    (original.parent.parent / "work").mkdir()
+    (original.parent.parent / "work" / ".copied.json").write_text('{"01_plane.ipynb": []}')
     open_in_lab(page, lab("workspaces/original/tree/notebooks/01_plane.ipynb"))
     page.get_by_text(IDLE).wait_for()
     model = "jupyterapp.shell.currentWidget.context.model"

@@ -135,7 +135,12 @@ def seen_from_elsewhere(states, styles, texts, data):
         room["view"][0] += 0.1
 
 
+def a_new_setting(states, styles, texts, data):
+    data["speed"] = 2
+
+
 SEEN = {
+    "a setting": a_new_setting,
     "a place moved by a pixel": places_moved_by(PARTS),
     "a place moved by two units": places_moved_by(2),
     "a colour": coloured,
@@ -175,6 +180,51 @@ def test_a_picture_in_a_page_is_kept_where_it_looks_the_same():
     assert reconciled(stored, again[0]) == stored
     assert reconciled(stored, again[1]) == again[1]
     assert reconciled(stored, again[0].replace("3.1", "3.2")) == stored.replace("3.1", "3.2")
+
+
+def labelled(label):
+    """A plot, as PNG, with one letter or digit in question."""
+    fig, ax = plt.subplots(figsize=(9, 5.5))
+    ax.set_ylabel(label)
+    content = io.BytesIO()
+    fig.savefig(content, format="png")
+    plt.close(fig)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("label", ["w2 [rad]", "w1 [rad/s]", "v1 [rad]"])
+def test_another_letter_in_a_large_picture_is_seen(label):
+    assert not agreement.look_the_same(labelled("w1 [rad]"), labelled(label))
+
+
+def test_a_transparent_picture_and_one_of_another_size_are_seen():
+    grey = np.full((40, 40, 4), 128, np.uint8)
+    clear = grey.copy()
+    clear[..., 3] = 0
+    page, *others = (f"<img src='{png(each)}'>" for each in (grey, clear, grey[:39]))
+    for other in others:
+        assert reconciled(page, other) == other
+
+
+def test_an_animation_that_runs_at_another_speed_is_stale(tmp_path):
+    frames = [Image.new("RGB", (20, 20), colour) for colour in ("red", "blue")]
+    for place, duration in (("stored", 50), ("drawn", 500)):
+        (tmp_path / place).mkdir()
+        frames[0].save(
+            tmp_path / place / "a.gif", save_all=True, append_images=frames[1:], duration=duration
+        )
+    assert stale_figures(tmp_path / "drawn", tmp_path / "stored") == ["a.gif"]
+    assert stale_figures(tmp_path / "drawn", tmp_path / "drawn") == []
+
+
+def test_cells_without_ids_are_paired_by_their_places(page):
+    texts = [notebook(page), notebook(changed(page, places_moved_by(1)))]
+    for i, text in enumerate(texts):
+        content = nbformat.reads(text, as_version=4)
+        content.nbformat_minor = 4
+        del content.cells[0]["id"]
+        texts[i] = nbformat.writes(content) + "\n"
+    assert reconciled_notebook(*texts) == texts[0]
 
 
 def notebook(*pages):
@@ -233,6 +283,23 @@ def test_a_file_that_differs_by_more_than_rounding_is_stale(tmp_path, number, co
     figure(tmp_path / "stored", "0.5", "#808080")
     figure(tmp_path / "drawn", number, colour)
     assert stale_figures(tmp_path / "drawn", tmp_path / "stored") == stale
+
+
+def test_a_damaged_file_and_one_of_an_unknown_kind_are_stale(tmp_path):
+    figure(tmp_path / "stored", "0.5", "#808080")
+    figure(tmp_path / "drawn", "0.5000000000001", "#808081")
+    (tmp_path / "stored" / "a.png").write_bytes(b"version https://git-lfs.github.com/spec/v1")
+    (tmp_path / "stored" / "a.csv").write_bytes(b"\xff\xfe")
+    for place in ("stored", "drawn"):
+        (tmp_path / place / "a.svg").write_text(place)
+    assert stale_figures(tmp_path / "drawn", tmp_path / "stored") == ["a.csv", "a.png", "a.svg"]
+
+
+def test_nan_in_a_table_agrees_with_itself(tmp_path):
+    for place, number in (("stored", "0.5"), ("drawn", "0.5000000000001")):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "a.csv").write_text(f"x [m]\n{number}\nnan\n")
+    assert stale_figures(tmp_path / "drawn", tmp_path / "stored") == []
 
 
 def test_a_document_that_alone_differs_and_a_file_that_is_not_stored_are_stale(tmp_path):

@@ -226,6 +226,7 @@ def test_an_original_that_was_run_keeps_its_bytes_and_one_that_was_changed_is_no
     folders, monkeypatch
 ):
     lesson, (place, _) = "notebooks/01_plane.ipynb", folders
+    notebooks.copy_lessons(*folders)
     manager = LargeFileManager(root_dir=str(place.parent))
     manager.pre_save_hook = notebooks.before_saving
     stored = (place / "01_plane.ipynb").read_bytes()
@@ -239,7 +240,16 @@ def test_an_original_that_was_run_keeps_its_bytes_and_one_that_was_changed_is_no
         HTTPError, match=r"is an original, and is not saved\. Your copy is in work/"
     ):
         manager.save(model, lesson)
-    manager.save(model, "work.ipynb")
+    manager.save(model, "notebooks/01_mine.ipynb")
+    manager.save(model, "notebooks/01_mine.ipynb")
+    model = manager.get(lesson)
+    model["content"]["cells"][0]["metadata"]["tags"] = ["solution"]
+    with pytest.raises(HTTPError, match="is an original"):
+        manager.save(model, lesson)
+    (place / "01_plane.ipynb").write_text("<<<<<<< HEAD")
+    with pytest.raises(HTTPError, match=r"01_plane\.ipynb is not saved"):
+        manager.save(model, lesson)
+    model["content"] = new_notebook(cells=[new_code_cell("2")])
     monkeypatch.setenv("RBCOURSE_EDIT", "1")
     manager.save(model, lesson)
     assert '"2"' in (place / "01_plane.ipynb").read_text()
@@ -257,7 +267,7 @@ save_figure(fig, "NAME")
 def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path):
     figures = tmp_path / "figures"
     figures.mkdir()
-    for file in ("arm.png", "old.png"):
+    for file in ("arm.png", "old.png", "plane.png"):  # the last one is damaged
         (figures / file).write_text("as it was")
     paths = [
         notebook_at(tmp_path / f"0{k}_{name}.ipynb", DRAW.replace("NAME", name))
@@ -269,10 +279,12 @@ def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path):
         True,
         False,
     ]
-    # what another lesson draws stays; what none draws goes
     assert {file.name: file.read_text() for file in figures.iterdir()} == {
         "arm.png": "as it was",
+        "old.png": "as it was",
         "plane.png": "plane",
     }
+    notebooks.regenerate(tmp_path, figures)
+    assert {file.name for file in figures.iterdir()} == {"arm.png", "plane.png"}
     with pytest.raises(ValueError, match="no lesson's name begins with '03'"):
         notebooks.regenerate(tmp_path, figures, ["03"])
