@@ -117,7 +117,7 @@ def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> Non
     """
     if model["type"] != "notebook" or not model.get("content"):
         return
-    folder, _, name = path.rpartition("/")
+    folder, name = os.path.split(path)
     if folder == "notebooks" and not os.environ.get("RBCOURSE_EDIT"):
         root = Path(contents_manager.root_dir)
         if name in _read_record(root / "work" / ".copied.json"):
