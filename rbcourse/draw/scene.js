@@ -10,6 +10,9 @@ const rbcourseScene = {
 
   dot: (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2],
 
+  // Depths as whole numbers: rounding does not decide which of two is less. Pixels begin at 0.7.
+  pixels: (depth) => Math.floor(depth + 0.3),
+
   // The unit normal of a whole face.
   normal(places) {
     const [o, ...others] = places, n = [0, 0, 0];
@@ -50,8 +53,8 @@ const rbcourseScene = {
   // Pieces from the farthest to the nearest, cut where they pass through faces: what the plane of a face
   // hides, what is in it, and what is on the side of the eye; on both sides so with the next face.
   order(pieces, eye) {
-    const { dot, cut } = rbcourseScene, drawn = [], todo = [[false, pieces]];
-    const mean = ({ places }) => Math.floor(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length + 0.3);
+    const { dot, cut, pixels } = rbcourseScene, drawn = [], todo = [[false, pieces]];
+    const mean = ({ places }) => pixels(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
     while (todo.length) {
       const [ready, group] = todo.pop();
       const wall = group.find(({ kind }) => kind === "face" || kind === "ball");
@@ -74,7 +77,7 @@ const rbcourseScene = {
 
   // What is to be drawn on the screen: styles and places [x, y], and how far along the line they begin.
   seen(pieces, { origin }, view) {
-    const { dot, order, sight, normal } = rbcourseScene, { right, up, eye } = sight(view);
+    const { dot, order, sight, normal, pixels } = rbcourseScene, { right, up, eye } = sight(view);
     const flat = (p) => [origin[0] + dot(p, right), origin[1] - dot(p, up)];
     // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut. An opaque
     // one is a trifle larger, so that nothing shines through there.
@@ -100,7 +103,8 @@ const rbcourseScene = {
     const [over, others] = [true, false].map((is) => ready.filter(({ zorder }) => zorder >= 10 === is));
     over.sort((a, b) => a.zorder - b.zorder);
     return [...order(others, eye), ...over].map(({ kind, style, places }) => {
-      const ends = kind === "mark" ? [...places].sort((p, q) => dot(p, eye) - dot(q, eye)) : places;
+      const depth = (p) => pixels(dot(p, eye));
+      const ends = kind === "mark" ? [...places].sort((p, q) => depth(p) - depth(q)) : places;
       return { style, along: places[0][3], runs: [(kind === "face" ? [...ends, ends[0]] : ends).map(flat)] };
     });
   },

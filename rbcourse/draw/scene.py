@@ -107,9 +107,7 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
     The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
     then what is in the plane, by its zorder, then what is on the side of the eye; and so on with
     the next face, on both sides. What no face parts is drawn by its zorder, then by its mean depth
-    in whole pixels, and then in the given order: so rounding does not decide between lines that
-    coincide. Pixels begin at 0.7, where depths of symmetric scenes hardly lie. `eye` is the
-    direction to the eye, shape (3,).
+    in `whole_pixels`, and then in the given order. `eye` is the direction to the eye, shape (3,).
     """
     drawn: list[Piece] = []
     todo = [(False, pieces)]  # whether they are in order, the next ones last
@@ -119,7 +117,7 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
         if ready:
             drawn += group
         elif wall is None:
-            depths = [np.floor((piece.places[:, :3] @ eye).mean() + 0.3) for piece in group]
+            depths = [whole_pixels((piece.places[:, :3] @ eye).mean()) for piece in group]
             order = sorted(range(len(group)), key=lambda i: (group[i].zorder, depths[i]))
             drawn += [group[i] for i in order]
         else:
@@ -134,6 +132,14 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
             inside = sorted(sides[0], key=lambda piece: piece.zorder)
             todo += [(False, sides[1]), (True, inside), (False, sides[-1])]
     return drawn
+
+
+def whole_pixels(depth: Any) -> Any:
+    """Return depths as whole numbers, so that rounding does not decide which of two is less.
+
+    The pixels begin at 0.7, where depths in symmetric scenes hardly lie.
+    """
+    return np.floor(depth + 0.3)
 
 
 def _filling_and_edge(piece: Piece) -> list[Piece]:

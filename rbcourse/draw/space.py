@@ -24,7 +24,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array
-from rbcourse.draw.scene import Piece, context, in_sight, normal_of
+from rbcourse.draw.scene import Piece, context, in_sight, normal_of, whole_pixels
 
 LIGHT = np.array([0.48, -0.36, 0.8])
 """Where the light comes from: a unit vector."""
@@ -158,7 +158,8 @@ class Scene(Artist):
             if dashes is not None:
                 gc.set_dashes(piece.places[0, 3] / renderer.points_to_pixels(1), dashes)
             for path in piece.marker:
-                nearer = np.argsort(piece.places[:, :3] @ sight.eye, kind="stable")
+                depths = whole_pixels(piece.places[:, :3] @ sight.eye)
+                nearer = np.argsort(depths, kind="stable")
                 renderer.draw_markers(gc, path, _SAME, Path(seen[nearer]), _SAME, piece.fill)
             if not piece.marker:
                 ends = seen[[*range(len(seen)), 0]] if piece.fill else seen
