@@ -98,10 +98,8 @@ def main():
         parser.error("%s takes no %s" % (known.task, " ".join(further)))
     if known.task == "test" and known.releases:
         venv = set_up_range(known.releases)
-        # what the lessons store belongs to the releases of environment.txt, as the examples of
-        # CONVENTIONS.md do, which need a newer SciPy than the package
+        # what the lessons store belongs to the releases of environment.txt
         stored = ["--deselect=notebooks", "--deselect=tests/test_notebooks.py"]
-        stored.append("--deselect=CONVENTIONS.md")
         test_in(venv, *(stored + further))
         return
     set_up()

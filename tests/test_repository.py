@@ -280,7 +280,7 @@ def test_tests_run_in_the_environment_that_is_asked_for(
     assert words[-2:] == ("-q", "tests/test_so3.py")
     assert "PYTHONDONTWRITEBYTECODE" not in os.environ
     left_out = [word for word in words if word.startswith("--deselect=")]
-    stored = ["notebooks", "tests/test_notebooks.py", "CONVENTIONS.md"]
+    stored = ["notebooks", "tests/test_notebooks.py"]
     assert left_out == [f"--deselect={path}" for path in stored if releases]
 
 
