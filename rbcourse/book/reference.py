@@ -82,7 +82,7 @@ def module_tables(groups: dict[str, list[str]], root: Path) -> str:
 def shown_code(root: Path) -> list[Path]:
     """Return the files with a page in the folder ``code``: none that answers a problem."""
     paths = [*(root / "rbcourse").rglob("*.py"), *(root / "tests").rglob("test_*.py")]
-    machinery = (root / "tests" / name for name in ("assignments", "browser", "course", "hostile"))
+    machinery = (root / "tests" / name for name in ("assignments", "browser", "hostile"))
     hidden = root / "rbcourse/assignments/problems", *machinery
     return sorted(path for path in paths if not any(map(path.is_relative_to, hidden)))
 
