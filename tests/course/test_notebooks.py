@@ -223,11 +223,12 @@ def test_what_is_saved_keeps_the_stills_of_widgets_and_drops_the_widgets():
 
 
 def test_an_original_that_was_run_keeps_its_bytes_and_one_that_was_changed_is_not_saved(
-    folders, monkeypatch
+    folders, monkeypatch, request
 ):
     lesson, (place, _) = "notebooks/01_plane.ipynb", folders
     notebooks.copy_lessons(*folders)
     manager = LargeFileManager(root_dir=str(place.parent))
+    request.addfinalizer(lambda: manager.notary.store.close())
     manager.pre_save_hook = notebooks.before_saving
     stored = (place / "01_plane.ipynb").read_bytes()
     model = manager.get(lesson)
