@@ -299,7 +299,7 @@ def make(venv, wanted, *words):
     except OSError as error:
         sys.exit("\n%s is in use (%s). Close JupyterLab and try again." % (venv.name, error))
     venv.mkdir()
-    stamp.write_text("unfinished")  # first, so that the next call knows what was interrupted
+    stamp.write_text("unfinished")  # first: the next call sees that this one was interrupted
     if UV:
         how = ("--seed", "--allow-existing", "--python", sys.executable)
         patiently(UV, "venv", *(how + (str(venv),)))

@@ -1,4 +1,4 @@
-"""What a run of a lesson gives and what is stored: the same, as far as processors agree.
+"""Compare the results of a run of a lesson with the stored ones, up to rounding.
 
 Processors round differently. Text is the same to the byte. Numbers in a table differ by at most
 1e-12 of the largest in their column, or by 2 units of their eleventh digit. Of the pixels of a

@@ -151,7 +151,7 @@ def _with_numbered_ids(ran: list[Any]) -> list[Any]:
 
 
 def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
-    """Execute lessons, then rewrite what has changed of the stored outputs and the figures.
+    """Execute lessons, then rewrite the stored outputs and figures that have changed.
 
     All lessons, or those whose names begin with one of `names`. What is the same as far as
     processors agree stays as it is. Nothing is rewritten unless every lesson ran. When all lessons
