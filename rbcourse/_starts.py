@@ -31,7 +31,7 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
 
     has the wanted ends. Moved ends give it moved, and R1, R0, −w1, −w0 give it run backwards.
     """
-    first, last = (np.clip(w, -1e6, 1e6) / 3 for w in (ends.w0, ends.w1))  # fast enough to start
+    first, last = (_slow(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
     C1 = ends.R0 @ ahead
     v = log_so3(C1.mT @ ends.R1 @ back)
@@ -48,6 +48,108 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
     between = exp_so3(t * t * (3 - 2 * t) * turn[:, None])
     over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
     return number, C1[number, None] @ between @ over[number]
+
+
+def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp], Array]:
+    """Return two curves for each problem, at n nodes, that lead from a free motion into another.
+
+    With F the free motion of a body of inertia G from R0 with w0, B the one that arrives at R1 with
+    w1, β = 3t² − 2t³, and v a logarithm of FᵀB, continuous in time, the curve
+
+        R = F exp(β v̂)
+
+    has the wanted ends. One v is the shortest at t = ½, the other one the other way round there.
+    The numbers of the problems are returned with the curves.
+    """
+    fine, t = grid(2 * n - 1).t, grid(n).t
+    R0, w0 = np.stack([ends.R0, ends.R1]), _slow(np.stack([ends.w0, -ends.w1]))
+    F, back = np.moveaxis(free_motions(R0, w0, G, fine), 1, 0)
+    v = _continuous_log(F.mT @ back[::-1])[:, ::2]
+    R = F[::2] @ exp_so3((t * t * (3 - 2 * t))[:, None, None] * v)
+    R = np.moveaxis(R, 1, 2).reshape(-1, n, 3, 3)
+    number = np.tile(np.arange(len(ends.w0)), 2)
+    return number, with_velocities(R, ends.w0[number], ends.w1[number])
+
+
+def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
+    """Return how bodies of inertia G turn without torque: R at the times t, nearly.
+
+    Euler's equations in principal axes, wᵢ' = (Gⱼ − Gₖ) wⱼ wₖ/Gᵢ, by Runge's and Kutta's method;
+    ‖G w‖ is kept.
+    From t to t + h a body turns by ∫ w dt + h² (w(t) × w(t + h))/12, to fourth order in h.
+    """
+    moments, axes = np.linalg.eigh(G)
+    axes *= np.linalg.det(axes)[..., None, None]  # right-handed
+    after, before = [1, 2, 0], [2, 0, 1]
+    gyration = (moments[..., after] - moments[..., before]) / moments
+
+    def rate(w: Array) -> Array:
+        return gyration * w[..., after] * w[..., before]
+
+    path = [(axes.mT @ w0[..., None])[..., 0]]
+    size = np.linalg.norm(moments * path[0], axis=-1)
+    for h in np.diff(t):
+        w = path[-1]
+        k1 = rate(w)
+        k2 = rate(w + h / 2 * k1)
+        k3 = rate(w + h / 2 * k2)
+        k4 = rate(w + h * k3)
+        w = w + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+        path.append(w * (size / np.maximum(np.linalg.norm(moments * w, axis=-1), 1e-300))[..., None])
+    w = np.stack(path)
+    a, h = rate(w), np.diff(t).reshape(-1, *(1 for _ in w0.shape))
+    turn = h / 2 * (w[1:] + w[:-1]) + h**2 / 12 * (a[:-1] - a[1:] + np.cross(w[:-1], w[1:]))
+    R = [R0 @ axes]
+    for step in exp_so3(turn):
+        R.append(R[-1] @ step)
+    return np.stack(R) @ axes.mT
+
+
+def _continuous_log(R: Array) -> Array:
+    """Return two logarithms v of R, continuous along the first axis, of an odd number of values.
+
+    In the middle they are the shortest one, and the one the other way round.
+    """
+    shortest = log_so3(R)
+    angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
+    axis = shortest / np.maximum(angle, 1e-300)
+    v = np.stack([shortest, shortest - 2 * np.pi * axis])
+    middle = len(R) // 2
+    after, before = range(middle + 1, len(R)), range(middle - 1, -1, -1)
+    for i, last in [*((i, i - 1) for i in after), *((i, i + 1) for i in before)]:
+        beyond = np.sum(v[:, last] * axis[i], axis=-1, keepdims=True) - angle[i]
+        v[:, i] = shortest[i] + 2 * np.pi * np.round(beyond / (2 * np.pi)) * axis[i]
+    return v
+
+
+def _slow(w: Array) -> Array:
+    """Return velocities that do not overflow; none that is solved is faster."""
+    return np.clip(w, -1e6, 1e6)
+
+
+def with_full_turns(R: Array, w0: Array, w1: Array, G: Array) -> Array:
+    """Return the curves R with a full turn more about each principal axis of G, both ways.
+
+    With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes these are R exp(±2π β ê), six
+    for each curve, in six stacks joined; about the axis of a small moment they may cost less.
+    """
+    t = grid(R.shape[1]).t[:, None]
+    axes = np.moveaxis(np.linalg.eigh(G)[1], -1, 0)[:, :, None]
+    turns = exp_so3(2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2) * axes)
+    turned = np.concatenate([R @ turns, R @ turns.mT]).reshape(-1, *R.shape[1:])
+    return with_velocities(turned, np.tile(w0, (6, 1)), np.tile(w1, (6, 1)))
+
+
+def with_velocities(R: Array, w0: Array, w1: Array) -> Array:
+    """Return the curves R exp(η̂), which have w = w0 and w1 at their ends; R stays there.
+
+    η = t (1 − t)² (w0 − w(0)) − t² (1 − t) (w1 − w(1)), w of the curves through R at the nodes:
+    where they are too few for R, its velocities are not those that it was made with.
+    """
+    (w,) = rates_of(R, 1)
+    t = grid(R.shape[1]).t[:, None]
+    s, lacking0, lacking1 = 1 - t, _slow(w0 - w[:, 0])[:, None], _slow(w1 - w[:, -1])[:, None]
+    return R @ exp_so3(t * s * (s * lacking0 - t * lacking1))
 
 
 def with_accelerations(R: Array, a0: Array, a1: Array) -> Array:
@@ -101,11 +203,9 @@ def _best_change(functional: Functional, R: Array, bumps: int) -> Array:
     nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order, bumps)
     rates = rates_of(R, order)
     root, u = np.sqrt(nodes.integral[-1])[:, None], functional.deviation(*rates)
-    by_eta = sum(
-        shape[:, None, :, None] * D[:, :, :, None]
-        for shape, D in zip(bump, _by_eta(functional.deviation_by(*rates), rates), strict=True)
-    )
-    J = (root[..., None, None] * by_eta).reshape(len(R), 3 * len(root), 3 * bumps)
+    D = np.stack(_by_eta(functional.deviation_by(*rates), rates), axis=-2)
+    J = np.stack(bump, axis=-1)[:, None] @ (root[..., None, None] * D)
+    J = J.reshape(len(R), 3 * len(root), 3 * bumps)
     x = np.linalg.solve(J.mT @ J, -(J.mT @ (root * u).reshape(len(R), 3 * len(root), 1)))
     return bump[0] @ x.reshape(len(R), bumps, 3)
 

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from rbcourse._chebyshev import along, grid, interpolation
 from rbcourse._numerics import EPS, Array
-from rbcourse._starts import cost_at_nodes, lowered, starts, with_accelerations
+from rbcourse._starts import (
+    between_free_motions,
+    cost_at_nodes,
+    lowered,
+    starts,
+    with_accelerations,
+    with_full_turns,
+    with_velocities,
+)
 from rbcourse.curves import Ends
 from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.projection import nearest
@@ -32,6 +40,7 @@ from rbcourse.rivals import corrected_bezier_so3
 from rbcourse.so3 import log_so3
 
 COARSE = 17  # nodes, on which curves are started and systems solved;
+FINER = 25  # for bodies, after turns are added;
 FINER_FOR_JERK = 21  # for the jerk, which has higher derivatives;
 LESS_COARSE = 33  # where that does not do
 CLOSE = 1.1  # lowered starts that cost more than this many times the cheapest are dropped,
@@ -42,8 +51,11 @@ SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for 
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
 ASIDE = 0.5  # rad
 TIE = 1e-9  # costs that differ by less, as a share, are equal: the first curve found is kept
+APART = 4.0  # to curves that cost more than so many times the cheapest no turns are added
+WORTH = 0.2  # nor where the cheapest costs less than so many full turns from rest to rest
 QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
-ROUGHLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 0.02}
+BRIEFLY: Any = {"bumps": 8, "steps": 3, "worthwhile": 5e-4}  # with a full turn more
+FARTHER: Any = {"bumps": 16, "steps": 40, "worthwhile": 1e-4}  # on FINER nodes
 SLOWLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 1e-6}  # where two curves part
 PATIENTLY: Any = {"bumps": 16, "steps": 200, "worthwhile": 0.0}  # where nothing else does
 Numbers: TypeAlias = NDArray[np.intp]
@@ -58,7 +70,8 @@ class Task(NamedTuple):
     batch : tuple of int
         The shape of the stack.
     functional : Functional
-        What is least.
+        What is least. For an `Effort` curves with full turns more are tried, and solutions about
+        one axis, which may be saddles, are bent aside.
     equations : Equations
         When it is: R p = c, and the ends.
     starts : callable
@@ -68,9 +81,6 @@ class Task(NamedTuple):
         ``solver(equations, R)``: what is found for some of the equations from these curves.
     nodes : int
         On how many nodes curves are started.
-    inertia : ndarray, shape (N, 3, 3), optional
-        Inertia of the bodies. If it is given, solutions about one axis, which may be saddles, are
-        bent aside too.
     known : dict of int to Solution
         Problems that are solved.
     """
@@ -81,7 +91,6 @@ class Task(NamedTuple):
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = COARSE
-    inertia: Array | None = None
     known: Mapping[int, Solution] = MappingProxyType({})
 
 
@@ -120,30 +129,29 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
 def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     """Return the problems of minimum acceleration, or torque, of bodies of inertia G.
 
-    They are started from the optimum of a ball, too, and from all these curves lowered in the other
-    functional. Where G is a multiple of I the optimum of a ball is theirs.
+    They are started from the optimum of a ball, too, and from curves between free motions. Where G
+    is a multiple of I the optimum of a ball is theirs.
     """
     ends, rates = _flat(given, given.w0, given.w1)
-    G = G.reshape(-1, 3, 3)
-    functional, other = (Effort(G, of_torque=which) for which in (of_torque, not of_torque))
+    functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
     of_ball = dict(enumerate(cheapest(ball(given))))
     curves = {i: one for i, one in of_ball.items() if isinstance(one, Solution)}
     round_ones = np.abs(functional.G - np.eye(3)).max(axis=(1, 2)) < 8 * EPS
 
     def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
         problem, R = starts(ends.of(which), n)
+        number, free = between_free_motions(ends.of(which), functional.G[which], n)
         more = [k for k, i in enumerate(which) if i in curves]
         of_balls = [_on_nodes(curves[which[k]].R[None], n) for k in more]
-        problem, R = np.append(problem, np.array(more, int)), np.concatenate([R, *of_balls])
-        R_other, _ = lowered(other.of(which[problem]), R, **ROUGHLY)
-        return np.tile(problem, 2), np.concatenate([R, R_other])
+        return np.concatenate([problem, number, np.array(more, int)]), np.concatenate(
+            [R, free, *of_balls]
+        )
 
     return Task(
         given.w0.shape[:-1],
         functional,
         Stationary(functional, ends.R0, ends.R1, rates),
         start,
-        inertia=functional.G,
         known={i: one for i, one in curves.items() if round_ones[i]},
     )
 
@@ -193,21 +201,49 @@ def _searched(task: Task) -> list[Solution | Failure]:
         return found
     fast = np.linalg.norm(ends[:, :2], axis=-1).sum(axis=-1)
     problem, R = _started(task, which, task.nodes)
-    least = partial(_least, len(ends), problem)
     R, cost = lowered(task.functional.of(problem), R, **QUICKLY)
+    if isinstance(task.functional, Effort):
+        problem, R, cost = _with_more_turns(task, task.functional, problem, R, cost)
+    least = partial(_least, len(ends), problem)
     likely = ~(cost > CLOSE * least(cost)) & ~_repeated(problem, cost, R)
     _follow(task, problem[likely], R[likely], found)
     dear = _costs(found)[problem] > ABOUT * least(cost)
     again = np.unique(problem[dear | (fast > FAST)[problem]])
     if len(again):
         _follow_on(task, again, problem, R, found)
-    if task.inertia is not None:
-        _leave_the_axis(task, task.inertia, which, found)
+    if isinstance(task.functional, Effort):
+        _leave_the_axis(task, task.functional, which, found)
     return found
 
 
+def _with_more_turns(
+    task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
+) -> tuple[Numbers, Array, Array]:
+    """Add curves with a full turn more about a principal axis; lower the cheapest of all farther.
+
+    The motion that costs least may turn once more about the axis of a small moment. From rest to
+    rest such a turn costs at least 12 (2π)² λ, λ the least eigenvalue of G M G; none is added where
+    the cheapest curve costs less than `WORTH` times that.
+    """
+    ends, count = task.equations.ends, len(task.equations.ends)
+    full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
+    least = _least(count, problem, cost)
+    some = ~(cost > APART * least) & ~_repeated(problem, cost, R)
+    some &= least > WORTH * full_turn[problem]
+    which = problem[some]
+    more = with_full_turns(R[some], *ends[which].swapaxes(0, 1), effort.G[which])
+    number = np.tile(which, 6)
+    more, cost_of_more = lowered(effort.of(number), more, **BRIEFLY)
+    problem, R = np.concatenate([problem, number]), np.concatenate([R, more])
+    cost = np.concatenate([cost, cost_of_more])
+    some = ~(cost > APART / 2 * _least(count, problem, cost)) & ~_repeated(problem, cost, R)
+    problem, R = problem[some], _on_nodes(R[some], FINER)
+    R = with_velocities(R, *ends[problem].swapaxes(0, 1))
+    return problem, *lowered(effort.of(problem), R, **FARTHER)
+
+
 def _leave_the_axis(
-    task: Task, inertia: Array, which: Numbers, found: list[Solution | Failure]
+    task: Task, effort: Effort, which: Numbers, found: list[Solution | Failure]
 ) -> None:
     """Bend solutions that turn about one axis, nearly, to four sides of it; follow the cheaper.
 
@@ -222,7 +258,7 @@ def _leave_the_axis(
             w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
             size = np.linalg.svd(w, compute_uv=False)
             if size[0] > 0 and size[1] < FLAT * size[0]:
-                sides = ASIDE * _across(w / size[0], inertia[i])[:, None]
+                sides = ASIDE * _across(w / size[0], effort.G[i])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
