@@ -14,7 +14,7 @@ from rbcourse.functionals import Functional
 from rbcourse.relaxation import cayley
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-MOST_TURNS = 4  # starts have fewer full turns more than the shortest way
+LONGEST = 100.0  # rad: where the legs of a start are longer no more full turns are tried
 SHARES = np.array([1.0, 0.25, 3.0])  # of a step that lowers the cost: the best of these
 _TOGETHER = 32  # curves that are lowered together, in the cache
 
@@ -36,10 +36,10 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
     C1 = ends.R0 @ ahead
     v = log_so3(C1.mT @ ends.R1 @ back)
     along_v = v + 1e-9 * (first + last)  # a direction where v is 0
-    full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-300)[:, None]
-    length = np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend
+    full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
+    length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
     problem, turns = [], []
-    for more in range(MOST_TURNS):
+    for more in range(int(length.max(initial=0) / (4 * np.pi) + 1.5)):
         some = np.flatnonzero(length >= (4 * more - 2) * np.pi)
         problem += [some, some]
         turns += [(v + more * full)[some], (v - (more + 1) * full)[some]]
@@ -68,7 +68,7 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
     R = F[::2] @ exp_so3((t * t * (3 - 2 * t))[:, None, None] * v)
     R = np.moveaxis(R, 1, 2).reshape(-1, n, 3, 3)
     number = np.tile(np.arange(len(ends.w0)), 2)
-    return number, with_velocities(R, ends.w0[number], ends.w1[number])
+    return number, with_ends(R, np.stack([ends.w0, ends.w1], axis=1)[number])
 
 
 def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
@@ -95,7 +95,9 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
         k3 = rate(w + h / 2 * k2)
         k4 = rate(w + h * k3)
         w = w + h / 6 * (k1 + 2 * (k2 + k3) + k4)
-        path.append(w * (size / np.maximum(np.linalg.norm(moments * w, axis=-1), 1e-300))[..., None])
+        path.append(
+            w * (size / np.maximum(np.linalg.norm(moments * w, axis=-1), 1e-150))[..., None]
+        )
     w = np.stack(path)
     a, h = rate(w), np.diff(t).reshape(-1, *(1 for _ in w0.shape))
     turn = h / 2 * (w[1:] + w[:-1]) + h**2 / 12 * (a[:-1] - a[1:] + np.cross(w[:-1], w[1:]))
@@ -112,7 +114,7 @@ def _continuous_log(R: Array) -> Array:
     """
     shortest = log_so3(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
-    axis = shortest / np.maximum(angle, 1e-300)
+    axis = shortest / np.maximum(angle, 1e-150)
     v = np.stack([shortest, shortest - 2 * np.pi * axis])
     middle = len(R) // 2
     after, before = range(middle + 1, len(R)), range(middle - 1, -1, -1)
@@ -127,7 +129,7 @@ def _slow(w: Array) -> Array:
     return np.clip(w, -1e6, 1e6)
 
 
-def with_full_turns(R: Array, w0: Array, w1: Array, G: Array) -> Array:
+def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
     """Return the curves R with a full turn more about each principal axis of G, both ways.
 
     With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes these are R exp(±2π β ê), six
@@ -137,58 +139,52 @@ def with_full_turns(R: Array, w0: Array, w1: Array, G: Array) -> Array:
     axes = np.moveaxis(np.linalg.eigh(G)[1], -1, 0)[:, :, None]
     turns = exp_so3(2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2) * axes)
     turned = np.concatenate([R @ turns, R @ turns.mT]).reshape(-1, *R.shape[1:])
-    return with_velocities(turned, np.tile(w0, (6, 1)), np.tile(w1, (6, 1)))
+    return with_ends(turned, np.tile(ends, (6, 1, 1)))
 
 
-def with_velocities(R: Array, w0: Array, w1: Array) -> Array:
-    """Return the curves R exp(η̂), which have w = w0 and w1 at their ends; R stays there.
+def with_ends(R: Array, ends: Array) -> Array:
+    """Return the curves R exp(η̂) with w0 and w1, or w0, w1, a0 and a1, at their ends.
 
-    η = t (1 − t)² (w0 − w(0)) − t² (1 − t) (w1 − w(1)), w of the curves through R at the nodes:
-    where they are too few for R, its velocities are not those that it was made with.
+    η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁, with what the velocities lack; then, for the accelerations,
+    η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁. R stays at both ends. What is lacking is that of the curves through R at
+    the nodes: where the nodes are few for R, these are not the velocities that R was made with.
     """
-    (w,) = rates_of(R, 1)
     t = grid(R.shape[1]).t[:, None]
-    s, lacking0, lacking1 = 1 - t, _slow(w0 - w[:, 0])[:, None], _slow(w1 - w[:, -1])[:, None]
-    return R @ exp_so3(t * s * (s * lacking0 - t * lacking1))
-
-
-def with_accelerations(R: Array, a0: Array, a1: Array) -> Array:
-    """Return the curves R exp(η̂), which have w' = a0 and a1 at their ends; R and w stay there.
-
-    η = ½ t² (1 − t)³ (a0 − w'(0)) + ½ t³ (1 − t)² (a1 − w'(1)), w' of the curves R.
-    """
-    _, a = rates_of(R, 2)
-    t = grid(R.shape[1]).t[:, None]
-    s, lacking0, lacking1 = 1 - t, (a0 - a[:, 0])[:, None], (a1 - a[:, -1])[:, None]
-    return R @ exp_so3((t * s) ** 2 / 2 * (s * lacking0 + t * lacking1))
+    for order in range(1, 1 + ends.shape[1] // 2):
+        now = rates_of(R, order)[-1][:, [0, -1]]
+        lacking0, lacking1 = np.moveaxis(_slow(ends[:, 2 * order - 2 : 2 * order] - now), 1, 0)
+        share = (t * (1 - t)) ** order / order
+        change = (1 - t) * lacking0[:, None] + (-1) ** order * t * lacking1[:, None]
+        R = R @ exp_so3(share * change)
+    return R
 
 
 def lowered(
-    functional: Functional, R: Array, *, bumps: int, steps: int, worthwhile: float
+    functional: Functional, R: Array, *, steps: int, worthwhile: float
 ) -> tuple[Array, Array]:
     """Return curves with the same ends, after steps of Gauss and Newton, and their costs.
 
     For R exp(η̂) the rates change by δw = η' + w × η and its derivatives, so the deviation, to first
     order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step takes the η for which the integral of its
-    square is least, of all polynomials tᵐ (1 − t)ᵐ p(t), p with `bumps` coefficients; or a quarter
-    or three times as much, where that is better. The last one takes less than `worthwhile` of the
-    cost away.
+    square is least, of all polynomials tᵐ (1 − t)ᵐ p(t), p with half as many coefficients as there
+    are nodes; or a quarter or three times as much, where that is better. The last one takes less
+    than `worthwhile` of the cost away.
     """
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
         before = cost[active]
         for part in blocks(len(active), _TOGETHER):
             which = active[part]
-            R[which], cost[which] = _lower(functional.of(which), R[which], cost[which], bumps)
+            R[which], cost[which] = _lower(functional.of(which), R[which], cost[which])
         active = active[cost[active] < (1 - worthwhile) * before]
         if not len(active):
             break
     return R, cost
 
 
-def _lower(functional: Functional, R: Array, cost: Array, bumps: int) -> tuple[Array, Array]:
+def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
     """Take one step: the best of `SHARES` of it, or none."""
-    shares = SHARES[:, None, None, None] * _best_change(functional, R, bumps)
+    shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))
     costs = cost_at_nodes(functional.of(number), tried.reshape(-1, *R.shape[1:]))
@@ -197,10 +193,10 @@ def _lower(functional: Functional, R: Array, cost: Array, bumps: int) -> tuple[A
     return tried[best], costs[best]
 
 
-def _best_change(functional: Functional, R: Array, bumps: int) -> Array:
+def _best_change(functional: Functional, R: Array) -> Array:
     """Return η of a step, at the nodes."""
-    order = functional.ends // 2 + 1
-    nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order, bumps)
+    order, bumps = functional.ends // 2 + 1, R.shape[1] // 2
+    nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order)
     rates = rates_of(R, order)
     root, u = np.sqrt(nodes.integral[-1])[:, None], functional.deviation(*rates)
     D = np.stack(_by_eta(functional.deviation_by(*rates), rates), axis=-2)
@@ -242,10 +238,10 @@ def rates_of(R: Array, count: int) -> list[Array]:
 
 
 @lru_cache
-def _bumps(n: int, m: int, count: int) -> list[Array]:
-    """Return tᵐ (1 − t)ᵐ times Chebyshev polynomials at the nodes, and m derivatives."""
+def _bumps(n: int, m: int) -> list[Array]:
+    """Return tᵐ (1 − t)ᵐ times n//2 Chebyshev polynomials at the nodes, and m derivatives."""
     nodes = grid(n)
-    shapes: list[Array] = [(nodes.t * (1 - nodes.t))[:, None] ** m * chebyshev(nodes.t, count)]
+    shapes: list[Array] = [(nodes.t * (1 - nodes.t))[:, None] ** m * chebyshev(nodes.t, n // 2)]
     for _ in range(m):
         shapes.append(nodes.derivative @ shapes[-1])
     return shapes

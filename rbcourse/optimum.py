@@ -295,7 +295,8 @@ class Optimum(Curve):
     functional : Functional
         What is least, and p.
     converged : bool, or ndarray of bool, shape (...)
-        Where a solution was found. Elsewhere the curve, `c` and the cost are NaN.
+        Where a solution was found, and no curve that was tried costs less. Where none was found
+        the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
         R p, which does not depend on t, in the fixed frame. Without an inertia p is w'': half of
         what it is with ``inertia=2 * np.eye(3)``.
@@ -331,10 +332,11 @@ class Optimum(Curve):
         cost = np.array([s.cost if isinstance(s, Solution) else np.nan for s in solutions], float)
         residual = np.array([s.residual for s in solutions], float)
         iterations = np.array([s.iterations for s in solutions], int)
+        beaten = np.array([isinstance(s, Solution) and s.beaten for s in solutions], bool)
         self.c = (np.reshape(functional.unit, (-1, 1)) * c).reshape(*batch_shape, 3)
         self.converged, self.nodes, self.cost, self.residual, self.iterations = (
             x.reshape(batch_shape) if batch_shape else x.item()
-            for x in (nodes > 0, nodes, functional.scale * cost, residual, iterations)
+            for x in ((nodes > 0) & ~beaten, nodes, functional.scale * cost, residual, iterations)
         )
 
     @cached_property
@@ -440,11 +442,19 @@ def from_guess(given: Ends, guess: Curve) -> Optimum:
 
 
 def _warn_if_not_converged(curve: Optimum) -> None:
-    failed = np.argwhere(~np.asarray(curve.converged))
-    if len(failed):
+    lost = np.isnan(curve.cost)
+    _warn(curve, lost, "did not converge", "there the curve is NaN")
+    beaten = ~np.asarray(curve.converged) & ~lost
+    _warn(curve, beaten, "may not have their optimum", "a curve that was tried costs less")
+
+
+def _warn(curve: Optimum, which: Array, what: str, why: str) -> None:
+    places = np.argwhere(which)
+    if len(places):
+        first = [int(i) for i in places[0]]
         warnings.warn(
-            f"{len(failed)} of {curve.count} problems did not converge, the first of them "
-            f"{[int(i) for i in failed[0]]}: there the curve is NaN (see converged)",
+            f"{len(places)} of {curve.count} problems {what}, the first of them {first}: {why} "
+            "(see converged)",
             RuntimeWarning,
-            stacklevel=4,
+            stacklevel=5,
         )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
-from rbcourse._numerics import Array, blocks
+from rbcourse._numerics import Array, blocks, scaled
 from rbcourse.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
@@ -27,7 +27,10 @@ Arrays: TypeAlias = tuple[Array, ...]
 
 
 class Solution(NamedTuple):
-    """One problem solved: R and the highest derivative k of w at the nodes, c = R p, ∫ ‖u‖² dt."""
+    """One problem solved: R and the highest derivative k of w at the nodes, c = R p, ∫ ‖u‖² dt.
+
+    `beaten` tells that a curve costs less, from which Newton's method did not get to a solution.
+    """
 
     R: Array
     k: Array
@@ -35,6 +38,7 @@ class Solution(NamedTuple):
     cost: float
     residual: float
     iterations: int
+    beaten: bool = False
 
 
 class Failure(NamedTuple):
@@ -381,8 +385,8 @@ class BallStationary:
         return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n, and what has twice, 4, 8 and 16 times as many intervals."""
-        return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16))
+        """Return n, and what has twice as many intervals again and again, up to 257."""
+        return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16) if (n - 1) * times <= 256)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest entry of R0 + ∫ R ŵ dt − R."""
@@ -448,8 +452,8 @@ def _across(c: Array) -> tuple[Array, Array]:
 
     They are rows of Householder's reflection that takes c to the third axis.
     """
-    v = c.copy()
-    v[:, 2] += np.copysign(np.sqrt(np.sum(c * c, axis=-1)), c[:, 2])
+    v = scaled(c, axis=-1)  # squares of small numbers underflow
+    v[:, 2] += np.copysign(np.sqrt(np.sum(v * v, axis=-1)), v[:, 2])
     square = np.sum(v * v, axis=-1)
     twice = v * (2 / np.where(square == 0, 1, square))[:, None]
     across = np.eye(2, 3) - v[:, :2, None] * twice[:, None]

@@ -17,9 +17,8 @@ from rbcourse._starts import (
     cost_at_nodes,
     lowered,
     starts,
-    with_accelerations,
+    with_ends,
     with_full_turns,
-    with_velocities,
 )
 from rbcourse.curves import Ends
 from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
@@ -41,11 +40,13 @@ from rbcourse.so3 import log_so3
 
 COARSE = 17  # nodes, on which curves are started and systems solved;
 FINER = 25  # for bodies, after turns are added;
-FINER_FOR_JERK = 21  # for the jerk, which has higher derivatives;
-LESS_COARSE = 33  # where that does not do
+FINER_FOR_JERK = 29  # for the jerk, which has higher derivatives;
+LESS_COARSE = 33  # where no solution is found on those that costs no more than a start;
+LEAST_COARSE = 65  # where ‖w0‖ + ‖w1‖ > VERY_FAST
 CLOSE = 1.1  # lowered starts that cost more than this many times the cheapest are dropped,
 NEAR = 0.1  # and those with entries of R that differ by less from those of a cheaper one
 FAST = 24.0  # rad: where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too
+VERY_FAST = 80.0
 ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
 SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
@@ -53,11 +54,11 @@ ASIDE = 0.5  # rad
 TIE = 1e-9  # costs that differ by less, as a share, are equal: the first curve found is kept
 APART = 4.0  # to curves that cost more than so many times the cheapest no turns are added
 WORTH = 0.2  # nor where the cheapest costs less than so many full turns from rest to rest
-QUICKLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 5e-4}  # how starts are lowered
-BRIEFLY: Any = {"bumps": 8, "steps": 3, "worthwhile": 5e-4}  # with a full turn more
-FARTHER: Any = {"bumps": 16, "steps": 40, "worthwhile": 1e-4}  # on FINER nodes
-SLOWLY: Any = {"bumps": 8, "steps": 40, "worthwhile": 1e-6}  # where two curves part
-PATIENTLY: Any = {"bumps": 16, "steps": 200, "worthwhile": 0.0}  # where nothing else does
+QUICKLY: Any = {"steps": 40, "worthwhile": 5e-4}  # how starts are lowered
+BRIEFLY: Any = {"steps": 3, "worthwhile": 5e-4}  # with a full turn more
+FARTHER: Any = {"steps": 40, "worthwhile": 1e-4}  # on FINER nodes
+SLOWLY: Any = {"steps": 40, "worthwhile": 1e-6}  # where two curves part
+PATIENTLY: Any = {"steps": 200, "worthwhile": 0.0}  # where nothing else does
 Numbers: TypeAlias = NDArray[np.intp]
 NOTHING = Failure(np.inf, 0)
 
@@ -164,8 +165,7 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
 
     def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
         problem, R = starts(ends.of(which), n, bend[which])
-        a = rates[which][problem, 2:]
-        return problem, with_accelerations(R, a[:, 0], a[:, 1])
+        return problem, with_ends(R, rates[which][problem])
 
     equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
     return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=FINER_FOR_JERK)
@@ -199,7 +199,8 @@ def _searched(task: Task) -> list[Solution | Failure]:
     which = np.flatnonzero([one is NOTHING for one in found])
     if not len(which):
         return found
-    fast = np.linalg.norm(ends[:, :2], axis=-1).sum(axis=-1)
+    share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in the turn of a quintic
+    fast = np.linalg.norm(ends, axis=-1) @ share
     problem, R = _started(task, which, task.nodes)
     R, cost = lowered(task.functional.of(problem), R, **QUICKLY)
     if isinstance(task.functional, Effort):
@@ -209,8 +210,9 @@ def _searched(task: Task) -> list[Solution | Failure]:
     _follow(task, problem[likely], R[likely], found)
     dear = _costs(found)[problem] > ABOUT * least(cost)
     again = np.unique(problem[dear | (fast > FAST)[problem]])
-    if len(again):
-        _follow_on(task, again, problem, R, found)
+    for n, some in (LESS_COARSE, fast <= VERY_FAST), (LEAST_COARSE, ~(fast <= VERY_FAST)):
+        if some[again].any():
+            _follow_on(task, again[some[again]], problem, R, n, found)
     if isinstance(task.functional, Effort):
         _leave_the_axis(task, task.functional, which, found)
     return found
@@ -231,14 +233,14 @@ def _with_more_turns(
     some = ~(cost > APART * least) & ~_repeated(problem, cost, R)
     some &= least > WORTH * full_turn[problem]
     which = problem[some]
-    more = with_full_turns(R[some], *ends[which].swapaxes(0, 1), effort.G[which])
+    more = with_full_turns(R[some], ends[which], effort.G[which])
     number = np.tile(which, 6)
     more, cost_of_more = lowered(effort.of(number), more, **BRIEFLY)
     problem, R = np.concatenate([problem, number]), np.concatenate([R, more])
     cost = np.concatenate([cost, cost_of_more])
     some = ~(cost > APART / 2 * _least(count, problem, cost)) & ~_repeated(problem, cost, R)
     problem, R = problem[some], _on_nodes(R[some], FINER)
-    R = with_velocities(R, *ends[problem].swapaxes(0, 1))
+    R = with_ends(R, ends[problem])
     return problem, *lowered(effort.of(problem), R, **FARTHER)
 
 
@@ -283,12 +285,17 @@ def _across(w: Array, G: Array) -> Array:
 
 
 def _follow_on(
-    task: Task, which: Numbers, problem: Numbers, R: Array, found: list[Solution | Failure]
+    task: Task,
+    which: Numbers,
+    problem: Numbers,
+    R: Array,
+    n: int,
+    found: list[Solution | Failure],
 ) -> None:
-    """Follow more starts of some problems, on more nodes, where their costs are better known."""
+    """Follow more starts of some problems, on n nodes, where their costs are better known."""
     mine = np.isin(problem, which)
-    problem, R = problem[mine], _on_nodes(R[mine], LESS_COARSE)
-    more, as_they_are = _started(task, which, LESS_COARSE)
+    problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
+    more, as_they_are = _started(task, which, n)
     problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
     functional = task.functional.of(problem)
     bound = ABOUT * _least(len(found), problem, cost_at_nodes(functional, R))
@@ -299,6 +306,9 @@ def _follow_on(
     if dear.any():
         R, _ = lowered(functional.of(dear), R[dear], **PATIENTLY)
         _follow(task, problem[dear], R, found)
+        for i in np.unique(problem[_costs(found)[problem] > bound]):
+            if isinstance(one := found[i], Solution):
+                found[i] = one._replace(beaten=True)
 
 
 def _costs(found: list[Solution | Failure]) -> Array:

@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 import oracles
 import pytest
+from direct_search import least_costs
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
@@ -429,6 +430,96 @@ def test_bad_arguments_are_named():
 def test_the_cheapest_curve_that_is_known_is_found(what, which, cost):
     curve = OPTIMA[what](*some(random_problems(800, 50), which))
     assert curve.cost == pytest.approx(cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("what", OPTIMA)
+def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
+    problems = random_problems(16, 77)
+    problems[4][:] = bodies(16, 78)
+    least = least_costs(what, problems, 16, seed=79)
+    assert np.all(OPTIMA[what](*problems).cost < least * (1 + 1e-6))
+
+
+def bodies(count, seed):
+    """Inertias of bodies whose largest moment is up to ten times the least one."""
+    rng = np.random.default_rng(seed)
+    moments = np.sort(np.exp(rng.uniform(0, np.log(10), (20 * count, 3))), axis=1)
+    moments = moments[moments @ [1, 1, -1] > 0][:count]
+    axes = Rotation.random(count, rng=rng).as_matrix()
+    G = axes @ (moments[:, :, None] * axes.mT)
+    return (G + G.mT) / 2
+
+
+@pytest.mark.parametrize(
+    ("turn", "w0", "w1", "moments", "cost"),
+    [
+        (
+            (2.751, 0.431, 1.014),
+            (5.098, -0.082, 4.558),
+            (-5.168, 5.805, -4.112),
+            (0.399, 1.031, 1.219),
+            134.51,
+        ),
+        (
+            (1.532, 1.491, 0.224),
+            (-3.494, 7.652, 2.381),
+            (2.509, 5.826, -5.963),
+            (0.21, 0.544, 0.654),
+            20.98,
+        ),
+    ],
+)
+def test_tumbling_motions_are_found(turn, w0, w1, moments, cost):
+    """Random starts of other programs led to these costs."""
+    curve = rb.minimum_torque_so3(I3, rb.exp_so3(turn), w0, w1, np.diag(moments))
+    assert curve.cost == pytest.approx(cost, abs=0.006)
+
+
+@pytest.mark.parametrize("what", FORCES)
+def test_free_motions_of_speeds_up_to_16_cost_nothing(what):
+    count, rng = 40, np.random.default_rng(16)
+    G = bodies(count, 17)
+    w0 = rng.normal(size=(count, 3))
+    w0 *= rng.uniform(3, 16, (count, 1)) / np.linalg.norm(w0, axis=1, keepdims=True)
+    ends = [rb.geodesic_flow(g, I3, w, [0.0, 1.0]) for g, w in zip(G, w0, strict=True)]
+    R1, w1 = (np.stack([x[i][1] for x in ends]) for i in (0, 1))
+    assert np.all(OPTIMA[what](I3, R1, w0, w1, G).cost < 1e-15)
+
+
+def cost_of_quintic(angle, w, a):
+    """What a turn by the quintic with these ends costs: twice the integral of p'''²."""
+    powers = [np.polynomial.Polynomial.basis(k) for k in range(6)]
+    at = [[p.deriv(d)(t) if d else p(t) for p in powers] for t in (0.0, 1) for d in (0, 1, 2)]
+    p = np.linalg.solve(at, np.stack([0 * angle, w[0], a[0], angle, w[1], a[1]]))
+    third, fourth, fifth = 6 * p[3], 24 * p[4], 60 * p[5]  # p''' = third + fourth t + fifth t²
+    square = third**2 + third * fourth + (fourth**2 + 2 * third * fifth) / 3
+    return 2 * (square + fourth * fifth / 2 + fifth**2 / 5)
+
+
+@pytest.mark.source("beyond BK 5")
+def test_least_jerk_about_one_axis_is_the_best_quintic_of_all_turns():
+    rng = np.random.default_rng(55)
+    angle = rng.uniform(-np.pi, np.pi, 200)
+    w, a = rng.uniform(-9, 9, (2, 200)), rng.uniform(-20, 20, (2, 200))
+    w[:, :100], a[:, :100] = rng.uniform(5, 9, (2, 100)), rng.uniform(10, 20, (2, 100))
+    a[1, :100] *= -1  # so that both accelerations add turns
+    least = np.min([cost_of_quintic(angle + 2 * np.pi * k, w, a) for k in range(-9, 10)], axis=0)
+    e = np.array([0.6, 0, 0.8])
+    rates = [x[:, None] * e for x in (*w, *a)]
+    curves = rb.minimum_jerk_so3(I3, rb.exp_so3(angle[:, None] * e), *rates)
+    assert np.all(curves.cost < least * (1 + 1e-9))
+
+
+def test_accelerations_near_one_axis_add_turns():
+    """Without a full turn more it costs 34,447."""
+    rates = (
+        [0.0478, -1.2536, 7.2756],
+        [0.7923, 0.2244, 6.3072],
+        [0.0926, -1.1733, 13.5431],
+        [3.2645, -1.6836, -16.3042],
+    )
+    curve = rb.minimum_jerk_so3(I3, rb.exp_so3([0, 0, -1.6796]), *rates)
+    assert curve.cost == pytest.approx(6350.394, abs=0.001)
 
 
 @pytest.mark.parametrize(
