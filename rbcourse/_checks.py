@@ -112,7 +112,8 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        As `as_symmetric`; and the message names the first matrix that is not positive definite.
+        As `as_symmetric`; and the message names the first matrix that is not positive definite, or
+        with eigenvalues whose squares are not floating-point numbers.
     """
     G = as_symmetric(name, value, 3)
     moments = np.linalg.eigvalsh(G)
@@ -122,6 +123,13 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
         raise ValueError(
             f"{first_index(name, refused)} is not positive definite, to rounding: its eigenvalues "
             f"are {listed}"
+        )
+    refused = (moments[..., 0] < 1e-150) | (moments[..., 2] > 1e150)
+    if refused.any():
+        listed = ", ".join(f"{x:.6g}" for x in moments[refused][0])
+        raise ValueError(
+            f"{first_index(name, refused)}: eigenvalues from 1e-150 to 1e150 are wanted, they are "
+            f"{listed}; use another unit"
         )
     return G
 
@@ -183,6 +191,8 @@ def as_tolerance(name: str, value: float) -> float:
 
 def as_positive(name: str, value: float) -> float:
     """Return a number above 0, or raise a ValueError."""
+    if isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} is {value}, a number above 0 is wanted")
     number = float(as_single(name, value))
     if number <= 0:
         raise ValueError(f"{name} is {number}, a number above 0 is wanted")

@@ -16,6 +16,7 @@ from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
 LONGEST = 100.0  # rad: where the legs of a start are longer no more full turns are tried
 SHARES = np.array([1.0, 0.25, 3.0])  # of a step that lowers the cost: the best of these
+SAME = 1e-9  # what differs by less, as a share, is the same: rounding does not decide
 _TOGETHER = 32  # curves that are lowered together, in the cache
 
 
@@ -31,10 +32,14 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
 
     has the wanted ends. Moved ends give it moved, and R1, R0, −w1, −w0 give it run backwards.
     """
-    first, last = (_slow(w) / 3 for w in (ends.w0, ends.w1))
+    first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
     C1 = ends.R0 @ ahead
     v = log_so3(C1.mT @ ends.R1 @ back)
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    # of two turns by π rounding does not choose
+    other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
+    v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
     along_v = v + 1e-9 * (first + last)  # a direction where v is 0
     full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
     length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
@@ -50,6 +55,13 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
     return number, C1[number, None] @ between @ over[number]
 
 
+def leading_sign(v: Array) -> Array:
+    """Return the sign of the largest component of v; of components as large, of the first one."""
+    size = np.abs(v)
+    largest = np.argmax(size > (1 - SAME) * size.max(axis=-1, keepdims=True), axis=-1)
+    return np.sign(np.take_along_axis(v, largest[..., None], axis=-1))
+
+
 def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp], Array]:
     """Return two curves for each problem, at n nodes, that lead from a free motion into another.
 
@@ -62,7 +74,7 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
     The numbers of the problems are returned with the curves.
     """
     fine, t = grid(2 * n - 1).t, grid(n).t
-    R0, w0 = np.stack([ends.R0, ends.R1]), _slow(np.stack([ends.w0, -ends.w1]))
+    R0, w0 = np.stack([ends.R0, ends.R1]), _bounded(np.stack([ends.w0, -ends.w1]))
     F, back = np.moveaxis(free_motions(R0, w0, G, fine), 1, 0)
     v = _continuous_log(F.mT @ back[::-1])[:, ::2]
     R = F[::2] @ exp_so3((t * t * (3 - 2 * t))[:, None, None] * v)
@@ -124,8 +136,8 @@ def _continuous_log(R: Array) -> Array:
     return v
 
 
-def _slow(w: Array) -> Array:
-    """Return velocities that do not overflow; none that is solved is faster."""
+def _bounded(w: Array) -> Array:
+    """Return velocities that do not overflow; problems with faster ones are not solved."""
     return np.clip(w, -1e6, 1e6)
 
 
@@ -145,14 +157,15 @@ def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
 def with_ends(R: Array, ends: Array) -> Array:
     """Return the curves R exp(η̂) with w0 and w1, or w0, w1, a0 and a1, at their ends.
 
-    η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁, with what the velocities lack; then, for the accelerations,
-    η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁. R stays at both ends. What is lacking is that of the curves through R at
-    the nodes: where the nodes are few for R, these are not the velocities that R was made with.
+    The first turns are by η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁, with what the velocities lack, the
+    second ones by η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁, with what the accelerations lack then.
+    It is what the curves through R at the nodes lack: where the nodes are too few for a curve, they
+    do not have its velocities.
     """
     t = grid(R.shape[1]).t[:, None]
     for order in range(1, 1 + ends.shape[1] // 2):
         now = rates_of(R, order)[-1][:, [0, -1]]
-        lacking0, lacking1 = np.moveaxis(_slow(ends[:, 2 * order - 2 : 2 * order] - now), 1, 0)
+        lacking0, lacking1 = np.moveaxis(_bounded(ends[:, 2 * order - 2 : 2 * order] - now), 1, 0)
         share = (t * (1 - t)) ** order / order
         change = (1 - t) * lacking0[:, None] + (-1) ** order * t * lacking1[:, None]
         R = R @ exp_so3(share * change)

@@ -48,8 +48,8 @@ def acceleration_cost(
         ∫ τᵀ G⁻¹ τ dt, where τ = G w' + w × G w is the torque, and on SE(3) that and
         ∫ m ‖d_c''‖² dt, where d_c is the place of the centre of mass. By default this is
         ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. To 1e-10 relative, or 1e-20 absolute,
-        unless all of the acceleration falls within a hundredth of the interval, as with an abrupt
-        ``f`` of a `projected_line_so3`. With an inertia the absolute bound is 1e-20 times a third
+        unless acceleration falls within a hundredth of the interval, as with an abrupt ``f`` of a
+        `projected_line_so3`, or with narrow ripples of it. With an inertia the absolute bound is 1e-20 times a third
         of its trace.
 
     Raises

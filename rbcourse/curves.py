@@ -12,7 +12,14 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_finite, as_inertia, as_single, as_time, check_broadcast, check_order
+from rbcourse._checks import (
+    as_finite,
+    as_inertia,
+    as_positive,
+    as_time,
+    check_broadcast,
+    check_order,
+)
 from rbcourse._numerics import Array, blocks
 from rbcourse.so3 import hat, log_so3
 
@@ -495,9 +502,7 @@ def retime(curve: Curve, duration: float) -> Retimed:
     """
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve wanted, got {curve!r}")
-    time, (start, end) = float(as_single("duration", duration)), curve.domain
-    if time <= 0:
-        raise ValueError(f"duration is {time}, a time above 0 is wanted")
+    time, (start, end) = as_positive("duration", duration), curve.domain
     if start + time == start:
         raise ValueError(f"duration is {time}: that vanishes beside the first time, {start}")
     if time < SHORTEST * (end - start):

@@ -135,7 +135,10 @@ def chain(
         ends |= _ends("A{}", poses) | _ends("d{}_dot", d_dot, h)
     unknown = [name for name in wanted if name not in ends]
     if unknown:
-        raise ValueError(f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}")
+        bound = f"functools.partial(leg, {unknown[0]}=...)"
+        raise ValueError(
+            f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}; {bound} gives it the rest"
+        )
     legs = _made(leg, {name: ends[name] for name in wanted})
     if moves and "A0" not in wanted:
         path = [(poses[:, :3, 3], h**0), (d_dot, h), (d_bend, h**2)]

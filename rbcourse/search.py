@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from rbcourse._chebyshev import along, grid, interpolation
 from rbcourse._numerics import EPS, Array
 from rbcourse._starts import (
+    SAME,
     between_free_motions,
     cost_at_nodes,
+    leading_sign,
     lowered,
     starts,
     with_ends,
@@ -51,7 +53,6 @@ ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bo
 SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
 ASIDE = 0.5  # rad
-TIE = 1e-9  # costs that differ by less, as a share, are equal: the first curve found is kept
 APART = 4.0  # to curves that cost more than so many times the cheapest no turns are added
 WORTH = 0.2  # nor where the cheapest costs less than so many full turns from rest to rest
 QUICKLY: Any = {"steps": 40, "worthwhile": 5e-4}  # how starts are lowered
@@ -266,7 +267,7 @@ def _leave_the_axis(
                 problem += [i] * len(sides)
     number = np.array(problem, int)
     R, cost = lowered(task.functional.of(number), np.concatenate(bent), **SLOWLY)
-    cheaper = cost < (1 - TIE) * _costs(found)[number]
+    cheaper = cost < (1 - SAME) * _costs(found)[number]
     _follow(task, number[cheaper], R[cheaper], found)
 
 
@@ -278,9 +279,7 @@ def _across(w: Array, G: Array) -> Array:
     """
     leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
     axes = np.linalg.svd(leans, full_matrices=False)[2][1:]
-    size = np.abs(axes)
-    largest = np.argmax(size > (1 - TIE) * size.max(axis=1, keepdims=True), axis=1)
-    axes *= np.sign(axes[[0, 1], largest])[:, None]
+    axes *= leading_sign(axes)
     return np.concatenate([axes, -axes])
 
 
@@ -344,5 +343,5 @@ def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failu
     Of curves that cost the same the first one stays, so that rounding does not decide.
     """
     for i, one in zip(problem, task.solver(task.equations.of(problem), R), strict=True):
-        if found[i] is NOTHING or cost_of(one) < (1 - TIE) * cost_of(found[i]):
+        if found[i] is NOTHING or cost_of(one) < (1 - SAME) * cost_of(found[i]):
             found[i] = one

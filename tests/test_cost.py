@@ -297,7 +297,11 @@ def test_on_se3_the_centre_of_mass_counts():
     assert rotation == pytest.approx(rb.acceleration_cost(curve.rotation, BOOK), rel=1e-10)
     assert rb.acceleration_cost(curve, BOOK, m, r) == pytest.approx(rotation + translation)
     assert rb.acceleration_cost(curve, 2 * np.eye(3)) == pytest.approx(rb.acceleration_cost(curve))
-    for bad, said in (({"mass": 0}, "^mass is 0.0"), ({"centre": [0, 1]}, r"^centre: shape \(3\)")):
+    for bad, said in (
+        ({"mass": 0}, "^mass is 0.0"),
+        ({"mass": True}, "^mass is True"),
+        ({"centre": [0, 1]}, r"^centre: shape \(3\)"),
+    ):
         with pytest.raises(ValueError, match=said):
             rb.acceleration_cost(curve, **bad)
     for cost in (rb.acceleration_cost, rb.jerk_cost, lambda c: rb.torque_cost(c, BOOK)):

@@ -230,6 +230,10 @@ def test_where_there_is_nothing_to_compare_with():
     ends = np.eye(3), rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
     assert np.isnan(rb.leading_excess("projection", *ends))
     assert np.isnan(rb.excess_estimate(rb.geodesic_so3(*ends[:2])))
+    w0, w1 = [[0, 0, 0.5], [1e160, 0, 0]], [[0, 0.5, 0], [0, 1e160, 0]]
+    with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
+        lost = rb.minimum_acceleration_so3(*ends[:2], w0, w1)
+    assert np.array_equal(np.isnan(rb.excess_estimate(lost)), [False, True])
 
 
 def test_a_curve_that_is_not_smooth_has_no_estimate():
@@ -249,6 +253,8 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
 
 def test_what_is_refused():
     ends = np.eye(3), np.eye(3), [0, 0, 1], [0, 0, 1]
+    with pytest.raises(ValueError, match=r"way: one of projection.* is wanted, got \['Cayley'\]"):
+        rb.leading_excess(["Cayley"], *ends)
     with pytest.raises(ValueError, match=r"way: one of projection.* is wanted, got 'corrected'"):
         rb.leading_excess("corrected", *ends)
     with pytest.raises(ValueError, match="curve: a Curve wanted"):

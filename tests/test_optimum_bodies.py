@@ -399,6 +399,11 @@ def test_bad_arguments_are_named():
                 r"^inertia is not positive definite, to rounding: its eigenvalues are -1",
             ),
             (np.array([[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), r"^inertia is not symmetric"),
+            (
+                5e307 * I3,
+                r"^inertia: eigenvalues from 1e-150 to 1e150 are wanted, they are 5e\+307",
+            ),
+            (1e-310 * BOOK, r"^inertia: eigenvalues from 1e-150 to 1e150 are wanted"),
             (np.diag([1.0, 2, np.nan]), r"^inertia\[2, 2\] is nan"),
             ([1.0, 2, 3], r"^inertia: shape \(\.\.\., 3, 3\) wanted, got \(3,\)"),
         ):
@@ -584,3 +589,15 @@ def test_of_two_best_curves_rounding_does_not_choose(turn):
         for nudge in np.random.default_rng(turn).normal(scale=1e-15, size=(8, 3)):
             again = rb.minimum_torque_so3(np.eye(3), R1 @ rb.exp_so3(nudge), rest, rest, G)(t, 1)
             assert np.abs(again - first).max() < 1e-6
+
+
+@pytest.mark.parametrize("what", OPTIMA)
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, -0.8, 0), (-1, 1, 0), (-0.48, -0.6, 0.64)])
+def test_of_two_half_turns_rounding_does_not_choose(what, axis):
+    """From rest to rest both ways round cost the same."""
+    half, t = rb.exp_so3(np.pi * np.array(axis) / np.linalg.norm(axis)), np.linspace(0, 1, 5)
+    problem = I3, half, REST, REST, 2 * I3, REST, REST
+    first = OPTIMA[what](*problem)(t, 1)
+    for nudge in np.random.default_rng(180).normal(scale=1e-15, size=(12, 3)):
+        again = OPTIMA[what](I3, half @ rb.exp_so3(nudge), *problem[2:])(t, 1)
+        assert np.abs(again - first).max() < 1e-6

@@ -241,6 +241,11 @@ HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
         (([0, 1], POSES[:2], TWISTS[:2, :3]), None, "velocities: shape (N, 6) wanted, got (2, 3)"),
         (([0, 1], POSES[:2], TWISTS[:3]), None, "velocities: 2 wanted, one a pose, got 3"),
         (([0, 1], ROTATIONS[:2]), rb.geodesic_se3, "leg: it asks for A0; there are R0, R1, w0"),
+        (
+            ([0, 1], ROTATIONS[:2]),
+            rb.minimum_torque_so3,
+            "leg: it asks for inertia; there are R0, R1, w0, w1, a0, a1; functools.partial(leg, in",
+        ),
         (([0, 1], ROTATIONS[:2]), rb.exp_so3, "leg: it asks for w; there are R0, R1, w0, w1, a0"),
         (([0, 1], ROTATIONS[:2]), 3, "leg: a function that makes curves wanted, got 3"),
         (([0, 1], ROTATIONS[:2]), lambda R0: R0, "leg: a stack of 1 curves on [0, 1] wanted"),
@@ -328,8 +333,9 @@ def test_a_retimed_stack_is_a_stack():
     ("curve", "duration", "message"),
     [
         (np.sin, 1, "curve: a Curve wanted, got"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), 0, "duration is 0.0, a time above 0 is wanted"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), -1, "duration is -1.0, a time above 0 is wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), 0, "duration is 0.0, a number above 0 is wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), -1, "duration is -1.0, a number above 0 is wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), True, "duration is True, a number above 0 is wanted"),
         (rb.geodesic_so3(*ROTATIONS[:2]), np.inf, "duration is inf"),
         (rb.geodesic_so3(*ROTATIONS[:2]), [1, 2], "duration: shape () wanted"),
         (rb.chain([1e9, 2e9], ROTATIONS[:2]), 1e-9, "duration is 1e-09: that vanishes beside"),

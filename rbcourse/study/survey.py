@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from functools import partial
+from inspect import signature
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from threading import Thread, current_thread, main_thread
@@ -105,6 +106,8 @@ def survey(
     for name, make in ways.items():
         if not callable(make):
             raise ValueError(f"ways: {name!r} is no function")
+        if (asked := _not_given(make)) is not None:
+            raise ValueError(f"ways: {name!r} is called with R0, R1, w0, w1: {asked}")
         if name == "optimum":
             raise ValueError("ways: 'optimum' is the name of what all are compared with")
     work = partial(_costs, inertia, tuple(ways.items()))
@@ -289,6 +292,17 @@ def _alone(own: int, work: Callable[[Ends], Array], chunk: Ends) -> Array:
         return work(chunk)
     with threadpool_limits(1):
         return work(chunk)
+
+
+def _not_given(make: Maker) -> str | None:
+    """Return why a function cannot be called with four arguments; None if it can."""
+    try:
+        signature(make).bind(*Ends._fields)
+    except TypeError as error:
+        return str(error)
+    except ValueError:  # of a function without a signature
+        return None
+    return None
 
 
 def _costs(inertia: Array | None, ways: Sequence[tuple[str, Maker]], chunk: Ends) -> Array:
