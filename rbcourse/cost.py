@@ -49,8 +49,8 @@ def acceleration_cost(
         ∫ m ‖d_c''‖² dt, where d_c is the place of the centre of mass. By default this is
         ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. To 1e-10 relative, or 1e-20 absolute,
         unless acceleration falls within a hundredth of the interval, as with an abrupt ``f`` of a
-        `projected_line_so3`, or with narrow ripples of it. With an inertia the absolute bound is 1e-20 times a third
-        of its trace.
+        `projected_line_so3`, or with narrow ripples of it. With an inertia the absolute bound is
+        1e-20 times a third of its trace.
 
     Raises
     ------

@@ -244,11 +244,12 @@ def minimum_jerk_so3(
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 600
-    random problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, ‖a0‖, ‖a1‖ < 20, converged, and all of 1,200 with these
-    vectors near one axis, ‖w0‖, ‖w1‖ from 5 to 9 and ‖a0‖, ‖a1‖ from 10 to 20. Sixteen random starts
-    of another optimiser found a cheaper curve for one of the latter, by 0.4 %. About one axis it is
-    the cheapest of the quintics to σ with any number of full turns, in all of 1,000 problems.
+    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 600 random
+    problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, ‖a0‖, ‖a1‖ < 20, converged, and all of 1,200 with these
+    vectors near one axis, ‖w0‖, ‖w1‖ from 5 to 9 and ‖a0‖, ‖a1‖ from 10 to 20. Sixteen random
+    starts of another optimiser found a cheaper curve for one of the latter, by 0.4 %. About one
+    axis it is the cheapest of the quintics to σ with any number of full turns, in all of 1,000
+    problems.
 
     From rest to rest without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
     costs 1440 ‖σ‖².
