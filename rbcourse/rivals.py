@@ -420,7 +420,8 @@ def normal_cubic_so3(
     Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector y(1)
     which `log_so3` chooses; and where x ↦ y is singular at x(1). Every y is reached, as
     yᵀ G x = xᵀ G x bounds all x with this y. With y(1) up to π the moments 1, 2, 2.9 have no such
-    place, thin rods do, beyond about 2 rad, about their middle axis. Near it the curve is long.
+    place; flat strips, thin bodies with three different moments, do, beyond about 2 rad about their
+    middle axis. Near it the curve is long.
 
     Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
 

@@ -111,11 +111,12 @@ def ball(given: Ends) -> Task:
 
 
 def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Return what is found from one start where no other curve can cost as little.
+    """Return what is found from one start where all curves the other way round cost more.
 
     With entries of σ, w0 and w1 below ½, so norms below 1, the optimum costs about ∫ ‖w'‖² =
     12 ‖e‖² + ‖d‖² < 52, and a curve the other way round, with such ends and a length of 2π − 1 and
-    more, at least 12 (2π − 2)² > 200.
+    more, at least 12 (2π − 2)² > 200. That only one curve of the short way is stationary is not
+    shown by this; no other one was found.
     """
     largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
     slow = np.flatnonzero(largest < SLOW)
