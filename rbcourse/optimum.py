@@ -92,9 +92,9 @@ def minimum_acceleration_so3(
     - ‖w0‖, ‖w1‖ < 20, 3,000 problems: none costs more than a closed form, one more than a curve
       that was found from one way round; reversing time changes the cost of 5. Eight random starts
       found no cheaper curve for any of 1,000.
-    - Bodies whose largest moment is at most ten times the least, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 2,100
+    - Bodies whose largest moment is at most ten times the least, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 2,700
       problems: all converge. Sixteen random starts of another optimiser found a cheaper curve for
-      5, by less than 0.4 %.
+      6, by less than 0.4 %.
 
     End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
     R0ᵀR1, the shortest or one with full turns more or the other way round. Of those the cheapest
@@ -171,10 +171,10 @@ def minimum_torque_so3(
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 2,100 random
+    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 2,700 random
     problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, of bodies whose largest moment is at most ten times the
-    least, converged. Sixteen random starts of another optimiser found a cheaper curve for 5, by 0.2
-    to 10 %.
+    least, converged. Sixteen random starts of another optimiser found a cheaper curve for 9, by 0.2
+    to 25 %.
 
     Thin rods are another matter: with the moments (0.01, 1, 1) 20 to 23 of 60 problems with
     ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 did not converge; with (0.03, 1, 1) all of 240 did, but for 3 of them a
