@@ -157,10 +157,10 @@ def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
 def with_ends(R: Array, ends: Array) -> Array:
     """Return the curves R exp(η̂) with w0 and w1, or w0, w1, a0 and a1, at their ends.
 
-    The first turns are by η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁, with what the velocities lack, the
-    second ones by η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁, with what the accelerations lack then.
-    It is what the curves through R at the nodes lack: where the nodes are too few for a curve, they
-    do not have its velocities.
+    Δw₀ and Δw₁ are the differences between the wanted velocities and those of the polynomials
+    through R at the nodes. A fast curve that is sampled at too few nodes has such differences. The
+    first factor has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁; for accelerations, the second one has
+    η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁.
     """
     t = grid(R.shape[1]).t[:, None]
     for order in range(1, 1 + ends.shape[1] // 2):

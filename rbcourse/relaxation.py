@@ -385,7 +385,7 @@ class BallStationary:
         return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n, and what has twice as many intervals again and again, up to 257."""
+        """Return n and the numbers with 2, 4, 8 and 16 times as many intervals, up to 257."""
         return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16) if (n - 1) * times <= 256)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:

@@ -48,13 +48,13 @@ LEAST_COARSE = 65  # where ‖w0‖ + ‖w1‖ > VERY_FAST
 CLOSE = 1.1  # lowered starts that cost more than this many times the cheapest are dropped,
 NEAR = 0.1  # and those with entries of R that differ by less from those of a cheaper one
 FAST = 24.0  # rad: where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too
-VERY_FAST = 80.0
+VERY_FAST = 80.0  # rad: where ‖w0‖ + ‖w1‖ is larger they are followed on LEAST_COARSE nodes
 ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
 SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
 ASIDE = 0.5  # rad
-APART = 4.0  # to curves that cost more than so many times the cheapest no turns are added
-WORTH = 0.2  # nor where the cheapest costs less than so many full turns from rest to rest
+APART = 4.0  # full turns are added to curves that cost at most 4 times the cheapest, and only
+WORTH = 0.2  # where the cheapest costs more than 0.2 times a full turn from rest to rest
 QUICKLY: Any = {"steps": 40, "worthwhile": 5e-4}  # how starts are lowered
 BRIEFLY: Any = {"steps": 3, "worthwhile": 5e-4}  # with a full turn more
 FARTHER: Any = {"steps": 40, "worthwhile": 1e-4}  # on FINER nodes
@@ -72,8 +72,8 @@ class Task(NamedTuple):
     batch : tuple of int
         The shape of the stack.
     functional : Functional
-        What is least. For an `Effort` curves with full turns more are tried, and solutions about
-        one axis, which may be saddles, are bent aside.
+        The cost. If it is an `Effort`, the search also adds full turns to the starts, and bends
+        solutions about one axis, which may be saddles.
     equations : Equations
         When it is: R p = c, and the ends.
     starts : callable
@@ -111,7 +111,7 @@ def ball(given: Ends) -> Task:
 
 
 def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Return what is found from one start where all curves the other way round cost more.
+    """Return the solutions from one start, where all curves the other way round cost more.
 
     With entries of σ, w0 and w1 below ½, so norms below 1, the optimum costs about ∫ ‖w'‖² =
     12 ‖e‖² + ‖d‖² < 52, and a curve the other way round, with such ends and a length of 2π − 1 and

@@ -127,7 +127,7 @@ def _quaternion_and_rates(R, w, a):
 def _polynomials(order, free, nodes):
     """Return Gauss's weights and, at his nodes, polynomials for the ends and the free ones.
 
-    Both with so many derivatives as the order says.
+    Each is a list: the values, and the derivatives up to the order.
     """
     x, weight = np.polynomial.legendre.leggauss(nodes)
     t = (x + 1) / 2

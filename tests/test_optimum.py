@@ -298,7 +298,7 @@ def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(sol
 
 @pytest.mark.parametrize("power", [-320, -162, -161, -160, -156, -150, -100, -20])
 def test_tiny_motions_cost_what_their_cubic_costs(power):
-    """Not what a full turn costs; squares of such velocities are 0 in floating point."""
+    """Squares of such velocities are 0 in floating point; the solver must not add a full turn."""
     speed = 10.0**power
     curve = rb.minimum_acceleration_so3(np.eye(3), np.eye(3), [0, 0, speed], REST)
     assert curve.cost == pytest.approx(8 * speed**2, rel=1e-4, abs=1e-40)
