@@ -41,7 +41,7 @@ from rbcourse.rivals import corrected_bezier_so3
 from rbcourse.so3 import log_so3
 
 COARSE = 17  # nodes, on which curves are started and systems solved;
-FINER = 25  # for bodies, after turns are added;
+FINER = 25  # for bodies, where turns are added;
 FINER_FOR_JERK = 29  # for the jerk, which has higher derivatives;
 LESS_COARSE = 33  # where no solution is found on those that costs no more than a start;
 LEAST_COARSE = 65  # where ‖w0‖ + ‖w1‖ > VERY_FAST
@@ -53,8 +53,10 @@ ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bo
 SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
 FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
 ASIDE = 0.5  # rad
-APART = 4.0  # full turns are added to curves that cost at most 4 times the cheapest, and only
-WORTH = 0.2  # where the cheapest costs more than 0.2 times a full turn from rest to rest
+APART = 3.0  # full turns are added to curves that cost at most 3 times the cheapest,
+LESS_APART = 1.2  # to those that come of it and cost at most 1.2 times the cheapest, and only
+WORTH = 0.3  # where the cheapest costs more than 0.3 times a full turn from rest to rest
+PROMISING = 1.5  # what costs more times the cheapest after a few steps is dropped
 QUICKLY: Any = {"steps": 40, "worthwhile": 5e-4}  # how starts are lowered
 BRIEFLY: Any = {"steps": 3, "worthwhile": 5e-4}  # with a full turn more
 FARTHER: Any = {"steps": 40, "worthwhile": 1e-4}  # on FINER nodes
@@ -208,10 +210,9 @@ def _searched(task: Task) -> list[Solution | Failure]:
     if isinstance(task.functional, Effort):
         problem, R, cost = _with_more_turns(task, task.functional, problem, R, cost)
     least = partial(_least, len(ends), problem)
-    likely = ~(cost > CLOSE * least(cost)) & ~_repeated(problem, cost, R)
+    likely = ~(cost > CLOSE * least(cost)[problem]) & ~_repeated(problem, cost, R)
     _follow(task, problem[likely], R[likely], found)
-    dear = _costs(found)[problem] > ABOUT * least(cost)
-    again = np.unique(problem[dear | (fast > FAST)[problem]])
+    again = np.unique(problem[((_costs(found) > ABOUT * least(cost)) | (fast > FAST))[problem]])
     for n, some in (LESS_COARSE, fast <= VERY_FAST), (LEAST_COARSE, ~(fast <= VERY_FAST)):
         if some[again].any():
             _follow_on(task, again[some[again]], problem, R, n, found)
@@ -223,27 +224,35 @@ def _searched(task: Task) -> list[Solution | Failure]:
 def _with_more_turns(
     task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
 ) -> tuple[Numbers, Array, Array]:
-    """Add curves with a full turn more about a principal axis; lower the cheapest of all farther.
+    """Lower the cheapest curves on more nodes, with a full turn more about a principal axis too.
 
-    The motion that costs least may turn once more about the axis of a small moment. From rest to
-    rest such a turn costs at least 12 (2π)² λ, λ the least eigenvalue of G M G; none is added where
-    the cheapest curve costs less than `WORTH` times that.
+    The motion that costs least may turn once or twice more about the axis of a small moment. From
+    rest to rest a full turn costs at least 12 (2π)² λ, λ the least eigenvalue of G M G; none is
+    added where the cheapest curve costs less than `WORTH` times that.
     """
     ends, count = task.equations.ends, len(task.equations.ends)
     full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
-    least = _least(count, problem, cost)
-    some = ~(cost > APART * least) & ~_repeated(problem, cost, R)
-    some &= least > WORTH * full_turn[problem]
-    which = problem[some]
-    more = with_full_turns(R[some], ends[which], effort.G[which])
-    number = np.tile(which, 6)
-    more, cost_of_more = lowered(effort.of(number), more, **BRIEFLY)
-    problem, R = np.concatenate([problem, number]), np.concatenate([R, more])
-    cost = np.concatenate([cost, cost_of_more])
-    some = ~(cost > APART / 2 * _least(count, problem, cost)) & ~_repeated(problem, cost, R)
-    problem, R = problem[some], _on_nodes(R[some], FINER)
-    R = with_ends(R, ends[problem])
-    return problem, *lowered(effort.of(problem), R, **FARTHER)
+    some = ~(cost > APART * _least(count, problem, cost)[problem]) & ~_repeated(problem, cost, R)
+    problem, R = problem[some], with_ends(_on_nodes(R[some], FINER), ends[problem[some]])
+    R, cost = lowered(effort.of(problem), R, **FARTHER)
+    turned = 0
+    for apart in APART, LESS_APART:
+        least = _least(count, problem, cost)
+        some = ~(cost > apart * least[problem]) & ~_repeated(problem, cost, R)
+        some &= (least > WORTH * full_turn)[problem]
+        some[:turned] = False
+        if not some.any():
+            break
+        turned = len(some)
+        number = np.tile(problem[some], 6)
+        more = with_full_turns(R[some], ends[problem[some]], effort.G[problem[some]])
+        more, briefly = lowered(effort.of(number), more, **BRIEFLY)
+        some = ~(briefly > PROMISING * least[number]) & ~_repeated(number, briefly, more)
+        number = number[some]
+        more, cost_of_more = lowered(effort.of(number), more[some], **FARTHER)
+        problem, R = np.append(problem, number), np.concatenate([R, more])
+        cost = np.append(cost, cost_of_more)
+    return problem, R, cost
 
 
 def _leave_the_axis(
@@ -299,14 +308,14 @@ def _follow_on(
     problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
     functional = task.functional.of(problem)
     bound = ABOUT * _least(len(found), problem, cost_at_nodes(functional, R))
-    some = _costs(found)[problem] > bound
+    some = (_costs(found) > bound)[problem]
     some[-len(more) :] = True
     _follow(task, problem[some], R[some], found)
-    dear = _costs(found)[problem] > bound
+    dear = (_costs(found) > bound)[problem]
     if dear.any():
         R, _ = lowered(functional.of(dear), R[dear], **PATIENTLY)
         _follow(task, problem[dear], R, found)
-        for i in np.unique(problem[_costs(found)[problem] > bound]):
+        for i in np.flatnonzero(_costs(found) > bound):
             if isinstance(one := found[i], Solution):
                 found[i] = one._replace(beaten=True)
 
@@ -316,10 +325,10 @@ def _costs(found: list[Solution | Failure]) -> Array:
 
 
 def _least(count: int, problem: Numbers, cost: Array) -> Array:
-    """Return, for each start, what the cheapest of its problem costs."""
+    """Return the cost of the cheapest start of each problem."""
     least = np.full(count, np.inf)
     np.fmin.at(least, problem, cost)
-    return least[problem]
+    return least
 
 
 def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
