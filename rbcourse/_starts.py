@@ -92,11 +92,11 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
     """
     moments, axes = np.linalg.eigh(G)
     axes *= np.linalg.det(axes)[..., None, None]  # right-handed
-    after, before = [1, 2, 0], [2, 0, 1]
+    after, before = np.array([1, 2, 0]), np.array([2, 0, 1])
     gyration = (moments[..., after] - moments[..., before]) / moments
 
     def rate(w: Array) -> Array:
-        return gyration * w[..., after] * w[..., before]
+        return gyration * w.take(after, axis=-1) * w.take(before, axis=-1)
 
     path = [(axes.mT @ w0[..., None])[..., 0]]
     size = np.linalg.norm(moments * path[0], axis=-1)

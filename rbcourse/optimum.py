@@ -92,7 +92,7 @@ def minimum_acceleration_so3(
     - ‖w0‖, ‖w1‖ < 20, 3,000 problems: none costs more than a closed form, one more than a curve
       that was found from one way round; reversing time changes the cost of 5. Eight random starts
       found no cheaper curve for any of 1,000.
-    - Bodies whose largest moment is at most ten times the least, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 2,700
+    - Bodies whose largest moment is at most ten times the least, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 3,300
       problems: all converge. Sixteen random starts of another optimiser found a cheaper curve for
       6, by less than 0.4 %.
 
@@ -103,7 +103,7 @@ def minimum_acceleration_so3(
     nothing; it was found in all of 800 problems with speeds of 3 to 16.
 
     Problems of very thin rods may not converge: of 240 with ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 none with the
-    moments (0.01, 1, 1), 40 with (0.0001, 1, 1).
+    moments (0.01, 1, 1), 28 with (0.0001, 1, 1).
 
     References
     ----------
@@ -171,13 +171,13 @@ def minimum_torque_so3(
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 2,700 random
+    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 3,300 random
     problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, of bodies whose largest moment is at most ten times the
-    least, converged. Sixteen random starts of another optimiser found a cheaper curve for 9, by 0.2
-    to 25 %.
+    least, converged. Sixteen random starts of another optimiser found a cheaper curve for 2, by
+    less than 0.2 %.
 
-    Thin rods are another matter: with the moments (0.01, 1, 1) 20 to 23 of 60 problems with
-    ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 did not converge; with (0.03, 1, 1) all of 240 did, but for 3 of them a
+    Thin rods are another matter: with the moments (0.01, 1, 1) 19 to 23 of 60 problems with
+    ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 did not converge; with (0.03, 1, 1) all of 240 did, but for 2 of them a
     start costs less.
 
     A turn about one axis is stationary about each principal axis; about that of the largest moment

@@ -232,7 +232,10 @@ def _with_more_turns(
     """
     ends, count = task.equations.ends, len(task.equations.ends)
     full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
-    some = ~(cost > APART * _least(count, problem, cost)[problem]) & ~_repeated(problem, cost, R)
+    least = _least(count, problem, cost)
+    if not (least > WORTH * full_turn)[problem].any():
+        return problem, R, cost
+    some = ~(cost > APART * least[problem]) & ~_repeated(problem, cost, R)
     problem, R = problem[some], with_ends(_on_nodes(R[some], FINER), ends[problem[some]])
     R, cost = lowered(effort.of(problem), R, **FARTHER)
     turned = 0
