@@ -3,7 +3,7 @@
 import rbcourse as rb
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.rotations import cubic_ends
-from rbcourse.rivals import CLOSED_FORMS
+from rbcourse import CLOSED_FORMS
 
 
 def closed_forms(n, rng):

@@ -7,16 +7,19 @@ samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f
 """
 
 from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling
+from rbcourse._numerics import Array
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
     quaternion_from_matrix,
     quaternion_from_rotation_vector,
+    quaternion_from_zyx,
     rotation_vector_from_quaternion,
     zyx_from_matrix,
+    zyx_from_quaternion,
 )
 from rbcourse.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
-from rbcourse.curves import Curve, geodesic_so3, retime
+from rbcourse.curves import Curve, Ends, geodesic_so3, retime
 from rbcourse.excess import excess_estimate, leading_excess
 from rbcourse.files import read_path, write_path
 from rbcourse.metrics import METRIC_SE3, METRIC_SO3, geodesic_flow
@@ -29,12 +32,15 @@ from rbcourse.motions import (
 )
 from rbcourse.optimum import (
     ConvergenceError,
+    Optimum,
     minimum_acceleration_so3,
     minimum_jerk_so3,
     minimum_torque_so3,
+    stationary_so3,
 )
 from rbcourse.paths import Chain, bessel_velocities, chain
 from rbcourse.projected_cubic import (
+    ProjectedPolynomial,
     projected_cubic_so3,
     projected_quintic_so3,
     weighted_cubic_so3,
@@ -59,10 +65,12 @@ from rbcourse.quaternion import (
 )
 from rbcourse.rivals import (
     CLOSED_FORMS,
+    bezier_long_so3,
     bezier_so3,
     cayley_cubic_so3,
     corrected_bezier_so3,
     cumulative_bezier_so3,
+    exponential_cubic_long_so3,
     exponential_cubic_so3,
     exponential_quintic_so3,
     normal_cubic_so3,
@@ -117,6 +125,8 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "rotation_vector_from_quaternion",
     "matrix_from_zyx",
     "zyx_from_matrix",
+    "quaternion_from_zyx",
+    "zyx_from_quaternion",
     # poses
     "BASIS_SE3",
     "hat_se3",
@@ -148,6 +158,7 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "geodesic_flow",
     # curves between two rotations or poses
     "Curve",
+    "Ends",
     "geodesic_so3",
     "geodesic_se3",
     "screw_se3",
@@ -156,12 +167,15 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "projected_cubic_so3",
     "projected_cubic_se3",
     "projected_quintic_so3",
+    "ProjectedPolynomial",
     # the optimum, and what curves cost
     "minimum_acceleration_so3",
     "minimum_acceleration_se3",
     "minimum_torque_so3",
     "minimum_jerk_so3",
     "shoot_minimum_acceleration_so3",
+    "stationary_so3",
+    "Optimum",
     "ConvergenceError",
     "acceleration_cost",
     "excess_estimate",
@@ -172,7 +186,9 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # other closed forms
     "CLOSED_FORMS",
     "exponential_cubic_so3",
+    "exponential_cubic_long_so3",
     "bezier_so3",
+    "bezier_long_so3",
     "cumulative_bezier_so3",
     "quaternion_cubic_so3",
     "cayley_cubic_so3",
@@ -187,6 +203,8 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "bessel_velocities",
     "read_path",
     "write_path",
+    # for annotations
+    "Array",
     # modules with more
     "arm",
     "files",

@@ -11,6 +11,16 @@ from rbcourse._checks import as_finite, as_single, first_index
 from rbcourse._numerics import EPS, Array
 from rbcourse.planar import Plan, interpolate, propagate
 
+__all__ = [
+    "LINKS",
+    "Posture",
+    "arm_forward_kinematics",
+    "arm_inverse_kinematics",
+    "arm_tip_jacobian",
+    "interpolate_joints",
+    "propagate_joints",
+]
+
 LINKS = (2.0, 1.5)
 """The lengths of the links in the report, in m (RR 4)."""
 

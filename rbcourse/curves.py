@@ -30,56 +30,70 @@ SHORTEST = 1e-100  # of a duration
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
 
 
-class Ends(NamedTuple):
-    """Boundary conditions at t = 0 and 1, all of one batch shape: rotations and body velocities.
-
-    Attributes
-    ----------
-    R0, R1 : ndarray, shape (..., 3, 3)
-        Rotation matrices.
-    w0, w1 : ndarray, shape (..., 3)
-        Angular velocities, body frame, in rad per unit time.
-    """
-
+class _Ends(NamedTuple):
     R0: Array
     R1: Array
     w0: Array
     w1: Array
+
+
+class Ends(_Ends):
+    """Boundary conditions at t = 0 and 1, all of one batch shape: rotations and body velocities.
+
+    It is a tuple, so that the makers of curves take it as ``make(*ends)``.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities, body frame, in rad per unit time.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not finite, not of its shape, or the batches do not broadcast.
+
+    References
+    ----------
+    BK 6.2.
+
+    Examples
+    --------
+    >>> from rbcourse import acceleration_cost, bezier_so3, exp_so3, projected_cubic_so3
+    >>> ends = Ends(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]), [0, 0, 0], [0, 1, 0])
+    >>> ends.w1.shape
+    (2, 3)
+    >>> costs = [acceleration_cost(make(*ends)) for make in (projected_cubic_so3, bezier_so3)]
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
+        """Check the arguments, and give them one batch shape."""
+        R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+        w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+        batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+        return cls._make((R0, R1, w0, w1)).broadcast_to(batch)
 
     @property
     def turn(self) -> Array:
         """R0ᵀ R1."""
         return np.swapaxes(self.R0, -1, -2) @ self.R1
 
-    def flat(self) -> Ends:
+    def flat(self) -> Self:
         """Return the same with one batch axis."""
-        rotations = (R.reshape(-1, 3, 3) for R in self[:2])
-        return Ends(*rotations, *(w.reshape(-1, 3) for w in self[2:]))
+        return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
 
-    def broadcast_to(self, batch: tuple[int, ...]) -> Ends:
+    def broadcast_to(self, batch: tuple[int, ...]) -> Self:
         """Return the same with another batch shape."""
-        rotations = (np.broadcast_to(R, (*batch, 3, 3)) for R in self[:2])
-        return Ends(*rotations, *(np.broadcast_to(w, (*batch, 3)) for w in self[2:]))
+        shapes = (3, 3), (3, 3), (3,), (3,)
+        arrays = zip(self, shapes, strict=True)
+        return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
 
-    def of(self, which: Any) -> Ends:
+    def of(self, which: Any) -> Self:
         """Return some of the problems, by an index of NumPy's into the batch axes."""
-        return Ends(*(array[which] for array in self))
-
-
-def check_ends(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Ends:
-    """Return the boundary conditions as arrays of one batch shape.
-
-    Validity of the rotations is not checked; see `project_so`.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of its shape, or the batches do not broadcast.
-    """
-    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
-    w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
-    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
-    return Ends(R0, R1, w0, w1).broadcast_to(batch)
+        return type(self)._make(x[which] for x in self)
 
 
 def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:

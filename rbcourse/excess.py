@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rbcourse._chebyshev import grid, tails
 from rbcourse._numerics import Array
 from rbcourse.cost import check_curve, summed
-from rbcourse.curves import Curve, check_ends
+from rbcourse.curves import Curve, Ends
 from rbcourse.rivals import seen_from_the_middle
 from rbcourse.so3 import exp_so3, log_so3
 
@@ -83,7 +83,7 @@ def leading_excess(way: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: Ar
     forms = _forms()
     if not isinstance(way, str) or way not in forms:
         raise ValueError(f"way: one of {', '.join(forms)} is wanted, got {way!r}")
-    ends = check_ends(R0, R1, w0, w1)
+    ends = Ends(R0, R1, w0, w1)
     sigma = log_so3(ends.turn)
     e, d = seen_from_the_middle(sigma, ends.w0, ends.w1)
     pairs = (sigma, sigma), (e, e), (d, d), (sigma, e), (sigma, d), (e, d)

@@ -18,6 +18,13 @@ from rbcourse.planar import Commands, Plan, as_command, as_plan
 from rbcourse.quaternion import continuous_quaternions, project_quaternion
 from rbcourse.se3 import check_path, join
 
+__all__ = [
+    "load_plan",
+    "read_path",
+    "save_plan",
+    "write_path",
+]
+
 Rows = Iterator[tuple[str, list[float]]]
 TIME = ["time [s]"]
 POSITION = ["x [m]", "y [m]", "z [m]"]

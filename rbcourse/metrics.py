@@ -17,6 +17,26 @@ from rbcourse.projection import project_se, project_so
 from rbcourse.se3 import BASIS_SE3, hat_se3
 from rbcourse.so3 import BASIS_SO3, hat_so3, vee
 
+__all__ = [
+    "METRIC_SE3",
+    "METRIC_SO3",
+    "box_inertia",
+    "christoffel",
+    "components_from_tangent",
+    "covariant_derivative",
+    "geodesic_flow",
+    "inertia_from_weight",
+    "inner_ga",
+    "inner_gl",
+    "inner_left_invariant",
+    "inner_se3",
+    "inner_so3",
+    "semi_riemannian_metric_se3",
+    "structure_constants",
+    "tangent_from_components",
+    "weight_from_inertia",
+]
+
 METRIC_SO3 = 2 * np.eye(3)
 """The matrix G of the metric that the trace induces on SO(3), shape (3, 3) (BK (12))."""
 METRIC_SE3 = np.diag([2.0, 2, 2, 1, 1, 1])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
 from rbcourse._numerics import Array
-from rbcourse.curves import Chosen, Curve, Ends, check_ends, combine, with_inertia
+from rbcourse.curves import Chosen, Curve, Ends, combine, with_inertia
 from rbcourse.functionals import Functional
 from rbcourse.projected_cubic import check_ends_of_quintic
 from rbcourse.relaxation import Failure, Solution, orthogonal
@@ -124,7 +124,7 @@ def minimum_acceleration_so3(
     >>> (c(0.5) @ c.costate(0.5)).round(6) - c.c.round(6)
     array([0., 0., 0.])
     """
-    given = check_ends(R0, R1, w0, w1)
+    given = Ends(R0, R1, w0, w1)
     if inertia is None:
         return solve(ball(given))
     return solve(body(*with_inertia(given, inertia), of_torque=False))
@@ -199,7 +199,7 @@ def minimum_torque_so3(
     >>> float(torque_cost(c, book).round(9))  # about a principal axis 12 (2.22 · 1.5)²
     133.0668
     """
-    given = check_ends(R0, R1, w0, w1)
+    given = Ends(R0, R1, w0, w1)
     return solve(body(*with_inertia(given, inertia), of_torque=True))
 
 
@@ -268,6 +268,54 @@ def minimum_jerk_so3(
            [0., 1., 0.]])
     """
     return solve(jerk(*check_ends_of_quintic(R0, R1, w0, w1, a0, a1)))
+
+
+def stationary_so3(guess: Curve) -> Optimum:
+    """Return the stationary curve that Newton's method finds from a curve with the same ends.
+
+    Parameters
+    ----------
+    guess : Curve
+        On SO(3) and [0, 1], or a stack of them.
+
+    Returns
+    -------
+    Optimum
+        A `Curve`, or a stack of them, with the rotations and the velocities of the guess at t = 0
+        and 1, and R w'' constant, as for the least ∫ 2 ‖w'‖² dt. It need not be the cheapest; NaN
+        where nothing is found (see ``converged``).
+
+    Raises
+    ------
+    ValueError
+        If `guess` is no such curve, or is NaN at a time.
+
+    See Also
+    --------
+    minimum_acceleration_so3 : The cheapest curve that is known.
+
+    References
+    ----------
+    BK (19).
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, projected_cubic_so3
+    >>> guess = projected_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = stationary_so3(guess)
+    >>> bool(np.abs(c([0, 1], 1) - guess([0, 1], 1)).max() < 1e-12), c.residual < 1e-12
+    (True, True)
+    """
+    if not isinstance(guess, Curve) or (guess.size, guess.domain) != (3, (0, 1)):
+        raise ValueError(f"guess: a Curve on SO(3) and [0, 1] is wanted, got {guess!r}")
+    values = guess([0, 1]), guess([0, 1], 1)
+    if not np.isfinite(values[1]).all():
+        raise ValueError("guess: a curve is NaN, it did not converge")
+    task = ball(Ends(*values[0], *values[1]))
+    R = np.moveaxis(guess(grid(COARSE).t).reshape(COARSE, -1, 3, 3), 0, 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        solutions = task.solver(task.equations, R)
+    return Optimum(task.functional, task.equations.ends, solutions, task.batch)
 
 
 class ConvergenceError(RuntimeError):
@@ -434,18 +482,6 @@ def solve(task: Task) -> Optimum:
     curve = Optimum(task.functional, task.equations.ends, solutions, task.batch)
     _warn_if_not_converged(curve)
     return curve
-
-
-def from_guess(given: Ends, guess: Curve) -> Optimum:
-    """Return what Newton's method finds, for a ball, from curves with these ends; NaN if nothing.
-
-    It is stationary, and need not be the cheapest.
-    """
-    task = ball(given)
-    R = np.moveaxis(guess(grid(COARSE).t).reshape(COARSE, -1, 3, 3), 0, 1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        solutions = task.solver(task.equations, R)
-    return Optimum(task.functional, task.equations.ends, solutions, task.batch)
 
 
 def _warn_if_not_converged(curve: Optimum) -> None:

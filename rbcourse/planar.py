@@ -16,6 +16,18 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_count, as_finite, as_single, check_broadcast
 from rbcourse._numerics import Array, scaled, sinc
 
+__all__ = [
+    "Plan",
+    "compose_planar",
+    "exp_planar",
+    "interpolate_planar",
+    "inverse_planar",
+    "log_planar",
+    "matrix_from_planar",
+    "planar_from_matrix",
+    "propagate_planar",
+]
+
 Plan: TypeAlias = Iterable[tuple[ArrayLike, float]]
 Commands: TypeAlias = list[tuple[Array, float]]
 

@@ -16,7 +16,6 @@ from rbcourse.curves import (
     Chosen,
     Curve,
     Ends,
-    check_ends,
     events_of,
     has_long_runs,
     least_over_time,
@@ -167,7 +166,7 @@ def projected_cubic_so3(
     >>> float(c.margin.round(3))
     1.464
     """
-    return watched(projected_cubic(check_ends(R0, R1, w0, w1)))
+    return watched(projected_cubic(Ends(R0, R1, w0, w1)))
 
 
 def weighted_cubic_so3(
@@ -232,7 +231,7 @@ def weighted_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return watched(weighted_cubic(*with_inertia(check_ends(R0, R1, w0, w1), inertia)))
+    return watched(weighted_cubic(*with_inertia(Ends(R0, R1, w0, w1), inertia)))
 
 
 def projected_quintic_so3(
@@ -304,14 +303,14 @@ def projected_quintic_so3(
 def check_ends_of_quintic(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
 ) -> tuple[Ends, Array, Array]:
-    """Return `check_ends`, and the accelerations a0 and a1, all of one batch shape.
+    """Return `Ends`, and the accelerations a0 and a1, all of one batch shape.
 
     Raises
     ------
     ValueError
         If an argument is not finite, not of its shape, or the batches do not broadcast.
     """
-    ends, a0, a1 = check_ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
+    ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     a0, a1 = (np.broadcast_to(a, (*batch, 3)) for a in (a0, a1))
     return ends.broadcast_to(batch), a0, a1

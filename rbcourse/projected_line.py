@@ -21,6 +21,15 @@ from rbcourse.curves import (
 )
 from rbcourse.projection import NOT_UNIQUE, warn_if_nearly_singular
 
+__all__ = [
+    "Progress",
+    "ProjectedLine",
+    "f",
+    "line_singular_value",
+    "projected_line_so3",
+    "theta",
+]
+
 Progress = Callable[[Array, int], ArrayLike]
 
 _PI_REST = 1.2246467991473532e-16  # π − np.pi

@@ -18,6 +18,18 @@ from rbcourse._jets import multiply
 from rbcourse._jets import slerp as slerp_jet
 from rbcourse._numerics import EPS, Array
 
+__all__ = [
+    "canonical_quaternion",
+    "continuous_quaternions",
+    "is_unit_quaternion",
+    "project_quaternion",
+    "quaternion_conjugate",
+    "quaternion_multiply",
+    "rotate_by_quaternion",
+    "slerp",
+    "slerp_long",
+]
+
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 

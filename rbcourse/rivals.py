@@ -31,7 +31,6 @@ from rbcourse.curves import (
     Chosen,
     Curve,
     Ends,
-    check_ends,
     events_of,
     identity,
     least_over_time,
@@ -94,8 +93,48 @@ def exponential_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = check_ends(R0, R1, w0, w1)
+    ends = Ends(R0, R1, w0, w1)
     return ExponentialCubic(ends, log_so3(ends.turn))
+
+
+def exponential_cubic_long_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+) -> ExponentialCubic:
+    """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
+
+    Parameters
+    ----------
+    R0, R1, w0, w1 : array_like
+        As for `exponential_cubic_so3`.
+
+    Returns
+    -------
+    ExponentialCubic
+        A `Curve` that meets all four ends, with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1).
+
+    See Also
+    --------
+    exponential_cubic_so3 : The short way round.
+
+    Notes
+    -----
+    Singular set: that of `exponential_cubic_so3`; and R0 = R1, where no axis is the other one, and
+    the curve is that of `exponential_cubic_so3`.
+
+    References
+    ----------
+    beyond BK 10.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> c = exponential_cubic_long_so3(np.eye(3), exp_so3([0, 0, 3]), [0, 0, -4], [0, 0, -4])
+    >>> log_so3(c([0.25, 0.75])).round(2) + 0.0
+    array([[ 0.  ,  0.  , -0.89],
+           [ 0.  ,  0.  , -2.4 ]])
+    """
+    ends = Ends(R0, R1, w0, w1)
+    return ExponentialCubic(ends, other_way(log_so3(ends.turn)))
 
 
 def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Bezier:
@@ -147,8 +186,54 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = _check_slow(check_ends(R0, R1, w0, w1))
+    ends = _check_slow(Ends(R0, R1, w0, w1))
     return Bezier(ends, bezier_legs(ends))
+
+
+def bezier_long_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Bezier:
+    """Return the Bézier curve with these ends whose middle leg turns the other way round.
+
+    Parameters
+    ----------
+    R0, R1, w0, w1 : array_like
+        As for `bezier_so3`.
+
+    Returns
+    -------
+    Bezier
+        A `Curve` that meets all four ends, with the control points of `bezier_so3`. Where the end
+        velocities are large, it may cost less than that.
+
+    Raises
+    ------
+    ValueError
+        As `bezier_so3`.
+
+    See Also
+    --------
+    bezier_so3 : The short way round.
+
+    Notes
+    -----
+    Singular set: that of `bezier_so3`; and the two inner control points equal, where no axis is the
+    other one, and the curve is that of `bezier_so3`.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    beyond BK 10.
+
+    Examples
+    --------
+    >>> from rbcourse import acceleration_cost, exp_so3
+    >>> ends = np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, -2.4], [0, 0, -2.4]
+    >>> [float(acceleration_cost(c(*ends)).round(1)) for c in (bezier_so3, bezier_long_so3)]
+    [365.0, 136.3]
+    """
+    ends = _check_slow(Ends(R0, R1, w0, w1))
+    first, middle, last = bezier_legs(ends)
+    return Bezier(ends, (first, other_way(middle), last))
 
 
 def cumulative_bezier_so3(
@@ -200,7 +285,7 @@ def cumulative_bezier_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = check_ends(R0, R1, w0, w1)
+    ends = Ends(R0, R1, w0, w1)
     return CumulativeBezier(ends, bezier_legs(ends))
 
 
@@ -260,7 +345,7 @@ def corrected_bezier_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = _check_slow(check_ends(R0, R1, w0, w1))
+    ends = _check_slow(Ends(R0, R1, w0, w1))
     return CorrectedBezier(ends, bezier_legs(ends))
 
 
@@ -318,7 +403,7 @@ def quaternion_cubic_so3(
     >>> float(c.margin.round(3))
     0.933
     """
-    return QuaternionCubic(check_ends(R0, R1, w0, w1))
+    return QuaternionCubic(Ends(R0, R1, w0, w1))
 
 
 def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> CayleyCubic:
@@ -370,7 +455,7 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return CayleyCubic(check_ends(R0, R1, w0, w1))
+    return CayleyCubic(Ends(R0, R1, w0, w1))
 
 
 def normal_cubic_so3(
@@ -439,7 +524,7 @@ def normal_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return NormalCubic(*with_inertia(check_ends(R0, R1, w0, w1), inertia))
+    return NormalCubic(*with_inertia(Ends(R0, R1, w0, w1), inertia))
 
 
 def exponential_quintic_so3(

@@ -17,6 +17,19 @@ from rbcourse._checks import Rng, as_angle, as_finite, as_generator, as_size, as
 from rbcourse._numerics import Array, at_cache_line, blocks, sine_gap_ratio
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
 
+__all__ = [
+    "Rng",
+    "UniformityTest",
+    "angle_law",
+    "arvo_rotation",
+    "sample_quaternion",
+    "sample_quaternion_naive",
+    "sample_rotation",
+    "sample_rotation_naive",
+    "shoemake_quaternion",
+    "uniformity_tests",
+]
+
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
 _BLOCK = 6136  # draws whose arrays fit into the cache together; with 6144 they would collide there
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._chebyshev import grid
 from rbcourse._numerics import Array
-from rbcourse.curves import check_ends
+from rbcourse.curves import Ends
 from rbcourse.optimum import Optimum, solve
 from rbcourse.relaxation import (
     BallStationary,
@@ -78,7 +78,7 @@ def shoot_minimum_acceleration_so3(
     >>> c(0.5, 1).round(9) + 0.0  # 1.5 times the average, as for any cubic from rest to rest
     array([0.  , 0.  , 2.25])
     """
-    return solve(ball(check_ends(R0, R1, w0, w1))._replace(solver=shoot))
+    return solve(ball(Ends(R0, R1, w0, w1))._replace(solver=shoot))
 
 
 def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:

@@ -17,6 +17,19 @@ from rbcourse._numerics import Array
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
 
+__all__ = [
+    "cubic_coefficients",
+    "geodesic_so3",
+    "minimum_acceleration_so3",
+    "minimum_torque_so3",
+    "polynomial",
+    "project_so",
+    "projected_cubic_so3",
+    "sample_quaternion",
+    "sample_rotation",
+    "show",
+]
+
 
 def show(function: Callable[..., Any]) -> None:
     """Print the code of a function that has a docstring, without it.

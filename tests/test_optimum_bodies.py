@@ -13,8 +13,6 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.curves import check_ends
-from rbcourse.optimum import from_guess
 from rbcourse.rivals import CLOSED_FORMS
 
 EPS = np.finfo(float).eps
@@ -561,7 +559,7 @@ def test_one_guess_is_followed(shape):
     ends = [
         x[0] if shape == () else x[:count].reshape(*shape, *x.shape[1:]) for x in (R0, R1, w0, w1)
     ]
-    found = from_guess(check_ends(*ends), rb.cumulative_bezier_so3(*ends))
+    found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.batch_shape == shape
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
 

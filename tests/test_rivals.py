@@ -13,7 +13,7 @@ from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.curves import check_ends
+from rbcourse.curves import Ends
 from rbcourse.rivals import ExponentialCubic, hermite, other_way
 
 pytestmark = pytest.mark.source("BK 1")
@@ -230,9 +230,34 @@ def test_near_half_turns_cayleys_end_velocity_is_met_too():
     assert np.abs(rb.cayley_cubic_so3(R0, R1, w0, w1)(1, 1) - w1).max() < 1e-12
 
 
+@pytest.mark.parametrize("make", [rb.exponential_cubic_long_so3, rb.bezier_long_so3])
+def test_the_other_way_round_meets_the_same_ends(make):
+    rng = np.random.default_rng(2)
+    R0, R1 = rb.sample_rotation((2, 50), rng=rng)
+    w0, w1 = rng.uniform(-5, 5, (2, 50, 3))
+    curve = make(R0, R1, w0, w1)
+    for t, R, w in ((0, R0, w0), (1, R1, w1)):
+        assert np.abs(curve(t) - R).max() < 1e-13
+        assert np.abs(curve(t, 1) - w).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("make", "rate"), [(rb.exponential_cubic_long_so3, 1), (rb.bezier_long_so3, 3)]
+)
+def test_the_other_way_round_turns_by_what_is_left_of_a_full_turn(make, rate):
+    """About one axis, with the velocities of a turn by 1 − 2π: then it is at constant speed."""
+    e = np.eye(3)[1]
+    w = np.array([(1 - 2 * np.pi) * e]) if rate == 1 else np.array([[0.0, 0, 0]])
+    curve = make(np.eye(3)[None], rb.exp_so3([e]), w, w)
+    speed = curve(np.linspace(0, 1, 201), 1)[:, 0, 1]
+    assert np.trapezoid(speed, dx=1 / 200) == pytest.approx(1 - 2 * np.pi, abs=1e-3)
+    if rate == 1:
+        assert speed == pytest.approx(np.full(201, 1 - 2 * np.pi))
+
+
 def test_the_cubic_in_exponential_coordinates_may_go_the_other_way_round():
     R0, R1, w0, w1 = ends(50, 2.5)
-    given = check_ends(R0, R1, w0, w1)
+    given = Ends(R0, R1, w0, w1)
     short = rb.log_so3(given.turn)
     other = other_way(short)
     assert np.abs(np.linalg.norm(other, axis=-1) - (2 * np.pi - 2.5)).max() < 20 * EPS

@@ -1,12 +1,16 @@
-"""Rooms import one way, nothing imports in a circle, and the package itself loads NumPy alone."""
+"""Who imports from whom: one way, no circles, exported names only, and NumPy alone at first."""
 
 import ast
+import importlib
 import inspect
+import json
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from textwrap import dedent
+
+import pytest
 
 import rbcourse
 
@@ -21,6 +25,12 @@ MAY_IMPORT = {  # the rooms, beside the core and itself, that a room may import
     "assignments": {"draw", "course"},
     "book": {"course", "assignments"},
 }
+CLIENTS = "draw", "explore", "study", "course", "assignments", "book"
+PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))} | {
+    "report",
+    "textbook",
+}
+"""Modules of the core whose names may be used from outside; each has an ``__all__``."""
 LIBRARIES = {
     "core": {"numpy", "scipy"},
     "draw": {"PIL", "matplotlib", "mpl_toolkits"},
@@ -96,6 +106,84 @@ def test_imports_keep_the_rules():
     assert list(faults(PACKAGE)) == []
 
 
+def clients():
+    """The code that uses the package from outside: what it is called, and its text."""
+    root = PACKAGE.parent
+    for folder in (*(PACKAGE / room for room in CLIENTS), root / "benchmarks"):
+        for path in sorted(folder.rglob("*.py")):
+            yield path.relative_to(root).as_posix(), path.read_text("utf-8")
+    for path in sorted((root / "notebooks").rglob("*.ipynb")):
+        cells = json.loads(path.read_text("utf-8"))["cells"]
+        code = ("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+        yield path.relative_to(root).as_posix(), "\n".join(code)
+
+
+def uses(text):
+    """Each name of `rbcourse` that a text imports or reads as an attribute, with its module."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.startswith("rbcourse."):
+                    yield alias.name.removeprefix("rbcourse."), "*"
+        elif isinstance(node, ast.ImportFrom):
+            top, _, module = (node.module or "").partition(".")
+            if top == "rbcourse" and not node.level:
+                yield from ((module, alias.name) for alias in node.names)
+        elif isinstance(node, ast.Attribute):
+            names, inner = [node.attr], node.value
+            while isinstance(inner, ast.Attribute):
+                names, inner = [inner.attr, *names], inner.value
+            if isinstance(inner, ast.Name) and inner.id in ("rb", "rbcourse"):
+                yield "", names[0]
+                if names[0] in PUBLIC and len(names) > 1:
+                    yield names[0], names[1]
+
+
+def not_exported(text):
+    """The names among `uses` that are not exported, as "module.name"."""
+    for module, name in uses(text):
+        first = module.split(".")[0]
+        if first in CLIENTS or name.startswith("__"):
+            continue
+        if module in PUBLIC:
+            known = importlib.import_module(f"rbcourse.{module}").__all__
+        else:
+            known = [] if module else [*rbcourse.__all__, *PUBLIC, *CLIENTS]
+        if name not in known:
+            yield f"{module}.{name}".lstrip(".")
+
+
+def test_clients_use_exported_names_only():
+    faults = {name: sorted(set(not_exported(text))) for name, text in clients()}
+    assert {name: found for name, found in faults.items() if found} == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("from rbcourse import exp_so3, Ends", []),
+        ("from rbcourse.sampling import angle_law", []),
+        ("import rbcourse as rb\nrb.planar.log_planar(rb.__version__)", []),
+        ("from rbcourse import hat", ["hat"]),
+        ("from rbcourse.so3 import exp_so3", ["so3.exp_so3"]),
+        ("from rbcourse._numerics import Array", ["_numerics.Array"]),
+        ("from rbcourse.planar import as_states", ["planar.as_states"]),
+        ("import rbcourse.search", ["search.*"]),
+        ("import rbcourse as rb\nrb.search.ball", ["search"]),
+        ("import rbcourse as rb\nrb.files.csv_lines", ["files.csv_lines"]),
+    ],
+)
+def test_a_name_that_is_not_exported_is_found(text, found):
+    assert sorted(set(not_exported(text))) == found
+
+
+def test_names_in_all_exist_and_are_documented():
+    for module in PUBLIC:
+        public = importlib.import_module(f"rbcourse.{module}")
+        assert len(set(public.__all__)) == len(public.__all__)
+        assert all(hasattr(public, name) for name in public.__all__), module
+
+
 def test_import_loads_numpy_only():
     code = """
         import sys, numpy
@@ -121,5 +209,5 @@ def test_every_public_name_is_listed_once_and_documented():
 def test_signatures_are_short_enough_to_be_read():
     """Shift + Tab shows ArrayLike, not the types that it stands for."""
     for name in rbcourse.__all__:
-        if callable(getattr(rbcourse, name)):
+        if inspect.isroutine(getattr(rbcourse, name)) or inspect.isclass(getattr(rbcourse, name)):
             assert "Buffer" not in str(inspect.signature(getattr(rbcourse, name))), name

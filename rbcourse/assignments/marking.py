@@ -13,7 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.assignments.student_code import NotYet, call_student
 
 IN_RADIANS = (

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._checks import Rng
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.assignments.marking import Mistake, as_numbers, show
 from rbcourse.assignments.student_code import NotYet, call_student
+from rbcourse.sampling import Rng
 
 DELTA = 1e-6  # a correct sampler is refused less often than this
 

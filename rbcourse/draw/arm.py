@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics
 from rbcourse.draw.save import COLOURS, Table, in_words
 

@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from rbcourse._numerics import Array
-from rbcourse.curves import Curve
+from rbcourse import Array, Curve, angle_between, pose_from_components
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.draw.scene import OVER
 from rbcourse.draw.space import Faces
-from rbcourse.se3 import pose_from_components
-from rbcourse.so3 import angle_between
 
 
 def pose_table(first: Table, poses: Array) -> Table:

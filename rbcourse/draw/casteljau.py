@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
-from rbcourse.curves import check_ends, geodesic_so3
+from rbcourse import Array, Ends, angle_between, exp_so3, geodesic_so3
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import draw_sphere
-from rbcourse.so3 import angle_between, exp_so3
 
 _SHARES = np.linspace(0, 1, 33)  # where a leg is drawn
 _LOOKS = ("0.7", 2), ("0.45", 2), (COLOURS["optimum"], 3)
@@ -102,7 +100,7 @@ def describe_casteljau(ends: Sequence[ArrayLike]) -> str:
 
 
 def _controls(ends: Sequence[ArrayLike]) -> Array:
-    R0, R1, w0, w1 = check_ends(*ends)
+    R0, R1, w0, w1 = Ends(*ends)
     return np.stack([R0, R0 @ exp_so3(w0 / 3), R1 @ exp_so3(-w1 / 3), R1])
 
 

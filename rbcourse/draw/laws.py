@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from rbcourse._numerics import Array
-from rbcourse.curves import Curve
+from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, Table
 
 LOOKS: dict[str, dict[str, Any]] = {

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.draw.save import COLOURS, Table, in_words
 from rbcourse.planar import compose_planar
 

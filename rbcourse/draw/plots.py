@@ -16,11 +16,9 @@ from matplotlib.patches import Arc
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
-from rbcourse.curves import Curve
+from rbcourse import Array, Curve, log_so3
 from rbcourse.draw.save import COLOURS, Table, in_words
 from rbcourse.draw.spheres import draw_sphere
-from rbcourse.so3 import log_so3
 
 LABELS = {
     "t": "time t",

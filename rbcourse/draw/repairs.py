@@ -13,9 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse import Array, orthonormalize_gram_schmidt, project_so
 from rbcourse.draw.save import COLOURS, Table
-from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 
 Repair = Callable[[Array], Array]
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.backend_bases import GraphicsContextBase
 from matplotlib.path import Path
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 
 OVER = 10
 """What has this zorder, or a higher one, is seen through everything."""

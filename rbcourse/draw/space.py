@@ -23,7 +23,7 @@ from mpl_toolkits.mplot3d.art3d import Line3D, Text3D
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.draw.scene import Piece, context, in_sight, normal_of, whole_pixels
 
 LIGHT = np.array([0.48, -0.36, 0.8])

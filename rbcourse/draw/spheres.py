@@ -7,12 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array
+from rbcourse import Array, pose_from_components
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.draw.space import Ball
 from rbcourse.sampling import angle_law
-from rbcourse.se3 import join
 
 Images = Mapping[str, tuple[Array, Array]]
 """For each sample of n rotations the images of v0 and of v1, both of shape (n, 3)."""
@@ -266,7 +265,7 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
     through its centre says; `edges` are its edges along its axes, in m, the pin along the second.
     ``update(i)`` turns the book to orientation i and returns the artists that move.
     """
-    poses, edges = join(R, np.zeros(3)), np.asarray(edges)
+    poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
     label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}

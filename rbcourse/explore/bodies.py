@@ -5,17 +5,21 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array
-from rbcourse.cost import acceleration_cost, torque_cost
-from rbcourse.curves import Curve
+from rbcourse import (
+    Array,
+    Curve,
+    acceleration_cost,
+    exp_so3,
+    minimum_acceleration_so3,
+    minimum_torque_so3,
+    pose_from_components,
+    torque_cost,
+)
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.laws import LOOKS, torques
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.metrics import box_inertia
-from rbcourse.optimum import minimum_acceleration_so3, minimum_torque_so3
-from rbcourse.se3 import pose_from_components
-from rbcourse.so3 import exp_so3
 
 _TIMES = np.linspace(0, 1, 61)
 _LENGTH, _WIDTH = 0.30, 0.20

@@ -5,17 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import (
+    Array,
+    angle_between,
+    exp_so3,
+    geodesic_se3,
+    pose_from_components,
+    pose_from_coordinates,
+    screw_from_pose,
+    screw_se3,
+)
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 from rbcourse.metrics import box_inertia, geodesic_flow
-from rbcourse.motions import geodesic_se3, screw_from_pose, screw_se3
 from rbcourse.projected_line import f, line_singular_value, theta
-from rbcourse.se3 import pose_from_components, pose_from_coordinates
-from rbcourse.so3 import angle_between, exp_so3
 
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8

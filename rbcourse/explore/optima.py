@@ -6,17 +6,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse.cost import acceleration_cost_parts
-from rbcourse.curves import Curve
+from rbcourse import (
+    CLOSED_FORMS,
+    Curve,
+    acceleration_cost_parts,
+    angle_between,
+    exp_so3,
+    log_so3,
+    minimum_acceleration_se3,
+    minimum_acceleration_so3,
+    pose_from_components,
+    pose_from_coordinates,
+    projected_cubic_se3,
+)
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse.motions import minimum_acceleration_se3, projected_cubic_se3
-from rbcourse.optimum import minimum_acceleration_so3
-from rbcourse.rivals import CLOSED_FORMS
-from rbcourse.se3 import pose_from_components, pose_from_coordinates
-from rbcourse.so3 import angle_between, exp_so3, log_so3
 
 Solved = tuple[dict[str, Curve], dict[str, float]]
 

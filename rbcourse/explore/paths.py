@@ -4,16 +4,22 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array
-from rbcourse.curves import Curve
+from rbcourse import (
+    Array,
+    Chain,
+    Curve,
+    bessel_velocities,
+    chain,
+    geodesic_se3,
+    minimum_acceleration_se3,
+    pose_from_coordinates,
+    projected_cubic_se3,
+    projected_quintic_so3,
+)
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse.motions import geodesic_se3, minimum_acceleration_se3, projected_cubic_se3
-from rbcourse.paths import Chain, bessel_velocities, chain
-from rbcourse.projected_cubic import projected_quintic_so3
-from rbcourse.se3 import pose_from_coordinates
 
 POSES = pose_from_coordinates(
     [

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics, interpolate_joints
 from rbcourse.draw.arm import show_reach
 from rbcourse.draw.plane import draw_body, move_body

@@ -5,17 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array
-from rbcourse.conversions import matrix_from_zyx, quaternion_from_matrix
+from rbcourse import (
+    Array,
+    angle_between,
+    log_so3,
+    matrix_from_zyx,
+    orthonormalize_gram_schmidt,
+    pose_from_components,
+    project_so,
+    quaternion_from_matrix,
+)
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import draw_sphere
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 from rbcourse.sampling import sample_rotation, sample_rotation_naive, uniformity_tests
-from rbcourse.se3 import pose_from_components
-from rbcourse.so3 import angle_between, log_so3
 
 _BOX = np.array([1.3, 0.8, 0.25])
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}

@@ -8,20 +8,22 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import Rng, as_count, as_generator, as_single
-from rbcourse._numerics import Array
-from rbcourse.curves import Curve, Ends, check_ends, with_inertia
-from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic, weighted_cubic
-from rbcourse.rivals import (
+from rbcourse import (
     CLOSED_FORMS,
-    Bezier,
-    ExponentialCubic,
-    bezier_legs,
+    Array,
+    Curve,
+    Ends,
+    ProjectedPolynomial,
+    angle_between,
+    exp_so3,
+    exponential_cubic_long_so3,
+    hat_so3,
+    log_so3,
     normal_cubic_so3,
-    other_way,
+    sample_rotation,
 )
-from rbcourse.sampling import sample_rotation
-from rbcourse.so3 import angle_between, exp_so3, log_so3
+from rbcourse.metrics import weight_from_inertia
+from rbcourse.sampling import Rng
 
 Maker = Callable[[Array, Array, Array, Array], Curve]
 
@@ -37,8 +39,8 @@ NEAR_ZERO = 1e-4
 
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomial:
-    """Return the stack of `projected_cubic_so3`, without a warning of any of its margins."""
-    return projected_cubic(check_ends(R0, R1, w0, w1))
+    """Return the stack of `projected_cubic_so3`, without looking for its margins, which is slow."""
+    return ProjectedPolynomial(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1))
 
 
 WAYS: dict[str, Maker] = {**CLOSED_FORMS, "projection": projection}
@@ -59,7 +61,9 @@ def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
 
 
 def _weighted(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
-    return weighted_cubic(*with_inertia(check_ends(R0, R1, w0, w1), inertia))
+    W = weight_from_inertia(inertia)
+    W = 3 * W / np.trace(W)
+    return ProjectedPolynomial(*(M @ W for M in projection(R0, R1, w0, w1).ends))
 
 
 def _normal(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
@@ -80,7 +84,7 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
     >>> atlas_problems(3, rng=1).w0.shape
     (600, 3)
     """
-    draws, rng = as_count("draws", draws), as_generator(rng)
+    draws, rng = _as_count("draws", draws), np.random.default_rng(rng)
     unknown = set(families) - {"along", "across", "any"}
     if unknown or not families:
         raise ValueError(f"families: along, across and any are wanted, got {sorted(unknown)}")
@@ -117,15 +121,21 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     >>> bool(np.linalg.norm(ends.w0, axis=-1).max() < 1)
     True
     """
-    count, rng, radius = as_count("count", count), as_generator(rng), as_single("size", size)
-    if not 0 < radius <= np.pi:
+    count, rng = _as_count("count", count), np.random.default_rng(rng)
+    if not isinstance(size, int | float) or not 0 < size <= np.pi:
         raise ValueError(f"size: a number above 0 and at most π is wanted, got {size}")
-    radii = radius * np.array([[1.0], [2.0], [2.0]]) * np.cbrt(rng.random((3, count)))
+    radii = size * np.array([[1.0], [2.0], [2.0]]) * np.cbrt(rng.random((3, count)))
     directions = rng.standard_normal((3, count, 3))
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     sigma, w0, w1 = radii[..., None] * directions
     R0 = sample_rotation(count, rng=rng)
     return Ends(R0, R0 @ exp_so3(sigma), w0, w1)
+
+
+def _as_count(name: str, value: int) -> int:
+    if not isinstance(value, int | np.integer) or value < 1:
+        raise ValueError(f"{name}: an integer from 1 up wanted, got {value!r}")
+    return int(value)
 
 
 def starts() -> dict[str, Maker]:
@@ -136,21 +146,8 @@ def starts() -> dict[str, Maker]:
     round.
     """
     return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
-        "long way round": long_way_round
+        "long way round": exponential_cubic_long_so3
     }
-
-
-def long_way_round(R0: Array, R1: Array, w0: Array, w1: Array) -> ExponentialCubic:
-    """Return the exponential cubics that turn the other way round, by 2π − ‖σ‖."""
-    ends = check_ends(R0, R1, w0, w1)
-    return ExponentialCubic(ends, other_way(log_so3(ends.turn)))
-
-
-def bezier_other_way(R0: Array, R1: Array, w0: Array, w1: Array) -> Bezier:
-    """Return the Bézier curves whose middle legs turn the other way round; they must not be 0."""
-    ends = check_ends(R0, R1, w0, w1)
-    first, middle, last = bezier_legs(ends)
-    return Bezier(ends, (first, other_way(middle), last))
 
 
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:

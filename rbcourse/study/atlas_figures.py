@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.study.atlas import CELLS, FASTEST, WAYS
 

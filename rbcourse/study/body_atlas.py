@@ -18,17 +18,14 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest, quantile_test
 from tqdm import tqdm
 
-from rbcourse._numerics import Array
-from rbcourse.curves import Ends
+from rbcourse import Array, Ends, bezier_long_so3, minimum_acceleration_so3
 from rbcourse.draw.save import csv_text
 from rbcourse.metrics import METRIC_SO3, box_inertia
-from rbcourse.optimum import minimum_acceleration_so3
 from rbcourse.study.atlas import (
     CELLS,
     FASTEST,
     Maker,
     atlas_problems,
-    bezier_other_way,
     cell_table,
     closed_forms,
     excesses,
@@ -78,7 +75,7 @@ def curves_for(body: str) -> dict[str, Maker]:
     compared = closed_forms(BODIES[body])
     return {
         **{name: compared[name] for name in CLOSED_FORMS},
-        "other way": bezier_other_way,
+        "other way": bezier_long_so3,
         "ball's optimum": minimum_acceleration_so3,
     }
 

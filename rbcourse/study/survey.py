@@ -7,6 +7,7 @@ import os
 import pickle
 import signal
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -21,14 +22,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from rbcourse import __version__
-from rbcourse._checks import as_inertia, as_single
-from rbcourse._numerics import Array, blocks
-from rbcourse.cost import rotation_cost
-from rbcourse.curves import Curve, Ends, check_ends, with_inertia
-from rbcourse.functionals import BallAcceleration, Effort, Functional
-from rbcourse.optimum import Optimum, from_guess
-from rbcourse.search import ball, body, cheapest
+from rbcourse import (
+    Array,
+    Curve,
+    Ends,
+    __version__,
+    acceleration_cost,
+    geodesic_so3,
+    minimum_acceleration_so3,
+    stationary_so3,
+)
 from rbcourse.study.atlas import Maker, closed_forms, starts
 
 Report = Callable[[int, int], object]
@@ -101,7 +104,8 @@ def survey(
     True
     """
     if inertia is not None:
-        inertia = as_inertia("inertia", as_single("inertia", inertia, 3, 3))
+        acceleration_cost(geodesic_so3(np.eye(3), np.eye(3)), inertia)  # raises if it is none
+        inertia = np.asarray(inertia, float)
     ways = dict(closed_forms(inertia) if ways is None else ways)
     for name, make in ways.items():
         if not callable(make):
@@ -147,14 +151,11 @@ def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Arra
         or curve.batch_shape != problems.w0.shape[:-1]
     ):
         raise ValueError(f"make: curves on SO(3) and [0, 1] are wanted, one each, got {curve!r}")
-    functional: Functional = BallAcceleration()
-    if inertia is not None:
-        functional = Effort(with_inertia(problems, inertia)[1], of_torque=False)
-    return rotation_cost("cost", curve, functional, np.array([0.0, 0.5, 1.0]), 1e-6)
+    return acceleration_cost(curve, inertia, rtol=1e-6)
 
 
 def _checked(problems: Ends) -> Ends:
-    problems = check_ends(*problems)
+    problems = Ends(*problems)
     if problems.w0.ndim != 2:
         raise ValueError(f"problems: one batch axis is wanted, got {problems.w0.shape[:-1]}")
     return problems
@@ -171,7 +172,7 @@ def _in_chunks(
     """Return ``work(chunk)``, shape (len(names), n), of all chunks together, by name."""
     problems = _checked(problems)
     total = len(problems.w0)
-    chunks = [problems.of(part) for part in blocks(total, CHUNK)]
+    chunks = [problems.of(slice(k, k + CHUNK)) for k in range(0, total, CHUNK)]
     found: dict[int, Array] = {}
     files = {}
     if folder is not None:
@@ -306,8 +307,9 @@ def _not_given(make: Maker) -> str | None:
 
 
 def _costs(inertia: Array | None, ways: Sequence[tuple[str, Maker]], chunk: Ends) -> Array:
-    task = ball(chunk) if inertia is None else body(*with_inertia(chunk, inertia), of_torque=False)
-    found = [Optimum(task.functional, task.equations.ends, cheapest(task), task.batch).cost]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # where none is found there is NaN
+        found = [np.asarray(minimum_acceleration_so3(*chunk, inertia).cost)]
     for name, make in ways:
         try:
             found.append(costs(make, chunk, inertia))
@@ -318,7 +320,7 @@ def _costs(inertia: Array | None, ways: Sequence[tuple[str, Maker]], chunk: Ends
 
 
 def _from_each_start(chunk: Ends) -> Array:
-    return np.stack([from_guess(chunk, make(*chunk)).cost for make in starts().values()])
+    return np.stack([stationary_so3(make(*chunk)).cost for make in starts().values()])
 
 
 def _try_to_write(folder: Path) -> None:

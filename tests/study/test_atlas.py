@@ -65,26 +65,6 @@ def test_an_impossible_size_is_named(size):
         atlas.random_problems(2, size)
 
 
-@pytest.mark.parametrize("make", [atlas.long_way_round, atlas.bezier_other_way])
-def test_the_other_way_round_meets_the_same_ends(make):
-    curve = make(*SOME)
-    for t, R, w in ((0, SOME.R0, SOME.w0), (1, SOME.R1, SOME.w1)):
-        assert np.abs(curve(t) - R).max() < 1e-13
-        assert np.abs(curve(t, 1) - w).max() < 1e-12
-
-
-@pytest.mark.parametrize(("make", "rate"), [(atlas.long_way_round, 1), (atlas.bezier_other_way, 3)])
-def test_the_other_way_round_turns_by_what_is_left_of_a_full_turn(make, rate):
-    """About one axis, with the velocities of a turn by 1 − 2π: then it is at constant speed."""
-    e = np.eye(3)[1]
-    w = np.array([(1 - 2 * np.pi) * e]) if rate == 1 else np.array([[0.0, 0, 0]])
-    curve = make(np.eye(3)[None], rb.exp_so3([e]), w, w)
-    speed = curve(np.linspace(0, 1, 201), 1)[:, 0, 1]
-    assert np.trapezoid(speed, dx=1 / 200) == pytest.approx(1 - 2 * np.pi, abs=1e-3)
-    if rate == 1:
-        assert speed == pytest.approx(np.full(201, 1 - 2 * np.pi))
-
-
 @pytest.mark.source("BK Prop. 3")
 def test_which_curves_go_along_with_moved_and_exchanged_ends():
     reversible = "projection", "Bézier", "corrected", "quaternion"

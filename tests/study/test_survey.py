@@ -91,8 +91,9 @@ def test_a_single_problem_is_refused():
 
 
 def test_what_is_not_found_is_nan_and_silent():
-    ends = atlas.Ends(*(x[:3].copy() for x in SOME))
-    ends.w0[1], ends.w1[1] = [1e3, 0, 0], [0, 1e3, 0]
+    w0, w1 = SOME.w0[:3].copy(), SOME.w1[:3].copy()
+    w0[1], w1[1] = [1e3, 0, 0], [0, 1e3, 0]
+    ends = atlas.Ends(SOME.R0[:3], SOME.R1[:3], w0, w1)
     found = survey.survey(ends, ways={"exponential": rb.exponential_cubic_so3})
     assert np.isnan(found["optimum"]).tolist() == [False, True, False]
     assert np.isfinite(found["exponential"]).all()

@@ -2,11 +2,8 @@
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array, exp_so3, hat_so3, project_so, projected_cubic_so3
 from rbcourse.assignments.marking import Drawing, Mistake, Problem
-from rbcourse.projected_cubic import projected_cubic_so3
-from rbcourse.projection import project_so
-from rbcourse.so3 import exp_so3, hat_so3
 
 ALLOWED = ("hat_so3", "project_so")  # what the notebook imports
 

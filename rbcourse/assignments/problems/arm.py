@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.arm import arm_forward_kinematics, arm_inverse_kinematics
 from rbcourse.assignments.marking import Drawing, Mistake, Problem
 

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array, exp_so3, project_so, project_so_weighted
 from rbcourse.assignments.marking import Drawing, Mistake, Problem
-from rbcourse.projection import project_so, project_so_weighted
-from rbcourse.so3 import exp_so3
 
 ALLOWED = ("project_so",)  # what the notebook imports
 

@@ -4,11 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array, exp_se3, exp_so3, log_se3, log_so3
 from rbcourse.assignments.marking import Drawing, Mistake, Problem
 from rbcourse.projected_line import f, theta
-from rbcourse.se3 import exp_se3, log_se3
-from rbcourse.so3 import exp_so3, log_so3
 
 ALLOWED = ("exp_se3", "exp_so3", "log_se3", "log_so3")  # what the notebook imports
 _PAIRS = [

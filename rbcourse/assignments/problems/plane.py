@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import Array
 from rbcourse.assignments.marking import IN_RADIANS, Mistake, Problem
 from rbcourse.planar import matrix_from_planar, propagate_planar
 

@@ -4,16 +4,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rbcourse._numerics import Array
-from rbcourse.assignments.marking import Drawing, Mistake, Problem
-from rbcourse.assignments.marking_samplers import Sampler
-from rbcourse.conversions import (
+from rbcourse import (
+    Array,
+    exp_so3,
     matrix_from_quaternion,
     quaternion_from_matrix,
     quaternion_from_rotation_vector,
 )
+from rbcourse.assignments.marking import Drawing, Mistake, Problem
+from rbcourse.assignments.marking_samplers import Sampler
 from rbcourse.sampling import angle_law, arvo_rotation, sample_quaternion_naive, shoemake_quaternion
-from rbcourse.so3 import exp_so3
 
 Generator = np.random.Generator
 FULL = 2 * np.pi

@@ -4,11 +4,16 @@ from functools import partial
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse import (
+    Array,
+    distance_to_so,
+    exp_so3,
+    hat_so3,
+    matrix_from_zyx,
+    orthonormalize_gram_schmidt,
+    project_so,
+)
 from rbcourse.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem
-from rbcourse.conversions import matrix_from_zyx
-from rbcourse.projection import distance_to_so, orthonormalize_gram_schmidt, project_so
-from rbcourse.so3 import exp_so3, hat_so3
 
 X, Y, Z = np.eye(3)
 
