@@ -77,29 +77,3 @@ def test_the_ends_are_met():
         assert np.abs(CUBICS(t) - A).max() < 80 * EPS
         in_body = (np.swapaxes(A[:, :3, :3], -1, -2) @ v[..., None])[..., 0]
         assert np.abs(CUBICS(t, 1) - np.concatenate([w, in_body], axis=-1)).max() < 400 * EPS
-
-
-def test_rotation_and_translation_broadcast():
-    rest = np.zeros(3)
-    curve = rb.projected_cubic_se3(A0[0], A1[0], rest, W1[:4], np.zeros((2, 1, 3)), rest)
-    assert curve.batch_shape == (2, 4)
-    t = np.zeros((5, 3))
-    assert curve(t).shape == (5, 3, 2, 4, 4, 4)
-    assert curve(t, 1).shape == curve(t, 2).shape == (5, 3, 2, 4, 6)
-    assert rb.acceleration_cost(curve).shape == (2, 4)
-    one = rb.projected_cubic_se3(A0[0], A1[0], rest, W1[2], rest, rest)
-    for order in (0, 1, 2):
-        assert np.abs(curve(0.3, order)[1, 2] - one(0.3, order)).max() < 1e-12
-
-
-def test_bad_arguments_are_named():
-    rest = np.zeros(3)
-    for make in (rb.projected_cubic_se3, rb.minimum_acceleration_se3):
-        with pytest.raises(ValueError, match=r"A0: shape \(.*4, 4\) wanted, got \(3, 3\)"):
-            make(np.eye(3), np.eye(4), rest, rest, rest, rest)
-        with pytest.raises(ValueError, match=r"d1_dot\[0\] is inf"):
-            make(np.eye(4), np.eye(4), rest, rest, rest, [np.inf, 0, 0])
-    with pytest.raises(ValueError, match=r"do not broadcast: .* d0_dot \(3,\)"):
-        rb.projected_cubic_se3(A0, A1, rest, rest, np.zeros((3, 3)), rest)
-    with pytest.raises(ValueError, match=r"do not broadcast: A0 \(8,\), A1 \(2,\)"):
-        rb.geodesic_se3(A0, A1[:2])

@@ -104,24 +104,3 @@ def test_no_motion_nearby_costs_a_body_less():
         assert min(less, more) > same
         slope = cost(1e-3, eta, xi) - cost(-1e-3, eta, xi)
         assert abs(slope) < 1e-5 * (less + more - 2 * same)
-
-
-def test_one_motion_goes_with_many_bodies():
-    A, rest = np.eye(4), np.zeros(3)
-    G = np.stack([BODY["inertia"], np.diag([1.0, 2, 2.5])])
-    A1, w1 = rb.pose_from_coordinates([1.0, 0.5, 0.2, 3, 1, 1]), [0, 2, 0]
-    fan = rb.minimum_acceleration_se3(A, A1, rest, w1, rest, rest, inertia=G, centre=[0.1, 0, 0])
-    assert fan.batch_shape == (2,)
-    for i in range(2):
-        one = rb.minimum_acceleration_se3(
-            A, A1, rest, w1, rest, rest, inertia=G[i], centre=[0.1, 0, 0]
-        )
-        assert np.abs(fan(0.3)[i] - one(0.3)).max() < 1e-12
-    none = rb.minimum_acceleration_se3(A, A1, rest, w1, rest, rest, inertia=G[:0])
-    assert none(0.5).shape == (0, 4, 4)
-    for bad, said in (
-        ({"mass": -1}, "^mass is -1.0, a number above 0"),
-        ({"centre": 1}, "^centre: shape"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            rb.minimum_acceleration_se3(A, A1, rest, w1, rest, rest, **bad)

@@ -421,33 +421,6 @@ def test_of_a_stack_the_rates_are_the_derivatives_and_the_jerk_in_the_fixed_fram
         assert np.all(np.abs((STACK(t) @ jerk[..., None])[..., 0] - STACK.c) < 1e-8 * scale)
 
 
-def test_stacks_have_the_shape_of_what_is_broadcast():
-    R0, R1, w0, w1 = ENDS
-    shaped = rb.minimum_acceleration_so3(
-        R0.reshape(5, 60, 3, 3), R1.reshape(5, 60, 3, 3), w0.reshape(5, 60, 3), w1.reshape(5, 60, 3)
-    )
-    assert shaped.batch_shape == shaped.residual.shape == shaped.nodes.shape == (5, 60)
-    assert shaped.c.shape == (5, 60, 3)
-    assert shaped.converged.all()
-    t = np.array([[0.0, 0.3, 1], [0.5, 0.7, 0.1]])
-    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
-        assert shaped(t, order).shape == (2, 3, 5, 60, *core)
-        assert shaped([], order).shape == (0, 5, 60, *core)
-        off = shaped(t, order).reshape(6, 300, *core) - STACK(t.ravel(), order)
-        assert np.abs(off).max() < 1e-10
-    assert shaped.cost == pytest.approx(STACK.cost.reshape(5, 60), rel=1e-10)
-
-
-def test_one_start_goes_with_many_goals_and_velocities():
-    R0, R1, w0, w1 = ENDS
-    fan = rb.minimum_acceleration_so3(R0[0], R0[0] @ R0[:4].mT @ R1[:4], w0[:3, None], w1[:4])
-    assert fan.batch_shape == (3, 4)
-    for i, k in np.ndindex(3, 4):
-        one = rb.minimum_acceleration_so3(R0[0], R0[0] @ R0[k].T @ R1[k], w0[i], w1[k])
-        assert np.abs(fan(TIMES)[:, i, k] - one(TIMES)).max() < 1e-10
-        assert fan.cost[i, k] == pytest.approx(one.cost, rel=1e-10)
-
-
 @pytest.mark.parametrize(("speed", "shape"), [(1e160, (12,)), (1e160, (3, 4)), (1e3, (3, 4))])
 def test_a_hopeless_problem_is_named_and_harms_no_other(speed, shape):
     R0, R1, w0, w1 = (x.copy() for x in members(ENDS, slice(12)))
@@ -499,25 +472,6 @@ def test_a_stack_over_half_turns_is_solved():
         assert np.abs(moving(TIMES)[:, i] - alone(TIMES)).max() < 1e-10
 
 
-def test_shooting_takes_stacks_too():
-    ends = members(ENDS, slice(2))
-    shot, relaxed = (solver(*ends) for solver in (SOLVERS["shooting"], SOLVERS["relaxation"]))
-    assert shot.batch_shape == (2,)
-    assert shot.converged.all()
-    for order in (0, 1, 2):
-        assert np.abs(shot(TIMES, order) - relaxed(TIMES, order)).max() < 1e-9
-    assert shot.cost == pytest.approx(relaxed.cost, rel=1e-9)
-
-
-@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
-@pytest.mark.parametrize("batch", [(0,), (2, 0)])
-def test_a_stack_of_no_problems_has_no_curves(solver, batch):
-    curve = solver(np.eye(3), np.eye(3), np.zeros((*batch, 3)), REST)
-    assert curve.batch_shape == curve.cost.shape == curve.converged.shape == batch
-    assert curve(TIMES).shape == (101, *batch, 3, 3)
-    assert curve(0.5, 1).shape == curve(0.5, 2).shape == curve.c.shape == (*batch, 3)
-
-
 def poses(R, d):
     A = np.tile(np.eye(4), (*R.shape[:-2], 1, 1))
     A[..., :3, :3], A[..., :3, 3] = R, d
@@ -549,25 +503,6 @@ def test_motions_come_in_stacks_and_a_hopeless_one_is_nan():
         values = broken(TIMES, order)
         assert np.isnan(values[:, 2]).any(axis=tuple(range(1, values.ndim - 1))).all()
         assert np.abs(values - motion(TIMES, order))[:, others].max() < 1e-10
-
-
-@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
-def test_shapes_and_bad_arguments(solver):
-    curve = solver(np.eye(3), rb.exp_so3([0, 1, 0]), REST, REST)
-    assert curve.batch_shape == ()
-    assert curve(np.zeros((2, 5))).shape == (2, 5, 3, 3)
-    assert curve(0.5).shape == (3, 3)
-    assert curve(0.5, 1).shape == curve(0.5, 2).shape == (3,)
-    with pytest.raises(ValueError, match=r"w0: shape \(\.\.\., 3\) wanted, got \(2,\)"):
-        solver(np.eye(3), np.eye(3), [0, 0], REST)
-    with pytest.raises(ValueError, match=r"R1\[0, 0\] is nan"):
-        solver(np.eye(3), np.full((3, 3), np.nan), REST, REST)
-    with pytest.raises(ValueError, match=r"do not broadcast: .*w0 \(3,\), w1 \(4,\)"):
-        solver(np.eye(3), np.eye(3), np.zeros((3, 3)), np.zeros((4, 3)))
-    with pytest.raises(ValueError, match=r"t is -1\.0"):
-        curve(-1)
-    with pytest.raises(ValueError, match="order: 0, 1, 2 or 3 wanted"):
-        curve(0, 4)
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():

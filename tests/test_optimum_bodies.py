@@ -1,8 +1,6 @@
 """The optima of real bodies and of jerk: `solve_bvp`, direct minimisation, closed forms."""
 
-import copy
 import functools
-import pickle
 import warnings
 
 import numpy as np
@@ -15,7 +13,6 @@ from scipy.spatial.transform import Rotation
 import rbcourse as rb
 from rbcourse.rivals import CLOSED_FORMS
 
-EPS = np.finfo(float).eps
 I3, REST = np.eye(3), np.zeros(3)
 ALONG = np.pi / 6 * np.array([1, 2, 3])
 PAPER = {
@@ -339,16 +336,6 @@ def test_a_stack_is_what_each_is_alone(what):
     assert stack.costate([0.1, 0.2]).shape == (2, 2, 3, 3)
 
 
-def test_one_problem_goes_with_many_bodies():
-    R0, R1, w0, w1, G, *_ = random_problems(4, 40, 2.0, 4.0)
-    fan = rb.minimum_torque_so3(R0[0], R1[0], w0[0], w1[0], G)
-    assert fan.batch_shape == (4,)
-    for i in range(4):
-        assert fan.cost[i] == pytest.approx(
-            rb.minimum_torque_so3(R0[0], R1[0], w0[0], w1[0], G[i]).cost, rel=1e-10
-        )
-
-
 @pytest.mark.parametrize("what", OPTIMA)
 def test_a_hopeless_problem_is_named_and_harms_no_other(what):
     problems = random_problems(3, 41, 2.0, 4.0)
@@ -364,16 +351,6 @@ def test_a_hopeless_problem_is_named_and_harms_no_other(what):
     assert np.abs(curves(TIMES)[:, [0, 2]] - good(TIMES)[:, [0, 2]]).max() < 1e-10
     with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iterations"):
         OPTIMA[what](*some(problems, 1))
-
-
-@pytest.mark.parametrize("what", OPTIMA)
-@pytest.mark.parametrize("batch", [(0,), (2, 0)])
-def test_no_problems_have_no_curves(what, batch):
-    none = np.zeros((*batch, 3))
-    curves = OPTIMA[what](I3, I3, none, REST, BOOK, REST, REST)
-    assert curves.batch_shape == curves.cost.shape == batch
-    assert curves(TIMES).shape == (101, *batch, 3, 3)
-    assert curves(0.5, 3).shape == curves.costate(0.5).shape == (*batch, 3)
 
 
 @pytest.mark.parametrize("what", OPTIMA)
@@ -562,16 +539,6 @@ def test_one_guess_is_followed(shape):
     found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.batch_shape == shape
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
-
-
-@pytest.mark.parametrize("what", OPTIMA)
-def test_a_copy_is_the_same_curve(what):
-    curves = OPTIMA[what](*random_problems(3, 43, 2.0, 4.0))
-    for other in (copy.copy(curves), copy.deepcopy(curves), pickle.loads(pickle.dumps(curves))):
-        assert np.array_equal(other(0.4, 3), curves(0.4, 3))
-        assert np.array_equal(other.costate(0.4), curves.costate(0.4))
-    assert np.array_equal(curves[[True, False, True]].cost, curves.cost[[0, 2]])
-    assert curves[:0](0.5).shape == (0, 3, 3)
 
 
 @pytest.mark.parametrize("turn", [110, 120, 140, 170])

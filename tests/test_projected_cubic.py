@@ -210,66 +210,6 @@ def test_no_warning_without_need():
         rb.projected_cubic_so3(R0, R1, W0, W1)
 
 
-def test_shapes_are_times_then_stack_then_core():
-    stack = rb.projected_cubic_so3(
-        R0[:6].reshape(2, 3, 3, 3), R1[:3], np.zeros(3), W1[:6].reshape(2, 3, 3)
-    )
-    assert stack.batch_shape == stack.margin.shape == (2, 3)
-    t = np.array([[0.1, 0.5], [0.2, 1]])
-    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
-        assert stack(t, order).shape == (2, 2, 2, 3, *core)
-        for i in np.ndindex(2, 3):
-            k = 3 * i[0] + i[1]
-            one = rb.projected_cubic_so3(R0[k], R1[i[1]], np.zeros(3), W1[k])
-            scale = one.margin ** (1 + order)
-            off = np.abs(stack(t, order)[:, :, *i] - one(t, order)).max()
-            assert off < 1e-11 / min(scale, 1)
-
-
-def with_ends(make, which, batch):
-    """A stack of curves, of that shape, of the problems `which`."""
-    rotations = (R[which].reshape(*batch, 3, 3) for R in (R0, R1))
-    vectors = (W0, W1) if make is rb.projected_cubic_so3 else (W0, W1, B0, B1)
-    return make(*rotations, *(w[which].reshape(*batch, 3) for w in vectors))
-
-
-MAKERS = [rb.projected_cubic_so3, rb.projected_quintic_so3]
-
-
-@pytest.mark.parametrize("make", MAKERS)
-@pytest.mark.parametrize(
-    ("count", "batch"), [(12_000, ()), (3000, (2, 3)), (5001, (1,)), (1, (6, 840))]
-)
-def test_more_than_is_worked_out_together_is_the_stack_of_its_members(make, count, batch):
-    """More times, or more curves, than a block has: to rounding over the margin, and its powers."""
-    which = np.arange(int(np.prod(batch))) % 6
-    stack, t = with_ends(make, which, batch), np.random.default_rng(3).random(count)
-    some = np.unique(np.linspace(0, count - 1, 30, dtype=int))
-    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
-        values = stack(t, order).reshape(count, -1, *core)
-        for k in range(6 if batch else 1):
-            one = with_ends(make, [k], ())
-            scale = np.linalg.norm(one.ends, axis=(-2, -1)).sum() / min(one.margin, 1)
-            off = np.abs(values[some][:, which == k] - one(t[some], order)[:, None]).max(initial=0)
-            assert off < 4 * EPS * scale ** (1 + order)
-
-
-@pytest.mark.parametrize("make", MAKERS)
-@pytest.mark.parametrize("batch", [(), (0,), (2, 0), (2, 3)])
-@pytest.mark.parametrize("shape", [(), (0,), (2, 0), (2, 3), (2, 3000)])
-def test_stacks_and_times_of_any_shape_even_of_none(make, batch, shape):
-    count = int(np.prod(batch))
-    stack = with_ends(make, np.arange(count), batch)
-    t = np.random.default_rng(4).random(shape)
-    assert stack.batch_shape == stack.margin.shape == stack.margin_time.shape == batch
-    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
-        values = stack(t, order)
-        assert values.shape == (*shape, *batch, *core)
-        flat = stack(t.ravel(), order).reshape(values.shape)
-        scale = np.abs(values).max(initial=1)
-        assert np.abs(values - flat).max(initial=0) < 1000 * EPS * scale
-
-
 def test_the_time_and_the_curve_that_jump_are_named_in_any_block():
     half, rest = np.diag([1.0, -1, -1]), np.zeros(3)
     goals = np.tile(np.eye(3), (2, 3, 1, 1))
@@ -286,33 +226,6 @@ def test_the_time_and_the_curve_that_jump_are_named_in_any_block():
                 stack(times, order)
             with pytest.raises(ValueError, match=r"^t = 0\.5 of curve \[1, 2\]: the nearest"):
                 stack(times.reshape(40, 100), order)
-
-
-@pytest.mark.parametrize("make", MAKERS)
-def test_neither_times_nor_ends_are_changed_or_kept(make):
-    ends = [x[:3].copy() for x in (R0, R1, W0, W1, B0, B1)[: 4 if make is MAKERS[0] else 6]]
-    given, t = [x.copy() for x in ends], TIMES.copy()
-    curve = make(*ends)
-    first = [curve(t, order) for order in (0, 1, 2)]
-    assert all(np.array_equal(x, y) for x, y in zip((*ends, t), (*given, TIMES), strict=True))
-    kept = [values.copy() for values in first]
-    for x in (*ends, t):
-        x[:] = 0
-    for order in (0, 1, 2):
-        assert np.array_equal(first[order], kept[order])
-        assert np.array_equal(curve(TIMES, order), kept[order])
-
-
-def test_bad_arguments_are_named():
-    rest = np.zeros(3)
-    with pytest.raises(ValueError, match=r"w1: shape \(\.\.\., 3\) wanted, got \(4,\)"):
-        rb.projected_cubic_so3(np.eye(3), np.eye(3), rest, np.zeros(4))
-    with pytest.raises(ValueError, match=r"a0\[1\] is nan"):
-        rb.projected_quintic_so3(np.eye(3), np.eye(3), rest, rest, [0, np.nan, 0], rest)
-    with pytest.raises(ValueError, match=r"batch shapes do not broadcast: .* w0 \(5,\)"):
-        rb.projected_cubic_so3(R0, R1, W0[:5], W1)
-    with pytest.raises(ValueError, match=r"t is 1\.2, a time in \[0, 1\] is wanted"):
-        CUBICS(1.2)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])

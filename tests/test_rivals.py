@@ -230,17 +230,6 @@ def test_near_half_turns_cayleys_end_velocity_is_met_too():
     assert np.abs(rb.cayley_cubic_so3(R0, R1, w0, w1)(1, 1) - w1).max() < 1e-12
 
 
-@pytest.mark.parametrize("make", [rb.exponential_cubic_long_so3, rb.bezier_long_so3])
-def test_the_other_way_round_meets_the_same_ends(make):
-    rng = np.random.default_rng(2)
-    R0, R1 = rb.sample_rotation((2, 50), rng=rng)
-    w0, w1 = rng.uniform(-5, 5, (2, 50, 3))
-    curve = make(R0, R1, w0, w1)
-    for t, R, w in ((0, R0, w0), (1, R1, w1)):
-        assert np.abs(curve(t) - R).max() < 1e-13
-        assert np.abs(curve(t, 1) - w).max() < 1e-12
-
-
 @pytest.mark.parametrize(
     ("make", "rate"), [(rb.exponential_cubic_long_so3, 1), (rb.bezier_long_so3, 3)]
 )
@@ -267,90 +256,6 @@ def test_the_cubic_in_exponential_coordinates_may_go_the_other_way_round():
         assert np.abs(curve(t) - R).max() < 40 * EPS
         assert np.abs(curve(t, 1) - w).max() < 400 * EPS
     assert np.array_equal(other_way(np.zeros((2, 3))), np.zeros((2, 3)))
-
-
-@every_curve
-def test_stacks_broadcast_and_each_member_is_the_single_curve(name):
-    R0, R1, w0, w1 = ends(10)
-    R0, R1, w0, w1 = R0[0], R1.reshape(2, 5, 3, 3), w0[:5], w1[:2, None]
-    stack = MAKERS[name](R0, R1, w0, w1)
-    assert stack.batch_shape == (2, 5)
-    t = np.random.default_rng(3).random((3, 4))
-    for order, core in CORES:
-        values = stack(t, order)
-        assert values.shape == (3, 4, 2, 5, *core)
-        for i, j in np.ndindex(2, 5):
-            one = MAKERS[name](R0, R1[i, j], w0[j], w1[i, 0])
-            assert one.batch_shape == ()
-            assert one(0.5, order).shape == core
-            scale = max(1, np.abs(one(t, order)).max())
-            assert np.abs(values[:, :, i, j] - one(t, order)).max() < 20 * EPS * scale
-
-
-@every_curve
-@pytest.mark.parametrize("batch", [(), (0,), (2, 0), (2, 3)])
-def test_stacks_and_times_of_any_shape_even_of_none(name, batch):
-    """And of more times than are worked out together."""
-    given = [x.reshape(*batch, *x.shape[1:]) for x in ends(int(np.prod(batch)))]
-    stack = MAKERS[name](*given)
-    for shape in ((), (0,), (2, 0), (2, 3), (2, 1, 2500)):
-        t = np.random.default_rng(4).random(shape)
-        some = np.unique(np.linspace(0, t.size - 1, 9 if t.size else 0, dtype=int))
-        for order, core in CORES:
-            values = stack(t, order)
-            assert values.shape == (*shape, *batch, *core)
-            flat = values.reshape(t.size, *batch, *core)[some]
-            each = np.array([stack(u, order) for u in t.ravel()[some]]).reshape(flat.shape)
-            assert np.abs(flat - each).max(initial=0) < 20 * EPS * np.abs(flat).max(initial=1)
-
-
-@every_curve
-def test_nothing_is_lost_where_one_block_of_times_ends(name):
-    t = np.random.default_rng(4).random(8200)
-    single, stack = MAKERS[name](*(x[0] for x in ends(1))), MAKERS[name](*ends(6))
-    for curve, places in (
-        (single, (0, 4095, 4096, 8191, 8192, 8199)),
-        (stack, (0, 681, 682, 8199)),
-    ):
-        for order in (0, 1, 2):
-            values = curve(t, order)
-            for k in places:
-                scale = max(1, np.abs(values[k]).max())
-                assert np.abs(values[k] - curve(t[k], order)).max() < 20 * EPS * scale
-
-
-@every_curve
-def test_neither_times_nor_ends_are_changed_or_kept(name):
-    given, t = ends(3), np.linspace(0, 1, 7)
-    copies, times = [x.copy() for x in given], t.copy()
-    curve = MAKERS[name](*given)
-    kept = [curve(t, order).copy() for order in (0, 1, 2)]
-    assert all(np.array_equal(x, y) for x, y in zip((*given, t), (*copies, times), strict=True))
-    for x in (*given, t):
-        x[:] = 0
-    for order in (0, 1, 2):
-        assert np.array_equal(curve(times, order), kept[order])
-
-
-@every_curve
-def test_bad_arguments_are_named(name):
-    make, one = MAKERS[name], np.eye(3)
-    with pytest.raises(ValueError, match=r"^R0: shape \(\.\.\., 3, 3\) wanted, got \(2, 2\)"):
-        make(np.eye(2), one, REST, REST)
-    with pytest.raises(ValueError, match=r"^w1: shape \(\.\.\., 3\) wanted, got \(4,\)"):
-        make(one, one, REST, np.zeros(4))
-    with pytest.raises(ValueError, match=r"^R1\[0, 2\] is nan"):
-        make(one, [[1, 0, np.nan], [0, 1, 0], [0, 0, 1]], REST, REST)
-    with pytest.raises(ValueError, match=r"^w0\[1\] is inf"):
-        make(one, one, [0, np.inf, 0], REST)
-    with pytest.raises(ValueError, match=r"do not broadcast: R0 \(\), .* w0 \(2,\), w1 \(3,\)"):
-        make(one, one, np.zeros((2, 3)), np.zeros((3, 3)))
-    curve = make(one, one, REST, REST)
-    for t in (-1e-9, 1 + 1e-9, np.nan):
-        with pytest.raises(ValueError, match=r"^t\[1\] is "):
-            curve([0, t])
-    with pytest.raises(ValueError, match=r"^order: 0, 1, 2 or 3 wanted, got 4"):
-        curve(0.5, 4)
 
 
 def test_beziers_velocities_stay_below_3_pi():
