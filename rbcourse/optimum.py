@@ -380,10 +380,6 @@ class Optimum(Curve):
         nodes, c = np.zeros(total, int), np.full((total, 3), np.nan)
         for i, solution in found.items():
             nodes[i], c[i] = len(solution.R), solution.c
-        self._same = [np.flatnonzero(nodes == n) for n in np.unique(nodes[nodes > 0])]
-        self._part, self._place = np.full((2, total), -1)
-        for number, index in enumerate(self._same):
-            self._part[index], self._place[index] = number, np.arange(len(index))
         cost = np.array([s.cost if isinstance(s, Solution) else np.nan for s in solutions], float)
         residual = np.array([s.residual for s in solutions], float)
         iterations = np.array([s.iterations for s in solutions], int)
@@ -395,17 +391,27 @@ class Optimum(Curve):
         )
 
     @cached_property
-    def _series(self) -> list[list[Array]]:
-        """The Chebyshev series of R, w, w', …, for each number of nodes."""
-        parts = []
-        for index in self._same:
+    def _series(self) -> list[Array]:
+        """The Chebyshev series of R, w, w', …, shape (n, count, 9) or (n, count, 3).
+
+        Series of fewer nodes are padded with zeros. Where no solution was found they are NaN.
+        """
+        nodes, m = np.ravel(self.nodes), self._ends.shape[1]
+        most, orders = nodes.max(initial=1) + m, range(m + 2)
+        series = [np.zeros((most, len(nodes), 3 if order else 9)) for order in orders]
+        for n in np.unique(nodes[nodes > 0]):
+            index = np.flatnonzero(nodes == n)
             solutions = [self._solutions[i] for i in index]
             R, k = (np.stack([getattr(one, name) for one in solutions]) for name in ("R", "k"))
-            by = primitives(k.shape[1], self._ends.shape[1])
+            by = primitives(n, m)
             rates = zip(by.series_from_ends, by.series_from_k, strict=True)
             w = [E @ self._ends[index] + K @ k for E, K in rates]
-            parts.append([along(grid(R.shape[1]).series, R), *w])
-        return parts
+            for whole, part in zip(series, [along(grid(n).series, R), *w], strict=True):
+                columns = part.reshape(*part.shape[:2], -1).swapaxes(0, 1)
+                whole[: len(columns), index] = columns
+        for whole in series:
+            whole[:, nodes == 0] = np.nan
+        return series
 
     def costate(self, t: ArrayLike) -> Array:
         """Return p at the times t, body frame: R p is `c`.
@@ -440,17 +446,9 @@ class Optimum(Curve):
         return type(self)(functional, self._ends[numbers], solutions, np.shape(chosen))
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        out[...] = np.nan
-        part, place = self._part[which], self._place[which]
-        for number, of_orders in enumerate(self._series):
-            there, series = np.flatnonzero(part == number), of_orders[order]
-            if there.size:
-                times = t if t.shape[1] == 1 else t[:, there]
-                weights = np.moveaxis(chebyshev(times, series.shape[1]), -1, 0)
-                terms = series.reshape(*series.shape[:2], -1).swapaxes(0, 1)
-                values = np.empty((len(t), len(there), terms.shape[2]))
-                combine(weights, terms, place[there], values)
-                out[:, there] = values.reshape(*values.shape[:2], *self._core(order))
+        terms = self._series[order]
+        weights = np.moveaxis(chebyshev(t, len(terms)), -1, 0)
+        combine(weights, terms, which, out.reshape(*out.shape[:2], terms.shape[-1]))
         if order == 0:
             out[...] = orthogonal(out)
 
