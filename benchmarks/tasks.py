@@ -13,9 +13,9 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 
 import rbcourse as rb
 from benchmarks.chains import LEGS, chain_of_poses
+from benchmarks.closed_forms import closed_forms, closed_forms_with_derivatives
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.optima import CASES, one_body, one_optimum, stacked_bodies, stacked_optimum, surveys
-from benchmarks.rivals import closed_forms, closed_forms_with_derivatives
 from benchmarks.rotations import (
     geodesic,
     nearest_rotation,

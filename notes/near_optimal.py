@@ -201,11 +201,11 @@ def deviations():
     """Return what each closed form is away from the optimum, of third order."""
     best = times(-1, optimum())
     curves = {
-        "projection": projection(),
-        "exponential": exponential(),
-        "Bézier": bezier(),
-        "quaternion": quaternion(),
-        "Cayley": cayley(),
+        "projected_cubic_so3": projection(),
+        "exponential_cubic_so3": exponential(),
+        "bezier_so3": bezier(),
+        "quaternion_cubic_so3": quaternion(),
+        "cayley_cubic_so3": cayley(),
     }
     return {way: add(curve, best) for way, curve in curves.items()}
 
@@ -213,7 +213,7 @@ def deviations():
 def forms():
     """Return the numerator of the leading excess of each closed form."""
     found = {way: energy(away) for way, away in deviations().items()}
-    return {**found, "cumulative": cumulative_energy()}
+    return {**found, "cumulative_bezier_so3": cumulative_energy()}
 
 
 def write(table=TABLE):

@@ -8,6 +8,19 @@ samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f
 
 from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling
 from rbcourse._numerics import Array
+from rbcourse.closed_forms import (
+    CLOSED_FORMS,
+    bezier_long_so3,
+    bezier_so3,
+    cayley_cubic_so3,
+    corrected_bezier_so3,
+    cumulative_bezier_so3,
+    exponential_cubic_long_so3,
+    exponential_cubic_so3,
+    exponential_quintic_so3,
+    normal_cubic_so3,
+    quaternion_cubic_so3,
+)
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
@@ -62,19 +75,6 @@ from rbcourse.quaternion import (
     quaternion_multiply,
     rotate_by_quaternion,
     slerp,
-)
-from rbcourse.rivals import (
-    CLOSED_FORMS,
-    bezier_long_so3,
-    bezier_so3,
-    cayley_cubic_so3,
-    corrected_bezier_so3,
-    cumulative_bezier_so3,
-    exponential_cubic_long_so3,
-    exponential_cubic_so3,
-    exponential_quintic_so3,
-    normal_cubic_so3,
-    quaternion_cubic_so3,
 )
 from rbcourse.sampling import sample_quaternion, sample_rotation
 from rbcourse.se3 import (

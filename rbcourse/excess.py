@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from rbcourse._chebyshev import grid, tails
 from rbcourse._numerics import Array
+from rbcourse.closed_forms import seen_from_the_middle
 from rbcourse.cost import check_curve, summed
 from rbcourse.curves import Curve, Ends
-from rbcourse.rivals import seen_from_the_middle
 from rbcourse.so3 import exp_so3, log_so3
 
 _NODES = 33
@@ -25,13 +25,13 @@ SPEED_LIMIT = 2.5
 """In rad over the whole time: for a curve that turns as fast there is no estimate."""
 
 
-def leading_excess(way: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Array:
+def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Array:
     """Return the leading term of a closed form's excess over the optimum, from the ends alone.
 
     Parameters
     ----------
-    way : str
-        One of `CLOSED_FORMS`, but not "corrected", whose leading term is not tabulated.
+    name : str
+        One of `CLOSED_FORMS`, but not "corrected_bezier_so3", whose leading term is not tabulated.
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
@@ -43,13 +43,13 @@ def leading_excess(way: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: Ar
         E/(12 ‖e‖² + ‖d‖²), which cost over optimum, minus 1, approaches for small data. With
         σ = log_so3(R0ᵀ R1), e and d are the mean less σ, and the difference, of the two end
         velocities, carried parallel to the rotation half-way. E is a polynomial of degree six in
-        σ, e and d; for "cumulative" of degree four. NaN where e and d are 0: there the optimum
-        costs nothing.
+        σ, e and d; for "cumulative_bezier_so3" of degree four. NaN where e and d are 0: there
+        the optimum costs nothing.
 
     Raises
     ------
     ValueError
-        If `way` is none of these, an argument is not finite or not of its shape, or the batches do
+        If `name` is none of these, an argument is not finite or not of its shape, or the batches do
         not broadcast.
 
     See Also
@@ -75,20 +75,20 @@ def leading_excess(way: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: Ar
     >>> from rbcourse import exp_so3
     >>> a, rest = 0.2, [0, 0, 0]
     >>> R1 = exp_so3([0, 0, a])
-    >>> float(leading_excess("projection", np.eye(3), R1, rest, rest).round(9))
+    >>> float(leading_excess("projected_cubic_so3", np.eye(3), R1, rest, rest).round(9))
     5.6841e-05
     >>> round(6401 / 180180 * a**4, 9)
     5.6841e-05
     """
     forms = _forms()
-    if not isinstance(way, str) or way not in forms:
-        raise ValueError(f"way: one of {', '.join(forms)} is wanted, got {way!r}")
+    if not isinstance(name, str) or name not in forms:
+        raise ValueError(f"name: one of {', '.join(forms)} is wanted, got {name!r}")
     ends = Ends(R0, R1, w0, w1)
     sigma = log_so3(ends.turn)
     e, d = seen_from_the_middle(sigma, ends.w0, ends.w1)
     pairs = (sigma, sigma), (e, e), (d, d), (sigma, e), (sigma, d), (e, d)
     inner = np.stack([np.sum(a * b, axis=-1) for a, b in pairs], axis=-1)
-    powers, coefficients = forms[way]
+    powers, coefficients = forms[name]
     E = np.prod(inner[..., None, :] ** powers, axis=-1) @ coefficients
     optimum = 12 * inner[..., 1] + inner[..., 2]
     E = np.maximum(E, 0)  # but for rounding it is not negative

@@ -22,6 +22,7 @@ from rbcourse._starts import (
     with_ends,
     with_full_turns,
 )
+from rbcourse.closed_forms import corrected_bezier_so3
 from rbcourse.curves import Ends
 from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.projection import nearest
@@ -37,7 +38,6 @@ from rbcourse.relaxation import (
     relax,
     relax_ball,
 )
-from rbcourse.rivals import corrected_bezier_so3
 from rbcourse.so3 import log_so3
 
 COARSE = 17  # nodes, on which curves are started and systems solved;

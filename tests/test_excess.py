@@ -8,16 +8,16 @@ import pytest
 
 import rbcourse as rb
 from rbcourse import excess
+from rbcourse.closed_forms import bezier_deviation
 from rbcourse.curves import Ends
-from rbcourse.rivals import bezier_deviation
 from rbcourse.study import atlas
 
 ROOT = Path(__file__).parents[1]
 SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "notes/near_optimal.py")
 exact = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(exact)
-POWERS = {"cumulative": 2, "corrected": 8}
-TABULATED = [name for name in rb.CLOSED_FORMS if name != "corrected"]
+POWERS = {"cumulative_bezier_so3": 2, "corrected_bezier_so3": 8}
+TABULATED = [name for name in rb.CLOSED_FORMS if name != "corrected_bezier_so3"]
 pytestmark = pytest.mark.source("beyond BK 10")
 
 
@@ -32,7 +32,7 @@ def excesses(name, ends):
     nodes, weights = np.polynomial.legendre.leggauss(40)
     best, cost = (
         weights @ np.sum(curve((nodes + 1) / 2, 2) ** 2, axis=-1)
-        for curve in (rb.minimum_acceleration_so3(*ends), atlas.WAYS[name](*ends))
+        for curve in (rb.minimum_acceleration_so3(*ends), rb.CLOSED_FORMS[name](*ends))
     )
     return cost / best - 1
 
@@ -58,11 +58,11 @@ def test_the_constants_near_a_geodesic():
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |sigma x e|², |sigma x d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
     wanted = {
-        "projection": projection,
-        "quaternion": projection * Q(1, 16),
-        "exponential": ss * across_e * Q(1, 175),
-        "Bézier": ss * (across_d * Q(1, 14580) + across_e * Q(1, 14175)),
-        "cumulative": across_e * Q(1, 7) + across_d * Q(47, 11340),
+        "projected_cubic_so3": projection,
+        "quaternion_cubic_so3": projection * Q(1, 16),
+        "exponential_cubic_so3": ss * across_e * Q(1, 175),
+        "bezier_so3": ss * (across_d * Q(1, 14580) + across_e * Q(1, 14175)),
+        "cumulative_bezier_so3": across_e * Q(1, 7) + across_d * Q(47, 11340),
     }
     forms = exact.forms()
     for name, form in wanted.items():
@@ -87,9 +87,9 @@ def test_rest_to_rest_and_about_one_axis():
     found = {
         name: form.compose(list(at_rest.items())).exquo(12 * ss) for name, form in forms.items()
     }
-    assert found["projection"] == exact.QQ(6401, 180180) * ss**2
-    assert found["quaternion"] == exact.QQ(6401, 16 * 180180) * ss**2
-    for name in ("exponential", "Bézier", "cumulative"):
+    assert found["projected_cubic_so3"] == exact.QQ(6401, 180180) * ss**2
+    assert found["quaternion_cubic_so3"] == exact.QQ(6401, 16 * 180180) * ss**2
+    for name in ("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"):
         assert found[name] == 0
 
 
@@ -111,7 +111,7 @@ def test_the_deviation_in_the_package_is_the_derived_one():
     for (i, j), symbol in zip(pairs, symbols, strict=True):
         value = Fraction(sum(vectors[i] * vectors[j]))
         inner[symbol] = exact.QQ(value.numerator, value.denominator)
-    theirs = exact.deviations()["Bézier"]
+    theirs = exact.deviations()["bezier_so3"]
     for i in range(3):
         total = exact.RING(0)
         for share, vector in zip(theirs, vectors, strict=True):
@@ -129,19 +129,24 @@ def test_the_leading_term_against_the_solver(name):
         some = scaled(ends, s)
         errors.append(np.median(np.abs(excesses(name, some) / rb.leading_excess(name, *some) - 1)))
     assert errors[0] < 0.1
-    least = 1.6 if name == "cumulative" else 3.4
+    least = 1.6 if name == "cumulative_bezier_so3" else 3.4
     assert min(errors[0] / errors[1], errors[1] / errors[2]) > least
 
 
 @pytest.mark.parametrize(
-    ("name", "over"), [("projection", 6300), ("quaternion", 256 * 6300), ("Cayley", 2800)]
+    ("name", "over"),
+    [
+        ("projected_cubic_so3", 6300),
+        ("quaternion_cubic_so3", 256 * 6300),
+        ("cayley_cubic_so3", 2800),
+    ],
 )
 def test_what_curves_cost_that_are_not_the_geodesic(name, over):
     """With e = d = 0 they deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
     start = np.broadcast_to(np.eye(3), (2, 3, 3))
-    curves = atlas.WAYS[name](start, rb.exp_so3(sigma), sigma, sigma)
+    curves = rb.CLOSED_FORMS[name](start, rb.exp_so3(sigma), sigma, sigma)
     found = rb.acceleration_cost(curves) / 2 * over / sizes**10
     assert found == pytest.approx(1, abs=0.1)
     assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # a relative error of second order
@@ -157,7 +162,7 @@ def test_the_power(name):
 def test_the_corrected_curve_has_the_eighth_power():
     """By the solver in the median; by the estimate, which sees smaller ones, for each problem."""
     ends = atlas.random_problems(20, 1.0, rng=7)
-    large, small = (excesses("corrected", scaled(ends, s)) for s in (0.9, 0.6))
+    large, small = (excesses("corrected_bezier_so3", scaled(ends, s)) for s in (0.9, 0.6))
     assert 7.5 < np.median(np.log(large / small) / np.log(1.5)) < 8.5
     large, small = (
         rb.excess_estimate(rb.corrected_bezier_so3(*scaled(ends, s))) for s in (0.6, 0.4)
@@ -171,7 +176,7 @@ def test_the_corrected_curve_has_the_eighth_power():
 def test_the_estimate_within_a_fifth_or_none(name):
     for size in (0.5, 1, 2):
         ends = atlas.random_problems(150, size, rng=8)
-        curves = atlas.WAYS[name](*ends)
+        curves = rb.CLOSED_FORMS[name](*ends)
         estimate, true = rb.excess_estimate(curves), excesses(name, ends)
         fastest = np.linalg.norm(curves(np.linspace(0, 1, 33), 1), axis=-1).max(axis=0)
         assert np.all(np.isnan(estimate[(fastest > 2.51) | (true > 1.25)]))
@@ -220,7 +225,7 @@ def test_stacks_and_time():
     ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in atlas.random_problems(6, 0.5, rng=1)))
     curves = rb.bezier_so3(*ends)
     estimate = rb.excess_estimate(curves)
-    assert estimate.shape == rb.leading_excess("Bézier", *ends).shape == (2, 3)
+    assert estimate.shape == rb.leading_excess("bezier_so3", *ends).shape == (2, 3)
     one = rb.bezier_so3(*ends.of((1, 2)))
     assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
     assert rb.excess_estimate(rb.retime(one, 20.0)) == pytest.approx(estimate[1, 2], rel=1e-9)
@@ -228,7 +233,7 @@ def test_stacks_and_time():
 
 def test_where_there_is_nothing_to_compare_with():
     ends = np.eye(3), rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
-    assert np.isnan(rb.leading_excess("projection", *ends))
+    assert np.isnan(rb.leading_excess("projected_cubic_so3", *ends))
     assert np.isnan(rb.excess_estimate(rb.geodesic_so3(*ends[:2])))
     w0, w1 = [[0, 0, 0.5], [1e160, 0, 0]], [[0, 0.5, 0], [0, 1e160, 0]]
     with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
@@ -253,10 +258,12 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
 
 def test_what_is_refused():
     ends = np.eye(3), np.eye(3), [0, 0, 1], [0, 0, 1]
-    with pytest.raises(ValueError, match=r"way: one of projection.* is wanted, got \['Cayley'\]"):
-        rb.leading_excess(["Cayley"], *ends)
-    with pytest.raises(ValueError, match=r"way: one of projection.* is wanted, got 'corrected'"):
-        rb.leading_excess("corrected", *ends)
+    with pytest.raises(
+        ValueError, match=r"^name: one of projected_cubic_so3, .* is wanted, got \["
+    ):
+        rb.leading_excess(["bezier_so3"], *ends)
+    with pytest.raises(ValueError, match=r"^name: one of .* is wanted, got 'corrected_bezier_so3'"):
+        rb.leading_excess("corrected_bezier_so3", *ends)
     with pytest.raises(ValueError, match="curve: a Curve wanted"):
         rb.excess_estimate(np.eye(3))
     with pytest.raises(ValueError, match=r"on SO\(3\)"):

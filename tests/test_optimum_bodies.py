@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.rivals import CLOSED_FORMS
+from rbcourse.closed_forms import CLOSED_FORMS
 
 I3, REST = np.eye(3), np.zeros(3)
 ALONG = np.pi / 6 * np.array([1, 2, 3])

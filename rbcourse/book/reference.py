@@ -14,7 +14,7 @@ from rbcourse.course.ledger import GROUPS, MISPRINTS, WHAT, Entry
 HOUSE = {
     "Rotations and poses": "so3 quaternion conversions se3",
     "Projection, sampling, metrics": "projection sampling metrics",
-    "Curves": "curves projected_line projected_cubic rivals motions paths cost",
+    "Curves": "curves projected_line projected_cubic closed_forms motions paths cost",
     "The optimum": "optimum functionals relaxation search shooting excess",
     "The plane": "planar arm",
     "Textbook versions, files, the report": "textbook files report",

@@ -10,7 +10,7 @@ import html
 import io
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,16 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from PIL import Image
 
+from rbcourse import (
+    Curve,
+    bezier_so3,
+    cayley_cubic_so3,
+    corrected_bezier_so3,
+    cumulative_bezier_so3,
+    exponential_cubic_so3,
+    projected_cubic_so3,
+    quaternion_cubic_so3,
+)
 from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import drawn, few_colours, png
 from rbcourse.draw.space import scenes
@@ -42,6 +52,16 @@ COLOURS = {
     "path": "#BB0000",
 }
 """The same meaning has the same colour everywhere; all can be told apart when colour-blind."""
+FORMS: dict[str, Callable[..., Curve]] = {
+    "projection": projected_cubic_so3,
+    "exponential": exponential_cubic_so3,
+    "Bézier": bezier_so3,
+    "corrected": corrected_bezier_so3,
+    "cumulative": cumulative_bezier_so3,
+    "quaternion": quaternion_cubic_so3,
+    "Cayley": cayley_cubic_so3,
+}
+"""The closed forms by their short names in figures and tables."""
 
 
 @dataclass(frozen=True)

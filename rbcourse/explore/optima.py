@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse import (
-    CLOSED_FORMS,
     Curve,
     acceleration_cost_parts,
     angle_between,
@@ -20,7 +19,7 @@ from rbcourse import (
     projected_cubic_se3,
 )
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
-from rbcourse.draw.save import COLOURS
+from rbcourse.draw.save import COLOURS, FORMS
 from rbcourse.explore import widgets
 from rbcourse.explore.explorer import Explorer, look, new_figure, new_line, new_space, numbers
 
@@ -64,7 +63,7 @@ def minimum_acceleration_explorer() -> Explorer:
         artists["rival box"].set(**_OUTLINE)
         fig.text(0.835, 0.2, "the body at t", ha="center")
     controls = {
-        "rival": widgets.menu("closed form", list(CLOSED_FORMS)),
+        "rival": widgets.menu("closed form", list(FORMS)),
         "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
         "t": widgets.slider("time t", 0.5, 0.0, 1.0, 0.01),
         "k": widgets.stepped("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
@@ -136,9 +135,7 @@ def _solved_rotations(rival: str, size: float, k: float) -> Solved:
     """Solve BK (21) with these two changed."""
     sigma = size * _SIGMA
     ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
-    return _with_costs(
-        {"optimum": minimum_acceleration_so3(*ends), rival: CLOSED_FORMS[rival](*ends)}
-    )
+    return _with_costs({"optimum": minimum_acceleration_so3(*ends), rival: FORMS[rival](*ends)})
 
 
 @lru_cache(maxsize=64)

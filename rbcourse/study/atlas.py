@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse import (
-    CLOSED_FORMS,
     Array,
     Curve,
     Ends,
@@ -22,6 +21,7 @@ from rbcourse import (
     normal_cubic_so3,
     sample_rotation,
 )
+from rbcourse.draw.save import FORMS
 from rbcourse.metrics import weight_from_inertia
 from rbcourse.sampling import Rng
 
@@ -43,7 +43,7 @@ def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomia
     return ProjectedPolynomial(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1))
 
 
-WAYS: dict[str, Maker] = {**CLOSED_FORMS, "projection": projection}
+WAYS: dict[str, Maker] = {**FORMS, "projection": projection}
 """The closed forms for a ball, with the names that figures and tables have for them."""
 
 

@@ -586,15 +586,18 @@ def exponential_quintic_so3(
 
 
 CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
-    "projection": projected_cubic_so3,
-    "exponential": exponential_cubic_so3,
-    "Bézier": bezier_so3,
-    "corrected": corrected_bezier_so3,
-    "cumulative": cumulative_bezier_so3,
-    "quaternion": quaternion_cubic_so3,
-    "Cayley": cayley_cubic_so3,
+    make.__name__: make
+    for make in (
+        projected_cubic_so3,
+        exponential_cubic_so3,
+        bezier_so3,
+        corrected_bezier_so3,
+        cumulative_bezier_so3,
+        quaternion_cubic_so3,
+        cayley_cubic_so3,
+    )
 }
-"""The closed forms for two rotations and two angular velocities, with their names in figures."""
+"""The closed forms for two rotations and two angular velocities, by name."""
 
 
 def bezier_legs(ends: Ends) -> Legs:

@@ -3,7 +3,7 @@
 import rbcourse as rb
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.rotations import cubic_ends
-from rbcourse import CLOSED_FORMS
+from rbcourse.draw.save import FORMS
 
 
 def closed_forms(n, rng):
@@ -23,7 +23,7 @@ def closed_forms_with_derivatives(n, rng):
 def _methods(n, rng, values):
     t = rng.random(n)
     makers = {OURS: rb.projected_cubic_so3} | {
-        f"rbcourse, {name}": make for name, make in CLOSED_FORMS.items() if name != "projection"
+        f"rbcourse, {name}": make for name, make in FORMS.items() if name != "projection"
     }
     curves = {name: make(*cubic_ends()) for name, make in makers.items()}
     return [

@@ -13,8 +13,8 @@ from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
+from rbcourse.closed_forms import ExponentialCubic, hermite, other_way
 from rbcourse.curves import Ends
-from rbcourse.rivals import ExponentialCubic, hermite, other_way
 
 pytestmark = pytest.mark.source("BK 1")
 EPS = np.finfo(float).eps
