@@ -188,7 +188,7 @@ def lowered(
         before = cost[active]
         for part in blocks(len(active), _TOGETHER):
             which = active[part]
-            R[which], cost[which] = _lower(functional.of(which), R[which], cost[which])
+            R[which], cost[which] = _lower(functional.take(which), R[which], cost[which])
         active = active[cost[active] < (1 - worthwhile) * before]
         if not len(active):
             break
@@ -200,7 +200,7 @@ def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))
-    costs = cost_at_nodes(functional.of(number), tried.reshape(-1, *R.shape[1:]))
+    costs = cost_at_nodes(functional.take(number), tried.reshape(-1, *R.shape[1:]))
     tried, costs = np.concatenate([R[None], tried]), np.vstack([cost, costs.reshape(-1, len(R))])
     best = np.fmin(costs, np.inf).argmin(axis=0), np.arange(len(R))
     return tried[best], costs[best]

@@ -323,8 +323,8 @@ def corrected_bezier_so3(
     -----
     Near-optimal for small excursions: data s times as large have a relative excess over the
     optimum about s⁸ times as large, that of the other closed forms s⁴ or s² times. δ is of third
-    order in the data: where the ends are fast it is large, and makes the curve dearer than
-    Bézier's. Of 1,000 problems each, uniform in balls, ‖σ‖ < 3, it was dearer by more than a
+    order in the data: where the ends are fast it is large, and makes the curve cost more than
+    Bézier's. Of 1,000 problems each, uniform in balls, ‖σ‖ < 3, it cost more by over a
     thousandth in 2 to 4 % where ‖w0‖, ‖w1‖ < 6, and in 29 % where they were < 9.
 
     σ is the logarithm of R0ᵀ R1, of any length, that is nearest to the sum of Bézier's three legs.

@@ -291,7 +291,7 @@ def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float =
     """Return a functional of the rotations of a stack of curves on [0, 1], as `integral`."""
 
     def density(t: Array, which: Chosen) -> Array:
-        some = functional.of(which)
+        some = functional.take(which)
         rates = [_values(curve, t, which, order)[..., :3] for order in some.needs]
         u = some.deviation(*(np.moveaxis(rate, 0, 1) for rate in rates))
         return np.sum(u**2, axis=-1).T

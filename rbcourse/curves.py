@@ -91,9 +91,9 @@ class Ends(_Ends):
         arrays = zip(self, shapes, strict=True)
         return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return some of the problems, by an index of NumPy's into the batch axes."""
-        return type(self)._make(x[which] for x in self)
+        return type(self)._make(x[index] for x in self)
 
 
 def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
@@ -236,7 +236,7 @@ class Curve:
         """
         if not self.batch_shape:
             raise TypeError("a single curve is no stack, and has no index")
-        return self._picked(np.arange(self.count).reshape(self.batch_shape)[index])
+        return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
 
     def __repr__(self) -> str:
         """Return what it is a curve of, how many there are, and when."""
@@ -283,20 +283,20 @@ class Curve:
     def _core(self, order: int) -> tuple[int, ...]:
         return (self.size,) * 2 if order == 0 else (3 * self.size - 6,)
 
-    def _picked(self, chosen: Any) -> Self:
-        """Return the stack of the curves with these numbers."""
+    def take(self, index: Any) -> Self:
+        """Return the stack of the curves with these numbers, which count through the stack."""
         picked = copy(self)
-        picked.batch_shape = np.shape(chosen)
+        picked.batch_shape = np.shape(index)
         for name in list(vars(picked)):
             if isinstance(getattr(type(self), name, None), cached_property):
                 del picked.__dict__[name]
         for name, lead in self.per_curve.items():
             value = getattr(self, name)
             if isinstance(value, Curve):
-                setattr(picked, name, value._picked(chosen))
+                setattr(picked, name, value.take(index))
             else:
                 flat = self._flat(value, lead)
-                setattr(picked, name, np.take(flat, chosen, axis=lead))
+                setattr(picked, name, np.take(flat, index, axis=lead))
         return picked
 
     def _flat(self, values: NDArray[Any], lead: int = 0) -> NDArray[Any]:

@@ -51,7 +51,7 @@ class Functional(Protocol):
     scale: Any
     unit: Any
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return that of some of the problems."""
 
     @property
@@ -84,7 +84,7 @@ class BallAcceleration:
     name, ends, scale, unit = "MinimumAcceleration", 2, 2.0, 1.0
     needs: tuple[int, ...] = (2,)
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return itself: it is the same for all problems."""
         return self
 
@@ -142,12 +142,12 @@ class Effort:
         self.root = np.linalg.cholesky(self.M).mT
         self.scale = self.unit = size**2 if of_torque else size
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return that of some of the problems."""
         chosen = object.__new__(type(self))
         chosen.of_torque, chosen.name = self.of_torque, self.name
-        chosen.G, chosen.M, chosen.root = (x[which] for x in (self.G, self.M, self.root))
-        chosen.scale = chosen.unit = self.scale[which]
+        chosen.G, chosen.M, chosen.root = (x[index] for x in (self.G, self.M, self.root))
+        chosen.scale = chosen.unit = self.scale[index]
         return chosen
 
     def torque(self, w: Array, a: Array) -> Array:
@@ -197,7 +197,7 @@ class Jerk:
     name, ends, scale, unit = "MinimumJerk", 4, 2.0, 1.0
     needs: tuple[int, ...] = (1, 2, 3)
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return itself: it is the same for all problems."""
         return self
 

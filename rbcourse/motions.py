@@ -50,7 +50,7 @@ class RigidMotion(Curve):
         self.batch_shape = np.broadcast_shapes(rotation.batch_shape, *batches)
         self.path = np.stack([np.broadcast_to(point, (*self.batch_shape, 3)) for point in path])
         numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
-        self.rotation = rotation._picked(np.broadcast_to(numbers, self.batch_shape))
+        self.rotation = rotation.take(np.broadcast_to(numbers, self.batch_shape))
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         """Write (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""

@@ -440,10 +440,11 @@ class Optimum(Curve):
         p = np.reshape(self.functional.unit, (-1, 1, 1)) * self.functional.p(*rates)
         return p.swapaxes(0, 1).reshape(*times.shape, *self.batch_shape, 3)
 
-    def _picked(self, chosen: Any) -> Self:
-        numbers = np.reshape(chosen, -1)
-        functional, solutions = self.functional.of(numbers), [self._solutions[i] for i in numbers]
-        return type(self)(functional, self._ends[numbers], solutions, np.shape(chosen))
+    def take(self, index: Any) -> Self:
+        """Return the stack of the curves with these numbers, which count through the stack."""
+        numbers = np.reshape(index, -1)
+        functional, solutions = self.functional.take(numbers), [self._solutions[i] for i in numbers]
+        return type(self)(functional, self._ends[numbers], solutions, np.shape(index))
 
     def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
         terms = self._series[order]

@@ -68,7 +68,7 @@ class Equations(Protocol):
     R1: Array
     together: int
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return those of some of the problems."""
 
     def first(self, R: Array) -> Arrays:
@@ -97,7 +97,7 @@ def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
     coefficients have decayed. A problem that is singular or overflows is a `Failure`.
     """
     parts = blocks(len(R), equations.together)
-    return [one for part in parts for one in _attempt(equations.of(part), R[part])]
+    return [one for part in parts for one in _attempt(equations.take(part), R[part])]
 
 
 def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
@@ -114,7 +114,7 @@ def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
         if len(R) == 1:
             return [Failure(np.inf, 0)]
     parts = [slice(i, i + 1) for i in range(len(R))]
-    return [_attempt(equations.of(one), R[one])[0] for one in parts]
+    return [_attempt(equations.take(one), R[one])[0] for one in parts]
 
 
 def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
@@ -133,10 +133,10 @@ def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
         for i, left, taken in zip(which, now.left.tolist(), steps.tolist(), strict=True):
             found[i] = Failure(left, taken)
         good = tuple(x[solved] for x in now.unknowns)
-        results = equations.of(solved).solution(good)
+        results = equations.take(solved).solution(good)
         for i, R_i, k, c, cost in zip(which[solved], good[0], *results, strict=True):
             found[i] = Solution(R_i, k, c, float(cost), *found[i])
-        equations, which, steps = equations.of(finer), which[finer], steps[finer]
+        equations, which, steps = equations.take(finer), which[finer], steps[finer]
         unknowns = tuple(x[finer] for x in now.unknowns)
     return found
 
@@ -172,7 +172,7 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
     steps, verdict = np.zeros((2, len(R)), int)
     active = np.arange(len(R))
     for _ in range(STEPS):
-        some, now = equations.of(active), tuple(x[active] for x in unknowns)
+        some, now = equations.take(active), tuple(x[active] for x in unknowns)
         before = left[active]
         left[active], parts = some.errors(now)
         left[np.isnan(left)] = np.inf
@@ -185,7 +185,7 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
             break
         active = active[going]
         now, parts = (tuple(x[going] for x in arrays) for arrays in (now, parts))
-        turn, changes = some.of(going).step(now, parts)
+        turn, changes = some.take(going).step(now, parts)
         size[active] = np.linalg.norm(turn, axis=-1).max(axis=1)
         share = LONGEST_STEP / np.maximum(size[active], LONGEST_STEP)
         R[active] = cayley(share[:, None, None] * turn) @ now[0]
@@ -273,10 +273,10 @@ class Stationary:
     def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
         self.functional, self.R0, self.R1, self.ends = functional, R0, R1, ends
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return those of some of the problems."""
-        parts = self.R0[which], self.R1[which], self.ends[which]
-        return type(self)(self.functional.of(which), *parts)
+        parts = self.R0[index], self.R1[index], self.ends[index]
+        return type(self)(self.functional.take(index), *parts)
 
     def first(self, R: Array) -> tuple[Array, Array]:
         """Return the k that gives w most nearly, of half as many polynomials, and c = 0.
@@ -372,9 +372,9 @@ class BallStationary:
     def __init__(self, R0: Array, R1: Array, ends: Array, coarse: int = 17) -> None:
         self.R0, self.R1, self.ends, self.coarse = R0, R1, ends, coarse
 
-    def of(self, which: Any) -> Self:
+    def take(self, index: Any) -> Self:
         """Return those of some of the problems."""
-        return type(self)(self.R0[which], self.R1[which], self.ends[which], self.coarse)
+        return type(self)(self.R0[index], self.R1[index], self.ends[index], self.coarse)
 
     def first(self, R: Array) -> tuple[Array]:
         """Return c for which w'' = Rᵀc gives w most nearly."""

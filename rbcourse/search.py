@@ -106,7 +106,7 @@ def ball(given: Ends) -> Task:
         given.w0.shape[:-1],
         BallAcceleration(),
         equations,
-        lambda which, n: starts(ends.of(which), n),
+        lambda which, n: starts(ends.take(which), n),
         relax_ball,
         known=_of_slow_ends(ends, equations),
     )
@@ -124,9 +124,9 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
     slow = np.flatnonzero(largest < SLOW)
     if not len(slow):
         return {}
-    curves = corrected_bezier_so3(*ends.of(slow))
+    curves = corrected_bezier_so3(*ends.take(slow))
     R = np.ascontiguousarray(curves(grid(COARSE).t).swapaxes(0, 1))
-    found = relax_ball(equations.of(slow), R)
+    found = relax_ball(equations.take(slow), R)
     each = zip(slow.tolist(), found, strict=True)
     return {i: one for i, one in each if isinstance(one, Solution)}
 
@@ -144,8 +144,8 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     round_ones = np.abs(functional.G - np.eye(3)).max(axis=(1, 2)) < 8 * EPS
 
     def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.of(which), n)
-        number, free = between_free_motions(ends.of(which), functional.G[which], n)
+        problem, R = starts(ends.take(which), n)
+        number, free = between_free_motions(ends.take(which), functional.G[which], n)
         more = [k for k, i in enumerate(which) if i in curves]
         of_balls = [_on_nodes(curves[which[k]].R[None], n) for k in more]
         return np.concatenate([problem, number, np.array(more, int)]), np.concatenate(
@@ -168,7 +168,7 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
     def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.of(which), n, bend[which])
+        problem, R = starts(ends.take(which), n, bend[which])
         return problem, with_ends(R, rates[which][problem])
 
     equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
@@ -176,7 +176,7 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
 
 
 def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
-    """Return the ends with one batch axis, rotations mended, and the end values (N, m, 3)."""
+    """Return the ends with one batch axis, the nearest rotations, and the end values (N, m, 3)."""
     ends = given.flat()
     R0, R1 = (nearest(R)[0] for R in ends[:2])  # of few digits R p = c would not settle
     return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
@@ -206,7 +206,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
     share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in the turn of a quintic
     fast = np.linalg.norm(ends, axis=-1) @ share
     problem, R = _started(task, which, task.nodes)
-    R, cost = lowered(task.functional.of(problem), R, **QUICKLY)
+    R, cost = lowered(task.functional.take(problem), R, **QUICKLY)
     if isinstance(task.functional, Effort):
         problem, R, cost = _with_more_turns(task, task.functional, problem, R, cost)
     least = partial(_least, len(ends), problem)
@@ -237,7 +237,7 @@ def _with_more_turns(
         return problem, R, cost
     some = ~(cost > APART * least[problem]) & ~_repeated(problem, cost, R)
     problem, R = problem[some], with_ends(_on_nodes(R[some], FINER), ends[problem[some]])
-    R, cost = lowered(effort.of(problem), R, **FARTHER)
+    R, cost = lowered(effort.take(problem), R, **FARTHER)
     turned = 0
     for apart in APART, LESS_APART:
         least = _least(count, problem, cost)
@@ -249,10 +249,10 @@ def _with_more_turns(
         turned = len(some)
         number = np.tile(problem[some], 6)
         more = with_full_turns(R[some], ends[problem[some]], effort.G[problem[some]])
-        more, briefly = lowered(effort.of(number), more, **BRIEFLY)
+        more, briefly = lowered(effort.take(number), more, **BRIEFLY)
         some = ~(briefly > PROMISING * least[number]) & ~_repeated(number, briefly, more)
         number = number[some]
-        more, cost_of_more = lowered(effort.of(number), more[some], **FARTHER)
+        more, cost_of_more = lowered(effort.take(number), more[some], **FARTHER)
         problem, R = np.append(problem, number), np.concatenate([R, more])
         cost = np.append(cost, cost_of_more)
     return problem, R, cost
@@ -279,7 +279,7 @@ def _leave_the_axis(
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
     number = np.array(problem, int)
-    R, cost = lowered(task.functional.of(number), np.concatenate(bent), **SLOWLY)
+    R, cost = lowered(task.functional.take(number), np.concatenate(bent), **SLOWLY)
     cheaper = cost < (1 - SAME) * _costs(found)[number]
     _follow(task, number[cheaper], R[cheaper], found)
 
@@ -309,15 +309,15 @@ def _follow_on(
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, which, n)
     problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
-    functional = task.functional.of(problem)
+    functional = task.functional.take(problem)
     bound = ABOUT * _least(len(found), problem, cost_at_nodes(functional, R))
     some = (_costs(found) > bound)[problem]
     some[-len(more) :] = True
     _follow(task, problem[some], R[some], found)
-    dear = (_costs(found) > bound)[problem]
-    if dear.any():
-        R, _ = lowered(functional.of(dear), R[dear], **PATIENTLY)
-        _follow(task, problem[dear], R, found)
+    costly = (_costs(found) > bound)[problem]
+    if costly.any():
+        R, _ = lowered(functional.take(costly), R[costly], **PATIENTLY)
+        _follow(task, problem[costly], R, found)
         for i in np.flatnonzero(_costs(found) > bound):
             if isinstance(one := found[i], Solution):
                 found[i] = one._replace(beaten=True)
@@ -355,6 +355,6 @@ def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failu
 
     Of curves that cost the same the first one stays, so that rounding does not decide.
     """
-    for i, one in zip(problem, task.solver(task.equations.of(problem), R), strict=True):
+    for i, one in zip(problem, task.solver(task.equations.take(problem), R), strict=True):
         if found[i] is NOTHING or cost_of(one) < (1 - SAME) * cost_of(found[i]):
             found[i] = one

@@ -84,7 +84,7 @@ def shoot_minimum_acceleration_so3(
 def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:
     """Solve the problems of a stack, one by one."""
     parts = [slice(i, i + 1) for i in range(len(R))]
-    return [_shoot(equations.of(one), R[one]) for one in parts]
+    return [_shoot(equations.take(one), R[one]) for one in parts]
 
 
 def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:

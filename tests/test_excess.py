@@ -192,17 +192,17 @@ def test_the_correction_turns_the_way_that_bezier_turns():
     turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))
     w = [0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3))
     ends = np.broadcast_to(np.eye(3), (20, 3, 3)), rb.exp_so3(turn), *w
-    plain, mended = (
+    plain, corrected = (
         rb.acceleration_cost(make(*ends)) for make in (rb.bezier_so3, rb.corrected_bezier_so3)
     )
     best = rb.minimum_acceleration_so3(*ends).cost
-    assert np.all(mended - best < 0.5 * (plain - best) + 1e-9 * best)
+    assert np.all(corrected - best < 0.5 * (plain - best) + 1e-9 * best)
 
 
 @pytest.mark.source("beyond BK 11")
 @pytest.mark.parametrize("bend", [0.3, 3.0])
 def test_the_estimate_of_other_curves(bend):
-    """Quintics with random accelerations at their ends, some much dearer than the optimum."""
+    """Quintics with random accelerations at their ends; some cost much more than the optimum."""
     ends = atlas.random_problems(200, 0.7, rng=3)
     curves = rb.exponential_quintic_so3(
         *ends, *bend * np.random.default_rng(4).normal(size=(2, 200, 3))
@@ -226,7 +226,7 @@ def test_stacks_and_time():
     curves = rb.bezier_so3(*ends)
     estimate = rb.excess_estimate(curves)
     assert estimate.shape == rb.leading_excess("bezier_so3", *ends).shape == (2, 3)
-    one = rb.bezier_so3(*ends.of((1, 2)))
+    one = rb.bezier_so3(*ends.take((1, 2)))
     assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
     assert rb.excess_estimate(rb.retime(one, 20.0)) == pytest.approx(estimate[1, 2], rel=1e-9)
 
@@ -253,7 +253,7 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
     assert np.isnan(rb.excess_estimate(line))
     rest = [0, 0, 0]
     best = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3([0, 0, 0.5]), rest, rest)
-    assert rb.acceleration_cost(line) < 1.5 * best.cost  # neither dear nor fast
+    assert rb.acceleration_cost(line) < 1.5 * best.cost  # neither costly nor fast
 
 
 def test_what_is_refused():

@@ -538,7 +538,7 @@ def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost(name, share):
     assert data["family"] == "across"
     middle = [np.radians(81), 4.95, 100]
     assert [float(data[x]) for x in header[1:4]] == pytest.approx(middle)
-    ends = atlas.atlas_problems(100, rng=11).of(slice(100 * cell, 100 * cell + 100))
+    ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for way in ("projection", "exponential", "Bézier", "cumulative", "quaternion", "Cayley"):
         excess = np.sort(rb.acceleration_cost(atlas.WAYS[way](*ends)) / best - 1)
@@ -596,7 +596,7 @@ def test_a_cell_of_the_atlas_of_bodies_is_what_its_problems_cost(body):
     data = {name: column[table["body"] == body][cell] for name, column in table.items()}
     middle = [np.radians(63), 3.15, 200]
     assert [data[x] for x in list(data)[1:4]] == pytest.approx(middle)
-    ends = body_atlas.body_problems(200, 31).of(slice(200 * cell, 200 * cell + 200))
+    ends = body_atlas.body_problems(200, 31).take(slice(200 * cell, 200 * cell + 200))
     G = body_atlas.BODIES[body]
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends, G), G)
     for curve, make in {
@@ -620,7 +620,7 @@ def test_the_intervals_are_those_of_the_problems():
     rows = [{name: column[k] for name, column in table.items()} for k in np.flatnonzero(here)]
     assert [row["curve"] for row in rows] == list(body_atlas.CURVES)
     problems, G = body_atlas.body_problems(200, 32), body_atlas.BODIES["book"]
-    ends = problems.of(body_atlas.domain("small", 200))
+    ends = problems.take(body_atlas.domain("small", 200))
     found = survey(ends, inertia=G, ways=body_atlas.curves_for("book"))
     excess = body_atlas.with_choices(atlas.excesses(ends, found, G))
     for row in rows:

@@ -31,7 +31,7 @@ def test_relax_finds_the_others_where_one_problem_of_a_stack_is_singular(kind, s
     else:
         functional = Effort(np.tile(np.diag([1.0, 2, 2.5]), (COUNT, 1, 1)), of_torque=True)
         solve, equations = relax, Stationary(functional, ends.R0, ends.R1, rates)
-    alone = [solve(equations.of([i]), starts[[i]])[0] for i in range(COUNT)]
+    alone = [solve(equations.take([i]), starts[[i]])[0] for i in range(COUNT)]
     assert all(isinstance(one, Solution) for one in alone)
     starts[broken] = start
     for i, one in enumerate(solve(equations, starts)):

@@ -172,7 +172,7 @@ def _in_chunks(
     """Return ``work(chunk)``, shape (len(names), n), of all chunks together, by name."""
     problems = _checked(problems)
     total = len(problems.w0)
-    chunks = [problems.of(slice(k, k + CHUNK)) for k in range(0, total, CHUNK)]
+    chunks = [problems.take(slice(k, k + CHUNK)) for k in range(0, total, CHUNK)]
     found: dict[int, Array] = {}
     files = {}
     if folder is not None:

@@ -24,7 +24,7 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 @pytest.mark.parametrize("way", atlas.WAYS)
 def test_costs_are_the_integral(way):
     make = atlas.WAYS[way]
-    found = costs(make, SOME.of(slice(20)))
+    found = costs(make, SOME.take(slice(20)))
     for k in range(20):
         exact = rb.acceleration_cost(make(*(x[k] for x in SOME)))
         assert found[k] == pytest.approx(exact, rel=1e-6)
@@ -34,7 +34,7 @@ def test_costs_are_the_integral(way):
 @pytest.mark.parametrize("way", ["weighted", "normal", "Bézier"])
 def test_costs_of_a_body_are_the_integral(way):
     make = atlas.closed_forms(BOOK)[way]
-    found = costs(make, SOME.of(slice(10)), BOOK)
+    found = costs(make, SOME.take(slice(10)), BOOK)
     for k in range(10):
         exact = rb.acceleration_cost(make(*(x[k] for x in SOME)), BOOK)
         assert found[k] == pytest.approx(exact, rel=1e-6)
@@ -61,7 +61,7 @@ def test_a_survey_has_the_optimum_and_every_way():
 
 @pytest.mark.source("beyond BK 2")
 def test_a_survey_of_a_body_has_its_optimum_and_what_knows_the_body():
-    few = SOME.of(slice(20))
+    few = SOME.take(slice(20))
     found = survey.survey(few, inertia=BOOK)
     assert list(found) == ["optimum", *atlas.WAYS, "weighted", "normal"]
     best = rb.minimum_acceleration_so3(*few, BOOK)  # not on one thread, as in a survey
@@ -80,14 +80,14 @@ def test_a_survey_tells_how_far_it_is():
 
 
 def test_a_survey_of_nothing_is_empty():
-    none = SOME.of(slice(0))
+    none = SOME.take(slice(0))
     for found in (survey.survey(none), several_starts(none)):
         assert {cost.shape for cost in found.values()} == {(0,)}
 
 
 def test_a_single_problem_is_refused():
     with pytest.raises(ValueError, match=r"^problems: one batch axis is wanted, got \(\)"):
-        survey.survey(SOME.of(0))
+        survey.survey(SOME.take(0))
 
 
 def test_what_is_not_found_is_nan_and_silent():
