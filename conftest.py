@@ -37,7 +37,7 @@ def pytest_collect_file(file_path, parent):
 
 @pytest.fixture(autouse=True)
 def _elsewhere(request, tmp_path_factory, monkeypatch):
-    """Let the examples of README.md and CONVENTIONS.md write their files into another folder."""
+    """Let examples of README.md and docs/conventions.md write their files into another folder."""
     if request.node.path.suffix == ".md":
         monkeypatch.chdir(tmp_path_factory.mktemp("examples"))
 

@@ -84,7 +84,7 @@ def main():
     book.add_argument("--serve", action="store_true", help="show them in the browser")
     help_ = "where Binder finds the lessons on GitHub"
     book.add_argument("--repository", default="", metavar="OWNER/NAME", help=help_)
-    tasks.add_parser("ledger", help="rewrite LEDGER.md: where each equation is to be found")
+    tasks.add_parser("ledger", help="rewrite docs/ledger.md: where each equation is to be found")
     tasks.add_parser("atlas", help="compute the atlas of real bodies anew; goes on when stopped")
     tasks.add_parser("bench", help="time the package beside others; rewrite benchmarks/")
     tasks.add_parser("lint", help="check style and types of all code")

@@ -68,7 +68,7 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
 
     References
     ----------
-    beyond BK 10; notes/near_optimal.md derives E.
+    beyond BK 10; docs/near_optimal.md derives E.
 
     Examples
     --------

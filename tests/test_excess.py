@@ -13,7 +13,7 @@ from rbcourse.curves import Ends
 from rbcourse.study import atlas
 
 ROOT = Path(__file__).parents[1]
-SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "notes/near_optimal.py")
+SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "docs/near_optimal.py")
 exact = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(exact)
 POWERS = {"cumulative_bezier_so3": 2, "corrected_bezier_so3": 8}

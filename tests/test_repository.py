@@ -59,11 +59,11 @@ def test_the_core_needs_numpy_and_scipy_only():
 
 
 def test_binder_gets_the_same_environment():
-    assert read("binder/requirements.txt").split() == ["-r", "../environment.txt"]
+    assert read(".binder/requirements.txt").split() == ["-r", "../environment.txt"]
 
 
 def test_binder_gets_a_python_that_the_package_takes():
-    python = read("binder/runtime.txt").strip().removeprefix("python-")
+    python = read(".binder/runtime.txt").strip().removeprefix("python-")
     assert SpecifierSet(PROJECT["requires-python"]).contains(python)
 
 

@@ -7,10 +7,10 @@ from rbcourse.course.ledger import KEY, MISPRINTS, WHAT
 
 PAGES = {
     "README.md": "install.md",
-    "CONVENTIONS.md": "conventions.md",
+    "docs/conventions.md": "conventions.md",
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
-    "notes/near_optimal.md": "near_optimal.md",
+    "docs/near_optimal.md": "near_optimal.md",
     "notebooks/QUESTIONS.md": "teach/questions.md",
     "notebooks/assignments/README.md": "teach/problem_sets.md",
 }
@@ -33,7 +33,7 @@ def source_of(path: str) -> str | None:
     if code := re.fullmatch(r"rbcourse/([\w/]+)\.py", path):
         module = code[1].replace("/", ".")
         return f"package/{module}.rst" if has_page(module) else None
-    return {"LEDGER.md": "ledger.md", **PAGES}.get(path)
+    return {"docs/ledger.md": "ledger.md", **PAGES}.get(path)
 
 
 def has_page(module: str) -> bool:

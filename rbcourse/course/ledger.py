@@ -149,9 +149,9 @@ def _table(head: tuple[str, ...], rows: Iterable[Iterable[str]]) -> list[str]:
 
 
 def main() -> None:
-    """Write LEDGER.md, in the folder of the course."""
+    """Write docs/ledger.md, in the folder of the course."""
     try:
-        Path("LEDGER.md").write_text(render(collect(Path())), encoding="utf-8", newline="\n")
+        Path("docs/ledger.md").write_text(render(collect(Path())), encoding="utf-8", newline="\n")
     except (OSError, ValueError) as error:
         sys.exit(str(error))
 

@@ -19,7 +19,8 @@ def test_keys_in_a_text_lead_to_the_ledger():
 
 def test_links_between_files_become_links_between_pages():
     text = (
-        "[a](../LEDGER.md) [b](06_geodesics.ipynb#x) [c](https://x.org) [d](#here) [e](../LICENSE)"
+        "[a](../docs/ledger.md) [b](06_geodesics.ipynb#x) [c](https://x.org) [d](#here) "
+        "[e](../LICENSE)"
     )
     assert relinked(text, "notebooks/01_plane.ipynb", "lessons/01_plane.ipynb") == (
         "[a](../ledger.md) [b](06_geodesics.ipynb#x) [c](https://x.org) [d](#here) "

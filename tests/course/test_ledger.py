@@ -11,7 +11,7 @@ from nbformat.v4 import new_markdown_cell, new_notebook
 from rbcourse.course import ledger
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "LEDGER.md").read_text("utf-8")
+PAGE = (ROOT / "docs/ledger.md").read_text("utf-8")
 ENTRIES = ledger.SOURCES["entries"]
 
 
