@@ -347,6 +347,7 @@ def test_lab_opens_the_first_lesson_and_has_nothing_of_teachers(
     monkeypatch.setattr(module, "VENV", tmp_path)
     monkeypatch.setattr(module, "run", lambda *given: ran.append(list(given)))
     monkeypatch.setenv("JUPYTER_CONFIG_PATH", "")
+    monkeypatch.setenv("RBCOURSE_EDIT", "")  # so that it is removed again
     module.open_lab(edit, ["--no-browser"])
     assert ([*ran[0][:2], "copy"] == ran[0]) is not edit
     address = f"/lab/tree/{folder}/00_start_here.ipynb"
