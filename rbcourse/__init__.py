@@ -4,6 +4,9 @@ The names below are the everyday ones. The modules have more: `rbcourse.metrics`
 inner products, `rbcourse.planar` and `rbcourse.arm` the plane, `rbcourse.sampling` the naive
 samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f,
 `rbcourse.textbook` the main algorithms as on the board.
+
+Every function raises ValueError, and names the argument, if an array is not finite or does not have
+the stated shape, or if batch shapes do not broadcast. The docstrings name the other errors.
 """
 
 from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling

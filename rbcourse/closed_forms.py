@@ -62,11 +62,6 @@ def exponential_cubic_so3(
         A `Curve` that meets all four ends: σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1)
         by `right_jacobian_inverse_so3`.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
-
     See Also
     --------
     projected_cubic_so3 : In the space of matrices.
@@ -156,8 +151,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, or a
-        velocity is 3π or more: its leg would be no shortest geodesic.
+        If a velocity is 3π or more: its leg would be no shortest geodesic.
 
     See Also
     --------
@@ -253,11 +247,6 @@ def cumulative_bezier_so3(
     CumulativeBezier
         A `Curve` that meets all four ends: v₁ = w0/3, v₃ = w1/3, v₂ the shortest turn between, and
         β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
 
     See Also
     --------
@@ -370,8 +359,7 @@ def quaternion_cubic_so3(
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast. The
-        curve, when called at a time when the cubic is zero, to rounding.
+        From the curve, when called at a time when the cubic is zero, to rounding.
 
     See Also
     --------
@@ -427,8 +415,7 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, or R0 and R1
-        are a half-turn apart, to rounding.
+        If R0 and R1 are a half-turn apart, to rounding.
 
     See Also
     --------
@@ -546,11 +533,6 @@ def exponential_quintic_so3(
     ExponentialQuintic
         A `Curve` that meets all six ends: σ(0) = 0, σ(1) = log_so3(R0ᵀ R1), and the derivatives of
         σ that give w and w' there.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
 
     See Also
     --------

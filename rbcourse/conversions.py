@@ -24,11 +24,6 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     ndarray, shape (..., 3, 3)
         Its columns are the images of the three axes.
 
-    Raises
-    ------
-    ValueError
-        If `q` is not finite or not of that shape.
-
     See Also
     --------
     quaternion_from_matrix : The inverse.
@@ -62,11 +57,6 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4)
         Unit quaternions (w, x, y, z), accurate to a few eps.
-
-    Raises
-    ------
-    ValueError
-        If `R` is not finite or not of that shape.
 
     Notes
     -----
@@ -153,11 +143,6 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps.
 
-    Raises
-    ------
-    ValueError
-        If `q` is not finite or not of that shape.
-
     See Also
     --------
     log_so3 : The same from matrices.
@@ -198,11 +183,6 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     ndarray, shape (..., 3, 3)
         Rotation matrices.
 
-    Raises
-    ------
-    ValueError
-        If `angles` is not finite or not of that shape.
-
     See Also
     --------
     zyx_from_matrix : The inverse.
@@ -236,11 +216,6 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
         Angles in rad, as `zyx_from_quaternion` returns them. They give R back to a few eps, in
         gimbal lock to 40 eps.
 
-    Raises
-    ------
-    ValueError
-        If `R` is not finite or not of that shape.
-
     References
     ----------
     RR 2.1, RR (7), RR (8).
@@ -265,11 +240,6 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4)
         Unit quaternions.
-
-    Raises
-    ------
-    ValueError
-        If `angles` is not finite or not of that shape.
 
     See Also
     --------
@@ -307,11 +277,6 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         Angles in rad: α and γ in (−π, π], β in [−π/2, π/2]. They give q back to a few
         eps, in gimbal lock to 20 eps.
-
-    Raises
-    ------
-    ValueError
-        If `q` is not finite or not of that shape.
 
     Notes
     -----

@@ -329,7 +329,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
     density : callable
         ``density(t, which)``: what is integrated, at the times t, shape (T, K), on curves which[k].
     rtol : float, optional
-        From 1e-8 on there are two panels at the start, below that many where the curve is quick.
+        From 1e-8 on there are two panels at the start, below that many where the curve turns fast.
 
     Returns
     -------
@@ -379,9 +379,9 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
 
 
 def _panels(curve: Curve, w: Array) -> Array:
-    """Return the ends of panels: sixteenths, and ever smaller ones to where the curve is quick.
+    """Return the ends of panels: sixteenths, and ever smaller ones to where the curve turns fast.
 
-    It may be quick at its start and end, as its angular speeds `w` and accelerations there tell,
+    It may turn fast at its start and end, as its angular speeds `w` and accelerations there tell,
     and at its `_events`.
     """
     a = np.linalg.norm(curve([0, 1], 2)[..., :3], axis=-1).reshape(2, -1)

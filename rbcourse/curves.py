@@ -49,11 +49,6 @@ class Ends(_Ends):
     w0, w1 : array_like, shape (..., 3)
         Angular velocities, body frame, in rad per unit time.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of its shape, or the batches do not broadcast.
-
     References
     ----------
     BK 6.2.
@@ -401,11 +396,6 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
     -------
     AlongGeodesic
         A `Curve`: R0 exp(σ̂ t) with ``rotation_vector`` σ = log_so3(R0ᵀ R1), of length ‖σ‖ ≤ π.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
 
     See Also
     --------

@@ -49,8 +49,7 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     Raises
     ------
     ValueError
-        If `name` is none of these, an argument is not finite or not of its shape, or the batches do
-        not broadcast.
+        If `name` is not one of these.
 
     See Also
     --------

@@ -55,11 +55,6 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     -------
     ndarray, shape (...)
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the shapes do not fit.
-
     See Also
     --------
     inner_left_invariant : Any metric that moves along with the body.
@@ -162,8 +157,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, or `G` is
-        not symmetric.
+        If `G` is not symmetric.
 
     See Also
     --------
@@ -239,11 +233,6 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3) or (..., 4, 4)
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the two do not fit.
-
     See Also
     --------
     components_from_tangent : The inverse.
@@ -278,11 +267,6 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3) or (..., 6)
         Angular velocities, or twists (ω, v), body frame. Those of A' are the velocity of BK (1).
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the two do not fit.
 
     See Also
     --------
@@ -322,8 +306,7 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
     Raises
     ------
     ValueError
-        If `sides` is not finite, not of that shape, or negative, or `mass` is not a positive
-        number.
+        If negative, or `mass` is not a positive number.
 
     See Also
     --------
@@ -572,11 +555,6 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
         x_dot[i] + gamma[i, j, k] v[j] x[k], summed over j and k. With x = v it is the acceleration
         (9), which vanishes along geodesics: (8), for the components of the velocity. With
         x_dot = 0 it is ∇_v x of left-invariant fields.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
 
     References
     ----------

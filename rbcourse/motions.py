@@ -115,11 +115,6 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
         A `Curve`: its ``rotation`` is `geodesic_so3`, the origin moves on a straight line at
         constant speed. The angular velocity is constant, and so is d', but not v = Rᵀ d'.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
-
     See Also
     --------
     screw_se3 : The other natural motion, a geodesic of another metric.
@@ -316,11 +311,6 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
         A `Curve`: A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1), which turns by π at most.
         Its covariant acceleration is (0, ω × v): the origin runs on a helix.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
-
     See Also
     --------
     geodesic_se3 : The same turn, while the origin runs straight.
@@ -396,11 +386,6 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     -------
     Screw
         ``axis``, ``point``, ``angle`` and ``slide``, and their ``pitch``.
-
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
 
     See Also
     --------
@@ -481,13 +466,7 @@ def _cubic_ends(
     d0_dot: ArrayLike,
     d1_dot: ArrayLike,
 ) -> tuple[Ends, tuple[Array, ...]]:
-    """Return the checked ends of the rotation, and the cubic path of the origin.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of its shape, or the batches do not broadcast.
-    """
+    """Return the checked ends of the rotation, and the cubic path of the origin."""
     poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
     v = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)

@@ -45,11 +45,6 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     ndarray, shape (..., 3, 3)
         Elements of SE(2); they carry coordinates of the body to those of the world.
 
-    Raises
-    ------
-    ValueError
-        If `pose` is not finite or not of that shape.
-
     See Also
     --------
     planar_from_matrix : The inverse, up to multiples of 2π.
@@ -88,11 +83,6 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         Poses (x, y, theta): m, m, rad, −π ≤ theta ≤ π.
 
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
-
     Notes
     -----
     Singular set: blocks [[a, b], [b, −a]], reflections and zero among them, to which no rotation
@@ -129,11 +119,6 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         In the frame of the world. Its matrix is the product of theirs, and the angles add up.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
-
     References
     ----------
     RR 3.2.
@@ -161,11 +146,6 @@ def inverse_planar(pose: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3)
         In the frame of the body: `compose_planar` of the two is (0, 0, 0).
-
-    Raises
-    ------
-    ValueError
-        If `pose` is not finite or not of that shape.
 
     References
     ----------
@@ -195,11 +175,6 @@ def exp_planar(S: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         (x, y, omega): an arc of the angle omega was run through. (x, y) is its chord, that is
         (vx, vy), turned by omega/2, times sin(omega/2) / (omega/2).
-
-    Raises
-    ------
-    ValueError
-        If `S` is not finite or not of that shape.
 
     See Also
     --------
@@ -238,11 +213,6 @@ def log_planar(pose: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3)
         (vx, vy, omega), −π ≤ omega ≤ π; `exp_planar` of it is the pose, up to full turns.
-
-    Raises
-    ------
-    ValueError
-        If `pose` is not finite or not of that shape.
 
     Notes
     -----

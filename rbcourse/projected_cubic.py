@@ -125,8 +125,7 @@ def projected_cubic_so3(
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast. The
-        curve, when called at a time whose nearest rotation is not unique, to rounding.
+        From the curve, when called at a time whose nearest rotation is not unique, to rounding.
 
     Warns
     -----
@@ -303,13 +302,7 @@ def projected_quintic_so3(
 def check_ends_of_quintic(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
 ) -> tuple[Ends, Array, Array]:
-    """Return `Ends`, and the accelerations a0 and a1, all of one batch shape.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of its shape, or the batches do not broadcast.
-    """
+    """Return `Ends`, and the accelerations a0 and a1, all of one batch shape."""
     ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     a0, a1 = (np.broadcast_to(a, (*batch, 3)) for a in (a0, a1))

@@ -138,9 +138,8 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
     Raises
     ------
     ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, or `f` is
-        not callable or has other ends. The curve, when called: if `f` returns non-finite values or
-        another shape, or at a time whose nearest rotation is not unique.
+        If `f` is not callable or has other ends. The curve, when called: if `f` returns non-finite
+        values or another shape, or at a time whose nearest rotation is not unique.
 
     Warns
     -----

@@ -114,11 +114,6 @@ def project_so(M: ArrayLike) -> Array:
         Rotations R. S = RᵀM is symmetric and its two smallest eigenvalues sum to 0 or more, which
         only a nearest rotation does. L M projects to L R, and M L to R L, for every rotation L.
 
-    Raises
-    ------
-    ValueError
-        If `M` is not finite or not of that shape.
-
     See Also
     --------
     rbcourse.textbook.project_so : The same in three lines, by the singular value decomposition.
@@ -228,8 +223,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        If `M` is not finite or not of that shape, or a column depends on those before it, to
-        rounding.
+        If a column depends on those before it, to rounding.
 
     See Also
     --------
@@ -274,11 +268,6 @@ def distance_to_so(M: ArrayLike) -> Array:
     -------
     ndarray, shape (...)
         In the Frobenius norm; σ are the singular values, the last one the smallest.
-
-    Raises
-    ------
-    ValueError
-        If `M` is not finite or not of that shape.
 
     References
     ----------

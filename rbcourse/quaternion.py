@@ -85,11 +85,6 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     ndarray, shape (..., 4)
         Its norm is the product of the norms.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
-
     References
     ----------
     RR 2.2.
@@ -114,11 +109,6 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4)
-
-    Raises
-    ------
-    ValueError
-        If `q` is not finite or not of that shape.
 
     References
     ----------
@@ -145,11 +135,6 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of its shape, or the batches do not broadcast.
 
     References
     ----------
@@ -181,8 +166,7 @@ def project_quaternion(q: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        If `q` is not finite, not of that shape, or zero, the singular set: all unit quaternions are
-        equally near to zero.
+        If zero, the singular set: all unit quaternions are equally near to zero.
 
     See Also
     --------
@@ -211,11 +195,6 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4)
-
-    Raises
-    ------
-    ValueError
-        If `q` is not finite or not of that shape.
 
     Notes
     -----
@@ -255,11 +234,6 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     ndarray, shape (N, ..., 4) or (4,)
         ± q, the first ones with the sign that they have: no component jumps where w passes
         through 0.
-
-    Raises
-    ------
-    ValueError
-        If `q` is not finite or not of that shape.
 
     See Also
     --------
@@ -302,8 +276,7 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        If an argument is not finite, not of its shape, the batches do not broadcast, or a time
-        lies outside [0, 1].
+        If a time lies outside [0, 1].
 
     See Also
     --------

@@ -420,7 +420,7 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     Raises
     ------
     ValueError
-        If `R` is not finite, not of that shape, or has fewer than 100 members.
+        If has fewer than 100 members.
 
     References
     ----------

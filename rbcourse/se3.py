@@ -35,11 +35,6 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4, 4)
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
-
     See Also
     --------
     components_from_pose : The inverse.
@@ -76,11 +71,6 @@ def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
         Rotation matrices.
     d : ndarray, shape (..., 3)
         Positions, in m, fixed frame.
-
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
 
     See Also
     --------
@@ -123,11 +113,6 @@ def inverse_se3(A: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4, 4)
 
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
-
     References
     ----------
     BK 2.1.
@@ -154,11 +139,6 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4, 4)
-
-    Raises
-    ------
-    ValueError
-        If `x` is not finite or not of that shape.
 
     See Also
     --------
@@ -193,11 +173,6 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     ndarray, shape (..., 6)
         σ in rad, ‖σ‖ ≤ π; d in m, fixed frame.
 
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
-
     Notes
     -----
     Singular set: half-turns, as for `log_so3`.
@@ -226,11 +201,6 @@ def hat_se3(S: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4, 4)
-
-    Raises
-    ------
-    ValueError
-        If `S` is not finite or not of that shape.
 
     See Also
     --------
@@ -266,11 +236,6 @@ def vee_se3(matrix: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 6)
 
-    Raises
-    ------
-    ValueError
-        If `matrix` is not finite or not of that shape.
-
     References
     ----------
     BK 2.1, BK (1).
@@ -302,11 +267,6 @@ def exp_se3(S: ArrayLike) -> Array:
     ndarray, shape (..., 4, 4)
         [[exp_so3(ω), J v], [0, 1]] with J the left Jacobian of SO(3), the transpose of
         ``right_jacobian_so3(ω)``; accurate to a few eps (1 + ‖ω‖) (1 + ‖v‖).
-
-    Raises
-    ------
-    ValueError
-        If `S` is not finite or not of that shape.
 
     See Also
     --------
@@ -348,11 +308,6 @@ def log_se3(A: ArrayLike) -> Array:
     ndarray, shape (..., 6)
         (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π; accurate to a few eps (1 + ‖d‖).
 
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
-
     See Also
     --------
     screw_from_pose : The axis and the pitch of that motion.
@@ -388,11 +343,6 @@ def adjoint_se3(A: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 6, 6)
         [[R, 0], [d̂ R, R]]: hat_se3(adjoint_se3(A) @ S) = A hat_se3(S) A⁻¹.
-
-    Raises
-    ------
-    ValueError
-        If `A` is not finite or not of that shape.
 
     References
     ----------

@@ -45,11 +45,6 @@ def hat_so3(w: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
 
-    Raises
-    ------
-    ValueError
-        If `w` is not finite or not of that shape.
-
     See Also
     --------
     vee_so3 : The inverse.
@@ -78,11 +73,6 @@ def vee_so3(W: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-
-    Raises
-    ------
-    ValueError
-        If `W` is not finite or not of that shape.
 
     References
     ----------
@@ -154,11 +144,6 @@ def log_so3(R: ArrayLike) -> Array:
         Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps, at half-turns
         too.
 
-    Raises
-    ------
-    ValueError
-        If `R` is not finite or not of that shape.
-
     Notes
     -----
     Singular set: at a half-turn both w and −w are logarithms. The one whose component of largest
@@ -189,11 +174,6 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     -------
     ndarray, shape (...)
         Angles in [0, π], in rad; accurate to a few eps.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
 
     See Also
     --------
@@ -266,11 +246,6 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         I + ŵ/2 + (1 − (a/2) cot(a/2)) n̂² with a = ‖w‖ and n = w/a.
-
-    Raises
-    ------
-    ValueError
-        If `w` is not finite or not of that shape.
 
     Notes
     -----

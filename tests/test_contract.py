@@ -209,7 +209,7 @@ INDICES = [
 
 
 def is_indexed_as_an_array_is(make):
-    """With what it tells of its curves."""
+    """With the attributes that describe its curves."""
     stack = make(sample(2, 3))
     t = times(stack, 3)
     told = "margin", "margin_time", "converged", "nodes", "c", "cost", "rotation_vector", "twist"
@@ -231,7 +231,7 @@ def is_indexed_as_an_array_is(make):
 
 
 def keeps_and_changes_no_arguments(make):
-    """Neither ends nor times; nor does it give away what it keeps."""
+    """Ends, times and returned arrays are independent of the curve."""
     ends = sample(2)
     before = {name: value.copy() for name, value in ends.items()}
     curve = make(ends)

@@ -107,7 +107,7 @@ def test_imports_keep_the_rules():
 
 
 def clients():
-    """The code that uses the package from outside: what it is called, and its text."""
+    """The name and the text of each file that uses the package from outside."""
     root = PACKAGE.parent
     for folder in (*(PACKAGE / room for room in CLIENTS), root / "benchmarks"):
         for path in sorted(folder.rglob("*.py")):

@@ -104,7 +104,7 @@ def survey(
     True
     """
     if inertia is not None:
-        acceleration_cost(geodesic_so3(np.eye(3), np.eye(3)), inertia)  # raises if it is none
+        acceleration_cost(geodesic_so3(np.eye(3), np.eye(3)), inertia)  # raises if it is invalid
         inertia = np.asarray(inertia, float)
     ways = dict(closed_forms(inertia) if ways is None else ways)
     for name, make in ways.items():
