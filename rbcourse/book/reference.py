@@ -62,6 +62,7 @@ def module_page(name: str, root: Path) -> str:
         f"{name}\n{'=' * len(name)}\n\n"
         f'.. raw:: html\n\n   <p class="listed">{listed}</p>\n\n'
         f".. automodule:: rbcourse.{name}\n   :members:\n   :member-order: bysource\n"
+        "   :ignore-module-all:\n"
     )
 
 
