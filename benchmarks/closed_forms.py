@@ -1,4 +1,4 @@
-"""What is compared over N: curves in closed form with the same four ends, as lesson 12 does."""
+"""The contest over N times: curves in closed form with the same four ends, as in lesson 12."""
 
 import rbcourse as rb
 from benchmarks.contest import OURS, Contest, Method

@@ -155,7 +155,7 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
 
     See Also
     --------
-    cumulative_bezier_so3 : From the same control points, quicker.
+    cumulative_bezier_so3 : From the same control points, faster to evaluate.
     corrected_bezier_so3 : Nearer to the optimum.
     retime : From [0, 1] to T seconds.
 
@@ -303,7 +303,7 @@ def corrected_bezier_so3(
 
     See Also
     --------
-    bezier_so3 : What is corrected.
+    bezier_so3 : The curve without the correction.
     minimum_acceleration_so3 : The optimum.
     excess_estimate : How far above the optimum a curve is.
     retime : From [0, 1] to T seconds.

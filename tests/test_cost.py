@@ -336,3 +336,25 @@ def test_the_unit_of_inertia_does_not_matter(size):
     for cost, power in ((rb.torque_cost, 2), (rb.acceleration_cost, 1)):
         want = size**power * cost(other, G / size)
         assert cost(other, G) == pytest.approx(want, rel=1e-12)
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-8, 1e-12])
+def test_a_cost_is_as_exact_as_rtol_asks(rtol):
+    """On lines of which one turns fast half-way."""
+    G = np.diag([1.0, 2, 2.5])
+    curve = rb.projected_line_so3(np.eye(3), rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
+    for cost in (
+        rb.acceleration_cost,
+        lambda c, **rtol: rb.acceleration_cost_parts(c, G, **rtol)[0],
+        lambda c, **rtol: rb.torque_cost(c, G, **rtol),
+        rb.jerk_cost,
+    ):
+        off = np.abs(cost(curve, rtol=rtol) / cost(curve) - 1).max()
+        assert off < max(rtol, 1e-10)
+        assert (off > 1e-9) == (rtol == 1e-2)  # fewer times are enough for that
+
+
+@pytest.mark.parametrize("rtol", [0, -1e-6, 1e-13, 0.2, np.nan, [1e-6, 1e-6]])
+def test_an_impossible_rtol_is_named(rtol):
+    with pytest.raises(ValueError, match=r"^rtol"):
+        rb.jerk_cost(rb.geodesic_so3(np.eye(3), np.eye(3)), rtol=rtol)
