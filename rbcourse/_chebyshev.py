@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rbcourse._hermite import hermite
 from rbcourse._numerics import Array
-from rbcourse.projected_cubic import hermite
 
 
 class Grid(NamedTuple):

@@ -147,10 +147,13 @@ def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
     return array
 
 
-def as_time(t: ArrayLike, batch_ndim: int, domain: tuple[float, float] = (0.0, 1.0)) -> Array:
+def as_time(
+    t: ArrayLike, batch_ndim: int, domain: tuple[float, float | Array] = (0.0, 1.0)
+) -> Array:
     """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
 
-    A time that is outside by rounding only, by 8 eps of the larger end, becomes that end.
+    A time that is outside by rounding only, by 8 eps of the larger end, becomes that end. The end
+    of the domain is one, or one for each time, where the shapes broadcast.
 
     Raises
     ------
@@ -158,13 +161,28 @@ def as_time(t: ArrayLike, batch_ndim: int, domain: tuple[float, float] = (0.0, 1
         As `as_finite`; and the message names the first time outside the domain.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
-    if not (times.min(initial=start) >= start and times.max(initial=end) <= end):
+    if not (np.all(times >= start) and np.all(times <= end)):
         times = as_finite("t", t)
-        wanted = f"a time in [{start:.17g}, {end:.17g}]"
-        slack = 8 * EPS * max(abs(start), abs(end))
-        _check_all((times >= start - slack) & (times <= end + slack), "t", times, wanted)
-        times = np.clip(times, start, end)
+        ends = np.broadcast_to(end, times.shape)
+        slack = 8 * EPS * np.maximum(abs(start), np.abs(ends))
+        outside = (times < start - slack) | (times > ends + slack)
+        wanted = f"a time in [{start:.17g}, {ends[outside][0] if outside.any() else 1:.17g}]"
+        _check_all(~outside, "t", times, wanted)
+        times = np.clip(times, start, ends)
     return times.reshape(times.shape + (1,) * batch_ndim)
+
+
+def as_duration(name: str, value: ArrayLike) -> Array:
+    """Return durations, all from 1e-100 up: accelerations over shorter ones overflow.
+
+    Raises
+    ------
+    ValueError
+        As `as_finite`; and the message names the first shorter one.
+    """
+    durations = as_finite(name, value)
+    _check_all(durations >= 1e-100, name, durations, "a duration from 1e-100 up")
+    return durations
 
 
 def as_angle(angle: ArrayLike) -> Array:

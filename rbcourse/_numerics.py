@@ -22,6 +22,17 @@ def sine_gap_ratio(x: Array) -> Array:
     return np.where(tiny, 1 / 6, (1 - sinc(x)) / np.where(tiny, 1.0, x) ** 2)
 
 
+def matvec(A: Array, x: Array) -> Array:
+    """Return matrices times vectors: A of shape (..., m, n), x of shape (..., n)."""
+    return (A @ x[..., None])[..., 0]
+
+
+def cross(x: Array, y: Array, axis: int = -1) -> Array:
+    """Return x × y, several times as fast as NumPy's; the axis is that of the components."""
+    (a, b, c), (u, v, w) = np.moveaxis(x, axis, 0), np.moveaxis(y, axis, 0)
+    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u], axis=axis)
+
+
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
     """Return matrices, or columns, over powers of two; the largest entries are in [0.5, 1)."""
     _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))

@@ -6,15 +6,17 @@ Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import first_index
-from rbcourse._jets import (
+from rbcourse._hermite import hermite
+from rbcourse._numerics import EPS, Array, matvec
+from rbcourse._taylor import (
     Jet,
     angular_velocity,
     cross,
@@ -25,19 +27,19 @@ from rbcourse._jets import (
     slerp,
     times,
 )
-from rbcourse._numerics import EPS, Array
-from rbcourse.conversions import quaternion_from_matrix
+from rbcourse.conversions import quaternion_from_matrix, quaternion_from_rotation_vector
 from rbcourse.curves import (
-    Chosen,
     Curve,
     Ends,
-    events_of,
+    check_defined,
+    graded,
     identity,
     least_over_time,
+    near_margins,
     which_curve,
     with_inertia,
 )
-from rbcourse.projected_cubic import check_ends_of_quintic, hermite, projected_cubic_so3
+from rbcourse.projected_cubic import ends_of_quintic, projected_cubic_so3
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import exp_so3, hat, log_so3, right_jacobian_inverse_so3
 
@@ -45,7 +47,7 @@ Legs = tuple[Array, Array, Array]
 
 
 def exponential_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ExponentialCubic:
     """Return R0 exp(σ̂(t)), σ(t) the cubic in exponential coordinates about R0 with these ends.
 
@@ -55,6 +57,8 @@ def exponential_cubic_so3(
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -65,7 +69,6 @@ def exponential_cubic_so3(
     See Also
     --------
     projected_cubic_so3 : In the space of matrices.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -88,12 +91,12 @@ def exponential_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = Ends(R0, R1, w0, w1)
-    return ExponentialCubic(ends, log_so3(ends.turn))
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    return _exponential_cubic(ends, T, log_so3(ends.turn))
 
 
 def exponential_cubic_long_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ExponentialCubic:
     """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
 
@@ -101,6 +104,8 @@ def exponential_cubic_long_so3(
     ----------
     R0, R1, w0, w1 : array_like
         As for `exponential_cubic_so3`.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -128,11 +133,13 @@ def exponential_cubic_long_so3(
     array([[ 0.  ,  0.  , -0.89],
            [ 0.  ,  0.  , -2.4 ]])
     """
-    ends = Ends(R0, R1, w0, w1)
-    return ExponentialCubic(ends, other_way(log_so3(ends.turn)))
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    return _exponential_cubic(ends, T, other_way(log_so3(ends.turn)))
 
 
-def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Bezier:
+def bezier_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> Bezier:
     """Return the cubic Bézier curve with these ends: de Casteljau's construction by geodesics.
 
     Parameters
@@ -141,6 +148,8 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -157,7 +166,6 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     --------
     cumulative_bezier_so3 : From the same control points, faster to evaluate.
     corrected_bezier_so3 : Nearer to the optimum.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -180,17 +188,20 @@ def bezier_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Be
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = _check_slow(Ends(R0, R1, w0, w1))
-    return Bezier(ends, bezier_legs(ends))
+    return _bezier(*_slow_ends(R0, R1, w0, w1, duration))
 
 
-def bezier_long_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Bezier:
+def bezier_long_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
     Parameters
     ----------
     R0, R1, w0, w1 : array_like
         As for `bezier_so3`.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -225,13 +236,12 @@ def bezier_long_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) 
     >>> [float(acceleration_cost(c(*ends)).round(1)) for c in (bezier_so3, bezier_long_so3)]
     [365.0, 136.3]
     """
-    ends = _check_slow(Ends(R0, R1, w0, w1))
-    first, middle, last = bezier_legs(ends)
-    return Bezier(ends, (first, other_way(middle), last))
+    ends, T, (first, middle, last) = _slow_ends(R0, R1, w0, w1, duration)
+    return _bezier(ends, T, (first, other_way(middle), last))
 
 
 def cumulative_bezier_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> CumulativeBezier:
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
@@ -241,6 +251,8 @@ def cumulative_bezier_so3(
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -251,7 +263,6 @@ def cumulative_bezier_so3(
     See Also
     --------
     bezier_so3 : De Casteljau's construction, from the same control points.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -274,12 +285,13 @@ def cumulative_bezier_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = Ends(R0, R1, w0, w1)
-    return CumulativeBezier(ends, bezier_legs(ends))
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    halves = np.stack(bezier_legs(ends), axis=-2) / 2
+    return CumulativeBezier(duration=T, start=quaternion_from_matrix(ends.R0), controls=halves)
 
 
 def corrected_bezier_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> CorrectedBezier:
     """Return Bézier's curve less its leading deviation from the optimum.
 
@@ -289,6 +301,8 @@ def corrected_bezier_so3(
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -306,7 +320,6 @@ def corrected_bezier_so3(
     bezier_so3 : The curve without the correction.
     minimum_acceleration_so3 : The optimum.
     excess_estimate : How far above the optimum a curve is.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -334,12 +347,22 @@ def corrected_bezier_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    ends = _check_slow(Ends(R0, R1, w0, w1))
-    return CorrectedBezier(ends, bezier_legs(ends))
+    ends, T, legs = _slow_ends(R0, R1, w0, w1, duration)
+    curve = _bezier(ends, T, legs)
+    sigma = nearest_turn(log_so3(ends.turn), legs[0] + legs[1] + legs[2])
+    deviation = bezier_deviation(sigma, *seen_from_the_middle(sigma, ends.w0, ends.w1))
+    middle = quaternion_from_rotation_vector(sigma / 2)
+    points = quaternion_multiply(quaternion_conjugate(middle)[..., None, :], curve.controls)
+    pure = [np.concatenate([np.zeros_like(c[..., :1]), c], axis=-1) for c in deviation]
+    return CorrectedBezier(
+        duration=T,
+        start=quaternion_multiply(curve.start, middle),
+        controls=np.concatenate([points, np.stack(pure, axis=-2)], axis=-2),
+    )
 
 
 def quaternion_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> QuaternionCubic:
     """Return the projection of a cubic in R⁴ on the unit quaternions: BK's idea in another space.
 
@@ -349,6 +372,8 @@ def quaternion_cubic_so3(
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -364,7 +389,6 @@ def quaternion_cubic_so3(
     See Also
     --------
     projected_cubic_so3 : The same with matrices.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -391,10 +415,14 @@ def quaternion_cubic_so3(
     >>> float(c.margin.round(3))
     0.933
     """
-    return QuaternionCubic(Ends(R0, R1, w0, w1))
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
+    return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
 
 
-def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> CayleyCubic:
+def cayley_cubic_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> CayleyCubic:
     """Return the cubic in Cayley's parameters about R0 with these ends.
 
     Parameters
@@ -404,6 +432,8 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
         `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -420,7 +450,6 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     See Also
     --------
     exponential_cubic_so3 : The same in exponential coordinates.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -442,11 +471,24 @@ def cayley_cubic_so3(R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike)
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return CayleyCubic(Ends(R0, R1, w0, w1))
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    turn = quaternion_from_matrix(ends.turn)
+    infinite = np.flatnonzero(turn[..., 0] == 0)
+    if len(infinite):
+        curve = which_curve(infinite[0], T.shape)
+        raise ValueError(f"R0 and R1{curve} are a half-turn apart: no Cayley parameters")
+    growth = np.sum(turn[..., 1:] * ends.w1, axis=-1) / (2 * turn[..., 0])
+    return CayleyCubic(**_cubic_from_the_goal(ends, T, turn, 1 / turn[..., 0], growth))
 
 
 def normal_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, inertia: ArrayLike
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    inertia: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> NormalCubic:
     """Return the cubic with these ends in normal coordinates of a body's metric, to second order.
 
@@ -458,6 +500,8 @@ def normal_cubic_so3(
         Angular velocities there, body frame, in rad per unit time.
     inertia : array_like, shape (..., 3, 3)
         G, body frame: symmetric and positive definite.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -511,11 +555,30 @@ def normal_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return NormalCubic(*with_inertia(Ends(R0, R1, w0, w1), inertia))
+    ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
+    ends, T = ends.over(duration)
+    G = np.broadcast_to(G, (*T.shape, 3, 3))
+    inverse, turn = np.linalg.inv(G), log_so3(ends.turn)
+    goal, by_goal = _normal_coordinates(turn, G, inverse)
+    rate = right_jacobian_inverse_so3(turn) @ ends.w1[..., None]
+    end_rate = np.linalg.solve(by_goal, rate)[..., 0]
+    cubic = np.stack([np.zeros_like(turn), goal, ends.w0, end_rate], axis=-2)
+    return NormalCubic(
+        duration=T,
+        start=quaternion_from_matrix(ends.R0),
+        controls=np.concatenate([cubic, G, inverse], axis=-2),
+    )
 
 
 def exponential_quintic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    a0: ArrayLike,
+    a1: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> ExponentialQuintic:
     """Return R0 exp(σ̂(t)), σ(t) the quintic with these ends: near-optimal minimum jerk.
 
@@ -527,6 +590,8 @@ def exponential_quintic_so3(
         Angular velocities there, body frame, in rad per unit time.
     a0, a1 : array_like, shape (..., 3)
         Angular accelerations w' there, body frame, in rad per unit time squared.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -564,7 +629,15 @@ def exponential_quintic_so3(
     array([[0., 0., 0.],
            [0., 0., 2.]])
     """
-    return ExponentialQuintic(*check_ends_of_quintic(R0, R1, w0, w1, a0, a1))
+    ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
+    curve = _exponential_cubic(ends, T, log_so3(ends.turn))
+    turn, end_rate = 2 * curve.controls[..., 1, :], 2 * curve.controls[..., 3, :]
+    straight = exp([np.moveaxis(x, -1, 0) / 2 for x in (turn, end_rate, 0 * end_rate)])
+    w_rate = np.moveaxis(angular_velocity(straight), 0, -1)
+    bend = matvec(right_jacobian_inverse_so3(turn), a1 - w_rate)
+    more = np.stack([a0, bend], axis=-2) / 2
+    controls = np.concatenate([curve.controls, more], axis=-2)
+    return ExponentialQuintic(duration=T, start=curve.start, controls=controls)
 
 
 CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
@@ -588,15 +661,19 @@ def bezier_legs(ends: Ends) -> Legs:
     return first, log_so3(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
 
 
-def _check_slow(ends: Ends) -> Ends:
+def _slow_ends(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
+) -> tuple[Ends, Array, Legs]:
+    """Return ends for the time from 0 to 1, the duration, and Bézier's legs, of less than π."""
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
     for name, w in (("w0", ends.w0), ("w1", ends.w1)):
-        speed = np.linalg.norm(w, axis=-1)
-        fast = speed >= 3 * np.pi
+        angle = np.linalg.norm(w, axis=-1)
+        fast = angle >= 3 * np.pi
         if fast.any():
             raise ValueError(
-                f"{first_index(name, fast)}: a norm below 3π is wanted, got {speed[fast][0]:.4g}"
+                f"{first_index(name, fast)}: a norm below 3π is wanted, got {angle[fast][0]:.4g}"
             )
-    return ends
+    return ends, T, bezier_legs(ends)
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
@@ -618,7 +695,7 @@ def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Arr
         0 for the geodesic at constant speed.
     """
     quarter = exp_so3(sigma / 4)
-    u0, u1 = (quarter.mT @ w0[..., None])[..., 0], (quarter @ w1[..., None])[..., 0]
+    u0, u1 = matvec(quarter.mT, w0), matvec(quarter, w1)
     return (u0 + u1) / 2 - sigma, u1 - u0
 
 
@@ -668,83 +745,66 @@ def other_way(turn: Array) -> Array:
     return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class QuaternionCurve(Curve):
-    """A `Curve` that is R0 times the rotation of Q(t), unless a subclass starts elsewhere.
+    """A `Curve` that is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
 
     References
     ----------
     BK 1.
     """
 
-    per_curve: ClassVar[dict[str, int]] = {"_start": 2, "_controls": 3}
-    _controls: Array
-    """What Q is made of, shape (n, components, 1, ...)."""
+    start: Array  # the fixed rotation as a quaternion, shape (..., 4)
+    controls: Array  # what Q is made of, shape (..., n, components)
 
-    def __init__(self, ends: Ends) -> None:
-        self.batch_shape = ends.w0.shape[:-1]
-        self._start = _components(quaternion_from_matrix(ends.R0))
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return the jet of Q at the times t, from the controls of the curves."""
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return the jet of Q at the times t, from controls that broadcast with them."""
         raise NotImplementedError
 
-    def _check(self, Q: Array, controls: Array, t: Array, which: Chosen) -> None:
+    def values(self, t: Array, order: int) -> Array:
+        """Return the rotation of the start times Q, or a derivative."""
+        by_curve = len(t) > self.count  # the longer axis last
+        t, axis = (t.T, -1) if by_curve else (t, -2)
+        Q = self.quaternion(np.expand_dims(self._first, axis), t, order)
+        self._check(Q[0], t, by_curve)
+        if order:
+            values = np.moveaxis(angular_velocity(Q), 0, -1)
+        else:
+            values = rotation(multiply(np.expand_dims(self.start.T, axis), Q[0]))
+        return values.swapaxes(0, 1) if by_curve else values
+
+    def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
         """Raise a SingularTime where Q has no direction."""
 
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        if len(which) == 1:
-            t = t.reshape(1, -1)  # as if each time had its own curve: long axes last
-        controls = np.take(self._flat(self._controls, 3), which, axis=-1)
-        Q = self._quaternion(controls, t, order)
-        self._check(Q[0], controls, t, which)
-        if order == 0:
-            start = np.take(self._flat(self._start, 2), which, axis=-1)
-            out[...] = rotation(multiply(start, Q[0])).reshape(out.shape)
-        else:
-            out[...] = np.moveaxis(angular_velocity(Q), 0, -1).reshape(out.shape)
+    @cached_property
+    def _first(self) -> Array:
+        """The controls, components first."""
+        return np.ascontiguousarray(np.moveaxis(self.controls, (-2, -1), (0, 1)))
 
 
 class ExponentialCubic(QuaternionCurve):
     """The `Curve` R0 exp(σ̂(t)), σ a cubic; σ(1) is any logarithm of the turn."""
 
-    def __init__(self, ends: Ends, turn: Array) -> None:
-        super().__init__(ends)
-        end_rate = (right_jacobian_inverse_so3(turn) @ ends.w1[..., None])[..., 0]
-        vectors = np.zeros_like(turn), turn, ends.w0, end_rate
-        self._controls = np.stack([_components(x / 2) for x in vectors])
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return exp(σ/2)."""
         return exp(_polynomial(controls, t, order))
 
 
 class ExponentialQuintic(ExponentialCubic):
     """The `Curve` R0 exp(σ̂(t)), σ a quintic."""
 
-    def __init__(self, ends: Ends, a0: Array, a1: Array) -> None:
-        turn = log_so3(ends.turn)
-        super().__init__(ends, turn)
-        _, goal, _, rate = self._controls  # σ(1)/2 and σ'(1)/2
-        w_rate = np.moveaxis(angular_velocity(exp([goal, rate, 0 * rate]))[:, 0], 0, -1)
-        bend = (right_jacobian_inverse_so3(turn) @ (a1 - w_rate)[..., None])[..., 0]
-        more = [_components(x / 2) for x in (a0, bend)]
-        self._controls = np.concatenate([self._controls, more])
+
+def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
+    end_rate = matvec(right_jacobian_inverse_so3(turn), ends.w1)
+    controls = np.stack([np.zeros_like(turn), turn, ends.w0, end_rate], axis=-2) / 2
+    return ExponentialCubic(duration=T, start=quaternion_from_matrix(ends.R0), controls=controls)
 
 
 class NormalCubic(QuaternionCurve):
     """The `Curve` R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), x a cubic."""
 
-    def __init__(self, ends: Ends, inertia: Array) -> None:
-        super().__init__(ends)
-        inverse = np.linalg.inv(inertia)
-        turn = log_so3(ends.turn)
-        goal, by_goal = _normal_coordinates(turn, inertia, inverse)
-        rate = right_jacobian_inverse_so3(turn) @ ends.w1[..., None]
-        end_rate = np.linalg.solve(by_goal, rate)[..., 0]
-        cubic = np.zeros_like(turn), goal, ends.w0, end_rate
-        matrices = (M[..., i, :] for M in (inertia, inverse) for i in range(3))
-        self._controls = np.stack([_components(x) for x in (*cubic, *matrices)])
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return exp(y/2), from the ends of x, G and G⁻¹."""
         x, G, inverse = _polynomial(controls[:4], t, order), controls[4:7], controls[7:]
         bent = cross(x, [np.einsum("ij...,j...->i...", G, each) for each in x])
         return exp(
@@ -764,9 +824,9 @@ def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Arra
     for share in (0.25, 0.5, 0.75, 1):
         goal = share * y
         for _ in range(4 if share < 1 else 8):
-            h = (G @ x[..., None])[..., 0]
+            h = matvec(G, x)
             by_x = np.eye(3) - inverse @ (hat(x) @ G - hat(h)) / 2
-            miss = x - (inverse @ np.cross(x, h)[..., None])[..., 0] / 2 - goal
+            miss = x - matvec(inverse, np.cross(x, h)) / 2 - goal
             _check_normal(np.linalg.det(by_x) == 0, "the map from x to y is singular")
             x = x - np.linalg.solve(by_x, miss[..., None])[..., 0]
     size = 1 + np.abs(y).max(axis=-1) + np.abs(x - y).max(axis=-1)
@@ -779,18 +839,15 @@ def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Arra
 
 def _check_normal(lost: Array, why: str) -> None:
     if np.any(lost):
-        which = which_curve(int(np.flatnonzero(lost)[0]), np.shape(lost))
-        raise ValueError(f"normal cubic{which}: {why}")
+        curve = which_curve(int(np.flatnonzero(lost)[0]), np.shape(lost))
+        raise ValueError(f"normal cubic{curve}: {why}")
 
 
 class CumulativeBezier(QuaternionCurve):
     """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), β the cumulative Bernstein polynomials."""
 
-    def __init__(self, ends: Ends, legs: Legs) -> None:
-        super().__init__(ends)
-        self._controls = np.stack([_components(leg / 2) for leg in legs])
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return the product of exp(βᵢ vᵢ/2)."""
         s = 1 - t
         shares: list[Jet] = [
             [t * (1 + s + s * s), 3 * s * s, -6 * s, 6 + 0 * t],
@@ -807,20 +864,24 @@ class CumulativeBezier(QuaternionCurve):
 class Bezier(QuaternionCurve):
     """The `Curve` of de Casteljau's construction, geodesics in the place of straight lines."""
 
-    def __init__(self, ends: Ends, legs: Legs) -> None:
-        super().__init__(ends)
-        start, first, second, third = (
-            exp([_components(leg / 2)])[0] for leg in (np.zeros_like(ends.w0), *legs)
-        )
-        last = multiply(multiply(first, second), third)
-        self._controls = np.stack([start, first, multiply(first, second), last])
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return what the construction comes to from four control points."""
         share = [identity(t, k) for k in range(order + 1)]
         points = [[point, *[np.zeros_like(point)] * order] for point in controls]
         while len(points) > 1:
             points = [slerp(a, b, share) for a, b in pairwise(points)]
         return points[0]
+
+
+def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
+    point = np.broadcast_to(np.eye(4)[0], (*T.shape, 4))
+    points = [point]
+    for leg in legs:
+        point = quaternion_multiply(point, quaternion_from_rotation_vector(leg))
+        points.append(point)
+    return Bezier(
+        duration=T, start=quaternion_from_matrix(ends.R0), controls=np.stack(points, axis=-2)
+    )
 
 
 class CorrectedBezier(Bezier):
@@ -829,20 +890,11 @@ class CorrectedBezier(Bezier):
     It is seen from the rotation half-way: there moving by −δ is exp(−δ̂/2) on both sides.
     """
 
-    def __init__(self, ends: Ends, legs: Legs) -> None:
-        super().__init__(ends, legs)
-        sigma = nearest_turn(log_so3(ends.turn), legs[0] + legs[1] + legs[2])
-        deviation = bezier_deviation(sigma, *seen_from_the_middle(sigma, ends.w0, ends.w1))
-        middle, back = (exp([_components(x / 4)])[0] for x in (sigma, -sigma))
-        self._start = multiply(self._start, middle)
-        points = [multiply(back, point) for point in self._controls]
-        pure = [np.insert(_components(c), 0, 0, axis=0) for c in deviation]
-        self._controls = np.stack([*points, *pure])
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return exp(−δ/4) Q exp(−δ/4), from four points and the coefficients of δ."""
         points, deviation = controls[:4], controls[4:, 1:]
         moved = exp([x / -4 for x in _clamped(deviation, t, order)])
-        return product(product(moved, super()._quaternion(points, t, order)), moved)
+        return product(product(moved, super().quaternion(points, t, order)), moved)
 
 
 def _clamped(coefficients: Array, t: Array, order: int) -> Jet:
@@ -863,17 +915,20 @@ class NormalizedCubic(QuaternionCurve):
     however large it is.
     """
 
-    def __init__(self, ends: Ends, norm: Array, growth: Array) -> None:
-        super().__init__(ends)
-        turn = quaternion_from_matrix(ends.turn)
-        self._start = multiply(self._start, _components(turn))
-        start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
-        end_rate = growth[..., None] * one + _rate(one, ends.w1)
-        cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
-        self._controls = np.stack([_components(x) for x in cubic])
-
-    def _quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return the cubic with these ends."""
         return _polynomial(controls, t, order)
+
+
+def _cubic_from_the_goal(
+    ends: Ends, T: Array, turn: Array, norm: Array, growth: Array
+) -> dict[str, Array]:
+    """Return the arrays of a `NormalizedCubic`, of a norm at its goal that grows so."""
+    start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
+    end_rate = growth[..., None] * one + _rate(one, ends.w1)
+    cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
+    goal = quaternion_multiply(quaternion_from_matrix(ends.R0), turn)
+    return {"duration": T, "start": goal, "controls": np.stack(cubic, axis=-2)}
 
 
 class QuaternionCubic(NormalizedCubic):
@@ -887,13 +942,10 @@ class QuaternionCubic(NormalizedCubic):
         When that is.
     """
 
-    def __init__(self, ends: Ends) -> None:
-        norm = np.ones(ends.w0.shape[:-1])
-        super().__init__(ends, norm, 0 * norm)
-
-    def _check(self, Q: Array, controls: Array, t: Array, which: Chosen) -> None:
-        lost = np.abs(Q).max(axis=0) < 8 * EPS * np.abs(controls).max(axis=(0, 1))
-        self._check_defined(t, which, lost, "the cubic of quaternions is zero")
+    def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
+        size = np.expand_dims(np.abs(self._first).max(axis=(0, 1)), -1 if by_curve else -2)
+        lost = np.abs(Q).max(axis=0) < 8 * EPS * size
+        check_defined(t, lost, "the cubic of quaternions is zero", by_curve=by_curve)
 
     @property
     def margin(self) -> Array:
@@ -903,54 +955,34 @@ class QuaternionCubic(NormalizedCubic):
     @property
     def margin_time(self) -> Array:
         """When the margin is reached."""
-        return self._least[0]
+        return self._least[0] * self.duration
 
     @cached_property
     def _least(self) -> tuple[Array, Array]:
         def norm(t: Array) -> Array:
-            return np.linalg.norm(_polynomial(self._controls, t, 0)[0], axis=0)
+            return np.linalg.norm(_polynomial(self._first[:, :, None], t, 0)[0], axis=0)
 
         return least_over_time(norm, self.batch_shape)
 
-    def _events(self) -> list[tuple[float, float]]:
-        return events_of(self.margin_time, self.margin)
+    @property
+    def breakpoints(self) -> Array:
+        """As `Curve.breakpoints`."""
+        return near_margins(super().breakpoints, *self._least)
 
 
 class CayleyCubic(NormalizedCubic):
-    """The `Curve` of a cubic in Cayley's parameters.
+    """The `Curve` of a cubic in Cayley's parameters."""
 
-    Attributes
-    ----------
-    quickest : tuple of ndarray, shape (...)
-        When it turns most quickly, and about how long it takes for a radian then.
-    """
-
-    def __init__(self, ends: Ends) -> None:
-        turn = quaternion_from_matrix(ends.turn)
-        infinite = np.flatnonzero(turn[..., 0] == 0)
-        if len(infinite):
-            which = which_curve(infinite[0], turn.shape[:-1])
-            raise ValueError(f"R0 and R1{which} are a half-turn apart: no Cayley parameters")
-        growth = np.sum(turn[..., 1:] * ends.w1, axis=-1) / (2 * turn[..., 0])
-        super().__init__(ends, 1 / turn[..., 0], growth)
-
-    @cached_property
-    def quickest(self) -> tuple[Array, Array]:
-        """When it turns most quickly, and about how long it takes for a radian then."""
+    @property
+    def breakpoints(self) -> Array:
+        """As `Curve.breakpoints`; it turns most quickly where Q is small and its rate large."""
 
         def time_for_a_radian(t: Array) -> Array:
-            Q, rate = (np.linalg.norm(x, axis=0) for x in _polynomial(self._controls, t, 1))
+            jet = _polynomial(self._first[:, :, None], t, 1)
+            Q, rate = (np.linalg.norm(x, axis=0) for x in jet)
             return Q / (1 + rate)
 
-        return least_over_time(time_for_a_radian, self.batch_shape)
-
-    def _events(self) -> list[tuple[float, float]]:
-        return list(zip(*map(np.ravel, self.quickest), strict=True))
-
-
-def _components(x: Array) -> Array:
-    """Return vectors of shape (..., n) as (n, 1, ...): the components first, then the times."""
-    return np.ascontiguousarray(np.moveaxis(x, -1, 0))[:, None]
+        return graded(super().breakpoints, *least_over_time(time_for_a_radian, self.batch_shape))
 
 
 def _polynomial(ends: Array, t: Array, order: int) -> Jet:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite
-from rbcourse._jets import matrix
 from rbcourse._numerics import EPS, Array
+from rbcourse._taylor import matrix
 from rbcourse.quaternion import canonical_quaternion
 
 

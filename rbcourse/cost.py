@@ -7,19 +7,20 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._chebyshev import grid
 from rbcourse._checks import as_inertia, as_positive, as_single, check_broadcast
 from rbcourse._numerics import EPS, Array, blocks
-from rbcourse.curves import Chosen, Curve, which_curve
+from rbcourse.curves import Curve, SingularTime, which_curve
 from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.paths import smooth_parts
 
 _TOGETHER = 2000  # panels that are evaluated at once
 _HALVINGS = 30
 _MOST = 50_000  # panels that may be halved at once
-Density: TypeAlias = Callable[[Array, Chosen], Array]
-"""What is integrated, at the times t, shape (T, K), on the curves which[k]."""
+Index: TypeAlias = NDArray[np.intp]
+Density: TypeAlias = Callable[[Curve, Array, Index], Array]
 
 
 def acceleration_cost(
@@ -152,16 +153,15 @@ def acceleration_cost_parts(
     if curve.size == 3 and (m != 1 or r.any()):
         raise ValueError("mass, centre: a curve on SO(3) has none of them")
     name = "acceleration cost"
-    legs, durations = curve._unit_legs(name, 1)
+    legs = smooth_parts(curve, name, 1)
     functional: Functional = BallAcceleration()
     if inertia is not None:
         functional = Effort(_inertias(curve, legs, inertia), of_torque=False)
     rotation = rotation_cost(name, legs, functional, rtol)
     translation: Array = np.zeros(legs.count)
     if legs.size == 4:
-        translation = m * integral(name, legs, partial(_squared_acceleration, legs, r), rtol)
-    whole = partial(summed, curve, legs, (1 / np.asarray(durations, float)) ** 3)
-    return whole(rotation), whole(translation)
+        translation = m * integral(name, legs, partial(_squared_acceleration, r), rtol)
+    return summed(curve, rotation, legs, 3), summed(curve, translation, legs, 3)
 
 
 def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Array:
@@ -204,10 +204,10 @@ def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Arr
     1.0
     """
     check_curve(curve)
-    legs, durations = curve._unit_legs("torque cost", 1)
+    legs = smooth_parts(curve, "torque cost", 1)
     functional = Effort(_inertias(curve, legs, inertia), of_torque=True)
     cost = rotation_cost("torque cost", legs, functional, rtol)
-    return summed(curve, legs, (1 / np.asarray(durations, float)) ** 3, cost)
+    return summed(curve, cost, legs, 3)
 
 
 def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
@@ -254,9 +254,9 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     3240.0
     """
     check_curve(curve)
-    legs, durations = curve._unit_legs("jerk cost", 2)
+    legs = smooth_parts(curve, "jerk cost", 2)
     cost = rotation_cost("jerk cost", legs, Jerk(), rtol)
-    return summed(curve, legs, (1 / np.asarray(durations, float)) ** 5, cost)
+    return summed(curve, cost, legs, 5)
 
 
 def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
@@ -279,44 +279,37 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
     return np.broadcast_to(G, (*legs.batch_shape, 3, 3)).reshape(-1, 3, 3)
 
 
-def summed(curve: Curve, legs: Curve, rates: Array, costs: Array) -> Array:
-    """Return the costs of the curves: those of their legs on [0, 1] times rates, summed."""
-    costs = rates * costs
-    if legs.batch_shape == curve.batch_shape:
-        return costs.reshape(curve.batch_shape)[()]
-    return np.sum(costs.reshape(legs.batch_shape), axis=-1)[()]
+def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
+    """Return the costs of curves from those for the time from 0 to 1: of a chain their sum."""
+    with np.errstate(over="ignore"):
+        costs = costs / legs.flat.duration**power
+    return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
 
 
 def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float = 1e-10) -> Array:
-    """Return a functional of the rotations of a stack of curves on [0, 1], as `integral`."""
+    """Return a functional of the rotations of a stack of curves, as `integral`."""
 
-    def density(t: Array, which: Chosen) -> Array:
-        some = functional.take(which)
-        rates = [_values(curve, t, which, order)[..., :3] for order in some.needs]
-        u = some.deviation(*(np.moveaxis(rate, 0, 1) for rate in rates))
+    def density(some: Curve, t: Array, index: Index) -> Array:
+        those = functional.take(index)
+        rates = [some.values(t, order)[..., :3] for order in those.needs]
+        u = those.deviation(*(np.moveaxis(rate, 0, 1) for rate in rates))
         return np.sum(u**2, axis=-1).T
 
     return functional.scale * integral(name, curve, density, rtol)
 
 
-def _squared_acceleration(curve: Curve, r: Array, t: Array, which: Chosen) -> Array:
+def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Array:
     """Return ‖d_c''‖², of the point r of the body: Rᵀ d_c'' = Rᵀ d'' + w' × r + w × (w × r)."""
-    a = _values(curve, t, which, 2)
+    a = curve.values(t, 2)
     moved = a[..., 3:]
     if r.any():
-        w = _values(curve, t, which, 1)[..., :3]
+        w = curve.values(t, 1)[..., :3]
         moved = moved + np.cross(a[..., :3], r) + np.cross(w, np.cross(w, r))
     return np.sum(moved**2, axis=-1)
 
 
-def _values(curve: Curve, t: Array, which: Chosen, order: int) -> Array:
-    values = np.empty((*t.shape, *curve._core(order)))
-    curve._at(t, which, order, values)
-    return values
-
-
 def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
-    """Return the integral over [0, 1] for each curve of a stack, by halving panels.
+    """Return the integral for each curve of a stack, as if they took from 0 to 1: halving panels.
 
     A panel is halved while the rules of Clenshaw and Curtis with 9 and 17 nodes differ there by
     more than `rtol` times the integral; each curve has panels of its own.
@@ -327,7 +320,8 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
         What it is called in messages.
     curve : Curve
     density : callable
-        ``density(t, which)``: what is integrated, at the times t, shape (T, K), on curves which[k].
+        ``density(some, t, index)``: what is integrated, at the times t, shape (T, K), on some of
+        the curves, which have these numbers.
     rtol : float, optional
         From 1e-8 on there are two panels at the start, below that many where the curve turns fast.
 
@@ -344,52 +338,40 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")
-    w = np.linalg.norm(curve([0, 1], 1)[..., :3], axis=-1).reshape(2, -1)
-    if (nan := ~np.isfinite(w).all(axis=0)).any():
+    flat = curve.flat
+    if (nan := ~np.isfinite(flat.values(np.array([[0.0], [1.0]]), 1)).all(axis=(0, 2))).any():
         lost = which_curve(int(np.argmax(nan)), curve.batch_shape)
         raise RuntimeError(f"{name}{lost}: the curve is NaN, it did not converge")
-    ends = _panels(curve, w) if rtol < 1e-8 else np.array([0.0, 0.5, 1.0])
+    ends = curve.breakpoints if rtol < 1e-8 else np.array([0.0, 0.5, 1.0])
     fine, rough = grid(17), grid(9)
     cost = np.zeros(curve.count)
-    which = np.repeat(np.arange(curve.count), len(ends) - 1)
+    index = np.repeat(np.arange(curve.count), len(ends) - 1)
     start, width = np.tile(ends[:-1], curve.count), np.tile(np.diff(ends), curve.count)
     for _ in range(_HALVINGS):
-        value, error = np.empty((2, len(which)))
-        for part in blocks(len(which), _TOGETHER):
-            squares = density(start[part] + fine.t[:, None] * width[part], which[part])
+        value, error = np.empty((2, len(index)))
+        for part in blocks(len(index), _TOGETHER):
+            t = start[part] + fine.t[:, None] * width[part]
+            try:
+                squares = density(flat.take(index[part]), t, index[part])
+            except SingularTime as found:
+                i = int(index[part][found.curve])
+                raise SingularTime(found.time, i, found.reason, curve.batch_shape) from None
             value[part] = width[part] * (fine.integral[-1] @ squares)
             rest = width[part] * (rough.integral[-1] @ squares[::2])
             with np.errstate(invalid="ignore"):  # inf − inf
                 error[part] = np.abs(value[part] - rest)
-        expected = cost + np.bincount(which, value, curve.count)
-        coarse = ~(error <= rtol * expected[which] + 1e-20)  # NaN is
+        expected = cost + np.bincount(index, value, curve.count)
+        coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN is
         lost = coarse & (width < 256 * EPS * (start + width))  # beyond the resolution of the times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
-        cost += np.bincount(which[~coarse], value[~coarse], curve.count)
-        which = np.repeat(which[coarse], 2)
+        cost += np.bincount(index[~coarse], value[~coarse], curve.count)
+        index = np.repeat(index[coarse], 2)
         start, width = (np.repeat(x[coarse], 2) for x in (start, width / 2))
         start[1::2] += width[1::2]
-        if not len(which):
+        if not len(index):
             return cost
     raise RuntimeError(
         f"{name}: halved panels leave an uncertainty of {error.sum():.1e} "
         f"in {expected.max():.6g} (see margin)"
     )
-
-
-def _panels(curve: Curve, w: Array) -> Array:
-    """Return the ends of panels: sixteenths, and ever smaller ones to where the curve turns fast.
-
-    It may turn fast at its start and end, as its angular speeds `w` and accelerations there tell,
-    and at its `_events`.
-    """
-    a = np.linalg.norm(curve([0, 1], 2)[..., :3], axis=-1).reshape(2, -1)
-    speeds = (w + np.sqrt(a)).max(axis=-1, initial=0)
-    ends = [(0.0, 1 / (1 + speeds[0])), (1.0, 1 / (1 + speeds[1]))]
-    cuts = [np.arange(17) / 16]
-    for when, width in ends + curve._events():
-        apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
-        cuts += [np.append(when - apart, when), when + apart]
-    times = np.unique(np.concatenate(cuts))
-    return times[(times >= 0) & (times <= 1)]

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from copy import copy
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple, Self, TypeAlias
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import (
+    as_array,
+    as_duration,
     as_finite,
     as_inertia,
-    as_positive,
     as_time,
     check_broadcast,
     check_order,
@@ -23,11 +23,9 @@ from rbcourse._checks import (
 from rbcourse._numerics import Array, blocks
 from rbcourse.so3 import hat, log_so3
 
-Chosen: TypeAlias = NDArray[np.intp]
-BLOCK = 4096  # rotations that are evaluated together, in the cache
-LONG_RUN = 8  # times on one curve for which a matrix product of their own pays
-SHORTEST = 1e-100  # of a duration
+BLOCK = 6144  # rotations that are evaluated together, in the cache
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
+AnyCurve = TypeVar("AnyCurve", bound="Curve")
 
 
 class _Ends(NamedTuple):
@@ -38,7 +36,7 @@ class _Ends(NamedTuple):
 
 
 class Ends(_Ends):
-    """Boundary conditions at t = 0 and 1, all of one batch shape: rotations and body velocities.
+    """Boundary conditions at both ends, all of one batch shape: rotations and body velocities.
 
     It is a tuple, so that the makers of curves take it as ``make(*ends)``.
 
@@ -76,6 +74,13 @@ class Ends(_Ends):
         """R0ᵀ R1."""
         return np.swapaxes(self.R0, -1, -2) @ self.R1
 
+    def over(self, duration: ArrayLike) -> tuple[Self, Array]:
+        """Return the same for the time from 0 to 1, and the durations, of one batch shape."""
+        T = as_duration("duration", duration)
+        batch = check_broadcast(ends=(self.R0, 2), duration=(T, 0))
+        T, (R0, R1, w0, w1) = np.broadcast_to(T, batch), self.broadcast_to(batch)
+        return type(self)._make((R0, R1, T[..., None] * w0, T[..., None] * w1)), T
+
     def flat(self) -> Self:
         """Return the same with one batch axis."""
         return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
@@ -92,14 +97,7 @@ class Ends(_Ends):
 
 
 def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
-    """Return the boundary conditions and the inertia of bodies, of one batch shape.
-
-    Raises
-    ------
-    ValueError
-        If `inertia` is not finite, not of shape (..., 3, 3), not symmetric and positive definite,
-        or the batches do not broadcast.
-    """
+    """Return the boundary conditions and the inertia of bodies, of one batch shape."""
     G = as_inertia("inertia", inertia)
     batch = check_broadcast(ends=(ends.R0, 2), inertia=(G, 2))
     return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
@@ -108,20 +106,19 @@ def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
 class SingularTime(ValueError):
     """A curve is not defined at a time; `curve` is its number in the stack."""
 
-    def __init__(self, time: float, curve: int, batch_shape: tuple[int, ...], why: str) -> None:
-        super().__init__(time, curve, batch_shape, why)
-        self.curve, self.reason = curve, f"t = {time}: {why}"
-        self._said = f"t = {time}{which_curve(curve, batch_shape)}: {why}"
+    def __init__(
+        self, time: float, curve: int, reason: str, batch_shape: tuple[int, ...] = ()
+    ) -> None:
+        super().__init__(time, curve, reason, batch_shape)
+        self.time, self.curve, self.reason, self.batch_shape = self.args
 
     def __str__(self) -> str:
-        return self._said
+        return f"t = {self.time}{which_curve(self.curve, self.batch_shape)}: {self.reason}"
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Curve:
     """A rotation or a pose over time: ``c(t)``, with derivatives ``c(t, 1)`` and ``c(t, 2)``.
-
-    On SO(3) ``c(t, 2)`` is the derivative of ``c(t, 1)``; on SE(3) it is not, see below. Times t
-    are in [0, 1], except for the curves that `retime` and `chain` return.
 
     On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w, ``c(t, 2)``
     the angular acceleration w' and ``c(t, 3)`` the angular jerk w'', all three in the body frame:
@@ -134,25 +131,60 @@ class Curve:
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``; on SE(3)
     ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed as an array of that
-    shape is: ``c[2]`` is its third curve.
+    shape is: ``c[2]`` is its third curve. All array attributes begin with the axes of the stack.
 
     Attributes
     ----------
+    duration : ndarray, shape (...)
+        How long each curve takes, from t = 0. Velocities are per unit of that time.
     batch_shape : tuple of int
         The shape of the stack; ``()`` for a single curve.
     domain : tuple of float
-        The first and the last time.
+        The first and the last time; of a stack, the times that all curves have; of none, all.
 
     References
     ----------
     BK (1), BK (9), BK 6.
     """
 
-    batch_shape: tuple[int, ...]
-    domain: tuple[float, float] = (0.0, 1.0)
-    size: int = 3  # of its matrices
-    per_curve: ClassVar[dict[str, int]] = {}
-    """Attributes with an entry for each curve: how many of their axes stand before the batch's."""
+    duration: Array
+
+    @property
+    def batch_shape(self) -> tuple[int, ...]:
+        """The shape of the stack."""
+        return self.duration.shape
+
+    @property
+    def size(self) -> int:
+        """Of its matrices: 3 on SO(3), 4 on SE(3)."""
+        return 3
+
+    @property
+    def count(self) -> int:
+        """How many curves there are."""
+        return self.duration.size
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """The first and the last time."""
+        return 0.0, float(self.duration.min(initial=np.inf))
+
+    @property
+    def breakpoints(self) -> Array:
+        """Ends of panels for a quadrature, as shares of the duration: ndarray, shape (n,).
+
+        Sixteenths, and ever smaller panels to where a curve of the stack may turn fast: its start
+        and its end, as its angular velocity and acceleration there tell, and times of small margin.
+
+        Raises
+        ------
+        RuntimeError
+            If a margin is below 1e-6: there the curve almost jumps.
+        """
+        ends = np.array([[0.0], [1.0]])
+        w, a = (np.linalg.norm(self.flat.values(ends, k)[..., :3], axis=-1) for k in (1, 2))
+        fastest = (w + np.sqrt(a)).max(axis=1, initial=0)
+        return graded(np.arange(17) / 16, [0.0, 1.0], 1 / (1 + fastest))
 
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
         """Return the curve, or a derivative, at the times t.
@@ -182,7 +214,7 @@ class Curve:
         ((5, 3, 3), (3,))
         """
         times = as_time(t, 0, self.domain)
-        values = self._at_all(times.reshape(-1, 1), self._check_order(order))
+        values = self.evaluate(times.reshape(-1, 1), self._check_order(order))
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
@@ -191,7 +223,7 @@ class Curve:
         Parameters
         ----------
         t : array_like, shape (...) + batch_shape
-            Times in the domain.
+            Times from 0 to the duration of each curve.
         order : {0, 1, 2, 3}, optional
             As for a call.
 
@@ -204,12 +236,14 @@ class Curve:
         ValueError
             As a call, or if `t` does not have that shape.
         """
-        times, stacked = as_time(t, 0, self.domain), len(self.batch_shape)
+        times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
             wanted = ", ".join(["...", *map(str, self.batch_shape)])
             raise ValueError(f"t: shape ({wanted}) wanted, got {times.shape}")
+        start = self.domain[0]
+        times = as_time(times, 0, (start, start + self.duration))
         rows = math.prod(times.shape[: times.ndim - stacked])
-        values = self._at_all(times.reshape(rows, self.count), self._check_order(order))
+        values = self.evaluate(times.reshape(rows, self.count), self._check_order(order))
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
@@ -242,34 +276,63 @@ class Curve:
     def _what(self) -> str:
         return type(self).__name__
 
-    @property
-    def count(self) -> int:
-        """How many curves there are."""
-        return math.prod(self.batch_shape)
+    def take(self, index: Any) -> Self:
+        """Return the stack of the curves with these numbers, which count through the stack."""
+        parts = {field.name: getattr(self, field.name) for field in fields(self)}
+        stacked = len(self.batch_shape)
+        for name, value in parts.items():
+            if isinstance(value, Curve):
+                parts[name] = value.take(index)
+            elif isinstance(value, np.ndarray):
+                flat = value.reshape(self.count, *value.shape[stacked:])
+                parts[name] = np.asarray(flat[index])
+        return type(self)(**parts)
 
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        """Write curve which[k] of the stack at the times t[:, k] into out[:, k].
+    def lasting(self, duration: Array) -> Self:
+        """Return the curves with other durations."""
+        return replace(self, duration=duration)
 
-        This is how every curve is evaluated, alone, in a stack, or as the leg of a chain.
+    def values(self, t: Array, order: int) -> Array:
+        """Return all curves of a stack with one axis, as if they took from 0 to 1.
+
+        This is all that a kind of curve has to say.
 
         Parameters
         ----------
-        t : ndarray, shape (T, K), or (T, 1) for the same times on all
-        which : ndarray of int, shape (K,)
-            Numbers that count through the stack.
+        t : ndarray, shape (T, count), or (T, 1) for the same times on all
         order : {0, 1, 2, 3}
-        out : ndarray, shape (T, K, 3, 3) or (T, K, 3); or with 4 and 6
-            In C order.
+
+        Returns
+        -------
+        ndarray, shape (T, count, 3, 3) or (T, count, 3); or with 4 and 6
+
+        Raises
+        ------
+        SingularTime
+            If a curve is not defined at one of the times.
         """
         raise NotImplementedError
 
-    def _at_all(self, t: Array, order: int) -> Array:
-        """Return all curves at the times t, shape (T, count) or (T, 1), in blocks."""
-        count = self.count
-        which, values = np.arange(count), np.empty((len(t), count, *self._core(order)))
-        for rows in blocks(len(t), max(1, BLOCK // max(1, count))):
-            self._at(t[rows], which, order, values[rows])
+    def evaluate(self, t: Array, order: int) -> Array:
+        """Return all curves at the times t, shape (T, count) or (T, 1), in blocks of times."""
+        T, core = self.flat.duration, self._core(order)
+        shares = t / (T[:1] if np.all(T[:1] == T) else T)
+        values = np.empty((len(t), self.count, *core))
+        try:
+            for rows in blocks(len(t), max(1, BLOCK // max(1, self.count))):
+                values[rows] = self.flat.values(shares[rows], order)
+        except SingularTime as error:
+            k = error.curve
+            time = error.time * float(T[k])
+            raise SingularTime(time, k, error.reason, self.batch_shape) from None
+        if order:
+            values /= T.reshape(-1, *(1 for _ in core)) ** order
         return values
+
+    @cached_property
+    def flat(self) -> Self:
+        """The same curves as a stack with one axis."""
+        return self if len(self.batch_shape) == 1 else self.take(np.arange(self.count))
 
     def _check_order(self, order: int) -> int:
         """Return the order of a derivative, or raise a ValueError if the curve has none of it."""
@@ -278,51 +341,8 @@ class Curve:
     def _core(self, order: int) -> tuple[int, ...]:
         return (self.size,) * 2 if order == 0 else (3 * self.size - 6,)
 
-    def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these numbers, which count through the stack."""
-        picked = copy(self)
-        picked.batch_shape = np.shape(index)
-        for name in list(vars(picked)):
-            if isinstance(getattr(type(self), name, None), cached_property):
-                del picked.__dict__[name]
-        for name, lead in self.per_curve.items():
-            value = getattr(self, name)
-            if isinstance(value, Curve):
-                setattr(picked, name, value.take(index))
-            else:
-                flat = self._flat(value, lead)
-                setattr(picked, name, np.take(flat, index, axis=lead))
-        return picked
 
-    def _flat(self, values: NDArray[Any], lead: int = 0) -> NDArray[Any]:
-        """Return an array with one axis for the stack in place of the batch axes."""
-        stacked = lead + len(self.batch_shape)
-        return values.reshape(*values.shape[:lead], self.count, *values.shape[stacked:])
-
-    def _check_defined(self, t: Array, which: Chosen, lost: NDArray[np.bool_], why: str) -> None:
-        """Raise a SingularTime for the first time, shape (T, K), at which a curve is `lost`."""
-        if lost.any():
-            row, k = np.argwhere(lost)[0]
-            time = float(np.broadcast_to(t, lost.shape)[row, k])
-            curve = int(np.broadcast_to(which, lost.shape[1:])[k])
-            raise SingularTime(time, curve, self.batch_shape, why)
-
-    def _events(self) -> list[tuple[float, float]]:
-        """Return when a curve of the stack is quick, and about how long that takes."""
-        return []
-
-    def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
-        """Return the curves on [0, 1] that it consists of, as a stack, and their durations.
-
-        Raises
-        ------
-        RuntimeError
-            If a derivative jumps in between, up to the order `smooth`; `name` is the cost that
-            does not exist then.
-        """
-        return self, 1.0
-
-
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AlongGeodesic(Curve):
     """The `Curve` R0 exp(σ̂ p(t)) on the geodesic from R0 to R0 exp(σ̂); here p(t) = t.
 
@@ -338,40 +358,34 @@ class AlongGeodesic(Curve):
     BK 6.1.
     """
 
-    per_curve: ClassVar[dict[str, int]] = {"R0": 0, "rotation_vector": 0, "_angle": 0}
+    rotation_vector: Array
+    terms: Array  # R0, R0 K and R0 K² of R0 (I + sin a K + (1 − cos a) K²), Rodrigues' formula
 
-    def __init__(self, R0: Array, rotation_vector: Array) -> None:
-        self.batch_shape = rotation_vector.shape[:-1]
-        self.R0 = np.broadcast_to(R0, (*self.batch_shape, 3, 3))
-        self.rotation_vector = rotation_vector
-        self._angle = np.linalg.norm(rotation_vector, axis=-1)
+    @property
+    def R0(self) -> Array:
+        """The start."""
+        return self.terms[..., 0, :, :]
 
-    def _progress(self, t: Array, which: Chosen, order: int) -> Array:
-        """Return p or a derivative, shape (T, K) or (T, 1)."""
+    def _progress(self, t: Array, order: int) -> Array:
+        """Return p or a derivative, shape (T, count) or (T, 1)."""
         return identity(t, order)
 
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        progress = self._progress(t, which, order)
+    def values(self, t: Array, order: int) -> Array:
+        """Return R0 exp(σ̂ p), or a derivative of p times σ."""
+        progress, count = self._progress(t, order), self.count
         if order:
-            sigma = self._flat(self.rotation_vector)[which]
+            values = np.empty((len(t), count, 3))
             for i in range(3):  # four times as fast as in one go
-                np.multiply(progress, sigma[:, i], out=out[..., i])
-            return
-        shares = np.ones((3, len(t), len(which)))
-        _write_sine_and_versine(progress, self._half_angle[which], *shares[1:])
-        combine(shares, self._terms, which, out.reshape(*out.shape[:2], 9))
+                np.multiply(progress, self.rotation_vector[:, i], out=values[..., i])
+            return values
+        weights = np.empty((3, count, len(t)))
+        weights[0] = 1
+        _write_sine_and_versine(progress.T, self._half_angle, *weights[1:])
+        return weighted_sums(weights.T, self.terms.reshape(count, 3, 9), 3, 3)
 
     @cached_property
     def _half_angle(self) -> Array:
-        return self._flat(self._angle) / 2
-
-    @cached_property
-    def _terms(self) -> Array:
-        """R0, R0 K and R0 K² of R0 (I + sin a K + (1 − cos a) K²), Rodrigues' formula."""
-        axis = self.rotation_vector / np.where(self._angle == 0, 1.0, self._angle)[..., None]
-        K = hat(axis)
-        turn = self.R0 @ K
-        return np.stack([self.R0, turn, turn @ K]).reshape(3, self.count, 9)
+        return np.linalg.norm(self.rotation_vector, axis=-1, keepdims=True) / 2
 
 
 def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
@@ -384,13 +398,34 @@ def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: 
     versine *= sine
 
 
-def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
+def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
+    """Return for each curve of a stack the sums of its terms, each times its weight.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (T, count, n) or (T, 1, n)
+    terms : ndarray, shape (count, n, m)
+    *core : int
+        The shape of a sum, of m entries.
+
+    Returns
+    -------
+    ndarray, shape (T, count, *core)
+    """
+    sums = np.empty((len(weights), len(terms), terms.shape[-1]))
+    np.matmul(np.swapaxes(weights, 0, 1), terms, out=np.swapaxes(sums, 0, 1))
+    return sums.reshape(*sums.shape[:2], *core)
+
+
+def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> AlongGeodesic:
     """Return the shortest curve from R0 to R1, at constant angular velocity.
 
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices. Validity is not checked; see `project_so`.
+    duration : array_like, shape (...), optional
+        How long it takes.
 
     Returns
     -------
@@ -402,7 +437,6 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
     rbcourse.textbook.geodesic_so3 : The same in two lines.
     projected_line_so3 : The same path by projection, at another speed.
     slerp : The same curve in quaternions.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -417,85 +451,56 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike) -> AlongGeodesic:
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]))
-    >>> log_so3(c([0, 0.5, 1])).round(12)
+    >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]), duration=3)
+    >>> log_so3(c([0, 1.5, 3])).round(12)
     array([[0.  , 0.  , 0.  ],
            [0.  , 0.  , 0.75],
            [0.  , 0.  , 1.5 ]])
     >>> c(0.3, 1).round(12)  # the velocity
-    array([0. , 0. , 1.5])
+    array([0. , 0. , 0.5])
     """
-    return AlongGeodesic(*start_and_rotation_vector(R0, R1))
+    return AlongGeodesic(**geodesic_data(R0, R1, duration))
 
 
-class Retimed(Curve):
-    """A `Curve` reparameterised linearly to another duration.
-
-    Attributes
-    ----------
-    curve : Curve
-        The original.
-    rate : float
-        How much of its time passes in a unit of time.
-    """
-
-    per_curve: ClassVar[dict[str, int]] = {"curve": 0}
-
-    def __init__(self, curve: Curve, rate: float, domain: tuple[float, float]) -> None:
-        self.curve, self.rate, self.domain = curve, rate, domain
-        self.batch_shape, self.size = curve.batch_shape, curve.size
-
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        (start, end), (first, last) = self.domain, self.curve.domain
-        inner = np.minimum(first + (t - start) * self.rate, last)
-        self.curve._at(np.where(t == end, last, inner), which, order, out)
-        if order:
-            out *= self.rate**order
-
-    def _what(self) -> str:
-        return f"Retimed {self.curve._what()}"
-
-    def _events(self) -> list[tuple[float, float]]:
-        start, first = self.domain[0], self.curve.domain[0]
-        events = self.curve._events()
-        return [(start + (t - first) / self.rate, width / self.rate) for t, width in events]
-
-    def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
-        legs, durations = self.curve._unit_legs(name, smooth)
-        return legs, durations / self.rate
+def geodesic_data(R0: ArrayLike, R1: ArrayLike, duration: ArrayLike) -> dict[str, Array]:
+    """Return the arrays of an `AlongGeodesic`, from the arguments of `geodesic_so3`."""
+    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    T = as_duration("duration", duration)
+    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), duration=(T, 0))
+    turn = np.broadcast_to(log_so3(np.swapaxes(R0, -1, -2) @ R1), (*batch, 3))
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    K = hat(turn / np.where(angle == 0, 1.0, angle))
+    swept = R0 @ K
+    terms = np.stack(np.broadcast_arrays(R0, swept, swept @ K), axis=-3)
+    return {"duration": np.broadcast_to(T, batch), "rotation_vector": turn, "terms": terms}
 
 
-def retime(curve: Curve, duration: float) -> Retimed:
+def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     """Return the curve reparameterised linearly to a new duration, with the same start time.
 
     Parameters
     ----------
     curve : Curve
         Or a stack of them.
-    duration : float
-        The new duration, in s or any other unit of time; more than 0.
+    duration : array_like, shape (...)
+        The new duration, in s or any other unit of time; one, or one for each curve.
 
     Returns
     -------
-    Retimed
-        A `Curve` on [a, a + duration], a the first time of `curve`, which is 0 except for a
-        `chain`. Velocities and accelerations are per unit of the new time: k times the duration
-        divides them by k and k². `acceleration_cost` falls by k³.
+    Curve
+        Of the same kind. Velocities and accelerations are per unit of the new time: k times the
+        duration divides them by k and k², and `acceleration_cost` by k³. A `chain` that takes k
+        times as long is at its poses at a + k (t − a), a its first time.
 
     Raises
     ------
     ValueError
-        If `curve` is no `Curve`, `duration` no number above 0, or so short that accelerations
-        overflow or that it vanishes beside the first time.
+        If `curve` is no `Curve`, `duration` is not from 1e-100 up or does not broadcast with the
+        stack, or vanishes beside the first time.
 
     See Also
     --------
     chain : Through many poses, at times of your own.
-
-    Notes
-    -----
-    To arrive with the angular velocity w after T seconds, make a curve with the end velocity T w,
-    then retime it to T. A chain that takes k times as long is at its poses at a + k (t − a).
 
     Examples
     --------
@@ -506,58 +511,18 @@ def retime(curve: Curve, duration: float) -> Retimed:
     """
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve wanted, got {curve!r}")
-    time, (start, end) = as_positive("duration", duration), curve.domain
-    if start + time == start:
-        raise ValueError(f"duration is {time}: that vanishes beside the first time, {start}")
-    if time < SHORTEST * (end - start):
-        raise ValueError(f"duration is {time}: too short, accelerations would overflow")
-    return Retimed(curve, (end - start) / time, (start, start + time))
-
-
-def start_and_rotation_vector(R0: ArrayLike, R1: ArrayLike) -> tuple[Array, Array]:
-    """Return R0 as an array, and log_so3(R0ᵀ R1); or raise the ValueError of `geodesic_so3`."""
-    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
-    check_broadcast(R0=(R0, 2), R1=(R1, 2))
-    return R0, log_so3(np.swapaxes(R0, -1, -2) @ R1)
+    T = as_duration("duration", duration)
+    if check_broadcast(curve=(curve.duration, 0), duration=(T, 0)) != curve.batch_shape:
+        raise ValueError(
+            f"duration: one, or one for each curve of a stack of shape {curve.batch_shape}, is "
+            f"wanted, got shape {T.shape}"
+        )
+    return curve.lasting(np.broadcast_to(T, curve.batch_shape))
 
 
 def identity(t: Array, order: int) -> Array:
     """Return t, or its derivative."""
     return t if order == 0 else np.full_like(t, order == 1)
-
-
-def combine(weights: Array, terms: Array, which: Chosen, out: Array) -> None:
-    """Write the sums over n of weights[n] terms[n] of the curves which[k] into out[:, k].
-
-    Parameters
-    ----------
-    weights : ndarray, shape (n, T, K) or (n, T, 1)
-    terms : ndarray, shape (n, count, m)
-    which : ndarray of int, shape (K,)
-    out : ndarray, shape (T, K, m)
-    """
-    if len(which) == 1:
-        np.matmul(weights[:, :, 0].T, terms[:, which[0]], out=out[:, 0])
-    elif weights.shape[2] == 1:
-        columns = np.take(terms, which, axis=1).reshape(len(terms), -1)
-        out[...] = (weights[:, :, 0].T @ columns).reshape(out.shape)
-    elif len(out) == 1 and has_long_runs(which):
-        for curve, run in runs(which):
-            np.matmul(weights[:, 0, run].T, terms[:, curve], out=out[0, run])
-    else:
-        np.einsum("ntk,nkm->tkm", weights, np.take(terms, which, axis=1), out=out)
-
-
-def runs(which: Chosen) -> Iterator[tuple[int, slice]]:
-    """Yield each stretch of equal numbers, and where it is."""
-    cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist()] if len(which) else []
-    for start, end in pairwise([*cuts, len(which)]):
-        yield int(which[start]), slice(start, end)
-
-
-def has_long_runs(which: Chosen) -> bool:
-    """Tell whether equal numbers stand together, `LONG_RUN` of them or more in the mean."""
-    return len(which) >= LONG_RUN * (1 + int(np.count_nonzero(np.diff(which))))
 
 
 def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
@@ -566,8 +531,21 @@ def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
     return f" of curve {index}" if index else ""
 
 
-def events_of(times: ArrayLike, margins: ArrayLike) -> list[tuple[float, float]]:
-    """Return the times at which margins are small, and about how long curves turn quickly there.
+def check_defined(
+    t: Array, lost: NDArray[np.bool_], reason: str, *, by_curve: bool = False
+) -> None:
+    """Raise a `SingularTime` for the first time t, shape (T, count), at which a curve is lost.
+
+    If `by_curve`, the shape is (count, T).
+    """
+    if lost.any():
+        place = tuple(np.argwhere(lost)[0])
+        curve = place[0] if by_curve else place[1]
+        raise SingularTime(float(np.broadcast_to(t, lost.shape)[place]), int(curve), reason)
+
+
+def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
+    """Return `graded` breakpoints with those near times of small margin, where curves turn fast.
 
     Raises
     ------
@@ -577,8 +555,18 @@ def events_of(times: ArrayLike, margins: ArrayLike) -> list[tuple[float, float]]
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
         raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
-    when = np.broadcast_to(np.ravel(times), gaps.shape)
-    return [(float(t), gap / 4) for t, gap in zip(when, gaps, strict=True) if gap < 0.25]
+    when, small = np.broadcast_to(np.ravel(times), gaps.shape), gaps < 0.25
+    return graded(points, when[small], gaps[small] / 4)
+
+
+def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
+    """Return breakpoints in [0, 1], with more of them from 1/32 down to some widths near times."""
+    cuts = [points]
+    for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
+        apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
+        cuts += [np.append(when - apart, when), when + apart]
+    points = np.unique(np.concatenate(cuts))
+    return points[(points >= 0) & (points <= 1)]
 
 
 def least_over_time(

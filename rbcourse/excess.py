@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._chebyshev import grid, tails
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, matvec
 from rbcourse.closed_forms import seen_from_the_middle
 from rbcourse.cost import check_curve, summed
 from rbcourse.curves import Curve, Ends
+from rbcourse.paths import smooth_parts
 from rbcourse.so3 import exp_so3, log_so3
 
 _NODES = 33
@@ -169,26 +170,21 @@ def excess_estimate(curve: Curve) -> Array:
     0.0197
     """
     check_curve(curve)
-    legs, durations = curve._unit_legs("excess estimate", 1)
+    legs = smooth_parts(curve, "excess estimate", 1)
     t, derivative, integral, _ = grid(_NODES)
-    R, w, a, b = (legs(t, order) for order in range(4))
+    R, w, a, b = (legs.flat.values(t[:, None], order) for order in range(4))
     lost = np.isnan(R).any(axis=(0, -2, -1))
     R[:, lost] = np.eye(3)
     middle = R[_NODES // 2]
-    r = np.tensordot(derivative, _turned(R, b), axes=1)  # R (w''' + w × w''), as (R w'')'
+    r = np.tensordot(derivative, matvec(R, b), axes=1)  # R (w''' + w × w''), as (R w'')'
     parallel = exp_so3(log_so3(middle.mT @ R) / -2) @ middle.mT
-    bend = np.tensordot(integral @ integral, _turned(parallel, r), axes=1)
+    bend = np.tensordot(integral @ integral, matvec(parallel, r), axes=1)
     for line in (np.ones(_NODES), np.sqrt(3) * (2 * t - 1)):  # of norm 1, and orthogonal
         bend -= np.multiply.outer(line, np.tensordot(integral[-1] * line, bend, axes=1))
     saved, cost = (integral[-1] @ np.sum(x**2, axis=-1).reshape(_NODES, -1) for x in (bend, a))
     fast = np.linalg.norm(w, axis=-1).max(axis=0).ravel() >= SPEED_LIMIT
     rough = tails(np.moveaxis(a.reshape(_NODES, -1, 3), 1, 0)) > _SMOOTH * np.sqrt(cost)
     saved[fast | rough | lost.ravel() | (saved > cost / 2)] = np.nan
-    rates = (1 / np.asarray(durations, float)) ** 3
-    saved, cost = (summed(curve, legs, rates, x) for x in (saved, cost))
+    saved, cost = (summed(curve, x, legs, 3) for x in (saved, cost))
     with np.errstate(invalid="ignore"):  # 0/0
         return saved / (cost - saved)
-
-
-def _turned(R: Array, x: Array) -> Array:
-    return (R @ x[..., None])[..., 0]

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, as_positive, as_single, as_unit, check_broadcast
-from rbcourse._numerics import EPS, Array
-from rbcourse.curves import Chosen, Curve, Ends, geodesic_so3, with_inertia
-from rbcourse.optimum import solve
-from rbcourse.projected_cubic import (
-    ProjectedPolynomial,
-    hermite_stack,
-    projected_cubic,
-    stack_terms,
-    watched,
+from rbcourse._checks import (
+    as_duration,
+    as_finite,
+    as_positive,
+    as_single,
+    as_unit,
+    check_broadcast,
 )
+from rbcourse._hermite import hermite_stack, stack_terms
+from rbcourse._numerics import EPS, Array, matvec
+from rbcourse.curves import Curve, Ends, geodesic_so3, with_inertia
+from rbcourse.optimum import solve
+from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic, watched
 from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
 from rbcourse.search import ball, body
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RigidMotion(Curve):
     """The `Curve` on SE(3) of a rotation R(t) and a polynomial path d(t) of a point of the body.
 
@@ -30,10 +34,10 @@ class RigidMotion(Curve):
     ----------
     rotation : Curve
         R(t), on SO(3).
-    path : ndarray, shape (n, ..., 3)
-        d(0), d(1), and for a cubic d'(0), d'(1), for a quintic d''(0), d''(1) too: in m, fixed
-        frame; of the point `centre`.
-    centre : ndarray, shape (3,)
+    path : ndarray, shape (..., n, 3)
+        d(0), d(1), and for a cubic d'(0), d'(1), for a quintic d''(0), d''(1) too, for the time
+        from 0 to 1: in m, fixed frame; of the point `centre`.
+    centre : ndarray, shape (..., 3)
         The point of the body that the path is of, body frame, in m; 0 is the origin.
 
     References
@@ -41,53 +45,58 @@ class RigidMotion(Curve):
     BK 6.3.
     """
 
-    size = 4
-    per_curve: ClassVar[dict[str, int]] = {"rotation": 0, "path": 1}
+    rotation: Curve
+    path: Array
+    centre: Array
 
-    def __init__(self, rotation: Curve, *path: Array, centre: Array | None = None) -> None:
-        self.centre = np.zeros(3) if centre is None else centre
-        batches = (point.shape[:-1] for point in path)
-        self.batch_shape = np.broadcast_shapes(rotation.batch_shape, *batches)
-        self.path = np.stack([np.broadcast_to(point, (*self.batch_shape, 3)) for point in path])
-        numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
-        self.rotation = rotation.take(np.broadcast_to(numbers, self.batch_shape))
-
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        """Write (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
-        d = np.moveaxis(hermite_stack(self._entries, t, which, order), 0, -1)
-        R = self._turning(t, which, 0)
+    def values(self, t: Array, order: int) -> Array:
+        """Return (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
+        by_curve = len(t) > self.count  # the longer axis last
+        d = hermite_stack(self._terms, t.T if by_curve else t, order, by_curve=by_curve)
+        d = d.T if by_curve else np.moveaxis(d, 0, -1)
+        R = self.rotation.values(t, 0)
+        values = np.empty((len(t), self.count, *self._core(order)))
         if order == 0:
-            out[..., :3, :3], out[..., :3, 3] = R, d - self._arm(t, which, 0, R)
-            out[..., 3, :3], out[..., 3, 3] = 0, 1
+            values[..., :3, :3], values[..., :3, 3] = R, d - self._arm(t, 0, R)
+            values[..., 3, :3], values[..., 3, 3] = 0, 1
         else:
-            turning = self._turning(t, which, order)
-            moving = (np.swapaxes(R, -1, -2) @ d[..., None])[..., 0]
-            out[..., :3], out[..., 3:] = turning, moving - self._arm(t, which, order, turning)
-
-    def _turning(self, t: Array, which: Chosen, order: int) -> Array:
-        values = np.empty((np.shape(t)[0], len(which), *self.rotation._core(order)))
-        self.rotation._at(t, which, order, values)
+            values[..., :3] = turning = self.rotation.values(t, order)
+            values[..., 3:] = matvec(R.mT, d) - self._arm(t, order, turning)
         return values
 
-    def _arm(self, t: Array, which: Chosen, order: int, turning: Array) -> Array | float:
+    def _arm(self, t: Array, order: int, turning: Array) -> Array | float:
         """Return R r, w × r or w' × r + w × (w × r): the centre's own part of its motion."""
         r = self.centre
         if not r.any():
             return 0.0
         if order == 0:
-            return turning @ r
+            return matvec(turning, r)
         if order == 1:
             return np.cross(turning, r)
-        w = self._turning(t, which, 1)
+        w = self.rotation.values(t, 1)
         return np.cross(turning, r) + np.cross(w, np.cross(w, r))
 
     @cached_property
-    def _entries(self) -> Array:
+    def _terms(self) -> Array:
         """The terms of the path, shape (n + 1, 3, count)."""
-        return stack_terms(self._flat(self.path, 1))
+        return stack_terms(self.path)
 
-    def _events(self) -> list[tuple[float, float]]:
-        return self.rotation._events()
+    @property
+    def size(self) -> int:
+        """Of its matrices."""
+        return 4
+
+    @property
+    def breakpoints(self) -> Array:
+        """As `Curve.breakpoints`, of the rotation."""
+        return self.rotation.breakpoints
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the motion and its rotation with another duration."""
+        return replace(self, duration=duration, rotation=self.rotation.lasting(duration))
+
+
+Motion = TypeVar("Motion", bound=RigidMotion)
 
 
 class ProjectedMotion(RigidMotion):
@@ -101,13 +110,32 @@ class ProjectedMotion(RigidMotion):
         return self.rotation.margin
 
 
-def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
+def rigid_motion(
+    kind: type[Motion], rotation: Curve, *path: Array, centre: Array | None = None
+) -> Motion:
+    """Return the motion of a rotation and a path; its velocities are per unit of their time."""
+    batch = np.broadcast_shapes(rotation.batch_shape, *(x.shape[:-1] for x in path))
+    numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
+    turning = rotation.take(np.broadcast_to(numbers, batch))
+    T = turning.duration[..., None]
+    ends = [np.broadcast_to(T ** (i // 2) * x, (*batch, 3)) for i, x in enumerate(path)]
+    return kind(
+        duration=turning.duration,
+        rotation=turning,
+        path=np.stack(ends, axis=-2),
+        centre=np.broadcast_to(0.0 if centre is None else centre, (*batch, 3)),
+    )
+
+
+def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> RigidMotion:
     """Return the shortest curve from A0 to A1 in metric (14): turn and straight line at once.
 
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
         Poses. Validity is not checked (see `project_se`); the last row is not read.
+    duration : array_like, shape (...), optional
+        How long it takes.
 
     Returns
     -------
@@ -118,7 +146,6 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
     See Also
     --------
     screw_se3 : The other natural motion, a geodesic of another metric.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -140,7 +167,7 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike) -> RigidMotion:
     A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     check_broadcast(A0=(A0, 2), A1=(A1, 2))
     (R0, d0), (R1, d1) = split(A0), split(A1)
-    return RigidMotion(geodesic_so3(R0, R1), d0, d1)
+    return rigid_motion(RigidMotion, geodesic_so3(R0, R1, duration=duration), d0, d1)
 
 
 def projected_cubic_se3(
@@ -150,6 +177,8 @@ def projected_cubic_se3(
     w1: ArrayLike,
     d0_dot: ArrayLike,
     d1_dot: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> ProjectedMotion:
     """Return the near-optimal minimum-acceleration motion: projected cubic, and a cubic in R³.
 
@@ -162,6 +191,8 @@ def projected_cubic_se3(
         Angular velocities there, body frame, in rad per unit time.
     d0_dot, d1_dot : array_like, shape (..., 3)
         Velocities of the origin there, *fixed* frame, in m per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -183,7 +214,6 @@ def projected_cubic_se3(
     See Also
     --------
     minimum_acceleration_se3 : The optimum with the same ends.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -204,7 +234,8 @@ def projected_cubic_se3(
            [ 0.   ,  0.   ,  0.   ]])
     """
     ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
-    return ProjectedMotion(watched(projected_cubic(ends)), *path)
+    rotation = watched(projected_cubic(*ends.over(duration)))
+    return rigid_motion(ProjectedMotion, rotation, *path)
 
 
 def minimum_acceleration_se3(
@@ -218,6 +249,7 @@ def minimum_acceleration_se3(
     inertia: ArrayLike | None = None,
     mass: float = 1.0,
     centre: ArrayLike = (0.0, 0.0, 0.0),
+    duration: ArrayLike = 1.0,
 ) -> RigidMotion:
     """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic.
 
@@ -237,6 +269,8 @@ def minimum_acceleration_se3(
         Of the body, more than 0. It changes what the motion costs, but not the motion.
     centre : array_like, shape (3,), optional
         The centre of mass, in the body frame, in m; by default its origin.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -262,7 +296,6 @@ def minimum_acceleration_se3(
     See Also
     --------
     projected_cubic_se3 : Its near-optimal stand-in, in closed form.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -286,24 +319,23 @@ def minimum_acceleration_se3(
     ends, (d0, d1, v0, v1) = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
     r = as_single("centre", centre, 3)
     as_positive("mass", mass)
-    task = ball(ends) if inertia is None else body(*with_inertia(ends, inertia), of_torque=False)
-    (R0, R1, w0, w1), rotation = ends, solve(task)
-    path = d0 + R0 @ r, d1 + R1 @ r, v0 + _spun(R0, w0, r), v1 + _spun(R1, w1, r)
-    return RigidMotion(rotation, *path, centre=r)
+    R0, R1, w0, w1 = ends
+    v0, v1 = v0 + matvec(R0, np.cross(w0, r)), v1 + matvec(R1, np.cross(w1, r))
+    given, T = ends.over(duration)
+    task = ball(given) if inertia is None else body(*with_inertia(given, inertia), of_torque=False)
+    rotation = solve(task, T)
+    return rigid_motion(RigidMotion, rotation, d0 + R0 @ r, d1 + R1 @ r, v0, v1, centre=r)
 
 
-def _spun(R: Array, w: Array, r: Array) -> Array:
-    """Return R (w × r), the velocity that turning gives to the point r of a body, fixed frame."""
-    return (R @ np.cross(w, r)[..., None])[..., 0]
-
-
-def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
+def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
     """Return the screw motion from A0 to A1: about one axis, at constant twist.
 
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
         Poses. Validity is not checked (see `project_se`); the last row is not read.
+    duration : array_like, shape (...), optional
+        How long it takes.
 
     Returns
     -------
@@ -315,7 +347,6 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
     --------
     geodesic_se3 : The same turn, while the origin runs straight.
     screw_from_pose : The axis and the pitch.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -337,10 +368,17 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike) -> ScrewMotion:
     array([ 1., -1.,  1.])
     """
     A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
-    check_broadcast(A0=(A0, 2), A1=(A1, 2))
-    return ScrewMotion(join(*split(A0)), log_se3(inverse_se3(A0) @ A1))
+    T = as_duration("duration", duration)
+    batch = check_broadcast(A0=(A0, 2), A1=(A1, 2), duration=(T, 0))
+    start, S = join(*split(A0)), log_se3(inverse_se3(A0) @ A1)
+    return ScrewMotion(
+        duration=np.broadcast_to(T, batch),
+        A0=np.broadcast_to(start, (*batch, 4, 4)),
+        displacement=np.broadcast_to(S, (*batch, 6)),
+    )
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ScrewMotion(Curve):
     """The `Curve` A0 exp_se3(S t), of constant twist S.
 
@@ -348,6 +386,8 @@ class ScrewMotion(Curve):
     ----------
     A0 : ndarray, shape (..., 4, 4)
         The start.
+    displacement : ndarray, shape (..., 6)
+        S times the duration.
     twist : ndarray, shape (..., 6)
         S = (ω, v), body frame.
 
@@ -356,21 +396,27 @@ class ScrewMotion(Curve):
     BK 2.6.
     """
 
-    size = 4
-    per_curve: ClassVar[dict[str, int]] = {"A0": 0, "twist": 0}
+    A0: Array
+    displacement: Array
 
-    def __init__(self, A0: Array, twist: Array) -> None:
-        self.batch_shape, self.twist = twist.shape[:-1], twist
-        self.A0 = np.broadcast_to(A0, (*self.batch_shape, 4, 4))
+    @property
+    def size(self) -> int:
+        """Of its matrices."""
+        return 4
 
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        S = self._flat(self.twist)[which]
+    @property
+    def twist(self) -> Array:
+        """(ω, v), body frame."""
+        return self.displacement / self.duration[..., None]
+
+    def values(self, t: Array, order: int) -> Array:
+        """Return A0 exp(S t), S, or (0, ω × v)."""
+        S = self.displacement
         if order == 0:
-            out[...] = self._flat(self.A0)[which] @ exp_se3(t[..., None] * S)
-        elif order == 1:
-            out[...] = S
-        else:
-            out[..., :3], out[..., 3:] = 0, np.cross(S[:, :3], S[:, 3:])
+            return self.A0 @ exp_se3(t[..., None] * S)
+        if order == 2:
+            S = np.concatenate([0 * S[:, :3], np.cross(S[:, :3], S[:, 3:])], axis=-1)
+        return np.broadcast_to(S, (len(t), *S.shape))
 
 
 def screw_from_pose(A: ArrayLike) -> Screw:

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import warnings
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
 from rbcourse._numerics import Array
-from rbcourse.curves import Chosen, Curve, Ends, combine, with_inertia
+from rbcourse.curves import Curve, Ends, retime, weighted_sums, with_inertia
 from rbcourse.functionals import Functional
-from rbcourse.projected_cubic import check_ends_of_quintic
+from rbcourse.projected_cubic import ends_of_quintic
 from rbcourse.relaxation import Failure, Solution, orthogonal
 from rbcourse.search import COARSE, Task, ball, body, cheapest, jerk
+
+_FOUND = [
+    ("converged", bool),
+    ("nodes", int),
+    ("iterations", int),
+    ("cost", float),
+    ("residual", float),
+]
 
 
 def minimum_acceleration_so3(
@@ -25,6 +33,8 @@ def minimum_acceleration_so3(
     w0: ArrayLike,
     w1: ArrayLike,
     inertia: ArrayLike | None = None,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> Optimum:
     """Return the minimum-acceleration curve with these ends, of a ball or of any body.
 
@@ -37,6 +47,8 @@ def minimum_acceleration_so3(
     inertia : array_like, shape (..., 3, 3), optional
         G, the metric or the inertia of a body, body frame: symmetric and positive definite. By
         default 2 I, the metric (12).
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -68,7 +80,6 @@ def minimum_acceleration_so3(
     minimum_torque_so3, minimum_jerk_so3 : Least torque, and least jerk.
     projected_cubic_so3, weighted_cubic_so3 : Near-optimal stand-ins, in closed form.
     acceleration_cost : What they cost.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -124,14 +135,20 @@ def minimum_acceleration_so3(
     >>> (c(0.5) @ c.costate(0.5)).round(6) - c.c.round(6)
     array([0., 0., 0.])
     """
-    given = Ends(R0, R1, w0, w1)
+    given, T = Ends(R0, R1, w0, w1).over(duration)
     if inertia is None:
-        return solve(ball(given))
-    return solve(body(*with_inertia(given, inertia), of_torque=False))
+        return solve(ball(given), T)
+    return solve(body(*with_inertia(given, inertia), of_torque=False), T)
 
 
 def minimum_torque_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, inertia: ArrayLike
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    inertia: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> Optimum:
     """Return the curve with these ends that takes a body there with the least squared torque.
 
@@ -143,6 +160,8 @@ def minimum_torque_so3(
         Angular velocities there, body frame, in rad per unit time.
     inertia : array_like, shape (..., 3, 3)
         G, body frame: symmetric and positive definite.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -167,7 +186,6 @@ def minimum_torque_so3(
     rbcourse.textbook.minimum_torque_so3 : The equation, and SciPy's `solve_bvp`.
     minimum_acceleration_so3 : The least of ∫ τᵀ G⁻¹ τ dt, the covariant acceleration.
     torque_cost : What curves cost.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -199,12 +217,19 @@ def minimum_torque_so3(
     >>> float(torque_cost(c, book).round(9))  # about a principal axis 12 (2.22 · 1.5)²
     133.0668
     """
-    given = Ends(R0, R1, w0, w1)
-    return solve(body(*with_inertia(given, inertia), of_torque=True))
+    given, T = Ends(R0, R1, w0, w1).over(duration)
+    return solve(body(*with_inertia(given, inertia), of_torque=True), T)
 
 
 def minimum_jerk_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    a0: ArrayLike,
+    a1: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> Optimum:
     """Return the minimum-jerk curve with these ends.
 
@@ -216,6 +241,8 @@ def minimum_jerk_so3(
         Angular velocities there, body frame, in rad per unit time.
     a0, a1 : array_like, shape (..., 3)
         Angular accelerations w' there, body frame, in rad per unit time squared.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -240,7 +267,6 @@ def minimum_jerk_so3(
     --------
     exponential_quintic_so3 : Its near-optimal stand-in, in closed form.
     jerk_cost : What curves cost.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -267,7 +293,8 @@ def minimum_jerk_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return solve(jerk(*check_ends_of_quintic(R0, R1, w0, w1, a0, a1)))
+    ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
+    return solve(jerk(ends, a0, a1), T)
 
 
 def stationary_so3(guess: Curve) -> Optimum:
@@ -276,13 +303,13 @@ def stationary_so3(guess: Curve) -> Optimum:
     Parameters
     ----------
     guess : Curve
-        On SO(3) and [0, 1], or a stack of them.
+        On SO(3), or a stack of them.
 
     Returns
     -------
     Optimum
-        A `Curve`, or a stack of them, with the rotations and the velocities of the guess at t = 0
-        and 1, and R w'' constant, as for the least ∫ 2 ‖w'‖² dt. It need not be the cheapest; NaN
+        A `Curve`, or a stack of them, with the rotations and the velocities of the guess at both
+        ends, and R w'' constant, as for the least ∫ 2 ‖w'‖² dt. It need not be the cheapest; NaN
         where nothing is found (see ``converged``).
 
     Raises
@@ -306,16 +333,16 @@ def stationary_so3(guess: Curve) -> Optimum:
     >>> bool(np.abs(c([0, 1], 1) - guess([0, 1], 1)).max() < 1e-12), c.residual < 1e-12
     (True, True)
     """
-    if not isinstance(guess, Curve) or (guess.size, guess.domain) != (3, (0, 1)):
-        raise ValueError(f"guess: a Curve on SO(3) and [0, 1] is wanted, got {guess!r}")
-    values = guess([0, 1]), guess([0, 1], 1)
-    if not np.isfinite(values[1]).all():
+    if not isinstance(guess, Curve) or guess.size != 3 or guess.domain[0] != 0:
+        raise ValueError(f"guess: a Curve on SO(3) from t = 0 on is wanted, got {guess!r}")
+    unit = retime(guess, 1.0)
+    (R0, R1), (w0, w1) = (unit([0, 1], order) for order in (0, 1))
+    if not np.isfinite([w0, w1]).all():
         raise ValueError("guess: a curve is NaN, it did not converge")
-    task = ball(Ends(*values[0], *values[1]))
-    R = np.moveaxis(guess(grid(COARSE).t).reshape(COARSE, -1, 3, 3), 0, 1)
+    task = ball(Ends(R0, R1, w0, w1))
+    R = np.moveaxis(unit(grid(COARSE).t).reshape(COARSE, -1, 3, 3), 0, 1)
     with np.errstate(over="ignore", invalid="ignore"):
-        solutions = task.solver(task.equations, R)
-    return Optimum(task.functional, task.equations.ends, solutions, task.batch)
+        return _optimum(task, task.solver(task.equations, R), guess.duration)
 
 
 class ConvergenceError(RuntimeError):
@@ -342,6 +369,7 @@ class ConvergenceError(RuntimeError):
         return type(self), (self.residual, self.iterations)
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Optimum(Curve):
     """A `Curve` on SO(3), or a stack of them, along which R p is constant; as Chebyshev series.
 
@@ -358,7 +386,8 @@ class Optimum(Curve):
     cost : float or ndarray, shape (...)
         What is least: as `acceleration_cost`, `torque_cost` or `jerk_cost` of the curve.
     residual : float or ndarray, shape (...)
-        The largest error of the equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes.
+        The largest error of the equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for the
+        time from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
         How many steps the solver took, and how many nodes carry the curve.
 
@@ -367,51 +396,57 @@ class Optimum(Curve):
     beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
     """
 
-    def __init__(
-        self,
-        functional: Functional,
-        ends: Array,
-        solutions: list[Solution | Failure],
-        batch_shape: tuple[int, ...],
-    ) -> None:
-        self.functional, self._ends, self.batch_shape = functional, ends, batch_shape
-        self._solutions, total = solutions, len(solutions)
-        found = {i: s for i, s in enumerate(solutions) if isinstance(s, Solution)}
-        nodes, c = np.zeros(total, int), np.full((total, 3), np.nan)
-        for i, solution in found.items():
-            nodes[i], c[i] = len(solution.R), solution.c
-        cost = np.array([s.cost if isinstance(s, Solution) else np.nan for s in solutions], float)
-        residual = np.array([s.residual for s in solutions], float)
-        iterations = np.array([s.iterations for s in solutions], int)
-        beaten = np.array([isinstance(s, Solution) and s.beaten for s in solutions], bool)
-        self.c = (np.reshape(functional.unit, (-1, 1)) * c).reshape(*batch_shape, 3)
-        self.converged, self.nodes, self.cost, self.residual, self.iterations = (
-            x.reshape(batch_shape) if batch_shape else x.item()
-            for x in ((nodes > 0) & ~beaten, nodes, functional.scale * cost, residual, iterations)
-        )
+    functional: Functional
+    series: Array  # of the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
+    constant: Array  # c for the time from 0 to 1
+    found: NDArray[np.void]  # what is told of each problem, by `_FOUND`
 
-    @cached_property
-    def _series(self) -> list[Array]:
-        """The Chebyshev series of R, w, w', …, shape (n, count, 9) or (n, count, 3).
+    @property
+    def c(self) -> Array:
+        """R p, in the fixed frame."""
+        return self.constant / self.duration[..., None] ** (self.functional.ends + 1)
 
-        Series of fewer nodes are padded with zeros. Where no solution was found they are NaN.
-        """
-        nodes, m = np.ravel(self.nodes), self._ends.shape[1]
-        most, orders = nodes.max(initial=1) + m, range(m + 2)
-        series = [np.zeros((most, len(nodes), 3 if order else 9)) for order in orders]
-        for n in np.unique(nodes[nodes > 0]):
-            index = np.flatnonzero(nodes == n)
-            solutions = [self._solutions[i] for i in index]
-            R, k = (np.stack([getattr(one, name) for one in solutions]) for name in ("R", "k"))
-            by = primitives(n, m)
-            rates = zip(by.series_from_ends, by.series_from_k, strict=True)
-            w = [E @ self._ends[index] + K @ k for E, K in rates]
-            for whole, part in zip(series, [along(grid(n).series, R), *w], strict=True):
-                columns = part.reshape(*part.shape[:2], -1).swapaxes(0, 1)
-                whole[: len(columns), index] = columns
-        for whole in series:
-            whole[:, nodes == 0] = np.nan
-        return series
+    @property
+    def cost(self) -> Any:
+        """What is least."""
+        return self._told(self.found["cost"] / self.duration ** (self.functional.ends + 1))
+
+    @property
+    def converged(self) -> Any:
+        """Where a solution was found, and no curve that was tried costs less."""
+        return self._told(self.found["converged"])
+
+    @property
+    def residual(self) -> Any:
+        """The largest error of the equations."""
+        return self._told(self.found["residual"])
+
+    @property
+    def iterations(self) -> Any:
+        """How many steps the solver took."""
+        return self._told(self.found["iterations"])
+
+    @property
+    def nodes(self) -> Any:
+        """How many nodes carry the curve."""
+        return self._told(self.found["nodes"])
+
+    def _told(self, values: NDArray[Any]) -> Any:
+        return values if self.batch_shape else values.item()
+
+    def take(self, index: Any) -> Self:
+        """Return the stack of the curves with these numbers, which count through the stack."""
+        functional = self.functional.take(np.reshape(index, -1))
+        return replace(super().take(index), functional=functional)
+
+    def values(self, t: Array, order: int) -> Array:
+        """Return the sums of the series; of R without their rounding."""
+        columns = slice(9) if order == 0 else slice(6 + 3 * order, 9 + 3 * order)
+        terms = self.series[..., columns]
+        weights = chebyshev(t, terms.shape[1])
+        if order:
+            return weighted_sums(weights, terms, 3)
+        return orthogonal(weighted_sums(weights, terms, 3, 3))
 
     def costate(self, t: ArrayLike) -> Array:
         """Return p at the times t, body frame: R p is `c`.
@@ -436,22 +471,9 @@ class Optimum(Curve):
         """
         times = as_time(t, 0, self.domain)
         orders = range(1, self.functional.ends + 2)
-        rates = [self._at_all(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
+        rates = [self.evaluate(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
         p = np.reshape(self.functional.unit, (-1, 1, 1)) * self.functional.p(*rates)
         return p.swapaxes(0, 1).reshape(*times.shape, *self.batch_shape, 3)
-
-    def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these numbers, which count through the stack."""
-        numbers = np.reshape(index, -1)
-        functional, solutions = self.functional.take(numbers), [self._solutions[i] for i in numbers]
-        return type(self)(functional, self._ends[numbers], solutions, np.shape(index))
-
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        terms = self._series[order]
-        weights = np.moveaxis(chebyshev(t, len(terms)), -1, 0)
-        combine(weights, terms, which, out.reshape(*out.shape[:2], terms.shape[-1]))
-        if order == 0:
-            out[...] = orthogonal(out)
 
     def _what(self) -> str:
         return self.functional.name
@@ -462,7 +484,7 @@ class Optimum(Curve):
         return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 
 
-def solve(task: Task) -> Optimum:
+def solve(task: Task, duration: Array) -> Optimum:
     """Return for each problem the cheapest curve that is found from its starts.
 
     Raises
@@ -478,9 +500,48 @@ def solve(task: Task) -> Optimum:
     solutions = cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
-    curve = Optimum(task.functional, task.equations.ends, solutions, task.batch)
+    curve = _optimum(task, solutions, duration)
     _warn_if_not_converged(curve)
     return curve
+
+
+def _optimum(task: Task, solutions: list[Solution | Failure], duration: Array) -> Optimum:
+    """Return the curves of solutions."""
+    functional, ends, batch = task.functional, task.equations.ends, task.batch
+    found, c = np.zeros(len(solutions), _FOUND), np.full((len(solutions), 3), np.nan)
+    for i, one in enumerate(solutions):
+        found[i] = False, 0, one.iterations, np.nan, one.residual
+        if isinstance(one, Solution):
+            c[i] = one.c
+            found[i] = not one.beaten, len(one.R), one.iterations, one.cost, one.residual
+    found["cost"] *= functional.scale
+    c *= np.reshape(functional.unit, (-1, 1))
+    series = _series(ends, solutions, found["nodes"])
+    return Optimum(
+        duration=np.broadcast_to(duration, batch),
+        functional=functional,
+        series=series.reshape(*batch, *series.shape[1:]),
+        constant=c.reshape(*batch, 3),
+        found=found.reshape(batch),
+    )
+
+
+def _series(ends: Array, solutions: list[Solution | Failure], nodes: Array) -> Array:
+    """Return the Chebyshev series of R, w, w', …, shape (count, n, 9 + 3 + …).
+
+    Series of fewer nodes are padded with zeros. Where no solution was found they are NaN.
+    """
+    m = ends.shape[1]
+    series = np.zeros((len(nodes), nodes.max(initial=1) + m, 12 + 3 * m))
+    for n in np.unique(nodes[nodes > 0]):
+        index = np.flatnonzero(nodes == n)
+        R, k = (np.stack([solutions[i][part] for i in index]) for part in (0, 1))
+        by = primitives(n, m)
+        series[index, :n, :9] = along(grid(n).series, R).reshape(len(index), n, 9)
+        for order, (E, K) in enumerate(zip(by.series_from_ends, by.series_from_k, strict=True)):
+            series[index, : len(E), 9 + 3 * order : 12 + 3 * order] = E @ ends[index] + K @ k
+    series[nodes == 0] = np.nan
+    return series
 
 
 def _warn_if_not_converged(curve: Optimum) -> None:

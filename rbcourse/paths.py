@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from inspect import Parameter, signature
-from typing import Any
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import EPS, Array
-from rbcourse.curves import SHORTEST, Chosen, Curve, SingularTime
-from rbcourse.motions import RigidMotion, projected_cubic_se3
+from rbcourse._numerics import EPS, Array, blocks, matvec
+from rbcourse.curves import BLOCK, Curve, SingularTime
+from rbcourse.motions import RigidMotion, projected_cubic_se3, rigid_motion
 from rbcourse.projected_cubic import projected_cubic_so3
 from rbcourse.se3 import check_path
 from rbcourse.so3 import log_so3, right_jacobian_so3
 
 Leg = Callable[..., Curve]
 
-LONGEST = 1e100  # of a duration
+_SHORTEST, _LONGEST = 1e-100, 1e100  # of a duration
 _HALF_TURN = math.pi - 1e-6
 _EQUAL = 1e-12
 _ARRIVED = 1e-6
@@ -48,11 +49,11 @@ def chain(
     leg : callable, optional
         What joins two poses: a function of this package that returns two-point curves, or one of
         your own that returns a stack of them. It is called once for all legs, with keyword
-        arguments; its parameters must be among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1. They
-        are in a leg's own time from 0 to 1 (h ω, h² ω' for a leg of duration h), d0_dot and d1_dot
-        in the fixed frame. A function for rotations also joins poses: the origin then moves on the
-        polynomial with as many boundary conditions. By default
-        `projected_cubic_so3`, or `projected_cubic_se3`.
+        arguments: ``duration``, how long each leg takes, and its other parameters, which must be
+        among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1; d0_dot and d1_dot are in the fixed
+        frame. A function for rotations also joins poses: the origin then moves on the
+        polynomial with as many boundary conditions. By default `projected_cubic_so3`, or
+        `projected_cubic_se3`.
 
     Returns
     -------
@@ -129,26 +130,27 @@ def chain(
         w, d_dot = velocities[:, :3], _rotated(poses, velocities[:, 3:])
     elif "w0" in wanted:
         velocities = _twists(poses, w, d_dot)
-    h = np.diff(times)[:, None]
-    ends = _ends("R{}", poses[:, :3, :3]) | _ends("w{}", w, h) | _ends("a{}", a, h**2)
+    ends = _ends("R{}", poses[:, :3, :3]) | _ends("w{}", w) | _ends("a{}", a)
     if moves:
-        ends |= _ends("A{}", poses) | _ends("d{}_dot", d_dot, h)
+        ends |= _ends("A{}", poses) | _ends("d{}_dot", d_dot)
     unknown = [name for name in wanted if name not in ends]
     if unknown:
         bound = f"functools.partial(leg, {unknown[0]}=...)"
         raise ValueError(
             f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}; {bound} gives it the rest"
         )
-    legs = _made(leg, {name: ends[name] for name in wanted})
+    legs = _made(leg, {name: ends[name] for name in wanted}, np.diff(times))
     if moves and "A0" not in wanted:
-        path = [(poses[:, :3, 3], h**0), (d_dot, h), (d_bend, h**2)]
         order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # that legs ask for
-        pairs = [_ends("d{}", x, scale).values() for x, scale in path[: 1 + order]]
-        legs = RigidMotion(legs, *(x for pair in pairs for x in pair))
+        path = [poses[:, :3, 3], d_dot, d_bend][: 1 + order]
+        legs = rigid_motion(RigidMotion, legs, *(x for pair in path for x in (pair[:-1], pair[1:])))
     _check_arrival(legs, poses)
-    return Chain(times, legs, velocities)
+    return Chain(
+        duration=np.array(times[-1] - times[0]), times=times, legs=legs, velocities=velocities
+    )
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Chain(Curve):
     """A `Curve` of legs, each from one pose to the next.
 
@@ -161,21 +163,50 @@ class Chain(Curve):
     velocities : ndarray, shape (N, 3) or (N, 6), or None
         What it was told to have there, body frame; None where the legs ask for none.
     legs : Curve
-        The stack of the N − 1 legs, each on [0, 1].
-    durations : ndarray, shape (N − 1,)
-        How long each takes.
+        The stack of the N − 1 legs.
     """
 
-    batch_shape = ()
+    times: Array
+    legs: Curve
+    velocities: Array | None
 
-    def __init__(self, times: Array, legs: Curve, velocities: Array | None) -> None:
-        self.times, self.legs, self.velocities = times, legs, velocities
-        self.domain = float(times[0]), float(times[-1])
-        self.durations = np.diff(times)
-        self.size = legs.size
+    @property
+    def size(self) -> int:
+        """Of its matrices."""
+        return self.legs.size
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """The first and the last time."""
+        return float(self.times[0]), float(self.times[-1])
+
+    @property
+    def breakpoints(self) -> Array:
+        """Ends of panels for a quadrature, as shares of the duration: the joints among them."""
+        T = self.legs.duration
+        inside = self.legs.breakpoints * T[:, None]
+        return np.unique((np.append(0.0, np.cumsum(T[:-1]))[:, None] + inside) / np.sum(T))
 
     def _what(self) -> str:
-        return f"Chain of {len(self.durations)} legs, {self.legs._what()},"
+        return f"Chain of {self.legs.count} legs, {self.legs._what()},"
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the chain with another duration, and the same first time."""
+        start, end = self.domain
+        share = float(duration) / (end - start)
+        if start + float(duration) == start:
+            raise ValueError(
+                f"duration is {duration}: that vanishes beside the first time, {start}"
+            )
+        times = start + share * (self.times - start)
+        times[-1] = start + duration
+        return replace(
+            self,
+            duration=duration,
+            times=times,
+            legs=self.legs.lasting(share * self.legs.duration),
+            velocities=None if self.velocities is None else self.velocities / share,
+        )
 
     def jumps(self, order: int) -> Array:
         """Return what the inner poses change in the curve or a derivative: after, minus before.
@@ -201,59 +232,87 @@ class Chain(Curve):
         >>> chain([0, 1, 2], R, leg=geodesic_so3).jumps(1).round(12)
         array([[0., 0., 1.]])
         """
-        starts, ends = self.legs([0.0, 1.0], self.legs._check_order(order))
-        if order:
-            starts, ends = (x / self.durations[:, None] ** order for x in (starts, ends))
+        starts, ends = _at_ends(self.legs, self.legs._check_order(order))
         return starts[1:] - ends[:-1]
 
-    def _at_all(self, t: Array, order: int) -> Array:
-        """Return the values at the times t, sorted once."""
-        if np.all(t[1:] >= t[:-1]):
-            return super()._at_all(t, order)
-        in_order = np.argsort(t[:, 0])
-        written = super()._at_all(t[in_order], order)
-        values = np.empty_like(written)
-        values[in_order] = written
-        return values
-
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        """Let the legs write their values, each in its own time."""
-        times, values = t[:, 0], out[:, 0]
+    def evaluate(self, t: Array, order: int) -> Array:
+        """Return the values at the times t, shape (T, 1): each leg in its own time."""
+        times = t[:, 0]
+        values = np.empty((len(t), 1, *self._core(order)))
         if np.any(times[1:] < times[:-1]):
             in_order = np.argsort(times)
-            written = np.empty_like(out)
-            self._at(t[in_order], which, order, written)
-            values[in_order] = written[:, 0]
-            return
-        first, last = np.searchsorted(self.times[1:-1], times[[0, -1]], side="right")
-        starts = np.searchsorted(times, self.times[first + 1 : last + 1])
-        counts = np.diff([0, *starts.tolist(), len(times)])
-        legs = np.repeat(np.arange(first, last + 1), counts)
-        durations = self.durations[legs]
-        share = (times - self.times[legs]) / durations
-        try:
-            self.legs._at(share[None], legs, order, values[None])
-        except SingularTime as error:
-            start, end = self.times[error.curve : error.curve + 2]
-            raise ValueError(
-                f"leg {error.curve}, from {start} to {end}, in its own time from 0 to 1: "
-                f"{error.reason}"
-            ) from error
+            values[in_order] = self.evaluate(t[in_order], order)
+            return values
+        cuts = np.searchsorted(times, self.times[1:-1])
+        counts = np.diff(np.concatenate([[0], cuts, [len(times)]]))
+        own = np.repeat(np.arange(len(counts)), counts)
+        shares = np.minimum((times - self.times[own]) / np.diff(self.times)[own], 1)
+        leg, index = _even_parts(counts)
+        for part in blocks(len(leg), max(1, BLOCK // index.shape[1])):
+            rows = index[part]
+            try:
+                some = self.legs.take(leg[part]).values(shares[rows].T, order)
+            except SingularTime as error:
+                i = leg[part][error.curve]
+                after = error.time * self.legs.duration[i]
+                raise ValueError(
+                    f"leg {i}, from {self.times[i]} to {self.times[i + 1]}, {after} after its "
+                    f"start: {error.reason}"
+                ) from error
+            values[rows, 0] = some.swapaxes(0, 1)
         if order:
-            values /= durations[:, None] ** order
+            values /= self.legs.duration[own].reshape(-1, *(1 for _ in values.shape[1:])) ** order
+        return values
 
-    def _unit_legs(self, name: str, smooth: int) -> tuple[Curve, Any]:
-        """Return the legs, unless a derivative jumps at a joint."""
-        moments = np.append(self.times, self.times[:-1] + self.durations / 2)
-        for order, what in ((1, "a velocity"), (2, "an acceleration"))[:smooth]:
-            jumps, sizes = np.abs(self.jumps(order)), np.abs(self(moments, order))
-            if order == 2:  # a velocity that changes in the time of a leg
-                sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.durations.min()
+    def check_smooth(self, name: str, order: int) -> None:
+        """Raise a RuntimeError if a derivative jumps at a joint, up to an order.
+
+        `name` is the cost that does not exist then.
+        """
+        moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
+        for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
+            jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
+            if k == 2:  # a velocity that changes in the time of a leg
+                sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
             for half in (slice(3), slice(3, None)):  # rad and m
                 jump = jumps[:, half].max(initial=0)
                 if jump > 1e-9 * sizes[:, half].max(initial=0):
                     raise RuntimeError(f"{name}: {what} jumps at a joint, by {jump:.3g}")
-        return self.legs, self.durations
+
+
+def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Divide runs of these lengths, one after the other, into parts of one length.
+
+    Returns
+    -------
+    run : ndarray of int, shape (parts,)
+        To which run each part belongs.
+    rows : ndarray of int, shape (parts, length)
+        Where it is. The last row of a run is repeated to fill its last part.
+    """
+    mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
+    length, ends = max(1, min(int(counts.max()), 2 * mean)), np.cumsum(counts)
+    parts = (counts + length - 1) // length
+    run = np.repeat(np.arange(len(counts)), parts)
+    number = np.arange(len(run)) - np.repeat(np.cumsum(parts) - parts, parts)
+    first = (ends - counts)[run] + number * length
+    return run, np.minimum(first[:, None] + np.arange(length), ends[run, None] - 1)
+
+
+def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
+    """Return a curve, or of a chain its legs, unless a derivative jumps, up to an order.
+
+    `name` is the cost that does not exist then.
+    """
+    if isinstance(curve, Chain):
+        curve.check_smooth(name, order)
+        return curve.legs
+    return curve
+
+
+def _at_ends(legs: Curve, order: int) -> Array:
+    """Return the legs, or a derivative, at their starts and their ends."""
+    return legs.at_own_times(np.stack([0 * legs.duration, legs.duration]), order)
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
@@ -305,32 +364,40 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     return _twists(poses, w, d_dot)
 
 
-def _ends(name: str, values: Array, scale: float | Array = 1.0) -> dict[str, Array]:
-    """Return, by their names, what legs have at their starts and their ends."""
-    return {name.format(0): scale * values[:-1], name.format(1): scale * values[1:]}
+def _ends(name: str, values: Array) -> dict[str, Array]:
+    """Return, by their names, the values that legs have at their starts and their ends."""
+    return {name.format(0): values[:-1], name.format(1): values[1:]}
 
 
 def _arguments(leg: Leg) -> list[str]:
-    """Return the names of the arguments that a leg cannot do without."""
+    """Return the names of the arguments that a leg cannot do without, except the duration."""
     try:
         parameters = signature(leg).parameters
     except (TypeError, ValueError) as error:
         raise ValueError(f"leg: a function that makes curves wanted, got {leg!r}") from error
-    return [name for name, parameter in parameters.items() if parameter.default is Parameter.empty]
+    taken = {one.kind for one in parameters.values()}
+    if "duration" not in parameters and Parameter.VAR_KEYWORD not in taken:
+        raise ValueError(f"leg: it has no parameter duration: {leg!r}")
+    needed = [one.name for one in parameters.values() if one.default is Parameter.empty]
+    return [
+        name
+        for name in needed
+        if name != "duration" and parameters[name].kind != Parameter.VAR_KEYWORD
+    ]
 
 
-def _made(leg: Leg, ends: dict[str, Array]) -> Curve:
+def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
     """Return the stack of legs; what it warns of is told where `chain` is called."""
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
-            legs = leg(**ends)
+            legs = leg(**ends, duration=duration)
         except ValueError as error:
-            raise ValueError(f"leg, in its own time from 0 to 1: {error}") from error
+            raise ValueError(f"leg: {error}") from error
     for warning in warned:
         warnings.warn(warning.message, stacklevel=3)
-    count, size = len(next(iter(ends.values()))), 4 if "A0" in ends else 3
-    if not isinstance(legs, Curve) or (legs.batch_shape, legs.domain) != ((count,), (0, 1)):
-        raise ValueError(f"leg: a stack of {count} curves on [0, 1] wanted, got {legs!r}")
+    count, size = len(duration), 4 if "A0" in ends else 3
+    if not isinstance(legs, Curve) or not np.array_equal(legs.duration, duration):
+        raise ValueError(f"leg: a stack of {count} curves of these durations wanted, got {legs!r}")
     if legs.size != size:
         given = f"({legs.size}, {legs.size})"
         raise ValueError(f"leg: curves of shape ({size}, {size}) wanted, got {given}")
@@ -339,7 +406,7 @@ def _made(leg: Leg, ends: dict[str, Array]) -> Curve:
 
 def _check_arrival(legs: Curve, poses: Array) -> None:
     """Raise a ValueError that names the first leg that is not at the poses of its ends."""
-    starts, ends = legs([0.0, 1.0])
+    starts, ends = _at_ends(legs, 0)
     missed = np.abs(np.stack([starts - poses[:-1], ends - poses[1:]]))
     missed[..., :3, 3:] -= 64 * EPS * np.abs(poses[1:, :3, 3:])
     lost = ~(missed <= _ARRIVED).all(axis=(0, 2, 3))
@@ -359,7 +426,7 @@ def _checked(
         raise ValueError("times, poses: two or more wanted, got 1")
     with np.errstate(over="ignore"):
         h = np.diff(times)
-    odd = ~((h > SHORTEST) & (h < LONGEST))
+    odd = ~((h > _SHORTEST) & (h < _LONGEST))
     if odd.any():
         i = np.argmax(odd)
         raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too near, or too far")
@@ -416,7 +483,7 @@ def _parabola(h: Array, slopes: Array) -> tuple[Array, Array]:
 
 def _rotated(poses: Array, v: Array) -> Array:
     """Return vectors of body frames in the fixed frame."""
-    return (poses[:, :3, :3] @ v[..., None])[..., 0] if v.size else v
+    return matvec(poses[:, :3, :3], v) if v.size else v
 
 
 def _twists(poses: Array, w: Array, d_dot: Array) -> Array:

@@ -1,25 +1,22 @@
-"""Cubic and quintic polynomials through given ends, and their projections on SO(3)."""
+"""Projections on SO(3) of the cubic and the quintic polynomials through given ends."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, check_broadcast, check_order
+from rbcourse._checks import as_finite, check_broadcast
+from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import Array
 from rbcourse.curves import (
-    Chosen,
     Curve,
     Ends,
-    events_of,
-    has_long_runs,
+    check_defined,
     least_over_time,
-    runs,
+    near_margins,
     with_inertia,
 )
 from rbcourse.metrics import weight_of
@@ -27,21 +24,19 @@ from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singula
 from rbcourse.so3 import hat
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ProjectedPolynomial(Curve):
     """The `Curve` of the nearest rotations to a polynomial M(t) in the space of matrices.
 
     Attributes
     ----------
-    ends : ndarray, shape (n, ..., 3, 3)
-        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1). With a weight, all times W.
+    ends : ndarray, shape (..., n, 3, 3)
+        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1), for the time from 0 to 1. With a
+        weight, all times W.
     margin : ndarray, shape (...)
         The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M: how
         far the curve stays from where the nearest rotation is not unique. A small margin is a sign
-        of a poor cubic: of 4,000 random ones (‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9) those with less than 0.7
-        cost about four times the optimum or more. A large one certifies nothing: BK Figure 5 has
-        1.75 of at most 2 and costs 1.77 times the optimum, and others with more than 1.9 cost up to
-        some 40 times. A fifth of these cubics have det M < 0 at some time: they are defined and
-        smooth, and expensive, in the median about 100 times the optimum, the others 2.2 times.
+        of a poor cubic, a large one certifies nothing; the note on near-optimal curves has numbers.
     margin_time : ndarray, shape (...)
         When that is.
 
@@ -50,27 +45,24 @@ class ProjectedPolynomial(Curve):
     BK 6, BK 6.2.
     """
 
-    per_curve: ClassVar[dict[str, int]] = {"ends": 1}
+    ends: Array
 
-    def __init__(self, *ends: Array) -> None:
-        self.ends = np.stack(np.broadcast_arrays(*ends))
-        self.batch_shape = self.ends.shape[1:-2]
-
-    def _at(self, t: Array, which: Chosen, order: int, out: Array) -> None:
-        """Write R, w, w' or w'' of the projection of M; its arrays have their components first."""
-        M = [hermite_stack(self._entries, t, which, k) for k in range(order + 1)]
+    def values(self, t: Array, order: int) -> Array:
+        """Return R, w, w' or w'' of the projection of M; its arrays have their components first."""
+        by_curve = len(t) > self.count  # the longer axis last
+        t = t.T if by_curve else t
+        M = [hermite_stack(self._terms, t, k, by_curve=by_curve) for k in range(order + 1)]
         R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
-        self._check_defined(t, which, ~unique, NOT_UNIQUE)
-        if order == 0:
-            out[...] = R
-        else:
+        check_defined(t, ~unique, NOT_UNIQUE, by_curve=by_curve)
+        if order:
             R = np.ascontiguousarray(np.moveaxis(R, (-2, -1), (0, 1)))
-            out[...] = np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
+            R = np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
+        return R.swapaxes(0, 1) if by_curve else R
 
     @cached_property
-    def _entries(self) -> Array:
-        """The terms, shape (n + 1, 3, 3, count)."""
-        return stack_terms(self._flat(self.ends, 1))
+    def _terms(self) -> Array:
+        """The terms of M, shape (n + 1, 3, 3, count)."""
+        return stack_terms(self.ends)
 
     @property
     def margin(self) -> Array:
@@ -80,19 +72,17 @@ class ProjectedPolynomial(Curve):
     @property
     def margin_time(self) -> Array:
         """When the margin is reached."""
-        return self._least_gap[0]
+        return self._least_gap[0] * self.duration
 
     @cached_property
     def _least_gap(self) -> tuple[Array, Array]:
-        def gap_at(t: Array) -> Array:
-            return gap(hermite(self.ends, t[..., None, None]))
-
-        return least_over_time(gap_at, self.batch_shape)
+        ends = np.moveaxis(self.ends, -3, 0)
+        return least_over_time(lambda t: gap(hermite(ends, t[..., None, None])), self.batch_shape)
 
     def may_jump(self) -> bool:
         """Tell whether the gap at 65 times, if not at 9, leaves room for a zero in between."""
         may = np.ones(self.count, bool)
-        ends = self._flat(self.ends, 1)
+        ends = np.moveaxis(self.take(np.arange(self.count)).ends, 1, 0)
         for count in (9, 65):
             times = np.linspace(0, 1, count)[:, None, None, None]
             M = hermite(ends[:, may], times)
@@ -100,12 +90,14 @@ class ProjectedPolynomial(Curve):
             may[may] = (gap(M) < change).any(axis=0)
         return bool(may.any())
 
-    def _events(self) -> list[tuple[float, float]]:
-        return events_of(self.margin_time, self.margin)
+    @property
+    def breakpoints(self) -> Array:
+        """As `Curve.breakpoints`."""
+        return near_margins(super().breakpoints, *self._least_gap)
 
 
 def projected_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ProjectedPolynomial:
     """Return the projection of the cubic with these ends: near-optimal minimum acceleration.
 
@@ -115,6 +107,8 @@ def projected_cubic_so3(
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -138,7 +132,6 @@ def projected_cubic_so3(
     minimum_acceleration_so3 : The optimum with the same ends.
     weighted_cubic_so3 : For the inertia of another body than a ball.
     acceleration_cost : What both cost.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -165,11 +158,17 @@ def projected_cubic_so3(
     >>> float(c.margin.round(3))
     1.464
     """
-    return watched(projected_cubic(Ends(R0, R1, w0, w1)))
+    return watched(projected_cubic(*Ends(R0, R1, w0, w1).over(duration)))
 
 
 def weighted_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, inertia: ArrayLike
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    inertia: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> ProjectedPolynomial:
     """Return the projection of the cubic with these ends in the metric of a body's inertia.
 
@@ -182,6 +181,8 @@ def weighted_cubic_so3(
     inertia : array_like, shape (..., 3, 3)
         G, body frame: symmetric and positive definite, and of a body: each principal moment is at
         most the sum of the other two.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -230,11 +231,23 @@ def weighted_cubic_so3(
     array([[0., 0., 0.],
            [0., 1., 0.]])
     """
-    return watched(weighted_cubic(*with_inertia(Ends(R0, R1, w0, w1), inertia)))
+    ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
+    curve = projected_cubic(*ends.over(duration))
+    W = weight_of("inertia", G)
+    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
+    W = np.broadcast_to(W, (*curve.batch_shape, 3, 3))
+    return watched(replace(curve, ends=curve.ends @ W[..., None, :, :]))
 
 
 def projected_quintic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    a0: ArrayLike,
+    a1: ArrayLike,
+    *,
+    duration: ArrayLike = 1.0,
 ) -> ProjectedPolynomial:
     """Return the projection of the quintic with these ends: a curve with given accelerations.
 
@@ -246,6 +259,8 @@ def projected_quintic_so3(
         Angular velocities there, body frame, in rad per unit time.
     a0, a1 : array_like, shape (..., 3)
         Angular accelerations w' there, body frame, in rad per unit time squared.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -269,7 +284,6 @@ def projected_quintic_so3(
     projected_cubic_so3 : The projection of a cubic, for given velocities only.
     exponential_quintic_so3 : What is near the curve of least jerk.
     minimum_jerk_so3 : That curve.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -293,33 +307,35 @@ def projected_quintic_so3(
     array([[0., 0., 0.],
            [0., 0., 2.]])
     """
-    ends, a0, a1 = check_ends_of_quintic(R0, R1, w0, w1, a0, a1)
+    ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
     (R0, R1, w0, w1), W0, W1 = ends, hat(ends.w0), hat(ends.w1)
     curvatures = R0 @ (W0 @ W0 + hat(a0)), R1 @ (W1 @ W1 + hat(a1))
-    return watched(ProjectedPolynomial(R0, R1, R0 @ W0, R1 @ W1, *curvatures))
+    M = np.stack([R0, R1, R0 @ W0, R1 @ W1, *curvatures], axis=-3)
+    return watched(ProjectedPolynomial(ends=M, duration=T))
 
 
-def check_ends_of_quintic(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, a0: ArrayLike, a1: ArrayLike
-) -> tuple[Ends, Array, Array]:
-    """Return `Ends`, and the accelerations a0 and a1, all of one batch shape."""
+def ends_of_quintic(
+    R0: ArrayLike,
+    R1: ArrayLike,
+    w0: ArrayLike,
+    w1: ArrayLike,
+    a0: ArrayLike,
+    a1: ArrayLike,
+    duration: ArrayLike,
+) -> tuple[Ends, Array, Array, Array]:
+    """Return `Ends`, a0 and a1 for the time from 0 to 1, and the duration, of one batch shape."""
     ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
-    a0, a1 = (np.broadcast_to(a, (*batch, 3)) for a in (a0, a1))
-    return ends.broadcast_to(batch), a0, a1
+    ends, T = ends.broadcast_to(batch).over(duration)
+    a0, a1 = (np.broadcast_to(T[..., None] ** 2 * a, (*T.shape, 3)) for a in (a0, a1))
+    return ends, a0, a1, T
 
 
-def projected_cubic(ends: Ends) -> ProjectedPolynomial:
-    """Return `projected_cubic_so3` of checked ends, without a warning of its margin."""
+def projected_cubic(ends: Ends, duration: Array) -> ProjectedPolynomial:
+    """Return `projected_cubic_so3` of ends for the time from 0 to 1, with no warning."""
     R0, R1, w0, w1 = ends
-    return ProjectedPolynomial(R0, R1, R0 @ hat(w0), R1 @ hat(w1))
-
-
-def weighted_cubic(ends: Ends, inertia: Array) -> ProjectedPolynomial:
-    """Return `weighted_cubic_so3` of checked ends and inertias, without that warning."""
-    W = weight_of("inertia", inertia)
-    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
-    return ProjectedPolynomial(*(M @ W for M in projected_cubic(ends).ends))
+    M = np.stack([R0, R1, R0 @ hat(w0), R1 @ hat(w1)], axis=-3)
+    return ProjectedPolynomial(ends=M, duration=duration)
 
 
 def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
@@ -327,137 +343,6 @@ def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
     if curve.may_jump():
         warn_if_nearly_singular(curve.margin, curve.margin_time)
     return curve
-
-
-def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
-    """Return the polynomial of least degree with these ends, or a derivative, at the times t.
-
-    Written from the nearer end, it meets both exactly, however they differ in size. Of all curves
-    with its ends the line has the least ∫ ‖x'‖² dt, the cubic the least ∫ ‖x''‖² dt, and the
-    quintic the least ∫ ‖x'''‖² dt.
-
-    Parameters
-    ----------
-    ends : sequence of array_like
-        x0, x1 of a line; x0, x1, v0, v1 of a cubic; x0, x1, v0, v1, a0, a1 of a quintic: values and
-        derivatives at t = 0 and 1.
-    t : ndarray
-        The times; they broadcast with the ends.
-    order : {0, 1, 2, 3}, optional
-        Which derivative.
-
-    Returns
-    -------
-    ndarray
-
-    Raises
-    ------
-    ValueError
-        If `order` is another, or there are not two, four or six ends.
-
-    References
-    ----------
-    BK 6, BK 6.2.
-
-    Examples
-    --------
-    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
-    array([0. , 0.5, 1. ])
-    """
-    return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
-
-
-def hermite_stack(terms: Array, t: Array, which: Chosen, order: int) -> Array:
-    """Return `hermite` of a stack with these `stack_terms`, components first.
-
-    Parameters
-    ----------
-    terms : ndarray, shape (n + 1, ..., count)
-    t : ndarray, shape (T, K) or (T, 1)
-    which : ndarray of int, shape (K,)
-    order : int
-
-    Returns
-    -------
-    ndarray, shape (..., T, K)
-    """
-    core = terms.shape[1:-1]
-    if len(which) != 1 and not (len(t) == 1 and has_long_runs(which)):
-        chosen = np.take(terms, which, axis=-1)[..., None, :]
-        return _sum(_weights(len(terms) - 1, t, order), chosen)
-    weights = np.stack(_weights(len(terms) - 1, t.ravel(), order))
-    flat = terms[-len(weights) :].reshape(len(weights), math.prod(core), terms.shape[-1])
-    if len(which) == 1:
-        values = flat[:, :, which[0]].T @ weights
-    else:
-        values = np.empty((flat.shape[1], weights.shape[1]))
-        for curve, run in runs(which):
-            np.matmul(flat[:, :, curve].T, weights[:, run], out=values[:, run])
-    return values.reshape(*core, len(t), len(which))
-
-
-def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
-    """Return the sum of the last terms, weighed."""
-    first, *others = (w * x for w, x in zip(weights, terms[-len(weights) :], strict=True))
-    return sum(others, first)
-
-
-def stack_terms(ends: Array) -> Array:
-    """Return the terms of a stack: of ends of shape (n, count, ...), shape (n + 1, ..., count)."""
-    return np.stack([np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in _terms(ends)])
-
-
-def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
-    """Return what a polynomial is a sum of: x0, x1, x1 − x0 and the derivatives at the ends."""
-    x0, x1, *rates = map(np.asarray, ends)
-    return [x0, x1, x1 - x0, *rates]
-
-
-def _weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return what the terms weigh; those of derivatives begin with x1 − x0."""
-    starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
-    rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
-    weights = [weight for pair in rates for weight in pair]
-    if order:
-        return [(-1) ** order * ends[0], *weights]
-    early = t.real < 0.5
-    return [early + 0 * t, ~early + 0 * t, np.where(early, ends[0], -starts[0]), *weights]
-
-
-def _start_weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of x0, v0 and a0.
-
-    By symmetry x1, v1 and a1 have the same at 1 − t; the sign changes for each derivative.
-    """
-    s = 1 - t
-    match count, order:
-        case 2, 0:
-            return [s]
-        case 2, 1:
-            return [0 * t - 1]
-        case 2, _:
-            return [0 * t]
-        case 4, 0:
-            return [s * s * (1 + 2 * t), t * s * s]
-        case 4, 1:
-            return [-6 * t * s, s * (1 - 3 * t)]
-        case 4, 2:
-            return [6 * (t - s), 2 - 6 * s]
-        case 4, 3:
-            return [12 + 0 * t, 6 + 0 * t]
-        case 6, 0:
-            sss = s * s * s
-            return [sss * (1 + 3 * t + 6 * t * t), t * sss * (1 + 3 * t), t * t * sss / 2]
-        case 6, 1:
-            ts, ss = t * s, s * s
-            return [-30 * ts * ts, ss * (1 - 3 * t) * (1 + 5 * t), ts * s * (2 - 5 * t) / 2]
-        case 6, 2:
-            ts = t * s
-            return [60 * ts * (t - s), -12 * ts * (3 - 5 * t), s * (1 - 8 * t + 10 * t * t)]
-        case 6, 3:
-            tt = t * t
-            return [60 * (6 * t * s - 1), -12 * (3 - 16 * t + 15 * tt), -9 + 36 * t - 30 * tt]
-    raise ValueError(f"ends: two, four or six wanted, got {count}")
 
 
 def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:

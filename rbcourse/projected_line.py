@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import ClassVar
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_angle, as_array, as_finite, as_time, check_broadcast, check_order
 from rbcourse._numerics import EPS, Array, sinc
 from rbcourse.curves import (
     AlongGeodesic,
-    Chosen,
-    events_of,
+    check_defined,
+    geodesic_data,
     identity,
-    runs,
-    start_and_rotation_vector,
+    near_margins,
     which_curve,
 )
 from rbcourse.projection import NOT_UNIQUE, warn_if_nearly_singular
@@ -35,6 +35,7 @@ Progress = Callable[[Array, int], ArrayLike]
 _PI_REST = 1.2246467991473532e-16  # π − np.pi
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ProjectedLine(AlongGeodesic):
     """The projection of a straight line between two rotations: p(t) = θ(f(t)).
 
@@ -49,76 +50,71 @@ class ProjectedLine(AlongGeodesic):
     BK Prop. 6, BK (15), BK (17).
     """
 
-    per_curve: ClassVar[dict[str, int]] = {**AlongGeodesic.per_curve, "margin": 0, "_number": 0}
+    timing: Progress
+    number: NDArray[np.intp]  # in the stack of this shape that the timing is for:
+    timed: tuple[int, ...]
 
-    def __init__(self, R0: Array, rotation_vector: Array, timing: Progress) -> None:
-        if timing is f:
-            raise ValueError("f: it must be bound to an angle: lambda t, order: f(t, angle, order)")
-        super().__init__(R0, rotation_vector)
-        self._angle = as_angle(self._angle)
-        self.margin = 2 * np.cos(self._angle / 2)
-        warn_if_nearly_singular(self.margin, 0.5, "t" if timing is identity else "f(t)")
-        self._f, self._f_batch = timing, self.batch_shape
-        self._number = np.arange(self.count).reshape(self.batch_shape)
-        which = np.arange(self.count)
-        start, end = self._on_line(np.array([[0.0], [1.0]]), which, 0)
-        for curve in np.flatnonzero((np.abs(start) > 1e-12) | (np.abs(end - 1) > 1e-12)):
-            raise ValueError(
-                f"f{which_curve(int(curve), self.batch_shape)}: f(0) = 0 and f(1) = 1 are wanted, "
-                f"got {start[curve]} and {end[curve]}"
-            )
+    @property
+    def margin(self) -> Array:
+        """The least sum of the two smallest eigenvalues of RᵀM."""
+        return 2 * np.cos(self._angle / 2)
 
-    def _progress(self, t: Array, which: Chosen, order: int) -> Array:
+    @property
+    def _angle(self) -> Array:
+        return as_angle(np.linalg.norm(self.rotation_vector, axis=-1))
+
+    def _progress(self, t: Array, order: int) -> Array:
         """Return θ(f(t)) or a derivative, by the chain rule."""
-        on_line, angle = self._on_line(t, which, 0), self._flat(self._angle)[which]
+        on_line, angle = self.on_line(t, 0), self._angle
         s = _singular_value(on_line, angle)
-        self._check_defined(t, which, s < 8 * EPS, NOT_UNIQUE)
+        check_defined(t, s < 8 * EPS, NOT_UNIQUE)
         if order == 0:
             return _theta(on_line, angle)
-        slope, speed = _theta_rate(angle, s), self._on_line(t, which, 1)
+        slope, speed = _theta_rate(angle, s), self.on_line(t, 1)
         if order == 1:
             return slope * speed
-        bend, push = _theta_bend(on_line, angle, s), self._on_line(t, which, 2)
+        bend, push = _theta_bend(on_line, angle, s), self.on_line(t, 2)
         if order == 2:
             return bend * speed**2 + slope * push
         third = _theta_third(on_line, angle, s) * speed**3
-        return third + 3 * bend * speed * push + slope * self._on_line(t, which, 3)
+        return third + 3 * bend * speed * push + slope * self.on_line(t, 3)
 
-    def _on_line(self, t: Array, which: Chosen, order: int) -> Array:
-        """Return f or a derivative of the chosen curves, shape (T, K) or (T, 1)."""
-        if self._f is identity:
+    def on_line(self, t: Array, order: int) -> Array:
+        """Return f or a derivative of the curves of a stack, shape (T, count) or (T, 1)."""
+        if self.timing is identity:
             return identity(t, order)
-        numbers = self._flat(self._number)[which]
-        if t.shape[1] == 1:
-            values = np.take(self._f_at(t[:, 0], order), numbers, axis=1, mode="clip")
+        if t.shape[1] == 1 and t.size:
+            values = np.take(self._f_at(t[:, 0], order), self.number, axis=1, mode="clip")
         elif t.size and self._f_at(t[0, :1], order).shape[1] == 1:  # the same for all curves
             values = self._f_at(t.ravel(), order).reshape(t.shape)
         else:
             values = np.empty(t.shape)
-            for number, run in runs(numbers):
-                at = self._f_at(t[:, run].ravel(), order)
-                values[:, run] = at[:, number].reshape(len(t), -1)
-        why = f"f(t, {order}) is not a finite number"
-        self._check_defined(t, which, ~np.isfinite(values), why)
+            for curve, number in enumerate(self.number):
+                values[:, curve] = self._f_at(t[:, curve], order)[:, number]
+        check_defined(t, ~np.isfinite(values), f"f(t, {order}) is not a finite number")
         return values
 
     def _f_at(self, t: Array, order: int) -> Array:
         """Return f or a derivative at the times t: shape (T, 1), or (T, N) for a stack of N."""
-        name, shape = f"f(t, {order})", (len(t), *self._f_batch)
-        value = as_array(name, self._f(t.copy().reshape(-1, *[1] * len(self._f_batch)), order))
+        name, shape, each = f"f(t, {order})", (len(t), *self.timed), [1] * len(self.timed)
+        value = as_array(name, self.timing(t.copy().reshape(-1, *each), order))
         try:
             np.broadcast_to(value, shape)
         except ValueError as error:
             raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
-        if value.size == 1 or value.shape[-len(shape) :] == (len(t), *[1] * len(self._f_batch)):
+        if value.size == 1 or value.shape[-len(shape) :] == (len(t), *each):
             return np.broadcast_to(value.reshape(-1, 1), (len(t), 1))
         return np.broadcast_to(value, shape).reshape(len(t), -1)
 
-    def _events(self) -> list[tuple[float, float]]:
-        return events_of(0.5, self.margin)
+    @property
+    def breakpoints(self) -> Array:
+        """As `Curve.breakpoints`."""
+        return near_margins(super().breakpoints, 0.5, self.margin)
 
 
-def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) -> ProjectedLine:
+def projected_line_so3(
+    R0: ArrayLike, R1: ArrayLike, f: Progress | None = None, *, duration: ArrayLike = 1.0
+) -> ProjectedLine:
     """Return the projection on SO(3) of the line R0 + (R1 − R0) f(t), in closed form.
 
     Parameters
@@ -128,7 +124,9 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
     f : callable, optional
         ``f(t, order)``, order 0, 1 or 2: how the line is run through, f(0) = 0 and f(1) = 1 to
         1e-12, and the derivatives of that; for the jerk ``c(t, 3)`` order 3 too. The times come
-        with an axis of length 1 for each batch axis. By default f(t) = t.
+        with an axis of length 1 for each batch axis, and from 0 to 1. By default f(t) = t.
+    duration : array_like, shape (...), optional
+        How long it takes.
 
     Returns
     -------
@@ -151,7 +149,6 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
     geodesic_so3 : The same path at constant speed.
     rbcourse.projected_line.f : The timing for constant speed (see the example).
     project_so : The projection, for any matrix.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -177,7 +174,23 @@ def projected_line_so3(R0: ArrayLike, R1: ArrayLike, f: Progress | None = None) 
     """
     if not (f is None or callable(f)):
         raise ValueError(f"f: a callable f(t, order) is wanted, got {f!r}")
-    return ProjectedLine(*start_and_rotation_vector(R0, R1), identity if f is None else f)
+    return _projected_line(geodesic_data(R0, R1, duration), f or identity)
+
+
+def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
+    if timing is f:
+        raise ValueError("f: it must be bound to an angle: lambda t, order: f(t, angle, order)")
+    shape = data["duration"].shape
+    number = np.arange(math.prod(shape)).reshape(shape)
+    curve = ProjectedLine(**data, timing=timing, number=number, timed=shape)
+    warn_if_nearly_singular(curve.margin, 0.5, "t" if timing is identity else "f(t)")
+    start, end = curve.take(number.ravel()).on_line(np.array([[0.0], [1.0]]), 0)
+    for i in np.flatnonzero((np.abs(start) > 1e-12) | (np.abs(end - 1) > 1e-12)):
+        raise ValueError(
+            f"f{which_curve(int(i), shape)}: f(0) = 0 and f(1) = 1 are wanted, "
+            f"got {start[i]} and {end[i]}"
+        )
+    return curve
 
 
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:

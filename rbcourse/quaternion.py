@@ -14,9 +14,9 @@ from rbcourse._checks import (
     check_broadcast,
     first_index,
 )
-from rbcourse._jets import multiply
-from rbcourse._jets import slerp as slerp_jet
 from rbcourse._numerics import EPS, Array
+from rbcourse._taylor import multiply
+from rbcourse._taylor import slerp as slerp_jet
 
 __all__ = [
     "canonical_quaternion",

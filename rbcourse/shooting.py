@@ -25,7 +25,7 @@ LONGEST_STEP = 0.5
 
 
 def shoot_minimum_acceleration_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> Optimum:
     """Return the minimum-acceleration curve with these ends, by shooting.
 
@@ -38,6 +38,8 @@ def shoot_minimum_acceleration_so3(
         Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
@@ -61,7 +63,6 @@ def shoot_minimum_acceleration_so3(
     See Also
     --------
     minimum_acceleration_so3 : The faster and more robust way.
-    retime : From [0, 1] to T seconds.
 
     Notes
     -----
@@ -78,7 +79,8 @@ def shoot_minimum_acceleration_so3(
     >>> c(0.5, 1).round(9) + 0.0  # 1.5 times the average, as for any cubic from rest to rest
     array([0.  , 0.  , 2.25])
     """
-    return solve(ball(Ends(R0, R1, w0, w1))._replace(solver=shoot))
+    given, T = Ends(R0, R1, w0, w1).over(duration)
+    return solve(ball(given)._replace(solver=shoot), T)
 
 
 def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:

@@ -87,6 +87,7 @@ def core(curve, order):
 
 def times(curve, *shape):
     start, end = curve.domain
+    end = min(end, start + 3)  # an empty stack has all times
     inside = np.random.default_rng(93).random(shape)
     return start + (end - start) * inside
 
@@ -309,6 +310,34 @@ def moves_with_its_ends(make):
     assert off(make(moved)(t, 1), want[1]) < 1e-9
 
 
+RATES = {"w0": 1, "w1": 1, "d0_dot": 1, "d1_dot": 1, "a0": 2, "a1": 2}
+
+
+def lasts_as_long_as_it_is_told(make):
+    """One duration for each: the curve from 0 to 1 whose rates at the ends are as many times."""
+    if "duration" not in inspect.signature(make.function).parameters:
+        pytest.skip("it has the duration of its curve, or takes it in a test of its own")
+    ends, T = sample(3), np.array([0.5, 1, 3])
+    curve = make.function(**{name: ends[name] for name in make.names}, duration=T)
+    scaled_ends = {
+        name: value * (T[:, None] ** RATES[name] if name in RATES else 1)
+        for name, value in ends.items()
+    }
+    unit = make(scaled_ends)
+    assert np.array_equal(curve.duration, T)
+    assert curve.domain == (0, 0.5)
+    t = np.random.default_rng(94).random((4, 3))
+    for same in (curve, rb.retime(unit, T)):
+        for order in orders(curve):
+            scale = T.reshape(3, *(1 for _ in core(curve, order))) ** order
+            want = unit.at_own_times(t, order) / scale
+            assert off(same.at_own_times(t * T, order), want) < 1e-11
+    assert off(curve[2](3 * t[:, 2]), curve.at_own_times(t * T)[:, 2]) < 1e-12
+    for bad in (0, -1, np.nan, 1e-200, "a", [1, 2]):
+        with pytest.raises(ValueError, match="duration"):
+            make.function(**{name: ends[name] for name in make.names}, duration=bad)
+
+
 CONTRACT = [
     meets_its_ends,
     has_the_derivatives_of_its_values,
@@ -321,6 +350,7 @@ CONTRACT = [
     refuses_bad_times_and_orders,
     is_the_same_after_pickling,
     moves_with_its_ends,
+    lasts_as_long_as_it_is_told,
 ]
 
 
@@ -341,7 +371,8 @@ class Keeping(rb.Curve):
     """A geodesic that keeps its arguments, and gives them away."""
 
     def __init__(self, R0, R1):
-        self.R0, self.R1, self.batch_shape = R0, R1, np.shape(R0)[:-2]
+        super().__init__(duration=np.ones(np.shape(R0)[:-2]))
+        self.R0, self.R1 = R0, R1
 
     def __call__(self, t, order=0):
         return rb.geodesic_so3(self.R0, self.R1)(t, order)
@@ -352,7 +383,7 @@ class Fixed(rb.Curve):
 
     def __init__(self, R0, R1):
         self.curve, self.known = rb.geodesic_so3(R0, R1), {}
-        self.batch_shape = self.curve.batch_shape
+        super().__init__(duration=self.curve.duration)
 
     def __call__(self, t, order=0):
         return self.known.setdefault(order, self.curve(t, order))
@@ -365,7 +396,7 @@ def altered(**methods):
         curve = copy(rb.projected_cubic_so3(R0, R1, w0, w1))
         right = type(curve)
         changed = {name: change(getattr(right, name)) for name, change in methods.items()}
-        curve.__class__ = type("Altered", (right,), changed)
+        object.__setattr__(curve, "__class__", type("Altered", (right,), changed))
         return curve
 
     return make
@@ -442,6 +473,10 @@ FAULTS = {
         moves_with_its_ends,
     ),
 }
+FAULTS["velocities that are not per unit of the duration"] = (
+    lambda R0, R1, w0, w1, *, duration=1.0: rb.retime(rb.bezier_so3(R0, R1, w0, w1), duration),
+    lasts_as_long_as_it_is_told,
+)
 ENDS_OF_A_PICKLE = tuple(sample(2, seed=3)[name] for name in ("R0", "R1", "w0", "w1"))
 
 

@@ -6,7 +6,6 @@ from numpy.polynomial import Chebyshev
 from scipy.integrate import quad
 
 import rbcourse as rb
-from rbcourse.curves import Retimed
 
 REST = np.zeros(3)
 
@@ -160,19 +159,17 @@ def test_of_a_curve_that_was_not_found_there_is_no_cost():
 
 
 @pytest.mark.parametrize("margin", [1e-3, 3e-6])
-def test_a_sharp_turn_of_a_retimed_leg_is_not_missed(margin):
-    """A curve that is retimed twice, to the time that it took, alone and as a leg of a chain."""
+def test_a_sharp_turn_of_a_leg_is_not_missed(margin):
+    """Alone, and as a leg of a chain: the breakpoints are close where it is."""
     turn = rb.exp_so3([0, 0, np.pi - margin])
-
-    def leg(R0, R1):
-        return rb.retime(rb.retime(rb.projected_line_so3(R0, R1), 3), 1)
-
     want = rb.acceleration_cost(rb.projected_line_so3(np.eye(3), turn))
-    assert rb.acceleration_cost(leg(np.eye(3), turn)) == pytest.approx(want, rel=1e-9)
-    legs, _ = rb.chain([0, 1], [np.eye(3), turn], leg=leg)._unit_legs("", 1)
-    assert isinstance(legs, Retimed)
-    ((when, width),) = legs._events()
-    assert (when, width) == pytest.approx((0.5, margin / 4), rel=1e-6)
+    for curve in (
+        rb.projected_line_so3(np.eye(3), turn, duration=3),
+        rb.chain([2, 5], [np.eye(3), turn], leg=rb.projected_line_so3),
+    ):
+        assert rb.acceleration_cost(curve) == pytest.approx(want / 27, rel=1e-9)
+        least = np.abs(np.setdiff1d(curve.breakpoints, 0.5) - 0.5).min()
+        assert margin / 20 < least < margin / 4
 
 
 def test_a_stack_of_no_curves_has_no_costs():
@@ -239,9 +236,9 @@ def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
         for i, rates in enumerate((([0, 0, 0], a), (a, [0, 0, 0])))
     ]
 
-    def leg(R0, R1, w0, w1):
-        rates = np.stack([[np.zeros(3), np.array(a)], [4 * np.array(a), np.zeros(3)]])
-        return rb.exponential_quintic_so3(R0, R1, w0, w1, rates[:, 0], rates[:, 1])
+    def leg(R0, R1, w0, w1, duration):
+        a0, a1 = np.stack([np.zeros(3), a]), np.stack([a, np.zeros(3)])
+        return rb.exponential_quintic_so3(R0, R1, w0, w1, a0, a1, duration=duration)
 
     chain = rb.chain([0, 1, 3], R, velocities=w, leg=leg)
     assert rb.jerk_cost(chain) == pytest.approx(

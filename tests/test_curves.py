@@ -333,10 +333,10 @@ def test_what_failed_in_a_stack_stays_failed():
 
 
 def test_an_error_of_a_time_survives_a_pickle():
-    error = SingularTime(0.5, 3, (2, 2), "no rotation")
+    error = SingularTime(0.5, 3, "no rotation", (2, 2))
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "t = 0.5 of curve [1, 1]: no rotation"
-    assert (again.curve, again.reason) == (3, "t = 0.5: no rotation")
+    assert (again.time, again.curve, again.reason) == (0.5, 3, "no rotation")
     lost = pickle.loads(pickle.dumps(rb.ConvergenceError(1e-3, 5)))
     assert (lost.residual, lost.iterations) == (1e-3, 5)
 

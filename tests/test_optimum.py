@@ -517,7 +517,7 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
 
 
 def test_a_guess_that_is_not_a_curve_on_so3_is_refused():
-    line = rb.geodesic_so3(np.eye(3), np.eye(3))
-    for guess in (np.eye(3), rb.retime(line, 2), rb.geodesic_se3(np.eye(4), np.eye(4))):
-        with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) and \[0, 1\] is wanted"):
+    motion = rb.geodesic_se3(np.eye(4), np.eye(4))
+    for guess in (np.eye(3), motion, rb.chain([1, 2], [np.eye(3)] * 2)):
+        with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) from t = 0 on is wanted"):
             rb.stationary_so3(guess)

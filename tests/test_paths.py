@@ -8,7 +8,7 @@ import oracles
 import pytest
 
 import rbcourse as rb
-from rbcourse.motions import RigidMotion
+from rbcourse.motions import RigidMotion, rigid_motion
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(110)
@@ -101,7 +101,7 @@ def test_uneven_steps_cost_no_digits(leg, ratio):
     times = np.append(0, np.cumsum(steps))
     c = rb.chain(times, POSES, leg=leg)
     assert np.abs(c(times) - POSES).max() < 8 * EPS
-    assert np.abs(c.legs(1.0) - POSES[1:]).max() < 8 * EPS
+    assert np.abs(c.legs.at_own_times(steps) - POSES[1:]).max() < 8 * EPS
     speed = np.abs(c(times, 1)).max()
     scales = 1, speed, speed**2 + np.abs(c(times, 2)).max()
     for order in range(3 if leg is rb.projected_quintic_so3 else 2):
@@ -115,11 +115,11 @@ def test_quintics_between_uneven_times_are_the_nearest_rotations(ratio):
     legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic_so3).legs
     for i, s in np.ndindex(N - 1, 5):
         share = [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9][s]
-        M = oracles.polynomial_through(legs.ends[:, i], share)
+        M = oracles.polynomial_through(legs.ends[i], share)
         R = oracles.nearest_rotation(M)
         gap = oracles.two_smallest_eigenvalues(R.T @ M)
-        size = np.abs(legs.ends[:, i]).max()
-        assert np.abs(legs[i](share) - R).max() < 8 * EPS * max(1, size / gap)
+        size = np.abs(legs.ends[i]).max()
+        assert np.abs(legs[i](share * legs.duration[i]) - R).max() < 8 * EPS * max(1, size / gap)
 
 
 def test_optima_are_rotations_between_their_nodes():
@@ -183,11 +183,11 @@ def test_the_quintic_bends_as_the_parabola_does():
 def test_the_origin_has_as_many_ends_as_legs_ask_for():
     """Of legs that ask for accelerations a quintic, for one velocity a cubic."""
 
-    def bent(R0, R1, a0, a1):
-        return rb.geodesic_so3(R0, R1)
+    def bent(R0, R1, a0, a1, duration):
+        return rb.geodesic_so3(R0, R1, duration=duration)
 
-    def leaving(R0, R1, w0):
-        return rb.geodesic_so3(R0, R1)
+    def leaving(R0, R1, w0, *, duration):
+        return rb.geodesic_so3(R0, R1, duration=duration)
 
     t = np.linspace(*TIMES[[0, -1]], 50)
     for leg, other in ((bent, rb.projected_quintic_so3), (leaving, rb.projected_cubic_so3)):
@@ -208,8 +208,11 @@ def test_times_in_any_order_and_shape():
 
 
 def test_own_functions_make_legs():
-    def slow(R0, R1):
-        return rb.projected_line_so3(R0, R1, lambda t, k: [t**2 * (3 - 2 * t), 6 * t * (1 - t)][k])
+    def pace(t, k):
+        return [t**2 * (3 - 2 * t), 6 * t * (1 - t)][k]
+
+    def slow(R0, R1, duration=1):
+        return rb.projected_line_so3(R0, R1, pace, duration=duration)
 
     c = rb.chain(TIMES, POSES, leg=slow)
     assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # its turn rests at each pose
@@ -246,39 +249,44 @@ HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
             rb.minimum_torque_so3,
             "leg: it asks for inertia; there are R0, R1, w0, w1, a0, a1; functools.partial(leg, in",
         ),
-        (([0, 1], ROTATIONS[:2]), rb.exp_so3, "leg: it asks for w; there are R0, R1, w0, w1, a0"),
+        (
+            ([0, 1], ROTATIONS[:2]),
+            rb.exp_so3,
+            "leg: it has no parameter duration: <function exp_so3",
+        ),
         (([0, 1], ROTATIONS[:2]), 3, "leg: a function that makes curves wanted, got 3"),
-        (([0, 1], ROTATIONS[:2]), lambda R0: R0, "leg: a stack of 1 curves on [0, 1] wanted"),
+        (([0, 1], ROTATIONS[:2]), lambda R0, duration: R0, "leg: a stack of 1 curves of these"),
         (
             (range(4), ROTATIONS[:4]),
-            lambda R0, R1: rb.geodesic_so3(R0, R1[[0, 2, 1]]),
+            lambda R0, R1, **time: rb.geodesic_so3(R0, R1[[0, 2, 1]], **time),
             "leg: it does not lead from poses[1] to poses[2]",
         ),
         (
             ([0, 1], FAR[:2]),
-            lambda R0, R1: rb.geodesic_so3(R0, R1 @ rb.exp_so3([0, 0, 2e-6])),
+            lambda R0, R1, **time: rb.geodesic_so3(R0, R1 @ rb.exp_so3([0, 0, 2e-6]), **time),
             "leg: it does not lead from poses[0] to poses[1]",
         ),
         (
             ([0, 1], POSES[:2]),
-            lambda A0, A1: rb.geodesic_so3(A0[:, :3, :3], A1[:, :3, :3]),
+            lambda A0, A1, **time: rb.geodesic_so3(A0[:, :3, :3], A1[:, :3, :3], **time),
             "leg: curves of shape (4, 4) wanted, got (3, 3)",
         ),
         (
             ([0, 1], POSES[:2]),
-            lambda R0, R1: rb.geodesic_se3(POSES[:1], POSES[1:2]),
+            lambda R0, R1, **time: rb.geodesic_se3(POSES[:1], POSES[1:2], **time),
             "leg: curves of shape (3, 3) wanted, got (4, 4)",
         ),
-        (([0, 1], POSES[:2]), lambda R0, R1: None, "leg: a stack of 1 curves on [0, 1] wanted"),
+        (([0, 1], POSES[:2]), lambda R0, **time: None, "leg: a stack of 1 curves of these"),
+        (([0, 1], POSES[:2]), lambda R0, R1: None, "leg: it has no parameter duration"),
         (
             ([0, 1], ROTATIONS[:2], 90 * TWISTS[:2, :3]),
             rb.bezier_so3,
-            "leg, in its own time from 0 to 1: w0[0]: a norm below",
+            "leg: w0[0]: a norm below",
         ),
         (
             ([0, 1], ROTATIONS[:2]),
-            lambda R0, R1: rb.retime(rb.geodesic_so3(R0, R1), 2),
-            "leg: a stack of 1 curves on [0, 1] wanted",
+            lambda R0, R1, duration: rb.geodesic_so3(R0, R1, duration=2 * duration),
+            "leg: a stack of 1 curves of these durations wanted",
         ),
     ],
 )
@@ -300,7 +308,7 @@ def test_a_leg_that_is_lost_is_named():
     with pytest.warns(RuntimeWarning, match=r"of curve \[1\]") as warned:
         c = rb.chain([0, 1, 2], R, w)
     assert warned[0].filename == __file__
-    message = "^leg 1, from 1.0 to 2.0, in its own time from 0 to 1: t = 0.5: the nearest rotation"
+    message = "^leg 1, from 1.0 to 2.0, 0.5 after its start: the nearest rotation"
     for t in (1.5, [0.2, 0.7, 1.5, 1.7], [1.7, 1.5]):
         with pytest.raises(ValueError, match=message):
             c(t)
@@ -317,7 +325,8 @@ def test_retimed_curves_are_run_through_evenly(duration):
         for order in range(3):
             t = np.minimum(start + share * (end - start), end)
             want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
-            assert np.abs(again(t, order) - want).max() <= 1e-9 * np.abs(want).max()
+            tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # its times are rounded
+            assert np.abs(again(t, order) - want).max() <= tolerance * np.abs(want).max()
         there = again([start, end])
         assert np.abs(there - c([first, last])).max() < 60 * EPS
 
@@ -327,19 +336,23 @@ def test_a_retimed_stack_is_a_stack():
     assert c(np.zeros(5)).shape == (5, N - 1, 3, 3)
     assert np.abs(c[2]([1, 4]) - c([1, 4])[:, 2]).max() < 10 * EPS
     assert rb.retime(rb.retime(c, 3), 8).domain == (0, 8)
+    uneven = rb.retime(c, H)
+    assert uneven.domain == (0, H.min())
+    assert np.abs(uneven.at_own_times(H, 1) - 4 / H[:, None] * c(4, 1)).max() < 200 * EPS
+    with pytest.raises(ValueError, match=r"^t\[1, 2\] is 9.0, a time in \[0, "):
+        uneven.at_own_times([0 * H, np.where(np.arange(N - 1) == 2, 9, 0)])
 
 
 @pytest.mark.parametrize(
     ("curve", "duration", "message"),
     [
         (np.sin, 1, "curve: a Curve wanted, got"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), 0, "duration is 0.0, a number above 0 is wanted"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), -1, "duration is -1.0, a number above 0 is wanted"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), True, "duration is True, a number above 0 is wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), 0, "duration is 0.0, a duration from 1e-100"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), -1, "duration is -1.0, a duration from 1e-100"),
         (rb.geodesic_so3(*ROTATIONS[:2]), np.inf, "duration is inf"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), [1, 2], "duration: shape () wanted"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), [1, 2], "duration: one, or one for each curve"),
         (rb.chain([1e9, 2e9], ROTATIONS[:2]), 1e-9, "duration is 1e-09: that vanishes beside"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), 1e-160, "duration is 1e-160: too short, accelerations"),
+        (rb.geodesic_so3(*ROTATIONS[:2]), 1e-160, "duration is 1e-160, a duration from"),
     ],
 )
 def test_a_bad_duration_is_refused(curve, duration, message):
@@ -407,7 +420,7 @@ def test_far_from_the_origin_it_is_the_same_motion():
 def test_from_epoch_times_on_a_duration_is_kept():
     c = rb.chain(1.3e9 + TIMES, ROTATIONS)
     again = rb.retime(c, 1e-3)
-    assert again.rate == (c.domain[1] - c.domain[0]) / 1e-3
+    assert np.abs(again.legs.duration / H * np.ptp(TIMES) / 1e-3 - 1).max() < 1e-5
     assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
 
 
@@ -448,8 +461,8 @@ def test_durations_of_any_size():
 def test_a_small_jump_of_the_velocity_is_seen_beside_fast_motion():
     """Legs that start a little faster than the ones before end: in the turning alone."""
 
-    def uneven(R0, R1, w0, w1):
-        return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1)
+    def uneven(R0, R1, w0, w1, duration):
+        return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
 
     fast = rb.pose_from_components(ROTATIONS, 1e6 * POSES[:, :3, 3])
     with pytest.raises(RuntimeError, match="a velocity jumps at a joint"):
@@ -459,8 +472,9 @@ def test_a_small_jump_of_the_velocity_is_seen_beside_fast_motion():
 def test_many_ways_and_one_turn():
     """A leg whose rotation is one for all."""
 
-    def sliding(A0, A1):
-        return RigidMotion(rb.geodesic_so3(np.eye(3), np.eye(3)), A0[:, :3, 3], A1[:, :3, 3])
+    def sliding(A0, A1, duration):
+        turn = rb.geodesic_so3(np.eye(3), np.eye(3), duration=duration)
+        return rigid_motion(RigidMotion, turn, A0[:, :3, 3], A1[:, :3, 3])
 
     places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
     c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))

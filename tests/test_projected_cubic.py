@@ -38,7 +38,7 @@ GAPS = oracles.two_smallest_eigenvalues(transposed(CUBICS(TIMES)) @ cubic_of_mat
 def test_the_cubic_is_projected_to_the_nearest_rotation():
     R, M = CUBICS(TIMES), cubic_of_matrices(TIMES)
     S = transposed(R) @ M
-    scale = np.linalg.norm(CUBICS.ends, axis=(-2, -1)).sum(axis=0)
+    scale = np.linalg.norm(CUBICS.ends, axis=(-2, -1)).sum(axis=-1)
     assert np.abs(transposed(R) @ R - np.eye(3)).max() < 20 * EPS
     assert np.abs(np.linalg.det(R) - 1).max() < 20 * EPS
     assert np.all(np.abs(S - transposed(S)).max(axis=(-2, -1)) < 10 * EPS * scale)
@@ -61,7 +61,7 @@ def test_where_the_determinant_is_negative_the_curve_is_right_and_smooth():
 @pytest.mark.source("BK 6.2", "errata 11")
 def test_the_ends_are_met_to_their_rounding():
     for curve in (CUBICS, QUINTICS):
-        scale = np.linalg.norm(curve.ends, axis=(-2, -1)).sum(axis=0)[:, None]
+        scale = np.linalg.norm(curve.ends, axis=(-2, -1)).sum(axis=-1)[:, None]
         for t, R, w in ((0, R0, W0), (1, R1, W1)):
             assert np.all(np.abs(curve(t) - R).max(axis=-1) < 4 * EPS * scale)
             assert np.all(np.abs(curve(t, 1) - w) < 40 * EPS * scale)
@@ -72,7 +72,7 @@ def test_the_ends_are_met_to_their_rounding():
 @pytest.mark.source("errata 11")
 def test_the_printed_end_condition_and_group_do_not_hold():
     """The second derivative at the end is not the one that is prescribed; and R0 ŵ0 is singular."""
-    M0, M1, V0, V1 = CUBICS.ends
+    M0, M1, V0, V1 = np.moveaxis(CUBICS.ends, -3, 0)
     M2, M3 = 3 * (M1 - M0) - 2 * V0 - V1, V0 + V1 - 2 * (M1 - M0)
     missed = np.abs(2 * M2 + 6 * M3 - R1 @ rb.hat_so3(W1)).max(axis=(-2, -1))
     assert np.all(missed > 0.1)

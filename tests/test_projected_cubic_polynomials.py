@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse.projected_cubic import hermite
+from rbcourse._hermite import hermite
 from rbcourse.textbook import cubic_coefficients, polynomial
 
 RNG = np.random.default_rng(62)

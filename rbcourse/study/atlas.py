@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -40,7 +41,9 @@ NEAR_ZERO = 1e-4
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomial:
     """Return the stack of `projected_cubic_so3`, without looking for its margins, which is slow."""
-    return ProjectedPolynomial(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1))
+    M = R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1)
+    ends = np.stack(np.broadcast_arrays(*M), axis=-3)
+    return ProjectedPolynomial(duration=np.ones(ends.shape[:-3]), ends=ends)
 
 
 WAYS: dict[str, Maker] = {**FORMS, "projection": projection}
@@ -63,7 +66,8 @@ def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
 def _weighted(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
     W = weight_from_inertia(inertia)
     W = 3 * W / np.trace(W)
-    return ProjectedPolynomial(*(M @ W for M in projection(R0, R1, w0, w1).ends))
+    cubic = projection(R0, R1, w0, w1)
+    return replace(cubic, ends=cubic.ends @ W)
 
 
 def _normal(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:

@@ -8,7 +8,7 @@ import oracles
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse import _jets as jets
+from rbcourse import _taylor as jets
 from rbcourse import vee_so3
 
 EPS = np.finfo(float).eps

@@ -1,0 +1,138 @@
+"""Polynomials of degree one, three and five through given ends: Hermite interpolation."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._checks import check_order
+from rbcourse._numerics import Array
+
+
+def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
+    """Return the polynomial of least degree with these ends, or a derivative, at the times t.
+
+    Written from the nearer end, it meets both exactly, however they differ in size. Of all curves
+    with its ends the line has the least ∫ ‖x'‖² dt, the cubic the least ∫ ‖x''‖² dt, and the
+    quintic the least ∫ ‖x'''‖² dt.
+
+    Parameters
+    ----------
+    ends : sequence of array_like
+        x0, x1 of a line; x0, x1, v0, v1 of a cubic; x0, x1, v0, v1, a0, a1 of a quintic: values and
+        derivatives at t = 0 and 1.
+    t : ndarray
+        The times; they broadcast with the ends.
+    order : {0, 1, 2, 3}, optional
+        Which derivative.
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    ValueError
+        If `order` is another, or there are not two, four or six ends.
+
+    References
+    ----------
+    BK 6, BK 6.2.
+
+    Examples
+    --------
+    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
+    array([0. , 0.5, 1. ])
+    """
+    return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
+
+
+def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
+    """Return `hermite` of a stack with these `stack_terms`, components first.
+
+    Parameters
+    ----------
+    terms : ndarray, shape (n + 1, ..., count)
+    t : ndarray, shape (T, count) or (T, 1); if `by_curve`, shape (count, T) or (1, T)
+    order : int
+    by_curve : bool, optional
+        Whether the axis of the curves is before that of the times.
+
+    Returns
+    -------
+    ndarray, shape (..., T, count); if `by_curve`, shape (..., count, T)
+    """
+    weights = _weights(len(terms) - 1, t, order)
+    if not by_curve:
+        return _sum(weights, terms[..., None, :])
+    core, count = terms.shape[1:-1], terms.shape[-1]
+    flat = terms[-len(weights) :].reshape(len(weights), math.prod(core), count)
+    sums = np.empty((math.prod(core), count, t.shape[1]))
+    np.matmul(flat.T, np.stack(weights, axis=1), out=np.moveaxis(sums, 1, 0))
+    return sums.reshape(*core, count, t.shape[1])
+
+
+def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
+    """Return the sum of the last terms, weighed."""
+    first, *others = (w * x for w, x in zip(weights, terms[-len(weights) :], strict=True))
+    return sum(others, first)
+
+
+def stack_terms(ends: Array) -> Array:
+    """Return the terms of a stack: of ends of shape (count, n, ...), shape (n + 1, ..., count)."""
+    terms = _terms(np.moveaxis(ends, 1, 0))
+    return np.stack([np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in terms])
+
+
+def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
+    """Return what a polynomial is a sum of: x0, x1, x1 − x0 and the derivatives at the ends."""
+    x0, x1, *rates = map(np.asarray, ends)
+    return [x0, x1, x1 - x0, *rates]
+
+
+def _weights(count: int, t: Array, order: int) -> list[Array]:
+    """Return what the terms weigh; those of derivatives begin with x1 − x0."""
+    starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
+    rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
+    weights = [weight for pair in rates for weight in pair]
+    if order:
+        return [(-1) ** order * ends[0], *weights]
+    early = t.real < 0.5
+    return [early + 0 * t, ~early + 0 * t, np.where(early, ends[0], -starts[0]), *weights]
+
+
+def _start_weights(count: int, t: Array, order: int) -> list[Array]:
+    """Return the weights of x0, v0 and a0.
+
+    By symmetry x1, v1 and a1 have the same at 1 − t; the sign changes for each derivative.
+    """
+    s = 1 - t
+    match count, order:
+        case 2, 0:
+            return [s]
+        case 2, 1:
+            return [0 * t - 1]
+        case 2, _:
+            return [0 * t]
+        case 4, 0:
+            return [s * s * (1 + 2 * t), t * s * s]
+        case 4, 1:
+            return [-6 * t * s, s * (1 - 3 * t)]
+        case 4, 2:
+            return [6 * (t - s), 2 - 6 * s]
+        case 4, 3:
+            return [12 + 0 * t, 6 + 0 * t]
+        case 6, 0:
+            sss = s * s * s
+            return [sss * (1 + 3 * t + 6 * t * t), t * sss * (1 + 3 * t), t * t * sss / 2]
+        case 6, 1:
+            ts, ss = t * s, s * s
+            return [-30 * ts * ts, ss * (1 - 3 * t) * (1 + 5 * t), ts * s * (2 - 5 * t) / 2]
+        case 6, 2:
+            ts = t * s
+            return [60 * ts * (t - s), -12 * ts * (3 - 5 * t), s * (1 - 8 * t + 10 * t * t)]
+        case 6, 3:
+            tt = t * t
+            return [60 * (6 * t * s - 1), -12 * (3 - 16 * t + 15 * tt), -9 + 36 * t - 30 * tt]
+    raise ValueError(f"ends: two, four or six wanted, got {count}")
