@@ -13,8 +13,8 @@ from nbformat import NotebookNode
 from nbval.plugin import IPyNbFile
 from shown import not_shown, start_recording
 
-from rbcourse.course.agreement import changed_lines, stale_figures
-from rbcourse.course.notebooks import kernel_address, lesson_paths, normalised
+from rbclassroom.course.agreement import changed_lines, stale_figures
+from rbclassroom.course.notebooks import kernel_address, lesson_paths, normalised
 
 ROOT = Path(__file__).parent
 LESSONS = lesson_paths(ROOT / "notebooks")

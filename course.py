@@ -30,12 +30,12 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 UV = shutil.which("uv")
 TOO_NEW = sys.version_info >= (3, 13)  # for the oldest releases
-TESTED = ("lessons", "grading", "test")  # the extras whose ranges are tested
+EXTRAS = {"": "draw,test", "classroom": "lessons,lecture,grading"}  # whose ranges are tested
 DARK = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img, canvas) {
   filter: invert(0.93) hue-rotate(180deg);
 }
 """
-STILLS = """from rbcourse.course.notebooks import before_saving
+STILLS = """from rbclassroom.course.notebooks import before_saving
 get_config().ContentsManager.pre_save_hook = before_saving
 """
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "msedge")
@@ -104,44 +104,50 @@ def main():
         return
     set_up()
     if known.task == "figures":
-        run("-m", "rbcourse.course.notebooks", "regenerate", *known.lessons)
+        run("-m", "rbclassroom.course.notebooks", "regenerate", *known.lessons)
         if not known.lessons:
-            run("-m", "rbcourse.explore.recorded", "figures/explorers")
+            run("-m", "rbclassroom.explorers.recorded", "figures/explorers")
     elif known.task == "test":
         test_in(VENV, *further)
     elif known.task == "lab":
         open_lab(known.edit, further)
     elif known.task == "lecture":
         if known.check:
-            run("-m", "rbcourse.course.rehearsal", known.lesson)
+            run("-m", "rbclassroom.course.rehearsal", known.lesson)
         else:
             words = ["--no-browser"] * known.no_browser
             if known.votes is not None:
                 words += ["--votes", known.votes] if known.votes else ["--votes"]
-            run("-m", "rbcourse.course.lecture", known.lesson, *words)
+            run("-m", "rbclassroom.course.lecture", known.lesson, *words)
     elif known.task == "check":
-        run("-m", "rbcourse.assignments.check", known.file)
+        run("-m", "rbclassroom.assignments.check", known.file)
     elif known.task == "handout":
-        run("-m", "rbcourse.assignments", "handout", known.set, *["--solutions"] * known.solutions)
+        run(
+            "-m",
+            "rbclassroom.assignments",
+            "handout",
+            known.set,
+            *["--solutions"] * known.solutions,
+        )
     elif known.task == "collect":
         due = ["--due", known.due] if known.due else []
-        run("-m", "rbcourse.assignments", "collect", known.folder, *due)
+        run("-m", "rbclassroom.assignments", "collect", known.folder, *due)
     elif known.task == "grade":
         box = ["--require-box"] * known.require_box
-        run("-m", "rbcourse.assignments", "grade", *(known.sets + box))
+        run("-m", "rbclassroom.assignments", "grade", *(known.sets + box))
     elif known.task == "hostile":
         install_package("bwrap", "bubblewrap")
-        test_in(VENV, "tests/hostile", *further)
+        test_in(VENV, "classroom/tests/hostile", *further)
     elif known.task == "browser":
         look_in_browser(further)
     elif known.task == "book":
         set_up_extra("book")
         words = ["--repository", known.repository] if known.repository else []
-        run("-m", "rbcourse.book.build", *(words + ["--serve"] * known.serve))
+        run("-m", "rbclassroom.book.build", *(words + ["--serve"] * known.serve))
     elif known.task == "ledger":
-        run("-m", "rbcourse.course.ledger")
+        run("-m", "rbclassroom.course.ledger")
     elif known.task == "atlas":
-        run("-m", "rbcourse.study.body_atlas")
+        run("-m", "rbclassroom.surveys.body_atlas")
     elif known.task == "bench":
         set_up_peers()
         run("-m", "benchmarks")
@@ -188,7 +194,7 @@ def open_lab(edit, further):
     if edit:
         os.environ["RBCOURSE_EDIT"] = "1"
     else:
-        run("-m", "rbcourse.course.notebooks", "copy")
+        run("-m", "rbclassroom.course.notebooks", "copy")
     folder = "notebooks" if edit else "work"
     words = ["--ServerApp.root_dir=%s" % ROOT, "--log-level=ERROR"]
     words.append("--LabApp.default_url=/lab/tree/%s/00_start_here.ipynb" % folder)
@@ -245,16 +251,17 @@ def look_in_browser(further):
     """Make the book; try every page, lesson and explorer in a browser."""
     set_up_extra("browser")
     set_up_extra("book")
-    run("-m", "rbcourse.book.build")
+    run("-m", "rbclassroom.book.build")
     os.environ["CHROMIUM"] = find_chromium()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     set_up_lab()
-    run("-m", "pytest", "-n", "auto", "--dist", "worksteal", "tests/browser", *further)
+    run("-m", "pytest", "-n", "auto", "--dist", "worksteal", "classroom/tests/browser", *further)
 
 
 def set_up():
     """Make .venv, from environment.txt."""
-    make(VENV, fingerprint(ROOT / "environment.txt", ROOT), "-r", "environment.txt")
+    wanted = fingerprint([ROOT / "environment.txt"], ROOT)
+    make(VENV, wanted, "-r", "environment.txt")
 
 
 def set_up_range(releases):
@@ -262,17 +269,26 @@ def set_up_range(releases):
     if releases == "oldest" and TOO_NEW:
         sys.exit("The oldest releases are to be had for Python 3.11 and 3.12: call one of these.")
     venv = ROOT / (".venv-" + releases)
-    words = ["-e", ".[%s]" % ",".join(TESTED)] + (lower_bounds() if releases == "oldest" else [])
-    make(venv, fingerprint(ROOT / "pyproject.toml", ROOT, date.today()), *words)
+    words = [word for place in EXTRAS for word in ("-e", "./%s[%s]" % (place, EXTRAS[place]))]
+    words += lower_bounds() if releases == "oldest" else []
+    make(venv, fingerprint(projects(), ROOT, date.today()), *words)
     return venv
 
 
+def projects():
+    """Return the files that say what each distribution requires."""
+    return [ROOT / place / "pyproject.toml" for place in EXTRAS]
+
+
 def lower_bounds():
-    """Return what pyproject.toml requires, each at the lower bound of its range."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    ranges = project["dependencies"] + [line for name in TESTED for line in extras[name]]
-    return [re.sub(">=([^,]+).*", r"==\1", line) for line in ranges]
+    """Return what the distributions require, each at the lower bound of its range."""
+    ranges = []
+    for path, extras in zip(projects(), EXTRAS.values(), strict=True):
+        project = tomllib.loads(path.read_text(encoding="utf-8"))["project"]
+        ranges += project["dependencies"]
+        for name in extras.split(","):
+            ranges += project["optional-dependencies"][name]
+    return [re.sub(">=([^,]+).*", r"==\1", line) for line in ranges if ">=" in line]
 
 
 def make(venv, wanted, *words):
@@ -317,12 +333,13 @@ def python(venv):
 
 
 def set_up_extra(name):
-    """Install what a task needs besides, at the versions of pyproject.toml."""
+    """Install an extra of a distribution that a task needs, at its exact versions."""
     stamp = VENV / ("%s-by-course.txt" % name)
-    wanted = fingerprint(ROOT / "pyproject.toml")
+    wanted = fingerprint(projects())
     if not stamp.exists() or stamp.read_text() != wanted:
         print("Installing what %s needs" % name, end="", flush=True)
-        install(VENV, "-e", ".[%s]" % name)
+        place = "classroom" if name in ("book", "browser") else "."
+        install(VENV, "-e", "./%s[%s]" % (place, name))
         stamp.write_text(wanted)
         print(" done.", flush=True)
 
@@ -388,9 +405,9 @@ def patiently(*command):
             raise SetUpError("".join(said.readlines()[-25:]))
 
 
-def fingerprint(path, *more):
-    """Return a text that changes when the file or one of the other things does."""
-    text = "\n".join([path.read_text(encoding="utf-8")] + [str(word) for word in more])
+def fingerprint(paths, *more):
+    """Return a text that changes when one of the files or of the other things does."""
+    text = "\n".join([path.read_text(encoding="utf-8") for path in paths] + list(map(str, more)))
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 

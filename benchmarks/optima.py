@@ -7,9 +7,9 @@ import rbcourse as rb
 from benchmarks import references
 from benchmarks.contest import OURS, Contest, Method
 from benchmarks.references import oracles
+from rbclassroom.surveys.atlas import random_problems
+from rbclassroom.surveys.survey import processes, survey
 from rbcourse import textbook
-from rbcourse.study.atlas import random_problems
-from rbcourse.study.survey import processes, survey
 
 MOMENTS = np.linspace(0, 1, 101)
 ALONG, E1 = np.pi / 6 * np.array([1, 2, 3]), np.array([1.0, 0, 0])

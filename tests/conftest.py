@@ -1,6 +1,6 @@
 import pytest
 
-from rbcourse.course.ledger import MISPRINTS, WHAT
+from rbclassroom.course.ledger import MISPRINTS, WHAT
 
 
 def pytest_collection_modifyitems(items):

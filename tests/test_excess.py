@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
+from rbclassroom.surveys import atlas
 from rbcourse import excess
 from rbcourse.closed_forms import bezier_deviation
 from rbcourse.curves import Ends
-from rbcourse.study import atlas
 
 ROOT = Path(__file__).parents[1]
 SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "docs/near_optimal.py")

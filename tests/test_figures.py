@@ -11,9 +11,9 @@ from scipy.integrate import simpson, solve_ivp
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import rbcourse as rb
+from rbclassroom.surveys import atlas, body_atlas
+from rbclassroom.surveys.survey import survey
 from rbcourse.draw.save import UNITS
-from rbcourse.study import atlas, body_atlas
-from rbcourse.study.survey import survey
 
 FIGURES = Path(__file__).parents[1] / "figures"
 TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # without pictures

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rbcourse.course import notebooks
-from rbcourse.course.agreement import BASE64
+from rbclassroom.course import notebooks
+from rbclassroom.course.agreement import BASE64
 
 ROOT = Path(__file__).parents[1]
 LESSONS = notebooks.lesson_paths(ROOT / "notebooks")

@@ -19,16 +19,29 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.version import Version
 
+import rbclassroom
 import rbcourse
 
 ROOT = Path(__file__).parents[1]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+PROJECT, CLASSROOM = (
+    tomllib.loads((ROOT / place / "pyproject.toml").read_text("utf-8"))["project"]
+    for place in ("", "classroom")
+)
 LINES = [
     line
     for line in (ROOT / "environment.txt").read_text("utf-8").splitlines()
     if line and not line.startswith("#")
 ]
-PINS = {pin.name: pin.specifier for pin in map(Requirement, LINES[:-1])}
+PINS = {pin.name: pin.specifier for pin in map(Requirement, LINES[:-2])}
+
+
+def ranges_of_both():
+    """What both distributions require, with the extras that environment.txt contains."""
+    extras = PROJECT["optional-dependencies"], CLASSROOM["optional-dependencies"]
+    wanted = [*PROJECT["dependencies"], *extras[0]["draw"], *extras[0]["test"]]
+    wanted += CLASSROOM["dependencies"]
+    wanted += [line for name in ("lessons", "lecture", "grading") for line in extras[1][name]]
+    return [range_ for range_ in map(Requirement, wanted) if range_.name != "rbcourse"]
 
 
 def read(name):
@@ -36,16 +49,13 @@ def read(name):
 
 
 def test_the_environment_is_exact_and_ends_with_the_course():
-    assert LINES[-1] == "-e ."
+    assert LINES[-2:] == ["-e .", "-e ./classroom"]
     for name, specifier in PINS.items():
         assert re.fullmatch(r"==[\d.]+", str(specifier)), name
 
 
 def test_the_environment_is_what_the_package_and_its_extras_need():
-    extras = PROJECT["optional-dependencies"]
-    wanted = [*PROJECT["dependencies"]]
-    wanted += [line for name in ("lessons", "grading", "test") for line in extras[name]]
-    ranges = {range_.name: range_.specifier for range_ in map(Requirement, wanted)}
+    ranges = {range_.name: range_.specifier for range_ in ranges_of_both()}
     for_figures, for_speed = {"fonttools", "kiwisolver"}, {"jsonschema"}
     assert set(PINS) - set(ranges) == for_figures | for_speed
     assert set(ranges) <= set(PINS)
@@ -71,6 +81,7 @@ def test_every_file_has_the_same_version():
     version = rbcourse.__version__
     assert re.search(r"^version: (.*)$", read("CITATION.cff"), re.MULTILINE)[1] == version
     assert re.search(r"^## (\S+)", read("CHANGELOG.md"), re.MULTILINE)[1] == version
+    assert rbclassroom.__version__ == version
 
 
 def test_the_citation_names_both_sources():
@@ -236,27 +247,42 @@ def test_a_task_for_problem_sets_runs_its_module(setting_up, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     module.main()
     name, *more = [word.replace("HERE", str(tmp_path)) for word in wanted]
-    module = ["rbcourse.assignments.check"] if name == "check" else ["rbcourse.assignments", name]
-    assert ran == [["-m", *module, *map(str, map(Path, more))]]
+    module = "rbclassroom.assignments"
+    words = [f"{module}.check"] if name == "check" else [module, name]
+    assert ran == [["-m", *words, *map(str, map(Path, more))]]
 
 
 RANGES = """
 [project]
 dependencies = ["numpy>=2.0"]
-optional-dependencies.lessons = ["voila>=0.5.8,<0.6"]
-optional-dependencies.grading = ["nbgrader>=0.9,!=0.9.1"]
-optional-dependencies.test = ["mpmath==1.2"]
+optional-dependencies.draw = ["pillow>=11"]
+optional-dependencies.test = ["mpmath>=1.2"]
 optional-dependencies.lint = ["ruff==0.1"]
 """
-BOUNDS = ["numpy==2.0", "voila==0.5.8", "nbgrader==0.9", "mpmath==1.2"]
+RANGES_OF_CLASSROOM = """
+[project]
+dependencies = ["rbcourse[draw]", "tqdm>=4"]
+optional-dependencies.lessons = ["jupyter>=1.1"]
+optional-dependencies.lecture = ["voila>=0.5.8,<0.6"]
+optional-dependencies.grading = ["nbgrader>=0.9,!=0.9.1"]
+"""
+BOUNDS = ["numpy==2.0", "pillow==11", "mpmath==1.2", "tqdm==4", "jupyter==1.1", "voila==0.5.8"]
+BOUNDS += ["nbgrader==0.9"]
+BOTH = ["-e", "./[draw,test]", "-e", "./classroom[lessons,lecture,grading]"]
+
+
+def write_ranges(root):
+    (root / "pyproject.toml").write_text(RANGES)
+    (root / "classroom").mkdir()
+    (root / "classroom" / "pyproject.toml").write_text(RANGES_OF_CLASSROOM)
 
 
 @pytest.mark.parametrize(
     ("releases", "folder", "installed"),
     [
         ([], ".venv", ["-r", "environment.txt"]),
-        (["--oldest"], ".venv-oldest", ["-e", ".[lessons,grading,test]", *BOUNDS]),
-        (["--newest"], ".venv-newest", ["-e", ".[lessons,grading,test]"]),
+        (["--oldest"], ".venv-oldest", [*BOTH, *BOUNDS]),
+        (["--newest"], ".venv-newest", BOTH),
     ],
 )
 def test_tests_run_in_the_environment_that_is_asked_for(
@@ -265,7 +291,7 @@ def test_tests_run_in_the_environment_that_is_asked_for(
     """With what is stored only where it was drawn; with the further words, last, everywhere."""
     module, done = setting_up
     monkeypatch.setattr(module, "TOO_NEW", False)
-    (module.ROOT / "pyproject.toml").write_text(RANGES)
+    write_ranges(module.ROOT)
     ran = []
     monkeypatch.setattr(module, "run_in", lambda venv, *words: ran.append((venv, words)))
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
@@ -273,7 +299,7 @@ def test_tests_run_in_the_environment_that_is_asked_for(
     module.main()
     ((venv, words),) = ran
     assert venv == module.ROOT / folder
-    assert [path for path in module.ROOT.iterdir() if path.is_dir()] == [venv]
+    assert {path.name for path in module.ROOT.iterdir() if path.is_dir()} == {folder, "classroom"}
     assert done[1][-len(installed) :] == tuple(installed)
     assert all(str(module.python(venv)) in command for command in done[1:])
     assert words[:2] == ("-m", "pytest")
@@ -288,7 +314,7 @@ def test_tests_run_in_the_environment_that_is_asked_for(
 def test_an_environment_of_a_range_is_made_once_a_day(setting_up, monkeypatch, releases):
     module, done = setting_up
     monkeypatch.setattr(module, "TOO_NEW", False)
-    (module.ROOT / "pyproject.toml").write_text(RANGES)
+    write_ranges(module.ROOT)
     for day, commands in ((1, 3), (1, 3), (2, 6)):
         today = SimpleNamespace(today=lambda day=day: date(2026, 1, day))
         monkeypatch.setattr(module, "date", today)
@@ -305,12 +331,11 @@ def test_a_python_without_the_oldest_releases_is_refused(setting_up, monkeypatch
 
 
 def test_every_range_has_a_lower_bound_which_is_tested():
-    extras = PROJECT["optional-dependencies"]
-    wanted = [*PROJECT["dependencies"]]
-    wanted += [line for name in ("lessons", "grading", "test") for line in extras[name]]
+    wanted = sorted(ranges_of_both(), key=lambda range_: range_.name)
     bounds = [Requirement(line) for line in course_module().lower_bounds()]
     assert len({bound.name for bound in bounds}) == len(bounds)
-    for range_, bound in zip(map(Requirement, wanted), bounds, strict=True):
+    bounds.sort(key=lambda bound: bound.name)
+    for range_, bound in zip(wanted, bounds, strict=True):
         (lowest,) = [part for part in range_.specifier if part.operator == ">="]
         assert (bound.name, str(bound.specifier)) == (range_.name, f"=={lowest.version}")
         assert range_.specifier.contains(lowest.version)
@@ -320,11 +345,11 @@ def test_every_range_has_a_lower_bound_which_is_tested():
 def test_bench_goes_on_without_what_does_not_install(setting_up, monkeypatch, capsys, missing):
     module, done = setting_up
     module.set_up()
-    (module.ROOT / "pyproject.toml").write_text("")
+    write_ranges(module.ROOT)
     ran, pretend = [], module.patiently
 
     def fails(*command):
-        if missing and command[-1] == ".[peers]":
+        if missing and command[-1] == "./.[peers]":
             raise module.SetUpError("no such package")
         pretend(*command)
 
@@ -401,13 +426,82 @@ def test_the_readme_has_a_row_for_every_task():
         assert re.search(rf"^\| `python3 course\.py {task}\b", readme, re.MULTILINE), task
 
 
+def built(place, folder):
+    code = f"from flit_core import buildapi; buildapi.build_wheel({str(folder)!r})"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT / place, check=True)
+    (path,) = folder.glob("*.whl")
+    return path
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("wheel")
-    code = f"from flit_core import buildapi; buildapi.build_wheel({str(folder)!r})"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
-    (built,) = folder.glob("*.whl")
-    return built
+    return built("", tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def classroom_wheel(tmp_path_factory):
+    return built("classroom", tmp_path_factory.mktemp("wheel"))
+
+
+def distributions_for(requirements):
+    """The installed distributions that are required, and those that these require in turn."""
+    left, asked = [(Requirement(line), {""}) for line in requirements], {}
+    while left:
+        requirement, extras = left.pop()
+        name, marker = requirement.name.lower().replace("_", "-"), requirement.marker
+        if marker and not any(marker.evaluate({"extra": extra}) for extra in extras):
+            continue
+        wanted = {"", *requirement.extras}
+        if name.startswith("rbcourse") or wanted <= asked.get(name, set()):
+            continue
+        asked[name] = wanted | asked.get(name, set())
+        needs = importlib.metadata.requires(name) or []
+        left += [(Requirement(line), asked[name]) for line in needs]
+    return [importlib.metadata.distribution(name) for name in asked]
+
+
+NEEDS_LECTURE = ["course.lecture", "course.rehearsal", "course.votes"]
+NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
+DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
+EXTRAS = CLASSROOM["optional-dependencies"]
+TEACH = [line for extra in ("lecture", "grading", "book") for line in EXTRAS[extra]]
+IMPORTED = {  # what is installed, and the modules that need more
+    "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
+    "rbcourse[draw]": (DRAW, []),
+    "rbclassroom": (
+        [*DRAW, *CLASSROOM["dependencies"]],
+        [*NEEDS_LECTURE, *NEEDS_GRADING, "book"],
+    ),
+    "rbclassroom[lecture,grading,book]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], []),
+}
+
+
+@pytest.mark.parametrize("case", IMPORTED)
+def test_wheels_import_completely_with_what_they_declare(wheel, classroom_wheel, tmp_path, case):
+    """In an environment that has nothing else: links to the distributions, and the wheels."""
+    installed, without = IMPORTED[case]
+    package = case.partition("[")[0]
+    for distribution in distributions_for(installed):
+        for top in {file.parts[0] for file in distribution.files} - {"..", "__pycache__"}:
+            link = tmp_path / top
+            if not link.exists():
+                link.symlink_to(distribution.locate_file(top))
+    for path in (wheel, classroom_wheel)[: 1 + (package == "rbclassroom")]:
+        ZipFile(path).extractall(tmp_path)
+    code = f"""
+        import importlib, pkgutil, sys
+        sys.path.insert(0, {str(tmp_path)!r})
+        import {package}
+        for module in pkgutil.walk_packages({package}.__path__, "{package}."):
+            name = module.name.removeprefix("{package}.")
+            if not any(f"{{name}}.".startswith(f"{{other}}.") for other in {without!r}):
+                importlib.import_module(module.name)
+                print(name)
+    """
+    words = [sys.executable, "-I", "-S", "-W", "ignore", "-c", dedent(code)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.stderr.splitlines()[-1:] == []
+    assert len(done.stdout.split()) > 15
 
 
 def test_the_five_lines_run_from_the_wheel_with_numpy_and_scipy_alone(wheel, tmp_path):
@@ -443,5 +537,14 @@ def test_the_wheel_carries_types_and_style(wheel):
     names = ZipFile(wheel).namelist()
     assert "rbcourse/py.typed" in names
     assert {"rbcourse/rbcourse.mplstyle", "rbcourse/paper.mplstyle"} <= set(names)
-    assert "rbcourse/course/lecture_view/index.html.j2" in names
-    assert not [name for name in names if name.startswith(("tests", "notebooks"))]
+    assert not [name for name in names if not name.startswith("rbcourse")]
+    drawn = [name for name in names if name.startswith("rbcourse/draw/")]
+    assert len(names) - len(drawn) <= 45
+
+
+def test_the_classroom_carries_its_pages(classroom_wheel):
+    names = ZipFile(classroom_wheel).namelist()
+    assert "rbclassroom/course/lecture_view/index.html.j2" in names
+    assert {name.split("/")[0] for name in names} <= {"rbclassroom"} | {
+        name.split("/")[0] for name in names if ".dist-info" in name
+    }

@@ -12,53 +12,60 @@ from textwrap import dedent
 
 import pytest
 
+import rbclassroom
 import rbcourse
 
-PACKAGE = Path(rbcourse.__file__).parent
-MAY_IMPORT = {  # the rooms, beside the core and itself, that a room may import
-    "core": set(),
-    "draw": set(),
-    "explore": {"draw", "course"},
-    "study": {"draw"},
-    "report": {"draw"},
-    "course": None,  # not even the core
-    "assignments": {"draw", "course"},
-    "book": {"course", "assignments"},
+ROOT = Path(rbcourse.__file__).parents[1]
+PACKAGES = {
+    name: Path(package.__file__).parent
+    for name, package in {"rbcourse": rbcourse, "rbclassroom": rbclassroom}.items()
 }
-CLIENTS = "draw", "explore", "study", "course", "assignments", "book"
+MAY_IMPORT = {  # the parts, beside itself, that a part of the packages may import
+    "rbcourse": set(),
+    "rbcourse.draw": {"rbcourse"},
+    "rbcourse.report": {"rbcourse", "rbcourse.draw"},
+    "rbclassroom": set(),
+    "rbclassroom.explorers": {"rbcourse", "rbcourse.draw", "rbclassroom.course"},
+    "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
+    "rbclassroom.course": {"rbclassroom"},  # not even the mathematics
+    "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
+    "rbclassroom.book": {"rbclassroom.course", "rbclassroom.assignments"},
+}
 PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))} | {
     "report",
     "textbook",
 }
 """Modules of the core whose names may be used from outside; each has an ``__all__``."""
 LIBRARIES = {
-    "core": {"numpy", "scipy"},
-    "draw": {"PIL", "matplotlib", "mpl_toolkits"},
-    "explore": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
-    "study": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
-    "report": {"matplotlib"},
-    "course": {"PIL", "jupyter_server", "nbclient", "nbformat", "numpy", "segno", "tornado"}
+    "rbcourse": {"numpy", "scipy"},
+    "rbcourse.draw": {"PIL", "matplotlib", "mpl_toolkits"},
+    "rbcourse.report": {"matplotlib"},
+    "rbclassroom": set(),
+    "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
+    "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
+    "rbclassroom.course": {"PIL", "jupyter_server", "nbclient", "nbformat", "segno", "tornado"}
     | {"traitlets", "voila"},
-    "assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient", "nbconvert"}
-    | {"nbformat", "nbgrader", "traitlets"},
-    "book": {"nbformat", "pygments", "sphinx"},
+    "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
+    | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
+    "rbclassroom.book": {"nbformat", "pygments", "sphinx"},
 }
 
 
-def modules(package):
-    """The modules of a package by their dotted names below it, the package itself as ""."""
-    for path in package.rglob("*.py"):
-        parts = path.relative_to(package).with_suffix("").parts
-        yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+def modules(packages):
+    """The modules of packages by their dotted names."""
+    for package, folder in packages.items():
+        for path in folder.rglob("*.py"):
+            parts = path.relative_to(folder).with_suffix("").parts
+            yield ".".join([package, *parts]).removesuffix(".__init__"), path
 
 
-def room(module):
-    first = module.split(".")[0]
-    return first if first in MAY_IMPORT else "core"
+def part(module):
+    first = ".".join(module.split(".")[:2])
+    return first if first in MAY_IMPORT else module.split(".")[0]
 
 
 def imports(module, path, known):
-    """What a module imports anywhere, inside functions too: modules of the package, libraries."""
+    """What a module imports anywhere, inside functions too: modules of the packages, libraries."""
     inner, outer = set(), set()
     here = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -66,35 +73,32 @@ def imports(module, path, known):
         if isinstance(node, ast.Import):
             names = [(alias.name, []) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            base = ["rbcourse", *here[: len(here) + 1 - node.level]] if node.level else []
-            name = ".".join([*filter(None, base), *filter(None, [node.module])])
+            base = here[: len(here) + 1 - node.level] if node.level else []
+            name = ".".join([*base, *filter(None, [node.module])])
             names = [(name, [alias.name for alias in node.names])]
         for name, members in names:
-            top, _, below = name.partition(".")
-            if top != "rbcourse":
-                outer.add(top)
+            if name.split(".")[0] not in PACKAGES:
+                outer.add(name.split(".")[0])
             else:
-                submodules = [".".join(filter(None, [below, member])) for member in members]
-                found = [name for name in submodules if name in known]
+                found = [f"{name}.{each}" for each in members if f"{name}.{each}" in known]
                 inner.update(found)
                 if len(found) < len(members) or not members:
-                    inner.add(below)
+                    inner.add(name)
     return inner, outer
 
 
-def faults(package):
+def faults(packages):
     """Each import that the rules forbid, as "a imports b"; and the first circle that is found."""
-    known = dict(modules(package))
+    known = dict(modules(packages))
     graph = {}
     for module, path in known.items():
         inner, outer = imports(module, path, known)
-        graph[module], own = inner - {module}, room(module)
-        allowed = {own} if MAY_IMPORT[own] is None else {own, "core", *MAY_IMPORT[own]}
+        graph[module], own = inner - {module}, part(module)
         for other in sorted(inner):
-            top = other == "" and module != ""  # what imports all of the core, for its version
-            if room(other) not in allowed or (own == "core" and top):
-                yield f"{module} imports {other or 'rbcourse'}"
-        libraries = LIBRARIES["core"] | LIBRARIES[own] | set(sys.stdlib_module_names)
+            top = other == "rbcourse" and module != other  # all of the mathematics
+            if part(other) not in {own, *MAY_IMPORT[own]} or (own == "rbcourse" and top):
+                yield f"{module} imports {other}"
+        libraries = LIBRARIES["rbcourse"] | LIBRARIES[own] | set(sys.stdlib_module_names)
         yield from (f"{module} imports {name}" for name in sorted(outer - libraries))
     try:
         TopologicalSorter(graph).prepare()
@@ -103,19 +107,18 @@ def faults(package):
 
 
 def test_imports_keep_the_rules():
-    assert list(faults(PACKAGE)) == []
+    assert list(faults(PACKAGES)) == []
 
 
 def clients():
     """The name and the text of each file that uses the package from outside."""
-    root = PACKAGE.parent
-    for folder in (*(PACKAGE / room for room in CLIENTS), root / "benchmarks"):
-        for path in sorted(folder.rglob("*.py")):
-            yield path.relative_to(root).as_posix(), path.read_text("utf-8")
-    for path in sorted((root / "notebooks").rglob("*.ipynb")):
+    folders = PACKAGES["rbcourse"] / "draw", PACKAGES["rbclassroom"], ROOT / "benchmarks"
+    for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
+        yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
+    for path in sorted((ROOT / "notebooks").rglob("*.ipynb")):
         cells = json.loads(path.read_text("utf-8"))["cells"]
         code = ("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
-        yield path.relative_to(root).as_posix(), "\n".join(code)
+        yield path.relative_to(ROOT).as_posix(), "\n".join(code)
 
 
 def uses(text):
@@ -142,13 +145,14 @@ def uses(text):
 def not_exported(text):
     """The names among `uses` that are not exported, as "module.name"."""
     for module, name in uses(text):
-        first = module.split(".")[0]
-        if first in CLIENTS or name.startswith("__"):
+        if name.startswith("__"):
             continue
-        if module in PUBLIC:
+        if module.split(".")[0] == "draw":
+            known = [] if "_" in (name[0], module.rpartition(".")[2][0]) else [name]
+        elif module in PUBLIC:
             known = importlib.import_module(f"rbcourse.{module}").__all__
         else:
-            known = [] if module else [*rbcourse.__all__, *PUBLIC, *CLIENTS]
+            known = [] if module else [*rbcourse.__all__, *PUBLIC, "draw"]
         if name not in known:
             yield f"{module}.{name}".lstrip(".")
 
@@ -169,6 +173,7 @@ def test_clients_use_exported_names_only():
         ("from rbcourse._numerics import Array", ["_numerics.Array"]),
         ("from rbcourse.planar import as_states", ["planar.as_states"]),
         ("import rbcourse.search", ["search.*"]),
+        ("from rbcourse.draw.save import save_figure, _text", ["draw.save._text"]),
         ("import rbcourse as rb\nrb.search.ball", ["search"]),
         ("import rbcourse as rb\nrb.files.csv_lines", ["files.csv_lines"]),
     ],
@@ -197,7 +202,7 @@ def test_import_loads_numpy_only():
     loaded = {name.split(".")[0] for name in done.stdout.split()}
     assert loaded - set(sys.stdlib_module_names) - {"numpy"} == {"rbcourse"}
     rooms = {name for name in done.stdout.split() if name.startswith("rbcourse.")}
-    assert {room(name.removeprefix("rbcourse.")) for name in rooms} == {"core"}
+    assert {part(name) for name in rooms} == {"rbcourse"}
 
 
 def test_every_public_name_is_listed_once_and_documented():

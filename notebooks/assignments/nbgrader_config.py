@@ -3,7 +3,7 @@
 They do not ask for a private set: that is ``--CourseDirectory.source_directory=private``.
 """
 
-from rbcourse.assignments.autograding import configure
+from rbclassroom.assignments.autograding import configure
 
 c = get_config()  # noqa: F821 (nbgrader gives it)
 configure(c)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Annulus, Rectangle
 
-from rbcourse.course.agreement import polygons, split
+from rbclassroom.course.agreement import polygons, split
 from rbcourse.draw import bodies
 from rbcourse.draw.display import PARTS, Display, joined
 

@@ -1,0 +1,6 @@
+"""The classroom of rbcourse: explorers, surveys, lessons, lectures, problem sets and the book.
+
+It uses only the names that `rbcourse` exports.
+"""
+
+__version__ = "0.26.0"

@@ -1,0 +1,53 @@
+"""Hand out, collect and grade from the command line, in the folder of the course."""
+
+import argparse
+import io
+import sys
+from datetime import datetime
+from pathlib import Path
+
+from nbclient.exceptions import CellExecutionError
+
+from rbclassroom.assignments.collect import collect
+from rbclassroom.assignments.grade import grade_all
+from rbclassroom.assignments.handout import make_handout, make_solutions
+
+LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
+LISTS += ["not on the roster", "missing"]
+
+
+def main() -> None:
+    """Run ``python -m rbclassroom.assignments``: handout, collect or grade."""
+    parser = argparse.ArgumentParser(prog="python -m rbclassroom.assignments")
+    tasks = parser.add_subparsers(dest="task", required=True)
+    task = tasks.add_parser("handout", help="pack a problem set for students")
+    task.add_argument("set", help="its name: ps1")
+    task.add_argument("--solutions", action="store_true", help="the model answers")
+    task = tasks.add_parser("collect", help="sort what was downloaded from Moodle and Canvas")
+    task.add_argument("folder", type=Path)
+    task.add_argument("--due", type=datetime.fromisoformat, help='"2026-12-01 23:59"')
+    task = tasks.add_parser("grade", help="grade what was collected")
+    task.add_argument("sets", nargs="*", metavar="set", help="as ps1; all that are submitted")
+    task.add_argument("--require-box", action="store_true", help="refuse to grade without a box")
+    known, assignments = parser.parse_args(), Path("notebooks", "assignments")
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
+        sys.stdout.reconfigure(errors="replace")
+    try:
+        if known.task == "grade":
+            grade_all(known.sets, assignments, known.require_box)
+        elif known.task == "collect":
+            rows = collect(known.folder, assignments, known.due)
+            for kind in LISTS:
+                own = [f"  {what}: {why}" for name, what, why in rows if name == kind]
+                if own or kind == "collected":
+                    print(f"{kind}: {len(own)}", *own, sep="\n")
+        elif known.solutions:
+            print(make_solutions(known.set, assignments))
+        else:
+            print(make_handout(known.set, assignments, Path()))
+    except (OSError, ValueError, CellExecutionError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""nbgrader preprocessors: restore cells, run in a box, make feedback that gives nothing away.
+
+`configure` names them in the configuration of nbgrader, so that they also work in its own commands
+and in the formgrader.
+"""
+
+import html
+import os
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import bleach
+import nbformat
+from jinja2 import pass_context
+from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
+from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
+from nbformat import NotebookNode
+from nbformat.v4 import new_output
+from nbgrader import preprocessors as nbgrader
+from traitlets import Integer
+from traitlets.config import Config
+
+from rbclassroom.assignments import sandbox
+from rbclassroom.assignments.client import CUT, BoundedClient
+from rbclassroom.assignments.restore import (
+    Refused,
+    is_answer,
+    is_test,
+    marks_of,
+    name_cell,
+    restore,
+)
+from rbclassroom.assignments.tampering import find_in_cells
+
+UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
+# what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
+TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt"}
+TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
+TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
+TAGS |= {"th", "thead", "tr", "ul"}
+LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
+SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
+SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
+
+
+def configure(config: Config) -> None:
+    """Set what nbgrader does with submissions and feedback, and where it finds its tools."""
+    # to make a gradebook it calls alembic by name, which a shell finds in an activated environment
+    if not shutil.which("alembic"):
+        path = os.environ.get("PATH", os.defpath)
+        os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
+    end = nbgrader.CheckCellMetadata
+    config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
+    run = [BoxedExecute, nbgrader.IgnorePattern, nbgrader.SaveAutoGrades]
+    config.Autograde.autograde_preprocessors = [*run, nbgrader.AssignLatePenalties, end]
+    # nbgrader gives no points where anything is written to stderr, be it a mere warning
+    config.IgnorePattern.enabled = True
+    config.IgnorePattern.pattern = r"(?s)."
+    # the feedback is of a run that never held the hidden tests; the scores are in the gradebook
+    clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
+    shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
+    config.GenerateFeedback.preprocessors = shown
+    # in the feedback and in the formgrader
+    config.HTMLExporter.sanitize_html = True
+    filters = {"clean_html": "inert_html", "markdown2html": "inert_markdown"}
+    config.HTMLExporter.filters = {key: f"{__name__}.{name}" for key, name in filters.items()}
+
+
+def inert_html(content: object) -> str:
+    """Return HTML without scripts, styles, frames, forms and links; pictures are embedded ones.
+
+    Examples
+    --------
+    >>> inert_html('<p onclick="steal()">x</p><img src="https://a.b/c.png"><script>1</script>')
+    '<p>x</p><img>&lt;script&gt;1&lt;/script&gt;'
+    """
+    inert = bleach.clean(str(content), TAGS, _is_inert, protocols={"data"})
+    return LINK.sub(r"\\text", str(inert))
+
+
+def _is_inert(tag: str, name: str, value: str) -> bool:
+    embedded = name == "src" and value.startswith("data:image/")
+    return tag == "img" and (name in ("alt", "title") or embedded)
+
+
+class _Renderer(IPythonRenderer):
+    """A renderer of Markdown that writes the addresses of links and of missing pictures."""
+
+    def link(self, text: str, url: str, title: str | None = None) -> str:
+        return f"{text} ({html.escape(url)})"
+
+    def image(self, text: str, url: str, title: str | None = None) -> str:
+        if url.startswith("attachment:") and url.partition(":")[2] not in self.attachments:
+            return f"{text} ({html.escape(url)} is missing)"
+        return str(super().image(text, url, title))
+
+
+@pass_context
+def inert_markdown(context: Any, source: str) -> str:
+    """Return the HTML of Markdown, with nothing in it that runs or loads."""
+    attached = context.get("cell", {}).get("attachments", {})
+    renderer = _Renderer(escape=False, attachments=attached, exclude_anchor_links=True)
+    return inert_html(MarkdownWithMath(renderer=renderer).render(source))
+
+
+class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
+    """Restore the cells that students must not change; refuse what overrides what tests rely on."""
+
+    def preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
+        """Restore the notebook as it was released; what was changed is noted in its metadata."""
+        about, course = resources["nbgrader"], self.parent.parent.coursedir
+        released = course.format_path(course.release_directory, ".", about["assignment"])
+        original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
+        remarks = restore(nb, original)
+        if len(remarks) > 2:
+            remarks[1:] = [f"and {len(remarks) - 1} more changes"]
+        for cell in nb.cells:
+            if is_answer(cell) or not marks_of(cell):  # what looks like a region stops nbgrader
+                regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
+                cell.source = re.sub(regions, r"\1-\2", cell.source)
+        nb, resources = super().preprocess(nb, resources)
+        for at, line, what in find_in_cells(nb.cells):
+            raise Refused(f"{name_cell(nb.cells, at)}, line {line} {what}: grade by hand")
+        nb.metadata = NotebookNode({"remarks": remarks})
+        return nb, resources
+
+
+class BoxedExecute(BoundedClient, nbgrader.Execute):
+    """Run a notebook in a new folder, and in a box where there is one."""
+
+    seconds = Integer(600, help="for all cells together, in a box").tag(config=True)
+
+    def preprocess(self, nb: NotebookNode, resources: Any, km: Any = None) -> Any:
+        """Run all cells; errors are among the outputs."""
+        remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
+        step: Any = self.parent
+        course, name = step.parent.coursedir, resources["nbgrader"]["assignment"]
+        source = course.format_path(course.source_directory, ".", name)
+        self.folder = Path(tempfile.mkdtemp())
+        work = self.folder / "work"
+        try:
+            # the files of the set; those of the student could pass for modules of the tests
+            shutil.copytree(source, work, ignore=shutil.ignore_patterns("*.ipynb", *course.ignore))
+            sandbox.prepare(self.folder)
+            resources["metadata"]["path"] = str(work)
+            nb, resources = nbgrader.Execute.preprocess(self, nb, resources, km)
+        finally:
+            resources["metadata"]["path"] = path
+            sandbox.delete(self.folder)
+        for at, cell in enumerate(nb.cells):
+            outputs = cell.get("outputs", [])
+            errors = {output.get("ename") for output in outputs} - {None}
+            what = [f"stopped after {self.timeout} s"] * (at in self.slow)
+            what += [CUT] * (at in self.cut)
+            what += ["takes too much memory"] * ("MemoryError" in errors)
+            if at in self.slow:  # in place of where in the tests it was interrupted
+                outputs = [output for output in outputs if output.output_type != "error"]
+                said = f"This cell took longer than {self.timeout} s and was stopped."
+                outputs.append(new_output("error", ename="Timeout", evalue="", traceback=[said]))
+                cell.outputs = outputs
+            remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in what]
+            for output in (output for output in outputs if "data" in output):
+                output.metadata = NotebookNode()
+                output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
+                if "text/latex" in output.data:
+                    output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
+            marks = marks_of(cell)  # in the feedback with scores
+            if is_test(cell) and marks["points"] and not marks.get("score", True) and not errors:
+                outputs.append(new_output("stream", name="stdout", text=UNSEEN))
+        nb.metadata["remarks"] = remarks
+        return nb, resources
+
+    def create_kernel_manager(self) -> Any:
+        """Return a manager of a kernel in a box."""
+        manager = super().create_kernel_manager()
+        if not sandbox.missing():
+            sandbox.put_in_box(manager, self.folder, self.seconds)
+        return manager
+
+    def start_new_kernel(self, **kwargs: Any) -> None:
+        """Start the kernel."""
+        super().start_new_kernel(env=sandbox.environment(self.folder), **kwargs)
+
+    def preprocess_cell(self, cell: NotebookNode, resources: Any, index: int) -> Any:
+        """Run a cell."""
+        try:
+            return super().preprocess_cell(cell, resources, index)
+        except DeadKernelError as error:
+            where = name_cell(self.nb.cells, index)
+            over = f"or {self.seconds} s were over: grade by hand"
+            raise Refused(f"Python ended in or before {where}, {over}") from error
+        except CellTimeoutError as error:
+            raise Refused(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error

@@ -1,0 +1,195 @@
+"""Check a problem set before submission: what was changed, whether it runs, the file to submit.
+
+A student runs this, without nbgrader.
+"""
+
+import argparse
+import io
+import logging
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbformat import NotebookNode
+
+from rbclassroom.assignments.client import CELL_SECONDS, CUT, BoundedClient
+from rbclassroom.assignments.restore import (
+    grade_id,
+    is_answer,
+    is_test,
+    marks_of,
+    name_cell,
+    read_notebook,
+    restore,
+    title_of,
+)
+from rbclassroom.assignments.tampering import find_in_cells
+from rbclassroom.assignments.writing import write_whole
+from rbclassroom.course.notebooks import KERNEL
+
+
+def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
+    """Compare a problem set with its original, run it, and write the file to submit.
+
+    The student's files are only read. In the file to submit locked cells are as in the original.
+    """
+    if not path.exists():
+        raise ValueError(f"{path} is missing: there is no such file")
+    if path.suffix != ".ipynb":
+        raise ValueError(f"{path.name} is no notebook; give the file that ends with .ipynb")
+    notebook, (name, given) = read_notebook(path.read_bytes(), path.name), _find_original(path)
+    original = read_notebook(given, name)
+    saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
+    print(f"checking {path.name}, last saved {saved}", flush=True)
+    if path.name != name:
+        print(f"it is to be submitted under the name {name}")
+    remarks = restore(notebook, original)
+    for at, line, what in find_in_cells(notebook.cells):  # it could be meant to deceive the tests
+        where = f"{name_cell(notebook.cells, at)}, line {line}"
+        remarks.append(f"{where} {what}: change it, or a person has to look")
+    notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
+        for file in path.parent.iterdir():
+            if file.is_file() and file.suffix not in (".whl", ".zip"):
+                shutil.copy(file, own)
+        remarks += _run(notebook, own, seconds)
+    for what in remarks:
+        print(f"- {what}")
+    passed = _print_problems(notebook, original)
+    nbformat.validate(notebook)
+    content = (nbformat.writes(notebook) + "\n").encode()
+    target = write_whole(path.parent / "to_submit" / name, content)
+    print(
+        f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run when it is graded; "
+        f"the file to submit is {target}"
+    )
+    return target
+
+
+def _find_original(path: Path) -> tuple[str, bytes]:
+    """Return the name and the content of the set as it was handed out; the course can make it."""
+    folder, course = path.parent / "original", Path("notebooks", "assignments")
+    if course.is_dir() and not folder.exists():
+        from rbclassroom.assignments.handout import release  # a student does not have nbgrader
+
+        sets = [place.parent.name for place in course.glob("*/*/*.ipynb")]
+        name = max((s for s in sets if path.stem.startswith(s)), key=len, default=path.stem)
+        return f"{name}.ipynb", release(name, course)[f"{name}.ipynb"]
+    same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
+    if len(same) != 1:
+        raise ValueError(
+            f"{folder / path.name} is missing; unpack the handout again, and work there"
+        )
+    return same[0].name, same[0].read_bytes()
+
+
+class _Client(BoundedClient):
+    """A client that tells where it is, and how long each cell took."""
+
+    at, began, took = 0, 0.0, dict[int, float]()
+
+    def on_cell_start(self, cell: NotebookNode, cell_index: int) -> None:
+        self.at, self.began = cell_index, time.monotonic()
+        print(f"\rrunning cell {self.at + 1} of {len(self.nb.cells)} ", end="", flush=True)
+
+    def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
+        """Note the time."""
+        super().on_cell_executed(cell, cell_index, execute_reply)
+        self.took = self.took | {cell_index: time.monotonic() - self.began}
+
+
+def _run(notebook: NotebookNode, own: str, seconds: int) -> list[str]:
+    """Run all cells; say what did not go well, except in a problem."""
+    log = logging.getLogger(__name__)
+    log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
+    cells, remarks = notebook.cells, list[str]()
+    client = _Client(notebook, log=log, kernel_name=KERNEL["name"], timeout=seconds)
+    client.folder, client.resources = Path(own), {"metadata": {"path": own}}
+    try:
+        client.execute(env={**os.environ, "IPYTHONDIR": own})
+    except (DeadKernelError, CellTimeoutError) as error:
+        if isinstance(error, DeadKernelError):
+            why = "it called exit, or used up the memory"
+            remarks.append(f"the kernel died in cell {client.at + 1}: {why}")
+        cells[client.at].execution_count = None
+        remarks.append(f"the cells after cell {client.at + 1} were not run")
+    except (OSError, RuntimeError, KeyError) as error:
+        why = f"Python could not be started, or stopped ({error})"
+        raise ValueError(f"{why}; install what requirements.txt of the handout lists") from error
+    print(flush=True)
+    long = f"took longer than {seconds} s and was stopped"
+    remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
+    near = f"took more than half of the {seconds} s that grading allows: make it faster"
+    slow = {at for at, took in client.took.items() if took > seconds / 2} - {*client.slow}
+    remarks += [f"{name_cell(cells, at)} {near}" for at in sorted(slow)]
+    remarks += [f"{name_cell(cells, at)}: {CUT}" for at in client.cut]
+    for at, cell in enumerate(cells):
+        if _error(cell) and not (is_test(cell) or is_answer(cell) or at in client.slow):
+            remarks.append(f"{name_cell(cells, at)} fails: {_error(cell)}")
+    return remarks
+
+
+def _error(cell: NotebookNode) -> str:
+    """Return the last line of the last error of a cell, or an empty string."""
+    errors = [o for o in cell.get("outputs", []) if o.output_type == "error"]
+    if not errors:
+        return ""
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
+    hint = lines[-1] and errors[-1].ename == "NotYet"  # it speaks for itself
+    return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
+
+
+def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
+    """Print a line a problem, under its title; return which of the visible tests passed."""
+    empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
+    problems = defaultdict[str, list[tuple[str, str]]](list)
+    passed, answered = [], True
+    for at, cell in enumerate(notebook.cells):
+        error, found = _error(cell), problems[title_of(notebook.cells, at)]
+        where = f"cell {at + 1}"
+        if is_answer(cell):
+            answered = cell.source.strip() not in ("", empty[grade_id(cell)])
+            if not answered:
+                found.append(("empty", f"{where} is not answered yet"))
+            elif error:
+                found.append(("FAILED", f"{where} {error}"))
+            elif marks_of(cell).get("grade"):
+                found.append(("words", f"{where} is graded by a person"))
+        elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
+            found.append(("hidden", f"{where} has hidden tests only"))
+        elif is_test(cell):
+            error = error or ("" if cell.execution_count else "it was not run to its end")
+            passed.append(not error)
+            if answered or not error:
+                found.append(("FAILED", f"{where} {error}") if error else ("passed", ""))
+    order = ("FAILED", "empty", "passed", "words", "hidden")
+    for title, found in problems.items():
+        if found:
+            words = "; ".join(said for _, said in found if said)
+            status = min((status for status, _ in found), key=order.index)
+            print(f"{status}  {title}" + f": {words}" * bool(words))
+    return passed
+
+
+def main() -> None:
+    """Check a problem set: ``python -m rbclassroom.assignments.check FILE.ipynb``."""
+    parser = argparse.ArgumentParser(prog="python -m rbclassroom.assignments.check")
+    parser.add_argument("file", type=Path, help="the notebook to be handed in: ps1.ipynb")
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
+        sys.stdout.reconfigure(errors="replace")
+    try:
+        check(parser.parse_args().file.absolute())
+    except (OSError, ValueError, nbformat.ValidationError) as error:
+        sys.exit(f"nothing to submit was written: {error}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Run a notebook of a student: time and output are bounded, and no error is lost."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from nbclient import NotebookClient
+from nbformat import NotebookNode
+from nbformat.v4 import new_output
+from traitlets import Integer
+
+from rbclassroom.course.notebooks import kernel_address
+
+CELL_SECONDS = 30  # for a cell, at home and in grading
+PRINTED, DISPLAYED = 100_000, 2_000_000  # characters of a cell: in print, and of pictures and pages
+ALL_OUTPUT = 10_000_000  # characters, for a notebook
+DISPLAYS = ("display_data", "execute_result", "update_display_data")
+SLOW = {"ename": "TimeoutError", "evalue": "the cell took too long", "traceback": []}
+CUT = "the output is too large; what is too much is left out"
+WIDGET = "application/vnd.jupyter.widget-view+json"
+
+
+class BoundedClient(NotebookClient):
+    """A client for a notebook whose cells may loop, flood or die.
+
+    Its kernel keeps what it keeps in `folder`, which is to be set before it starts. `slow` and
+    `cut` are the indices of the cells that took too long, and of which not all output is kept.
+    """
+
+    timeout = Integer(CELL_SECONDS, help="a cell has so many seconds").tag(config=True)
+    iopub_timeout = Integer(20, help="an interrupted cell has so many seconds").tag(config=True)
+    folder = Path()
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.allow_errors = self.interrupt_on_timeout = self.coalesce_streams = True
+        self.error_on_timeout, self.shutdown_kernel = SLOW, "immediate"
+        self.extra_arguments, self.record_timing = ["--log-level=CRITICAL"], False
+
+    def reset_execution_trackers(self) -> None:
+        """Begin to count."""
+        super().reset_execution_trackers()
+        self.slow, self.cut = list[int](), list[int]()
+        self._at, self._left, self._room = -1, ALL_OUTPUT, dict[str, int]()
+
+    def create_kernel_manager(self) -> Any:
+        """Return a manager of a kernel that listens in the folder."""
+        manager = super().create_kernel_manager()
+        for name, value in kernel_address(str(self.folder)).items():
+            setattr(manager, name, value)
+        return manager
+
+    async def _async_handle_timeout(self, timeout: int, cell: NotebookNode | None = None) -> Any:
+        self.slow.append(self._at)
+        self.raise_on_iopub_timeout = True  # what does not stop now cannot be stopped
+        return await super()._async_handle_timeout(timeout, cell)
+
+    def process_message(self, msg: dict[str, Any], cell: NotebookNode, cell_index: int) -> Any:
+        """Add an output to its cell, unless the cell has too many."""
+        if cell_index != self._at:
+            self._at, self.raise_on_iopub_timeout = cell_index, False
+            self._room = {"stream": PRINTED, "data": DISPLAYED}
+        kind, content = msg["msg_type"], msg["content"]
+        if kind == "error":
+            content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
+            content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
+        elif kind == "stream" or kind in DISPLAYS:
+            if kind != "stream":  # a widget lives with its kernel
+                data = content["data"].items()
+                content["data"] = {k: v for k, v in data if isinstance(v, str) and k != WIDGET}
+                kind = "data"
+            size = len(content["text"] if kind == "stream" else json.dumps(content["data"]))
+            room = min(self._room[kind], self._left)
+            if size > room:
+                self.cut += [cell_index] * (cell_index not in self.cut)
+                if kind == "data" or not room:
+                    return None
+                content["text"], size = content["text"][:room], room
+            self._room[kind] -= size
+            self._left -= size
+        return super().process_message(msg, cell, cell_index)
+
+    def handle_comm_msg(self, outs: Any, msg: dict[str, Any], cell_index: int) -> None:
+        """Follow no widget: what an Output holds stands in its cell, and nothing is sent back.
+
+        What nbclient sends back for an Output can keep it from seeing the reply of the cell.
+        """
+
+    def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
+        """Keep the error that the reply names: without it a test would seem to pass."""
+        reply = execute_reply["content"]
+        if reply["status"] != "ok":
+            cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]
+            empty = {"ename": "Error", "evalue": "it was not run", "traceback": []}
+            error = {key: reply.get(key, value) for key, value in empty.items()}
+            if not any(out.get("ename") == error["ename"] for out in cell.outputs):
+                cell.outputs.append(new_output("error", **error))
+        if cell_index in self.cut:
+            cell.outputs.append(new_output("stream", name="stdout", text=f"\n({CUT})\n"))

@@ -1,0 +1,160 @@
+"""Pack a problem set for students: the notebook, the package, and a page on how to begin."""
+
+import copy
+import io
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+import nbformat
+from nbformat import NotebookNode
+from nbgrader import preprocessors as nbgrader
+from nbgrader.nbgraderformat import ValidationError
+from traitlets.config import Config
+from traitlets.config.loader import PyFileConfigLoader
+
+from rbclassroom.assignments.client import BoundedClient
+from rbclassroom.assignments.restore import is_answer
+from rbclassroom.assignments.writing import write_whole
+from rbclassroom.course.notebooks import KERNEL
+
+# what a student needs of environment.txt
+NEEDED = ["numpy", "scipy", "matplotlib", "pillow", "anywidget", "ipykernel", "ipywidgets"]
+NEEDED += ["jupyterlab", "nbclient", "nbformat", "threadpoolctl", "tqdm"]
+LEFTOVER = re.compile(
+    r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
+    re.IGNORECASE,
+)
+# as `nbgrader generate_assignment` does
+STEPS = [nbgrader.LockCells, nbgrader.ClearSolutions, nbgrader.ClearOutput]
+STEPS += [nbgrader.CheckCellMetadata, nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme]
+STEPS += [nbgrader.ComputeChecksums]
+
+
+def find_set(name: str, assignments: Path) -> Path:
+    """Return the folder of a problem set; a private one goes before that of the course."""
+    folders = [p for step in ("source", "private") for p in sorted(assignments.glob(f"{step}/*/"))]
+    sets = {p.name: p for p in folders if (p / f"{p.name}.ipynb").is_file()}
+    if name not in sets:
+        there = ", ".join(sorted(sets)) or "none; this is run in the folder of the course"
+        raise ValueError(f"There is no problem set {name}; there are: {there}.")
+    return sets[name]
+
+
+def read_config(assignments: Path) -> Config:
+    """Return what nbgrader_config.py says."""
+    if not (assignments / "nbgrader_config.py").is_file():
+        return Config()
+    return PyFileConfigLoader("nbgrader_config.py", path=str(assignments)).load_config()
+
+
+def release(name: str, assignments: Path) -> dict[str, bytes]:
+    """Return what ``nbgrader generate_assignment`` makes, checked to give nothing away."""
+    source, config = find_set(name, assignments), read_config(assignments)
+    given = nbformat.read(source / f"{name}.ipynb", as_version=4)
+    notebook, about = copy.deepcopy(given), dict[str, Any]()
+    try:
+        for step in STEPS:
+            notebook, about = step(config=config).preprocess(notebook, about)
+    except (RuntimeError, ValidationError) as error:
+        raise ValueError(f"{name} cannot be released: {error}") from error
+    paths = sorted(path for path in source.rglob("*") if path.is_file())
+    paths = [path for path in paths if ".ipynb_checkpoints" not in path.parts]
+    files = {path.relative_to(source).as_posix(): path.read_bytes() for path in paths}
+    files[f"{name}.ipynb"] = (nbformat.writes(notebook) + "\n").encode()
+    _refuse_leaks(name, given, files)
+    return files
+
+
+def _refuse_leaks(name: str, given: NotebookNode, files: dict[str, bytes]) -> None:
+    """Raise a ValueError if a file has solutions, hidden tests or mark schemes of a notebook."""
+    notebook = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
+    taken, common = _lines(given) - _lines(notebook), ("import ", "from ", "raise ")
+    secrets = sorted(line for line in taken if len(line) >= 12 and not line.startswith(common))
+    for path, content in files.items():
+        texts = [content.decode("utf-8", errors="replace")]
+        if path == f"{name}.ipynb":
+            texts = [text for cell in notebook.cells for text in (cell.source, str(cell.metadata))]
+            if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
+                raise ValueError(f"{name}: nbgrader leaves the attachment of an answer there")
+        elif path.endswith(".ipynb"):
+            raise ValueError(f"{name}: {path} is a second notebook; a set has one")
+        for text in texts:
+            shown = [*(line for line in secrets if line in text), *LEFTOVER.findall(text)]
+            if shown:
+                raise ValueError(f"{name}: {path} gives away {shown[0]!r}")
+
+
+def _lines(notebook: NotebookNode) -> set[str]:
+    return {line.strip() for cell in notebook.cells for line in cell.source.splitlines()}
+
+
+def student_requirements(environment: str, *wheels: str) -> str:
+    """Return the requirements of the students."""
+    pins = {line.partition("==")[0]: line for line in environment.split() if "==" in line}
+    lines = [*(pins[name] for name in NEEDED), *(f"./{wheel}" for wheel in wheels)]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def build_wheel(course: Path) -> tuple[str, bytes]:
+    """Build a distribution, the same byte for byte each time, without the network."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = [sys.executable, "-m", "flit_core.wheel", "--outdir", folder]
+        first = {"SOURCE_DATE_EPOCH": "315532800"}  # the first day a zip knows
+        subprocess.run(
+            words, cwd=course, env={**os.environ, **first}, check=True, capture_output=True
+        )
+        (built,) = Path(folder).glob("*.whl")
+        return built.name, built.read_bytes()
+
+
+def make_handout(name: str, assignments: Path, course: Path) -> Path:
+    """Write ``handouts/NAME.zip``, which is what the students get; the same bytes each time."""
+    files = release(name, assignments)
+    wheels = dict(build_wheel(folder) for folder in (course, course / "classroom"))
+    environment = (course / "environment.txt").read_text("utf-8")
+    readme = Path(__file__).with_suffix(".txt").read_text("ascii")
+    own = {
+        f"original/{name}.ipynb": files[f"{name}.ipynb"],
+        "requirements.txt": student_requirements(environment, *wheels).encode(),
+        "README.txt": readme.format(name=name).replace("\n", "\r\n").encode("ascii"),
+        **wheels,
+    }
+    if taken := files.keys() & own.keys():
+        raise ValueError(f"{name}: {min(taken)} is a name that the handout needs")
+    packed = pack({f"{name}/{path}": data for path, data in {**files, **own}.items()})
+    return write_whole(assignments / "handouts" / f"{name}.zip", packed)
+
+
+def pack(files: dict[str, bytes]) -> bytes:
+    """Return files as a zip, the same bytes each time."""
+    packed = io.BytesIO()
+    with ZipFile(packed, "w") as archive:
+        for path, data in sorted(files.items()):
+            entry = ZipInfo(path)  # of the first day a zip knows
+            entry.create_system, entry.external_attr = 3, 0o644 << 16
+            archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
+    return packed.getvalue()
+
+
+def make_solutions(name: str, assignments: Path) -> Path:
+    """Write ``handouts/NAME-solutions.ipynb``: model answers, run, without hidden tests."""
+    notebook = nbformat.read(find_set(name, assignments) / f"{name}.ipynb", as_version=4)
+    for step in (nbgrader.ClearHiddenTests(), nbgrader.ClearMarkScheme()):
+        notebook, _ = step.preprocess(notebook, {})
+    for cell in notebook.cells:
+        cell.source = re.sub(r"^.*### (BEGIN|END) SOLUTION.*\n?", "", cell.source, flags=re.M)
+        cell.source = re.sub(r"\s*^\*\*Mark scheme\b.*", "", cell.source, flags=re.M | re.S)
+        cell.metadata = NotebookNode()
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        client = BoundedClient(notebook, kernel_name=KERNEL["name"])
+        client.folder, client.allow_errors = Path(folder), False
+        client.execute(cwd=folder)
+    notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
+    target = assignments / "handouts" / f"{name}-solutions.ipynb"
+    return write_whole(target, (nbformat.writes(notebook) + "\n").encode())

@@ -1,0 +1,124 @@
+"""A box for the kernel that runs a submission: bubblewrap, on Linux.
+
+In the box the kernel sees its own folder, the system's programs, this Python with its libraries
+and the package, and nothing else of the disk; it has no network and few environment variables.
+What it starts ends with it. Outside Linux, and where bubblewrap does not work, there is no box.
+"""
+
+import functools
+import os
+import platform
+import secrets
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+import rbclassroom
+import rbcourse
+
+PROCESSES = 128  # and threads
+FILE_BYTES = 100_000_000
+NOBODY = 2**30  # and above: who is nobody else; where root grades, limits would not hold
+# Linux keeps the keys of a session beyond its processes: a command begins a session of its own
+KEYCTL = {"x86_64": 250, "aarch64": 219}.get(platform.machine(), -1)
+ALONE = f"import ctypes, os, sys; ctypes.CDLL(None).syscall({KEYCTL}, 1, None); "
+ALONE += "os.execvp(sys.argv[1], sys.argv[1:])"
+KEPT = ("PATH", "LANG", "LC_ALL", "LC_CTYPE", "TZ", "SYSTEMROOT", "PATHEXT")
+SYSTEM = ["/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32"]
+SYSTEM += ["/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtime", "/nix/store"]
+
+
+@functools.cache
+def missing() -> str:
+    """Return why there is no box here and what helps, in one line; nothing where there is one."""
+    if sys.platform != "linux":
+        return "there is none on this system; grade on Linux with bubblewrap to have one"
+    if not shutil.which("bwrap"):
+        return "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
+    with tempfile.TemporaryDirectory() as folder:
+        prepare(Path(folder))
+        words = [*box(Path(folder), 60), sys.executable, "-c", "import ipykernel, rbclassroom"]
+        tried = subprocess.run(words, capture_output=True, text=True, errors="replace")
+    if tried.returncode:
+        said = (tried.stderr.strip() or f"it ended with {tried.returncode}").splitlines()[-1]
+        return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
+    return ""
+
+
+def prepare(folder: Path) -> None:
+    """Make what the kernel keeps in its folder, and the folder that it works in."""
+    for name in ("work", "tmp", "matplotlib"):
+        (folder / name).mkdir(exist_ok=True)
+    for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):  # seconds to make anew
+        shutil.copy(fonts, folder / "matplotlib")
+
+
+def delete(folder: Path) -> None:
+    """Delete a folder, whatever a kernel left there: locked, deep, or links to elsewhere."""
+    for _ in range(50):  # a kernel that is ended may still write
+        if os.name == "nt":
+            shutil.rmtree(folder, ignore_errors=True)
+        else:
+            words = ["sh", "-c", 'chmod -R u+rwX "$0"; rm -rf "$0"', str(folder)]
+            subprocess.run(words, capture_output=True)
+        if not folder.exists():
+            return
+        time.sleep(0.1)
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """Return the environment variables of the kernel: none of them is anybody's secret."""
+    own = dict.fromkeys(("HOME", "USERPROFILE", "IPYTHONDIR"), str(folder))
+    own |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder / "tmp"))
+    own |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
+    return kept | own | {"MPLCONFIGDIR": str(folder / "matplotlib")}
+
+
+def box(folder: Path, seconds: int) -> list[str]:
+    """Return the words that run a command in a box, which can write to a folder only."""
+    packages = (path for package in (rbcourse, rbclassroom) for path in package.__path__)
+    python = [sys.prefix, sys.base_prefix, *packages]
+    seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
+    is_root = os.geteuid() == 0
+    kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
+    # it ends with this process, and after some seconds
+    words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
+    words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]
+    words += [*(f"--unshare-{kind}" for kind in kinds), "--cap-drop", "ALL"]
+    for power in ("SETUID", "SETGID", "DAC_READ_SEARCH"):  # until it becomes nobody
+        words += ["--cap-add", f"CAP_{power}"] * is_root
+    words += ["--unsetenv", "JPY_PARENT_PID", "--dir", "/etc", "--proc", "/proc", "--dev", "/dev"]
+    for path in SYSTEM:
+        link = os.path.islink(path)
+        words += ["--symlink", os.readlink(path), path] if link else ["--ro-bind-try", path, path]
+    for path in ("/tmp", "/dev/shm"):  # in memory they would have no limit
+        words += ["--bind", str(folder / "tmp"), path]
+    for parent in sorted(seen)[1:]:  # without this they are as closed as they are outside
+        words += ["--dir", parent]
+    for path in python:
+        words += ["--ro-bind", path, path]
+    words += ["--bind", str(folder), str(folder), "--chdir", str(folder / "work")]
+    words += ["--remount-ro", "/dev", "--remount-ro", "/", "--"]
+    if is_root:
+        user = NOBODY + secrets.randbelow(NOBODY)  # the limit of processes is that of a user
+        for inner in (folder, *folder.rglob("*")):
+            os.chown(inner, user, user)
+        words += ["setpriv", f"--reuid={user}", f"--regid={user}", "--clear-groups"]
+        words += ["--no-new-privs", "--"]
+    return [*words, "prlimit", f"--nproc={PROCESSES}", f"--fsize={FILE_BYTES}", "--core=0", "--"]
+
+
+def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
+    """Let a manager start its kernel in a box, for some seconds; it listens in the folder."""
+    spec = manager.kernel_spec
+    manager.connection_file = str(folder / "connection.json")
+    manager.write_connection_file()
+    spec.argv = [*box(folder, seconds), sys.executable, *spec.argv[1:]]
+    spec.interrupt_mode = "message"  # a signal would end the box

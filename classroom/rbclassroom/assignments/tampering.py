@@ -1,0 +1,133 @@
+"""Find code in a submission that overrides what the tests rely on.
+
+This reads the code and does not run it: it finds what students write in earnest or in jest, not
+what an expert takes pains to hide.
+"""
+
+import ast
+import builtins
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from IPython.core.inputtransformer2 import TransformerManager
+from nbformat import NotebookNode
+
+from rbclassroom.assignments.restore import grade_id, is_answer
+
+# each leads round what can be read in the code
+NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
+NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # what was run, tests too
+ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
+ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
+ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
+ATTRIBUTES |= {"__setattr__", "__delattr__", "__globals__", "__closure__", "__subclasses__"}
+ATTRIBUTES |= {"__builtins__", "__wrapped__", "__self__", "__bases__", "__mro__"}
+ATTRIBUTES |= {"attrgetter", "methodcaller"}
+MODULES = {"builtins", "ctypes", "gc", "importlib", "inspect", "IPython", "ipykernel", "pkgutil"}
+MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq", "jupyter_client", "pickle"}
+MODULES |= {"code", "codeop", "cProfile", "profile"}
+# magics and help that do no harm; of those that run code only their names are left out
+MAGICS = re.compile(
+    r"(^%%capture\b[ \w-]*$|^[ \t]*%%?time(?:it)?\b(?: +-[nr] *\d+)*)"
+    r"|^[ \t]*(?:%(?:matplotlib|precision|(?:load_ext +)?autoreload)\b[ \w.-]*"
+    r"|%config +InlineBackend\.\w+ *=[\w'\"{}\[\], -]*|(?:\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+) *)$",
+    re.MULTILINE,
+)
+CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
+Said = Iterator[tuple[int, str]]  # the line, and what is done
+LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast.comprehension
+
+
+def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
+    """Return where a student overrides what tests rely on: the cell, the line, what is done."""
+    trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
+    own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
+    given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
+    names = {_defines(node) for node in given}
+    attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
+    modules, found = set[str](), []  # modules and what is in them
+    for node in (node for tree in trees.values() for node in ast.walk(tree)):
+        if isinstance(node, ast.alias):
+            modules.add(_defines(node))
+        elif isinstance(node, ast.Assign) and _root(node.value) in modules:
+            modules |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+    for at in own:
+        said = {*_rebound(trees[at], names), *_suspicious(trees[at], attributes, modules)}
+        found += [(at, *what) for what in sorted(said)]
+    return found
+
+
+def _parsed(source: str) -> ast.Module:
+    """Return the code; nothing if it is not Python, and so does not run."""
+    harmless = MAGICS.sub(lambda found: "" if found[1] else "pass", source)
+    for text in (harmless, source):
+        try:
+            tree = ast.parse(TransformerManager().transform_cell(text))
+            return ast.increment_lineno(tree, len(text) - len(text.lstrip("\n")))
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            continue
+    return ast.Module([], [])
+
+
+def _defines(node: ast.AST) -> str:
+    """Return the name to which a node of a locked cell gives a meaning, or nothing."""
+    if isinstance(node, ast.alias):
+        return node.asname or node.name.partition(".")[0]
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return node.name
+    return node.id if isinstance(node, ast.Name) and hasattr(builtins, node.id) else ""
+
+
+def _root(node: ast.AST) -> str:
+    """Return the name at the root of a chain of attributes, or nothing."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _rebound(tree: ast.Module, names: set[str]) -> Said:
+    """Yield where the notebook binds one of the names, except by customary imports."""
+    todo: list[Any] = [tree]
+    for node in todo:
+        todo += [] if isinstance(node, LOCAL) else ast.iter_child_nodes(node)
+    inner = (node for node in ast.walk(tree) if isinstance(node, ast.Global | ast.NamedExpr))
+    for node in {*todo, *inner}:
+        found = [getattr(node, "name", "")]  # of definitions, and in match
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            found = [node.id]
+        elif isinstance(node, ast.NamedExpr):
+            found = [node.target.id]
+        elif isinstance(node, ast.Global):
+            found = node.names
+        elif isinstance(node, ast.alias):
+            usual = CUSTOMARY.get(node.asname or "", node.asname or "").rpartition(".")[2]
+            found = [node.asname] * (usual != node.name.rpartition(".")[2])
+        for name in names.intersection(found) - {""}:
+            yield node.lineno, f"gives {name} another meaning"
+
+
+def _suspicious(tree: ast.Module, attributes: set[str], modules: set[str]) -> Said:
+    """Yield what leads round the tests."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name) if name in NAMES:
+                yield node.lineno, f"uses {'a magic or a shell' if name == 'get_ipython' else name}"
+            case ast.Attribute(attr=name, ctx=ast.Load()) if name in ATTRIBUTES:
+                yield node.lineno, f"uses {name}"
+            case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
+                root = _root(node)  # `self` is an object that the student describes
+                if root in modules or (name in attributes and root != "self"):
+                    yield node.lineno, f"replaces {ast.unparse(node)}"
+            case ast.Call(func=ast.Name(id="getattr"), args=args):
+                if not any(isinstance(name, ast.Constant) for name in args[1:2]):
+                    yield node.lineno, f"uses {ast.unparse(node)}"
+            case ast.Constant(value=str(name)) if name in ATTRIBUTES - {"modules"}:
+                yield node.lineno, f"names {name}"
+            case ast.Import() | ast.ImportFrom():
+                place = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+                for parts in ((place + alias.name).split(".") for alias in node.names):
+                    shown = parts[:2] == ["IPython", "display"] or parts[1:3] == ["core", "display"]
+                    dark = {parts[0], parts[-1]} & (MODULES | NAMES | ATTRIBUTES)
+                    for name in set() if shown else dark:
+                        yield node.lineno, f"imports {name}"

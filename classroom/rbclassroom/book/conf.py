@@ -1,0 +1,101 @@
+"""What Sphinx is to do with the sources of the book; it reads this file itself."""
+
+import os
+import re
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import Any
+
+from rbclassroom.book import reference
+from rbclassroom.book.places import anchor, file_of
+from rbclassroom.course.ledger import KEY
+
+project = html_title = "Rigid-body motion"
+author = "The rbcourse authors"
+default_role = "py:obj"
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.linkcode", "sphinx.ext.mathjax"]
+extensions += ["numpydoc"]
+
+nb_execution_mode = "off"
+nb_merge_streams = True
+myst_enable_extensions = ["amsmath", "dollarmath"]
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+toc_object_entries = False  # the navigation of each page would hold them all
+
+html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["book.css"]
+exclude_patterns = ["files"]
+html_favicon = "static/favicon.svg"
+html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
+html_show_search_summary = False  # pages of a folder may not read each other
+mathjax_path = "tex-svg.js"
+
+
+def name_sections(_app: Any, doctree: Any) -> None:
+    """Give the headings of lessons addresses that stay: ``#s3`` for section 3."""
+    if Path(doctree["source"]).parent.name == "lessons":
+        for section in doctree.findall(lambda node: node.tagname == "section"):
+            if section.parent is not doctree:
+                section["ids"] = [reference.fragment(section.children[0].astext())]
+
+
+def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
+    """Leave out members that other packages describe, and a page of JavaScript."""
+    module = getattr(obj, "__module__", None) or "rbcourse"
+    own = module.startswith(("rbcourse", "rbclassroom"))
+    return True if name == "ENGINE" or not own else None
+
+
+def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:
+    """Link the keys of a docstring to the ledger, and add the tests of a function."""
+    for i, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            lines[i] = KEY.sub(_as_link, line)
+    if what not in ("function", "class"):
+        return
+    if tests := reference.tests_of(name.partition(".")[2], app.config.tests):
+        links = [reference.to_test(test, "package/index.html") for test in tests]
+        lines += ["", ".. raw:: html", "", f"   {reference.folded('tests', links)}", ""]
+
+
+def _as_link(key: re.Match[str]) -> str:
+    return f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__"
+
+
+def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
+    """Return a link for a name that stands in another module."""
+    from sphinx.util.nodes import make_refnode
+
+    kinds = ("class", "data", "exception", "function")
+    ending = f".{node['reftarget']}"
+    found = [
+        (name, entry.docname)
+        for name, entry in env.domains["py"].objects.items()
+        if name.endswith(ending) and entry.objtype in kinds and ".textbook." not in name
+    ]
+    if len(found) != 1 or node["refdomain"] != "py":
+        return None
+    ((name, page),) = found
+    return make_refnode(app.builder, node["refdoc"], page, name, content)
+
+
+def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
+    """Return where the source of an object is."""
+    name = found["fullname"].partition(".")[0]
+    file = file_of(found["module"].partition(".")[2] or "__init__")
+    return f"../code/{file.removesuffix('.py')}.html#{name}"
+
+
+def setup(app: Any) -> None:
+    """Add MathJax, and what these functions do, before the contents of a page are collected."""
+    scripts = distribution("sphinx-mathjax-offline")
+    path = scripts.locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
+    app.config.html_static_path.append(str(path))
+    app.add_config_value("tests", reference.naming(Path()), "")
+    app.config.html_extra_path.append(os.environ["RBCOURSE_BOOK_EXTRA"])
+    app.connect("autodoc-skip-member", skip_foreign)
+    app.connect("doctree-read", name_sections, priority=400)
+    app.connect("autodoc-process-docstring", join_ledger, priority=900)
+    app.connect("missing-reference", find_anywhere)

@@ -1,0 +1,163 @@
+"""The ledger: where each equation of the texts is implemented, tested and taught."""
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import nbformat
+
+from rbclassroom.course.notebooks import lesson_paths
+
+KEY = re.compile(
+    r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)"
+    r"|beyond BK \d+|errata \d+)"
+    r"(?!\w|\.\d)",
+    re.ASCII,
+)
+SOURCES: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("sources.toml").read_text(encoding="utf-8")
+)
+MISPRINTS = {f"errata {i}": row for i, row in enumerate(SOURCES["misprints"], start=1)}
+WHAT: dict[str, str] = SOURCES["entries"] | SOURCES["beyond"]
+"""What each entry is, of the texts and beyond them."""
+GROUPS: dict[str, list[str]] = {
+    f"{text}: {title}": [key for key in SOURCES["entries"] if key.startswith(text)]
+    for text, title in SOURCES["texts"].items()
+} | {"Beyond BK: real bodies, and jerk": list(SOURCES["beyond"])}
+"""The entries by their headings."""
+
+
+@dataclass
+class Entry:
+    """Where one entry of the texts is to be found.
+
+    Attributes
+    ----------
+    functions : list of str
+        Such as ``so3.hat_so3``, within `rbcourse` or `rbclassroom`; constants too.
+    tests : list of str
+        Such as ``test_so3.py::test_hat``, within tests/ or classroom/tests/.
+    lessons : list of str
+        Such as ``06_geodesics.ipynb, 3``, within notebooks/.
+    """
+
+    functions: list[str] = field(default_factory=list)
+    tests: list[str] = field(default_factory=list)
+    lessons: list[str] = field(default_factory=list)
+
+    def lacks(self) -> list[str]:
+        """Return which of the three are not there."""
+        return [kind for kind in ("functions", "tests", "lessons") if not getattr(self, kind)]
+
+
+def collect(root: Path) -> dict[str, Entry]:
+    """Return where each entry and each misprint is to be found.
+
+    Functions come from the References of their docstrings, constants from what stands below them,
+    tests from their marks ``source``, lessons from the keys in small type below their headings.
+    """
+    found = {key: Entry() for key in [*WHAT, *MISPRINTS]}
+    finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
+    for kind, finder in finders.items():
+        for place, text in finder(root):
+            for key in dict.fromkeys(KEY.findall(text)):
+                if key not in found:
+                    raise ValueError(f"{place}: {key} is no entry of sources.toml")
+                getattr(found[key], kind).append(place)
+    return found
+
+
+def _functions(root: Path) -> Iterator[tuple[str, str]]:
+    packages = root / "rbcourse", root / "classroom/rbclassroom"
+    paths = ((package, path) for package in packages for path in sorted(package.rglob("*.py")))
+    for package, path in paths:
+        module = ".".join(path.relative_to(package).with_suffix("").parts)
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        for node, below in zip(body, [*body[1:], None], strict=True):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_":
+                yield f"{module}.{node.name}", _references(ast.get_docstring(node) or "")
+            elif isinstance(node, ast.Assign) and isinstance(below, ast.Expr):
+                yield f"{module}.{ast.unparse(node.targets[0])}", ast.unparse(below)
+
+
+def _references(docstring: str) -> str:
+    """Return the References section; of a docstring without sections, the text."""
+    text, _, references = docstring.partition("References\n----------\n")
+    if not references:
+        return " ".join(re.split(r"\n\n\w+( \w+)?\n-+\n", text)[0].split())
+    return references.partition("\n\n")[0]
+
+
+def _tests(root: Path) -> Iterator[tuple[str, str]]:
+    folders = root / "tests", root / "classroom/tests"
+    paths = ((folder, path) for folder in folders for path in sorted(folder.rglob("test_*.py")))
+    for folder, path in paths:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+                marks = [m for m in map(ast.unparse, node.decorator_list) if "mark.source(" in m]
+                yield f"{path.relative_to(folder).as_posix()}::{node.name}", " ".join(marks)
+
+
+def _headings(root: Path) -> Iterator[tuple[str, str]]:
+    for path in lesson_paths(root / "notebooks"):
+        for cell in nbformat.read(path, as_version=4).cells:
+            if cell.cell_type == "markdown" and cell.source.startswith("#"):
+                heading, *below = cell.source.splitlines()
+                number = re.match(r"## (\d+) ·", heading)
+                keys = [line for line in below[1:2] if line.startswith("<small>")]
+                yield f"{path.name}, {number[1] if number else heading.lstrip('# ')}", "".join(keys)
+
+
+def render(found: dict[str, Entry]) -> str:
+    """Return the ledger in short: the modules and the lessons of each entry."""
+    lines = [
+        "# Ledger",
+        "",
+        "Which modules and which lessons belong to each equation, proposition,",
+        "remark and figure of the two texts, and what is misprinted in our copies of them. Written",
+        "by `python3 course.py ledger`, not by hand. The ledger of the book, which",
+        "`python3 course.py book` makes, links functions, tests, sections and pictures, too.",
+    ]
+    for title, keys in GROUPS.items():
+        rows = []
+        for key in keys:
+            modules = {name.rsplit(".", 1)[0]: None for name in found[key].functions}
+            lessons = {lesson[:2]: None for lesson in found[key].lessons}
+            rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
+        lines += ["", f"## {title}", ""]
+        lines += _table(("", "what", "modules", "lessons"), rows)
+    rows = [
+        (key.removeprefix("errata "), row["where"], row["printed"], row["holds"])
+        for key, row in MISPRINTS.items()
+    ]
+    lines += [
+        "",
+        "## Misprints",
+        "",
+        "The tests show that the one does not hold, and the other does. (21 only looks like one.)",
+        "",
+    ]
+    lines += _table(("", "where", "as printed in our copy", "what holds"), rows)
+    lines.append("")
+    return "\n".join(lines)
+
+
+def _table(head: tuple[str, ...], rows: Iterable[Iterable[str]]) -> list[str]:
+    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+
+
+def main() -> None:
+    """Write docs/ledger.md, in the folder of the course."""
+    try:
+        Path("docs/ledger.md").write_text(render(collect(Path())), encoding="utf-8", newline="\n")
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

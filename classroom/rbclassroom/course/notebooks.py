@@ -1,0 +1,287 @@
+"""Execute and store the lessons, byte for byte the same each time."""
+
+import argparse
+import hashlib
+import json
+import os
+import platform
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient import NotebookClient
+from nbformat import NotebookNode
+from nbformat.sign import NotebookNotary
+from tornado.web import HTTPError
+
+from rbclassroom.course.agreement import reconciled_notebook, stale_figures
+
+KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
+# what JupyterLab writes into a notebook that it opens, and marks as changed if it was not there
+OPENED = {
+    "kernelspec": {**KERNEL, "display_name": "Python 3 (ipykernel)"},
+    "language_info": {
+        "codemirror_mode": {"name": "ipython", "version": 3},
+        "file_extension": ".py",
+        "mimetype": "text/x-python",
+        "name": "python",
+        "nbconvert_exporter": "python",
+        "pygments_lexer": "ipython3",
+        "version": platform.python_version(),
+    },
+}
+
+
+def lesson_paths(folder: Path) -> list[Path]:
+    """Return the lessons of a folder in the order of the course, without assignments."""
+    return sorted(folder.glob("[0-9][0-9]_*.ipynb"))
+
+
+def execute(path: Path, figures: Path) -> str:
+    """Run a lesson from top to bottom in a new kernel and return what is to be stored."""
+    notebook = nbformat.read(path, as_version=4)
+    client = NotebookClient(
+        notebook,
+        kernel_name=KERNEL["name"],
+        record_timing=False,
+        coalesce_streams=True,
+        store_widget_state=False,
+        timeout=600,
+        iopub_timeout=600,
+        raise_on_iopub_timeout=True,
+        extra_arguments=["--log-level=ERROR"],
+        resources={"metadata": {"path": str(path.parent)}},
+    )
+    kernel = client.create_kernel_manager()
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        for name, value in kernel_address(folder).items():
+            setattr(kernel, name, value)
+        own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": folder}
+        client.execute(env={**os.environ, **own})
+    return normalised(notebook)
+
+
+def kernel_address(folder: str) -> dict[str, str]:
+    """Return where a kernel shall listen, as settings of its manager.
+
+    At files, except on Windows: a port that is found free may be taken by another program before
+    the kernel takes it.
+    """
+    if os.name == "nt":
+        return {}
+    return {"transport": "ipc", "ip": os.path.join(folder, "kernel")}
+
+
+def normalised(notebook: NotebookNode) -> str:
+    """Return a notebook as text without what differs from run to run or machine to machine.
+
+    Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
+    random ids of 32 hexadecimal digits are numbered in the order of appearance.
+    """
+    notebook.metadata.kernelspec = dict(KERNEL)
+    notebook.metadata.language_info = {"name": "python"}
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    keep_stills(notebook)
+    for output in (output for cell in cells for output in cell.outputs):
+        for texts, key in ((output, "text"), (output.get("data", {}), "text/plain")):
+            if key in texts:
+                texts[key] = re.sub(r"0x[0-9a-fA-F]{6,16}", "0x0", texts[key])
+    notebook.metadata.pop("widgets", None)
+    for cell, ran in zip(cells, _with_numbered_ids([c.outputs for c in cells]), strict=True):
+        cell.outputs = ran
+    return nbformat.writes(notebook) + "\n"
+
+
+def keep_stills(notebook: Any) -> None:
+    """Drop widgets that have a still beside them: they live with their kernel, the still stays."""
+    for cell in notebook["cells"]:
+        for output in cell.get("outputs", []):
+            if "text/html" in (data := output.get("data", {})):
+                data.pop("application/vnd.jupyter.widget-view+json", None)
+
+
+def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> None:
+    """Keep the stills of what JupyterLab saves, and the lessons as they are stored.
+
+    Without ``course.py lab --edit`` a lesson that has a copy in ``work/`` and was only opened or
+    run keeps its stored outputs; one that was changed is not saved, and its reader is told where
+    the copy is.
+    """
+    if model["type"] != "notebook" or not model.get("content"):
+        return
+    folder, name = os.path.split(path)
+    if folder == "notebooks" and not os.environ.get("RBCOURSE_EDIT"):
+        root = Path(contents_manager.root_dir)
+        if name in _read_record(root / "work" / ".copied.json"):
+            model["content"] = _as_stored(root / path, model["content"])
+    keep_stills(model["content"])
+
+
+def _as_stored(path: Path, content: Any) -> Any:
+    """Return a lesson as it is stored, or raise an error for JupyterLab if its cells differ."""
+    try:
+        stored = nbformat.read(path, as_version=4)
+        now = nbformat.from_dict(content)
+        same = _sources(stored) == _sources(now) and _tags(stored) == _tags(now)
+    except Exception as error:  # of others JupyterLab would say nothing, and save
+        raise HTTPError(500, f"{path.name} is not saved: {error}") from error
+    if not same:
+        why = f"{path.name} is an original, and is not saved. Your copy is in work/"
+        keep = "to keep this one, choose File > Save Notebook As and enter a path such as work/mine"
+        raise HTTPError(403, f"{why}; {keep}.ipynb", reason="Not saved: this is an original")
+    return stored
+
+
+def _with_numbered_ids(ran: list[Any]) -> list[Any]:
+    numbers, names = count(1), dict[str, str]()
+    text = re.sub(
+        r"(?<![0-9a-f])[0-9a-f]{32}(?![0-9a-f])",
+        lambda match: names.setdefault(match[0], f"{next(numbers):032x}"),
+        json.dumps(ran),
+    )
+    return [nbformat.from_dict(part) for part in json.loads(text)]
+
+
+def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
+    """Execute lessons, then rewrite the stored outputs and figures that have changed.
+
+    All lessons, or those whose names begin with one of `names`. What is the same as far as
+    processors agree stays as it is. Nothing is rewritten unless every lesson ran. When all lessons
+    run, figures that none of them draws are removed.
+    """
+    every = lesson_paths(lessons)
+    if not every:
+        raise ValueError(f"{lessons}: no lessons here; this is run in the folder of the course")
+    if unknown := [name for name in names if not any(p.stem.startswith(name) for p in every)]:
+        raise ValueError(f"no lesson's name begins with {unknown[0]!r}")
+    chosen = [path for path in every if not names or path.stem.startswith(tuple(names))]
+    with tempfile.TemporaryDirectory() as folder:
+        texts = {}
+        for path in chosen:
+            print(f"{path.stem} ...", end=" ", flush=True)
+            start = time.perf_counter()
+            text = execute(path, Path(folder))
+            texts[path] = reconciled_notebook(path.read_text("utf-8"), text)
+            print(f"{time.perf_counter() - start:.1f} s", flush=True)
+        drawn = sorted(Path(folder).iterdir())
+        stale = {Path(name).stem for name in stale_figures(Path(folder), figures)}
+        changed = [path for path, text in texts.items() if path.read_text("utf-8") != text]
+        for path in changed:
+            path.write_text(texts[path], encoding="utf-8", newline="\n")
+        figures.mkdir(exist_ok=True)
+        for file in drawn:
+            if file.stem in stale:  # all files of a figure belong together
+                shutil.copyfile(file, figures / file.name)
+        if chosen == every:
+            for file in {file for file in figures.iterdir() if file.is_file()}:
+                if file.name not in {each.name for each in drawn}:
+                    file.unlink()
+    print(f"{len(texts)} lessons run, {len(changed)} changed; figures changed: {len(stale)}")
+
+
+def copy_lessons(lessons: Path, work: Path) -> None:
+    """Copy the lessons to a folder to work in, trusted; what was written there is never touched.
+
+    A lesson that is new to the folder is copied. One that has changed since it was copied takes
+    the place of its copy if the cells of that are as they were, run or not, and is laid beside it
+    otherwise.
+    """
+    work.mkdir(exist_ok=True)
+    record = work / ".copied.json"
+    copied, notary = _read_record(record), NotebookNotary()
+    with closing(notary.store):
+        for path in lesson_paths(lessons):
+            lesson, target = path.read_bytes(), work / path.name
+            notebook = _parsed(path)
+            last, now = copied.get(path.name), [_digest(lesson), _digest(_cells(lesson))]
+            if target.exists() and last and last[0] == now[0]:
+                continue
+            notebook.metadata.update(OPENED)
+            copy = (nbformat.writes(notebook) + "\n").encode()
+            if not _left_alone(target, copy, last):
+                target = next(p for p in _numbered(target) if not p.exists())
+                print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
+            target.write_bytes(copy)
+            try:
+                notary.sign(notebook)
+            except OSError as error:
+                print(f"{target.name} is copied, but not marked as trusted: {error}")
+            copied[path.name] = now
+            part = record.with_suffix(".part")
+            part.write_text(json.dumps(copied, indent=1), encoding="utf-8")
+            part.replace(record)
+
+
+def _read_record(record: Path) -> dict[str, list[str]]:
+    """Return what was copied when; nothing where the record is lost or damaged."""
+    try:
+        copied = json.loads(record.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return copied if isinstance(copied, dict) else {}
+
+
+def _left_alone(target: Path, lesson: bytes, last: list[str] | None) -> bool:
+    """Tell whether a copy is absent, the lesson itself, or unchanged apart from its outputs."""
+    if not target.exists():
+        return True
+    content = target.read_bytes()
+    return content == lesson or (last is not None and last[1] == _digest(_cells(content)))
+
+
+def _parsed(path: Path) -> NotebookNode:
+    try:
+        return nbformat.read(path, as_version=4)
+    except ValueError as error:
+        raise ValueError(f"{path.name} is no notebook: {str(error)[:80]}") from error
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+
+
+def _cells(content: bytes) -> bytes:
+    """Return what a person writes in a notebook; all of it where it cannot be read as one."""
+    try:
+        return json.dumps(_sources(nbformat.reads(content.decode(), as_version=4))).encode()
+    except Exception:
+        return content
+
+
+def _sources(notebook: Any) -> list[tuple[str, str]]:
+    return [(cell.cell_type, cell.source) for cell in notebook.cells]
+
+
+def _tags(notebook: Any) -> list[Any]:
+    return [cell.metadata.get("tags", []) for cell in notebook.cells]
+
+
+def _numbered(path: Path) -> Iterator[Path]:
+    return (path.with_stem(f"{path.stem}_{number}") for number in count(2))
+
+
+def main() -> None:
+    """Run a task from the command line, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="python -m rbclassroom.course.notebooks")
+    parser.add_argument("task", choices=["regenerate", "copy"])
+    parser.add_argument("lessons", nargs="*", help="how their names begin: 03; without, all")
+    words = parser.parse_args()
+    try:
+        if words.task == "regenerate":
+            regenerate(Path("notebooks"), Path("figures"), words.lessons)
+        else:
+            copy_lessons(Path("notebooks"), Path("work"))
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""Explorers of minimum acceleration: optimum and projection, solved again for other ends."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbclassroom.explorers import widgets
+from rbclassroom.explorers.explorer import Explorer, look, new_figure, new_line, new_space, numbers
+from rbcourse import (
+    Curve,
+    acceleration_cost_parts,
+    angle_between,
+    exp_so3,
+    log_so3,
+    minimum_acceleration_se3,
+    minimum_acceleration_so3,
+    pose_from_components,
+    pose_from_coordinates,
+    projected_cubic_se3,
+)
+from rbcourse.draw.bodies import draw_box, draw_ground, move_box
+from rbcourse.draw.save import COLOURS, FORMS
+
+Solved = tuple[dict[str, Curve], dict[str, float]]
+
+_TIMES = np.linspace(0, 1, 61)
+_SIGMA = np.pi / 6 * np.array([1, 2, 3])
+_SIDE = 3.5
+_LOW, _HIGH = np.array([-2.0, -2, -2]), np.array([10.0, 12, 15])
+_BOX = np.array([1.3, 0.8, 0.25])
+_OUTLINE: Any = {"colours": 7 * ["none"], "edgecolor": COLOURS["projection"], "linewidth": 1.5}
+_WAYS = {"optimum": "-", "projection": "--"}
+
+
+def minimum_acceleration_explorer() -> Explorer:
+    """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
+
+    From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
+    `acceleration_cost`. The box moves as the optimum does, its pink outline as the closed form.
+    Controls: the ``rival``, the projection or one of the others; the ``size`` s; the time ``t``;
+    and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig.
+    4).
+    """
+    with look():
+        fig = new_figure()
+        ax = fig.add_axes((0.12, 0.16, 0.46, 0.71))
+        ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
+        artists: dict[str, Any] = {}
+        for way, name, dash in (("optimum", "optimum", "-"), ("rival", "closed form", "--")):
+            for axis in "xyz":
+                artists[f"{way} {axis}"] = new_line(ax, color=COLOURS[axis], ls=dash)
+            ax.plot([], [], color="0.3", ls=dash, label=name)
+        for axis, number in zip("xyz", "₁₂₃", strict=True):
+            style: Any = {"color": COLOURS[axis], "va": "center"}
+            artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+        artists["now"] = ax.axvline(0, color="0.6", lw=1)
+        space = new_space(fig, (0.63, 0.24, 0.41, 0.6), 1.0)
+        for way in ("optimum", "rival"):
+            artists[f"{way} box"] = draw_box(space, np.eye(4), _BOX)
+        artists["rival box"].set(**_OUTLINE)
+        fig.text(0.835, 0.2, "the body at t", ha="center")
+    controls = {
+        "rival": widgets.menu("closed form", list(FORMS)),
+        "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
+        "t": widgets.slider("time t", 0.5, 0.0, 1.0, 0.01),
+        "k": widgets.stepped("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
+    }
+
+    def show(rival: str, size: float, t: float, k: float) -> dict[str, str]:
+        curves, costs = _solved_rotations(rival, size, k)
+        for way, curve in zip(("optimum", "rival"), curves.values(), strict=True):
+            for axis, line in zip("xyz", log_so3(curve(_TIMES)).T, strict=True):
+                artists[f"{way} {axis}"].set_data(_TIMES, line)
+            move_box(artists[f"{way} box"], pose_from_components(curve(t), np.zeros(3)), _BOX)
+        artists["now"].set_xdata([t, t])
+        for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
+            artists[f"σ{number}"].set_position((1.03, height))
+        return {**_compared(costs), "apart at most": _apart(curves, _TIMES)}
+
+    return Explorer("Minimum acceleration", fig, artists, controls, show, plays="k", seconds=6)
+
+
+def cube_explorer() -> Explorer:
+    """Return an explorer of Figure 5: two cubes on their ways, the optimum and the projection.
+
+    The ends are the paper's, except three that can be changed; the goal is pale. Controls: the
+    ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad per unit time;
+    ``rise``, that of the velocity at the end in m per unit time; and the time ``t``, which plays
+    (BK 6.3, BK (14), BK Fig. 5).
+    """
+    with look():
+        fig = new_figure()
+        artists: dict[str, Any] = {}
+        for way, left in zip(_WAYS, (0.0, 0.5), strict=True):
+            ax: Any = fig.add_axes((left - 0.09, -0.05, 0.65, 1.0), projection="space")
+            ax.fit(_LOW, _HIGH, zoom=1.04)
+            ax.view_init(elev=18, azim=-22)
+            draw_ground(ax, _LOW, _HIGH)
+            for name, end in zip("xyz", 5 * np.eye(3), strict=True):
+                ax.plot(*np.outer(end, [0, 1]), color="0.7", lw=1.5, zorder=0)
+                ax.text(*(1.2 * end), name, color="0.5", ha="center", va="center")
+            style = {"color": "black", "lw": 1, "ls": _WAYS[way]}
+            artists[f"{way} way"] = new_line(ax, **style)
+            artists[f"{way} goal"] = draw_box(ax, np.eye(4), _SIDE)
+            artists[f"{way} goal"].set_alpha(0.25)
+            artists[way] = draw_box(ax, np.eye(4), _SIDE)
+            fig.text(left + 0.25, 0.94, way, ha="center")
+        artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
+        artists["difference"].set(**_OUTLINE)
+        fig.text(0.5, 0.02, "axes: 5 m; pink: where the optimum is now", ha="center")
+    controls = {
+        "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
+        "spin": widgets.slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),
+        "rise": widgets.slider("ḋ₃(1) (m/time)", 3.0, -20.0, 20.0, 1.0),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
+    }
+
+    def show(turn: float, spin: float, rise: float, t: float) -> dict[str, str]:
+        curves, costs = _solved_poses(turn, spin, rise)
+        for way, curve in curves.items():
+            artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
+            move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
+            move_box(artists[way], curve(t), _SIDE)
+        move_box(artists["difference"], curves["optimum"](t), _SIDE)
+        return {**_compared(costs), "apart now": _apart(curves, t)}
+
+    return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")
+
+
+@lru_cache(maxsize=64)
+def _solved_rotations(rival: str, size: float, k: float) -> Solved:
+    """Solve BK (21) with these two changed."""
+    sigma = size * _SIGMA
+    ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
+    return _with_costs({"optimum": minimum_acceleration_so3(*ends), rival: FORMS[rival](*ends)})
+
+
+@lru_cache(maxsize=64)
+def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
+    """Solve BK 6.3 with these three changed; while only the time runs it stays solved."""
+    sigma = turn * np.pi / 6 * np.array([1, 4, 3])
+    A0, A1 = np.eye(4), pose_from_coordinates([*sigma, 8, 10, 12])
+    ends = A0, A1, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
+    best, near = minimum_acceleration_se3(*ends), projected_cubic_se3(*ends)
+    return _with_costs({"optimum": best, "projection": near})
+
+
+def _with_costs(curves: dict[str, Curve]) -> Solved:
+    return curves, {way: float(acceleration_cost_parts(c)[0]) for way, c in curves.items()}
+
+
+def _compared(costs: dict[str, float]) -> dict[str, str]:
+    low, high = costs.values()
+    if low > 1e-12:
+        ratio = numbers(high / low, 3)
+    else:
+        ratio = "none: the optimum costs nothing" if high > 1e-12 else "none: both cost nothing"
+    said = {f"cost, {way}": f"{numbers(cost, 3)} rad²" for way, cost in costs.items()}
+    return {**said, "their ratio": ratio}
+
+
+def _apart(curves: dict[str, Curve], t: ArrayLike) -> str:
+    """Return by how much two motions are turned against each other, at most, at these times."""
+    best, near = (curve(t)[..., :3, :3] for curve in curves.values())
+    return f"{numbers(np.degrees(angle_between(best, near).max()), 1)}°"

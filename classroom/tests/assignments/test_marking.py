@@ -1,0 +1,149 @@
+"""A problem accepts what is right, hints at a listed mistake, and else says what it saw."""
+
+import numpy as np
+import pytest
+from test_student_code import student
+
+from rbclassroom.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem, curves_of
+from rbclassroom.assignments.student_code import NotYet
+
+DOUBLE = Problem(
+    answer=lambda x, k: 2 * k * x,
+    inputs=[(np.array([1.0, -2.0]), 1), (np.array([0.5, 4.0]), 3)],
+    mistakes=[
+        Mistake("half", lambda x, k: x * k / 2, lambda x, k: x / 2),
+        Mistake("sign", lambda x, k: -2 * k * x),
+    ],
+)
+
+
+def told(problem, source):
+    with pytest.raises(NotYet) as refused:
+        problem.accepts(student(source))
+    return str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["2 * k * x", "list(2 * k * x)", "k * x + k * x + 1e-12"])
+def test_what_is_right_is_accepted(text, capsys):
+    assert DOUBLE.accepts(student(f"def answer(x, k): return {text}")) is True
+    assert capsys.readouterr().out.startswith("As it should be")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"), [("k * x / 2", "half"), ("x / 2", "half"), ("-2 * k * x", "sign")]
+)
+def test_a_listed_mistake_gets_its_hint(text, hint):
+    assert told(DOUBLE, f"def answer(x, k): return {text}") == hint
+
+
+def test_a_mistake_has_to_be_made_on_all_inputs():
+    text = told(DOUBLE, "def answer(x, k): return x * k / 2 if k == 1 else 2 * k * x")
+    assert text == (
+        "For x = [1.0, -2.0], k = 1 the result should be [2.0, -4.0]; yours is [0.5, -1.0], "
+        "off by 3."
+    )
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("pass", "returns nothing. Is the line with return missing?"),
+        ("return np.linalg.svd(np.eye(2))", "returns no real numbers but ("),
+        ("return 'two'", "returns no real numbers but two"),
+        ("return [[1], [1, 2]]", "returns no real numbers but [[1], [1, 2]]."),
+        ("return x + 0j", "no real numbers but [(1+0j), (-2+0j)]. It is complex"),
+        ("return (2 * k * x)[:1]", "the shape (2,) is wanted; yours is (1,)"),
+        ("return x * np.nan", "your result is not finite: [nan, nan]"),
+        ("x *= 2 * k\n    return x", "changes the arguments"),
+        ("raise NotImplementedError()", "Nothing is written here yet"),
+        ("return undefined", "stops: NameError: name 'undefined' is not defined"),
+    ],
+)
+def test_other_faults_are_described(body, said):
+    assert said in told(DOUBLE, f"import numpy as np\ndef answer(x, k):\n    {body}")
+
+
+def test_a_function_with_other_arguments_is_told_so():
+    assert "takes 1 positional argument but 2 were given" in told(DOUBLE, "def answer(x): return x")
+
+
+def test_a_mistake_made_in_degrees_gets_both_hints():
+    text = told(DOUBLE, "import numpy as np\ndef answer(x, k): return np.degrees(-2 * k * x)")
+    assert text == f"{IN_RADIANS} There is a second mistake: sign"
+
+
+def test_full_turns_do_not_count_where_the_problem_says_so():
+    problem = Problem(lambda x: x, [(np.array([1.0]),)], [], read=lambda a: np.exp(1j * a).real)
+    assert problem.accepts(student("import numpy as np\ndef answer(x): return x + 2 * np.pi"))
+
+
+def test_inputs_are_not_touched_from_trial_to_trial():
+    before = [x.copy() for x, _ in DOUBLE.inputs]
+    told(DOUBLE, "def answer(x, k):\n    x[:] = 0\n    return x")
+    assert all(map(np.array_equal, before, [x for x, _ in DOUBLE.inputs]))
+
+
+LINE = Drawing(
+    answer=lambda t: [np.column_stack([t, t**2])],
+    inputs=[(np.linspace(0, 1, 5),), (np.linspace(0, 2, 7),)],
+    mistakes=[Mistake("swapped", lambda t: [np.column_stack([t**2, t])])],
+)
+LABELS = "ax.set(xlabel='x [m]', ylabel='y [m]')"
+
+
+@pytest.mark.parametrize(
+    "drawing",
+    [
+        "ax.plot(t, t**2)",
+        "ax.plot(t, t**2, 'o')",
+        "ax.scatter(t, t**2)",
+        "ax.plot(t[::-1], t[::-1] ** 2)",
+        "ax.plot([0, 1], [0, 0])\n    ax.plot(t, t**2)",
+    ],
+)
+def test_a_drawing_is_judged_by_its_points(drawing):
+    assert LINE.accepts(student(f"def answer(ax, t):\n    {drawing}\n    {LABELS}"))
+
+
+@pytest.mark.parametrize(
+    ("drawing", "said"),
+    [
+        ("ax.plot(t**2, t)", "swapped"),
+        ("pass", "Nothing was drawn on the axes that your function was given."),
+        ("ax.plot(t[1:], t[1:])", "A curve of 5 points is wanted; you drew curves of [4] points."),
+        (
+            "for x in t: ax.plot(x, x**2, '.')",
+            "Draw one line through 5 points; you drew 5 lines of 1 point.",
+        ),
+        ("ax.plot(t, t)", "Point 2 of the curve should be [0.5, 0.25]; yours is [0.5, 0.5]."),
+        ("ax.plot(t, t**2)", "The curves are right. The x axis needs a label"),
+        ("ax.plot(t, t**2)\n    ax.set_xlabel('t')", "The curves are right. The y axis needs"),
+    ],
+)
+def test_what_is_wrong_with_a_drawing_is_told(drawing, said):
+    assert told(LINE, f"def answer(ax, t):\n    {drawing}").startswith(said)
+
+
+def test_bars_and_steps_are_curves():
+    from matplotlib.figure import Figure
+
+    data, edges, heights = [0.5, 1.2, 1.4], [0, 1, 2], [1 / 3, 2 / 3]
+    wanted = [[0.5, 1 / 3], [1.5, 2 / 3]]
+    for draw in (
+        lambda ax: ax.hist(data, edges, density=True),
+        lambda ax: ax.hist(data, edges, density=True, rwidth=0.9),
+        lambda ax: ax.hist(data, edges, density=True, histtype="step"),
+        lambda ax: ax.hist(data, edges, density=True, histtype="stepfilled"),
+        lambda ax: ax.stairs(heights, edges),
+        lambda ax: ax.stairs(heights, edges, fill=True),
+        lambda ax: ax.bar([0, 1], heights, width=1, align="edge"),
+        lambda ax: ax.bar([0.5, 1.5], heights, width=0.8),
+        lambda ax: ax.step(edges, [*heights, heights[-1]], where="post"),
+        lambda ax: ax.step(edges, [heights[0], *heights], where="pre"),
+        lambda ax: ax.step([0.5, 1.5], heights, where="mid"),
+        lambda ax: ax.fill_between(edges, [*heights, 0], step="post"),
+        lambda ax: (ax.axvspan(0, 1), ax.hist(data, edges, density=True)),
+    ):
+        ax = Figure().subplots()
+        draw(ax)
+        assert any(np.shape(c) == (2, 2) and np.allclose(c, wanted) for c in curves_of(ax))

@@ -1,0 +1,167 @@
+"""Votes: the ballot by its rules, and thirty phones at the port of a lecture."""
+
+import json
+import re
+import signal
+import socket
+import sys
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from urllib.parse import urlencode, urlsplit
+
+import pytest
+from nbformat.v4 import new_markdown_cell
+from tiny import ask, lecture, lesson_at
+
+from rbclassroom.course import lecture as module
+from rbclassroom.course.lecture import open_votes
+from rbclassroom.course.votes import Ballot, find_address
+
+
+def opened(options=4):
+    ballot = Ballot()
+    ballot.begin("Poll 1", options)
+    return ballot
+
+
+def test_only_the_last_vote_of_a_phone_counts():
+    ballot = opened()
+    a, b, c, silent = (ballot.admit() for _ in range(4))
+    for phone, letter in [(a, "A"), (b, "C"), (a, "C"), (c, "D")]:
+        ballot.vote(phone, letter)
+    assert [ballot.vote_of(phone) for phone in (a, silent)] == ["C", ""]
+    assert ballot.state() == {"poll": "Poll 1", "open": True, "voters": 3, "counts": []}
+    for _ in range(2):  # to close it again changes nothing
+        ballot.close()
+        counted = {"poll": "Poll 1", "open": False, "voters": 3, "counts": [0, 0, 2, 1]}
+        assert ballot.state() == counted
+
+
+def test_nothing_of_a_phone_is_kept_when_the_vote_is_closed():
+    ballot = opened()
+    key, phone = ballot.key, ballot.admit()
+    ballot.vote(phone, "A")
+    ballot.close()
+    assert phone not in repr(vars(ballot))
+    assert not ballot.knows(phone)
+    ballot.begin("Poll 1", 4)
+    assert ballot.key != key
+    assert ballot.state()["voters"] == 0
+    ballot.close()
+    assert ballot.state()["counts"] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("letter", ["E", "a", "", "AB", "1"])
+def test_only_options_of_the_poll_are_taken(letter):
+    ballot = opened()
+    with pytest.raises(ValueError, match="The options are A, B, C, D"):
+        ballot.vote(ballot.admit(), letter)
+
+
+def test_only_phones_that_were_admitted_vote_and_not_too_many_are():
+    ballot = opened()
+    for stranger in ("", "a"):
+        with pytest.raises(ValueError, match="not admitted"):
+            ballot.vote(stranger, "A")
+    for _ in range(500):
+        ballot.admit()
+    with pytest.raises(ValueError, match="500 phones"):
+        ballot.admit()
+
+
+def test_a_vote_that_is_closed_takes_none_and_one_that_is_open_is_not_opened_again():
+    ballot = Ballot()
+    for options in (1, 27):
+        with pytest.raises(ValueError, match="2 to 26"):
+            ballot.begin("Poll 1", options)
+    ballot.begin("Poll 1", 5)
+    with pytest.raises(ValueError, match="Poll 1 is open"):
+        ballot.begin("Poll 2", 4)
+    phone = ballot.admit()
+    ballot.close()
+    with pytest.raises(ValueError, match="not admitted"):
+        ballot.vote(phone, "A")
+
+
+@pytest.mark.parametrize(
+    "address", ["0.0.0.0", "224.0.0.1", "255.255.255.255", "192.0.2.77", "::1", "06", "a.org"]
+)
+def test_an_address_that_is_not_of_this_machine_is_refused(address):
+    with pytest.raises(ValueError, match=f"Phones cannot vote at {address}: "):
+        open_votes(address)
+
+
+def test_without_a_network_the_class_votes_by_hand(monkeypatch, capsys):
+    def nowhere():
+        raise OSError("Network is unreachable")
+
+    monkeypatch.setattr(module, "find_address", nowhere)
+    assert open_votes("") is None
+    assert "show of hands" in capsys.readouterr().out
+
+
+def test_the_address_is_looked_up_without_sending_anything():
+    try:
+        address = find_address()
+    except OSError:
+        return  # there is no network
+    with socket.socket() as probe:
+        probe.bind((address, 0))  # it is of this machine
+
+
+FORM = {"Content-Type": "application/x-www-form-urlencoded"}
+
+
+def vote(url, letters):
+    """Open the page as a phone does, and vote, once for each letter; return page and cookie."""
+    status, page, cookie = ask(url)
+    assert status == 200
+    assert re.findall(r'value="(.)"', page) == list("ABCD")
+    for letter in letters:
+        body = urlencode({"choice": letter})
+        assert ask(url, "POST", body, **FORM, Cookie=cookie)[0] == 303
+    page = ask(url, Cookie=cookie)[1]
+    assert f"You voted {letters[-1]}." in page
+    return page, cookie
+
+
+def test_thirty_phones_vote_and_nobody_sees_the_count_before_it_is_closed(tmp_path):
+    lesson_at(tmp_path, new_markdown_cell("### Poll 1\n\n- **A** · yes\n- **B** · no"))
+    with lecture(tmp_path, "--votes", "127.0.0.1") as (address, server):
+        url = re.search(r"Phones vote at (\S+)", server.stdout.readline())[1]
+        desk = address.replace("/?", "/votes?")
+
+        def state(words=None):
+            method, body = ("GET", None) if words is None else ("POST", json.dumps(words))
+            return json.loads(ask(desk, method, body)[1])
+
+        begin = {"poll": "Poll 1", "options": 4}
+        late = urlencode({"choice": "A"})
+        assert "No vote is open" in ask(url)[1]
+        assert ask(desk.split("?")[0])[0] in (302, 401, 403)
+        assert ask(url + "/votes")[0] == 404
+        assert state(begin)["open"]
+        assert "is open" in state(begin)["message"]
+        letters = ["BA", "DA", *"CCCCCBBBBDDDAAAAAAAAAABCBCBC", "AB"]
+        with ThreadPoolExecutor(30) as phones:
+            pages, cookies = zip(*phones.map(vote, [url] * len(letters), letters), strict=True)
+        assert len(set(cookies)) == len(letters)  # a random name each
+        assert not any(re.search(r"\b\d+ votes?\b", page) for page in pages)
+        assert ask(url, "POST", late, **FORM)[0] == 303  # of no phone that was admitted
+        assert ask(url, "POST", late, **FORM, Cookie="vote-1=a")[0] == 303
+        assert ask(url, "POST", "choice=E", **FORM, Cookie=cookies[0])[0] == 400
+        assert state() == {"poll": "Poll 1", "open": True, "voters": len(letters), "counts": []}
+        closed = state({})
+        counts = Counter(last for *_, last in letters)
+        assert closed["counts"] == [counts[letter] for letter in "ABCD"]
+        assert "Poll 1 is closed" in ask(url)[1]
+        assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # too late
+        assert state() == closed
+        state(begin)
+        assert "Tap your answer" in ask(url, Cookie=cookies[0])[1]  # another vote
+        with socket.create_connection(("127.0.0.1", urlsplit(url).port)):
+            end = signal.SIGTERM if sys.platform == "win32" else signal.SIGINT
+            server.send_signal(end)
+            server.wait()
+    with socket.socket() as probe:
+        assert probe.connect_ex(("127.0.0.1", urlsplit(url).port))

@@ -1,0 +1,137 @@
+"""The atlas: its problems, what curves cost in it, and what is read off."""
+
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbclassroom.surveys import atlas
+
+DRAWS = 6
+PROBLEMS = atlas.atlas_problems(DRAWS, rng=1)
+SOME = atlas.random_problems(60, 3, rng=2)
+
+
+def turns(ends):
+    return rb.log_so3(np.swapaxes(ends.R0, -1, -2) @ ends.R1)
+
+
+def norms(x):
+    return np.linalg.norm(x, axis=-1)
+
+
+def test_each_cell_has_its_displacements_and_end_velocities():
+    family, turn, speed, _ = np.indices((2, 10, 10, DRAWS)).reshape(4, -1)
+    sigma, w = turns(PROBLEMS), np.stack([PROBLEMS.w0, PROBLEMS.w1])
+    assert np.array_equal(np.floor(norms(sigma) / (np.pi / 10)), turn)
+    assert np.array_equal(np.floor(np.hypot(*norms(w)) / 0.9), speed)
+    along = np.abs(np.sum(w * sigma, axis=-1)) / norms(w) / norms(sigma)
+    assert np.abs(along[:, family == 0] - 1).max() < 1e-9
+    assert along[:, family == 1].max() < 1e-9
+
+
+def test_velocities_point_both_ways_and_all_ways_across():
+    cosine = np.sum(PROBLEMS.w0 * PROBLEMS.w1, axis=-1) / norms(PROBLEMS.w0) / norms(PROBLEMS.w1)
+    along, across = cosine.reshape(2, -1)
+    assert np.abs(np.sort(along)[[0, -1]] - [-1, 1]).max() < 1e-9
+    assert np.abs(np.abs(along) - 1).max() < 1e-9
+    for way in (-1, 1):
+        assert np.mean(np.sign(along) == way) > 0.4
+    assert np.mean(np.abs(across) < np.cos(np.pi / 4)) == pytest.approx(0.5, abs=0.1)
+
+
+def test_random_problems_fill_balls():
+    ends = atlas.random_problems(4000, 1.5, rng=3)
+    for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
+        share = (norms(x) / radius) ** 3  # of the volume: uniform
+        assert share.max() < 1 + 1e-9
+        assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
+        assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
+
+
+@pytest.mark.parametrize(
+    "make", [atlas.atlas_problems, lambda n, rng: atlas.random_problems(n, 1, rng=rng)]
+)
+def test_a_seed_gives_the_same_problems_again(make):
+    one, again, other = make(2, rng=5), make(2, rng=5), make(2, rng=6)
+    assert all(np.array_equal(a, b) for a, b in zip(one, again, strict=True))
+    assert not any(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+    with pytest.raises(ValueError, match=r"an integer from 1 up wanted, got 0"):
+        make(0, rng=5)
+
+
+@pytest.mark.parametrize("size", [0, -1, 3.2, np.nan, "a", [1, 2]])
+def test_an_impossible_size_is_named(size):
+    with pytest.raises(ValueError, match=r"^size"):
+        atlas.random_problems(2, size)
+
+
+@pytest.mark.source("BK Prop. 3")
+def test_which_curves_go_along_with_moved_and_exchanged_ends():
+    reversible = "projection", "Bézier", "corrected", "quaternion"
+    for way, make in atlas.WAYS.items():
+        off = atlas.defects(make, SOME, rng=1)
+        assert list(off) == ["left", "right", "reversed"]
+        assert max(off["left"], off["right"]) < 1e-11, way
+        assert off["reversed"] < 1e-11 if way in reversible else off["reversed"] > 0.1, way
+
+
+def test_what_is_not_invariant_is_seen():
+    """σ taken about I: right-invariant it is not, and neither left."""
+
+    def about_the_identity(R0, R1, w0, w1):
+        return lambda t: rb.exp_so3(
+            rb.log_so3(R0) * (1 - t[:, None, None]) + rb.log_so3(R1) * t[:, None, None]
+        )
+
+    off = atlas.defects(about_the_identity, SOME, rng=1)
+    assert min(off["left"], off["right"]) > 0.1
+    assert off["reversed"] < 1e-12
+
+
+def test_nothing_is_divided_by_an_optimum_near_zero():
+    """Along the axis of a turn by a, w0 = w1 = a + d costs 24 d²."""
+    a, d = 1.0, np.array([0.0, 0.005, 0.01, 0.5])
+    e, R0 = np.eye(3)[2], np.tile(np.eye(3), (4, 1, 1))
+    w = (a + d)[:, None] * e
+    ends = atlas.Ends(R0, rb.exp_so3(np.tile(a * e, (4, 1))), w, w)
+    found = {"optimum": 24 * d**2, "other": 48 * d**2}
+    assert (24 * d**2 < 3e-4 * (1 + d)).tolist() == [True, False, False, False]
+    assert atlas.near_zero(ends, found["optimum"]).tolist() == [True, False, False, False]
+    excess = atlas.excesses(ends, found)
+    assert list(excess) == ["other"]
+    assert np.isnan(excess["other"]).tolist() == [True, False, False, False]
+    assert excess["other"][1:] == pytest.approx([1, 1, 1])
+
+
+def test_a_quantile_is_the_number_that_so_many_do_not_pass():
+    rng = np.random.default_rng(7)
+    x = rng.random((3, 50))
+    x[0, ::2] = np.nan
+    for share in (0.1, 0.5, 0.9, 1):
+        for row, value in zip(x, atlas.quantile(x, share), strict=True):
+            numbers = np.sort(row[~np.isnan(row)])
+            assert value == pytest.approx(numbers[int(np.ceil(share * len(numbers))) - 1], rel=5e-4)
+
+
+def test_numbers_have_four_digits_and_eight_decimals():
+    assert atlas.rounded(np.array([123456.0, 0.00123456, 1.26e-8, -1e-12])).tolist() == [
+        123500.0,
+        0.001235,
+        1e-8,
+        0.0,
+    ]
+
+
+def test_the_table_has_a_row_for_each_cell():
+    excess = np.arange(2 * 10 * 10 * 5.0)
+    excess[:2] = np.nan
+    table = atlas.cell_table({"one": excess, "two": 2 * excess}, 5, 0.5)
+    assert table["family"].tolist() == ["along"] * 100 + ["across"] * 100
+    middles = np.radians([9, 9, 27, 171])
+    assert table["displacement [rad]"][[0, 9, 10, 199]] == pytest.approx(middles)
+    assert table["end velocity [rad]"][[0, 9, 10, 199]] == pytest.approx([0.45, 8.55, 0.45, 8.55])
+    assert table["problems [1]"].tolist() == [3] + [5] * 199
+    middle = np.arange(200) * 5 + 2.0
+    middle[0] = 3
+    assert table["one excess [1]"] == pytest.approx(middle, rel=5e-4)
+    assert table["two excess [1]"] == pytest.approx(2 * middle, rel=5e-4)

@@ -1,0 +1,45 @@
+"""A course of one small lesson, how Python runs a module in it, and how it is shown."""
+
+import http.client
+import subprocess
+import sys
+from contextlib import contextmanager
+from http.cookies import SimpleCookie
+from urllib.parse import urlsplit
+
+import nbformat
+from nbformat.v4 import new_notebook
+
+MODULE = [sys.executable, "-m"]
+
+
+def lesson_at(folder, *cells):
+    """Write a lesson of these cells into the course of a folder; return its path."""
+    (folder / "notebooks").mkdir()
+    path = folder / "notebooks" / "01_tiny.ipynb"
+    path.write_text(nbformat.writes(new_notebook(cells=list(cells))), encoding="utf-8")
+    return path
+
+
+@contextmanager
+def lecture(folder, *further):
+    """The address of a lecture, and the process."""
+    words = [*MODULE, "rbclassroom.course.lecture", "1", "--no-browser", *further]
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            yield server.stdout.readline().split()[-1], server
+        finally:
+            server.terminate()
+            server.stdout.read()
+
+
+def ask(address, method="GET", body=None, **headers):
+    """Ask for a page; return its status, its text and what it sets in cookies."""
+    parts = urlsplit(address)
+    connection = http.client.HTTPConnection(parts.netloc, timeout=60)
+    connection.request(method, f"{parts.path or '/'}?{parts.query}", body, headers)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    cookies = SimpleCookie(answer.getheader("Set-Cookie"))
+    return answer.status, text, "; ".join(f"{key}={it.value}" for key, it in cookies.items())

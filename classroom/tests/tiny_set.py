@@ -1,0 +1,57 @@
+"""A problem set of two small problems and a question in words, as a teacher writes it."""
+
+from pathlib import Path
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from rbclassroom.course.notebooks import KERNEL
+
+ANSWERS = {"square-answer": "def square(x):\n    return x * x", "half-answer": "half = 0.5"}
+
+
+def marked(cell, grade_id, points=None, **kind):
+    """The cell with nbgrader's metadata."""
+    marks = {"schema_version": 3, "grade_id": grade_id, "locked": True, "grade": False}
+    marks |= {"solution": False, "task": False, "cell_type": cell.cell_type, **kind}
+    cell.metadata["nbgrader"] = marks | ({} if points is None else {"points": points})
+    cell.id = grade_id
+    return cell
+
+
+def _answer(source, grade_id):
+    text = f"### BEGIN SOLUTION\n{source}\n### END SOLUTION"
+    return marked(new_code_cell(text), grade_id, locked=False, solution=True)
+
+
+def _tests(visible, hidden, grade_id, points):
+    text = f"{visible}\n### BEGIN HIDDEN TESTS\n{hidden}\n### END HIDDEN TESTS"
+    return marked(new_code_cell(text), grade_id, points, grade=True)
+
+
+def write_tiny_set(assignments: Path, name: str = "ps0") -> Path:
+    """Write the set into the folder of assignments; return its path."""
+    words = "Like signs.\n\n**Mark scheme** One point for the sign of a product."
+    cells = [
+        marked(new_markdown_cell("# A tiny set"), "title"),
+        marked(new_code_cell("import math"), "imports"),
+        _answer(ANSWERS["square-answer"], "square-answer"),
+        _tests("assert square(2) == 4, 'times itself'", "assert square(-3) == 9", "square-test", 2),
+        _answer(ANSWERS["half-answer"], "half-answer"),
+        _tests("assert half < 1", "assert math.isclose(half, 0.5)", "half-test", 1),
+        marked(new_markdown_cell("Why is a square never negative?"), "words-question"),
+        marked(
+            new_markdown_cell(f"### BEGIN SOLUTION\n{words}\n### END SOLUTION"),
+            "words-answer",
+            points=3,
+            locked=False,
+            grade=True,
+            solution=True,
+        ),
+    ]
+    notebook = new_notebook(cells=cells)
+    notebook.metadata.kernelspec = dict(KERNEL)
+    path = assignments / "source" / name / f"{name}.ipynb"
+    path.parent.mkdir(parents=True)
+    path.write_text(nbformat.writes(notebook), encoding="utf-8")
+    return path
