@@ -405,12 +405,12 @@ def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
     ----------
     weights : ndarray, shape (T, count, n) or (T, 1, n)
     terms : ndarray, shape (count, n, m)
-    *core : int
+    core : int
         The shape of a sum, of m entries.
 
     Returns
     -------
-    ndarray, shape (T, count, *core)
+    ndarray, shape (T, count, ...)
     """
     sums = np.empty((len(weights), len(terms), terms.shape[-1]))
     np.matmul(np.swapaxes(weights, 0, 1), terms, out=np.swapaxes(sums, 0, 1))

@@ -25,7 +25,13 @@ MAY_IMPORT = {  # the parts, beside itself, that a part of the packages may impo
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},
     "rbclassroom": set(),
-    "rbclassroom.explorers": {"rbcourse", "rbcourse.draw", "rbclassroom.course"},
+    "rbclassroom.figures": {"rbcourse", "rbcourse.draw"},
+    "rbclassroom.explorers": {
+        "rbcourse",
+        "rbcourse.draw",
+        "rbclassroom.course",
+        "rbclassroom.figures",
+    },
     "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
     "rbclassroom.course": {"rbclassroom"},  # not even the mathematics
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
@@ -42,6 +48,7 @@ LIBRARIES = {
     "rbcourse.report": {"matplotlib"},
     "rbclassroom": set(),
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
+    "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
     "rbclassroom.course": {"PIL", "jupyter_server", "nbclient", "nbformat", "segno", "tornado"}
     | {"traitlets", "voila"},

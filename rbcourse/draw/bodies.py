@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from rbcourse import Array, Curve, angle_between, pose_from_components
+from rbcourse import Array, Curve, angle_between
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.draw.scene import OVER
 from rbcourse.draw.space import Faces
@@ -243,72 +243,6 @@ def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
             else f" The orientations of {first} and {name} agree at all times."
         )
     return said
-
-
-def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> list[Any]:
-    """Draw a fixed frame, a moving frame on its body, and the position vector between them.
-
-    `names` and `poses`, shape (2, 4, 4), are those of the fixed frame and the moving one
-    (BK Fig. 1).
-    """
-    d, R = poses[:, :3, 3], poses[:, :3, :3]
-    artists = [draw_box(ax, poses[1], np.array([1.4, 1.0, 0.7]))]
-    artists[0].set_alpha(0.5)
-    for name, origin, axes in zip(names, d, R, strict=True):
-        artists += draw_triad(ax, origin, axes, name)
-        ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center", zorder=OVER)
-    vector = draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
-    ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
-    ax.fit(d.min(axis=0) - 0.4, d.max(axis=0) + 1, zoom=1.3)
-    ax.view_init(elev=20, azim=-60)
-    return [*artists, vector]
-
-
-def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
-    """Return in words what `draw_moving_frame` shows."""
-    fixed, moving = names
-    place = ", ".join(f"{x:g}" for x in poses[1, :3, 3])
-    turn = np.degrees(angle_between(np.eye(3), poses[1, :3, :3]))
-    return (
-        f"The fixed frame {{{fixed}}} with its axes x, y, z, and a box that carries the moving "
-        f"frame {{{moving}}}. Its origin is at ({place}) m, the tip of the vector d, and it is "
-        f"turned by {turn:.0f} degrees against the fixed one."
-    )
-
-
-def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> list[Any]:
-    """Draw a box with its frame in orientations R, shape (n, 3, 3), each in its own space.
-
-    The names become titles; pale are the axes of the room (RR 2.1).
-    """
-    artists: list[Any] = []
-    for ax, name, turned in zip(axes, names, R, strict=True):
-        pose = pose_from_components(turned, np.zeros(3))
-        artists.append(draw_box(ax, pose, np.array([1.6, 1.0, 0.3])))
-        for room in 1.3 * np.eye(3):
-            artists += ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
-        for axis, direction in zip("xyz", turned.T, strict=True):
-            artists.append(draw_arrow(ax, np.zeros(3), 1.2 * direction, COLOURS[axis]))
-            ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
-        ax.fit(np.full(3, -1.3), np.full(3, 1.3), zoom=1.4)
-        ax.view_init(elev=20, azim=-55)
-        ax.set_title(name)
-    return artists
-
-
-def describe_turns(names: Sequence[str], R: Array) -> str:
-    """Return in words what `draw_turns` shows."""
-    said = [
-        f"{name}: x {_heading(x)}, y {_heading(y)}, z {_heading(z)}"
-        for name, (x, y, z) in zip(names, np.swapaxes(R, -1, -2), strict=True)
-    ]
-    return f"A box with its axes: {'; '.join(names)}. Where they point: {'; '.join(said)}."
-
-
-def _heading(direction: Array) -> str:
-    """Return a direction as the fixed axis that it is nearest to, with its sign."""
-    k = int(np.abs(direction).argmax())
-    return f"along {'−' if direction[k] < 0 else '+'}{'xyz'[k]}"
 
 
 def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:

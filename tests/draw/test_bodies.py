@@ -149,40 +149,6 @@ def ax3d():
     plt.close(fig)
 
 
-@pytest.mark.source("BK Fig. 1")
-def test_the_moving_frame_shows_both_frames(ax3d):
-    poses = np.stack([np.eye(4), np.eye(4)])
-    poses[1, :3, :3], poses[1, :3, 3] = rb.exp_so3([0, 0, np.pi / 2]), [1, 2, 3]
-    artists = bodies.draw_moving_frame(ax3d, ["F", "M"], poses)
-    assert len(artists) == 8  # box, six axes, vector
-    faces = corners(artists[0])[:6]
-    assert np.abs(faces.mean(axis=(0, 1)) - [1, 2, 3]).max() < 1e-14
-    assert np.abs(np.ptp(faces, axis=(0, 1)) - [1.0, 1.4, 0.7]).max() < 1e-14  # turned by 90°
-    assert np.array_equal(np.transpose(artists[-1].get_data_3d())[:2], [[0, 0, 0], [1, 2, 3]])
-    texts = [text.get_text() for text in ax3d.texts]
-    axes = [f"${axis}_{name}$" for name in "FM" for axis in "xyz"]
-    assert texts == [*axes[:3], "{F}", *axes[3:], "{M}", "d"]
-    said = bodies.describe_moving_frame(["F", "M"], poses)
-    assert "(1, 2, 3) m" in said
-    assert "90 degrees" in said
-
-
-@pytest.mark.source("RR 2.1")
-def test_turned_boxes_carry_their_frames(ax3d):
-    R = rb.exp_so3([[0, 0, np.pi / 2]])
-    box, *room, x, y, z = bodies.draw_turns([ax3d], ["turned"], R)
-    assert np.array_equal([np.ptp(line.get_data_3d(), axis=1) for line in room], 2.6 * np.eye(3))
-    assert np.abs(np.ptp(corners(box)[:6], axis=(0, 1)) - [1.0, 1.6, 0.3]).max() < 1e-15
-    for arrow, direction in zip((x, y, z), R[0].T, strict=True):
-        start, tip, *_ = np.transpose(arrow.get_data_3d())
-        assert np.array_equal(start, [0, 0, 0])
-        assert np.abs(tip - 1.2 * direction).max() < 1e-15
-    assert ax3d.get_title() == "turned"
-    assert [text.get_text() for text in ax3d.texts] == ["x", "y", "z"]
-    said = bodies.describe_turns(["turned"], R)
-    assert "turned: x along +y, y along −x, z along +z." in said
-
-
 def test_an_arrow_has_its_barbs_at_its_tip_and_on_four_sides(ax3d):
     along = np.array([1.0, -2, 2])
     arrow = bodies.draw_arrow(ax3d, np.ones(3), along, "red")

@@ -23,6 +23,10 @@ MOVED = {
     **{f"explore.{name}": f"explorers.{name}" for name in ("recorded", "rotations", "widgets")},
     **{f"study.{name}": f"surveys.{name}" for name in ("atlas", "atlas_figures", "body_atlas")},
     **{f"study.{name}": f"surveys.{name}" for name in ("progress", "survey")},
+    "draw.casteljau": "figures.lesson11",
+    "draw.laws": "figures.lesson13",
+    "draw.plots": "figures.lesson06",
+    "draw.repairs": "figures.lesson04",
 }
 """Modules whose pages have another address than before: the old page leads to the new one."""
 

@@ -33,6 +33,7 @@ HOUSE = {
 ROOMS = {
     "draw": "Pictures",
     "explorers": "Explorers",
+    "figures": "Figures of one lesson",
     "surveys": "The atlas",
     "course": "For maintainers: lessons run and shown",
     "assignments": "For maintainers: problem sets",
@@ -95,7 +96,8 @@ def shown_code(root: Path) -> list[Path]:
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
     hidden = [root / "classroom/rbclassroom/assignments/problems"]
-    hidden += [root / "classroom/tests" / name for name in ("assignments", "browser", "hostile")]
+    machinery = "assignments", "book", "browser", "course", "hostile"
+    hidden += [root / "classroom/tests" / name for name in machinery]
     return sorted(path for path in paths if not any(map(path.is_relative_to, hidden)))
 
 

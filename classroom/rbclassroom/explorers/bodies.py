@@ -7,6 +7,7 @@ import numpy as np
 
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, look, new_figure, new_line, new_space, numbers
+from rbclassroom.figures.lesson13 import LOOKS, torques
 from rbcourse import (
     Array,
     Curve,
@@ -18,7 +19,6 @@ from rbcourse import (
     torque_cost,
 )
 from rbcourse.draw.bodies import draw_box, move_box
-from rbcourse.draw.laws import LOOKS, torques
 from rbcourse.metrics import box_inertia
 
 _TIMES = np.linspace(0, 1, 61)

@@ -9,7 +9,8 @@ from matplotlib.patches import Annulus
 from pixels import check_alike, shown
 
 import rbcourse as rb
-from rbcourse.draw import animate, bodies, casteljau, plane, spheres
+from rbclassroom.figures import lesson08, lesson11
+from rbcourse.draw import animate, bodies, plane, spheres
 
 TIMES = np.linspace(0, 1, 21)
 GOAL = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
@@ -23,7 +24,7 @@ def cubes():
 def book():
     fig, ax = plt.subplots(figsize=(4, 4), dpi=80, subplot_kw={"projection": "space"})
     R = rb.geodesic_so3(np.eye(3), GOAL[:3, :3])(TIMES)
-    return fig, spheres.moving_book(ax, TIMES, R, (0.2, 0.16, 0.03))
+    return fig, lesson08.moving_book(ax, TIMES, R, (0.2, 0.16, 0.03))
 
 
 def points():
@@ -43,7 +44,7 @@ def construction():
     axes = fig.add_subplot(1, 2, 1), fig.add_subplot(1, 2, 2, projection="space")
     flat = np.array([[0.0, 0], [1, 2], [3, 2], [4, 0]])
     ends = np.eye(3), GOAL[:3, :3], [1, 0, 0], [0, 2, 0]
-    return fig, casteljau.moving_casteljau(axes, TIMES, flat, ends, np.array([1.0, 0, 0]))
+    return fig, lesson11.moving_casteljau(axes, TIMES, flat, ends, np.array([1.0, 0, 0]))
 
 
 def rings():

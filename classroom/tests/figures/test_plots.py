@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse.draw import plots
+from rbclassroom.figures import lesson03, lesson06, lesson09, lesson14
 
 CURVE_TIMES = np.linspace(0, 1, 21)
 SIGMA = np.array([0.3, 0.6, 0.9])
@@ -14,7 +14,7 @@ CURVES = {
     "optimum": rb.minimum_acceleration_so3(*ENDS),
     "projection": rb.projected_cubic_so3(*ENDS),
 }
-COORDINATES = plots.coordinate_table(CURVES, CURVE_TIMES)
+COORDINATES = lesson09.coordinate_table(CURVES, CURVE_TIMES)
 POSES = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 3, 4, 0], [0, 0, 1, 3, 4, 5]])
 MOTION = rb.chain([0, 2, 4], POSES, leg=rb.geodesic_se3)
 SMOOTH = rb.chain([0, 2, 4], POSES)
@@ -55,7 +55,7 @@ def motions():
 
 
 def test_a_family_shows_six_curves_that_differ_in_colour_and_dashes(ax, family):
-    lines = plots.draw_family(ax, family)
+    lines = lesson06.draw_family(ax, family)
     rows = [3, 7, 11, 15, 19, 21]
     for line, row in zip(lines, rows, strict=True):
         assert np.array_equal(line.get_ydata(), family["theta [1]"][row])
@@ -67,12 +67,12 @@ def test_a_family_shows_six_curves_that_differ_in_colour_and_dashes(ax, family):
 
 
 def test_a_family_of_one_is_one_curve(ax, family):
-    (line,) = plots.draw_family(ax, {name: column[5:6] for name, column in family.items()})
+    (line,) = lesson06.draw_family(ax, {name: column[5:6] for name, column in family.items()})
     assert np.array_equal(line.get_ydata(), family["theta [1]"][5])
 
 
 def test_a_surface_spans_the_table(ax3d, family):
-    (surface,) = plots.draw_surface(ax3d, family)
+    (surface,) = lesson06.draw_surface(ax3d, family)
     points = np.concatenate([np.asarray(face) for face in surface._faces])
     for axis, column in enumerate(["t [1]", "angle [rad]", "theta [1]"]):
         assert points[:, axis].min() == family[column].min()
@@ -80,16 +80,16 @@ def test_a_surface_spans_the_table(ax3d, family):
 
 
 def test_an_angle_has_one_colour_on_the_curves_and_on_the_surface(ax, ax3d, family):
-    (surface,) = plots.draw_surface(ax3d, family)
+    (surface,) = lesson06.draw_surface(ax3d, family)
     starts = np.array([np.asarray(face)[:, 1].min() for face in surface._faces])
-    for line, row in zip(plots.draw_family(ax, family)[:-1], [3, 7, 11, 15, 19], strict=True):
+    for line, row in zip(lesson06.draw_family(ax, family)[:-1], [3, 7, 11, 15, 19], strict=True):
         faces = surface._facecolor3d[starts == family["angle [rad]"][row, 0]]
         assert len(faces) == 4
         assert np.array_equal(faces, np.tile(line.get_color(), (4, 1)))
 
 
 def test_a_family_is_described_by_its_numbers(family):
-    said = plots.describe_family(family)
+    said = lesson06.describe_family(family)
     assert "for 22 angles" in said
     assert "for the largest angle, 11π/12 rad, it is 0, 0.0439, 0.5, 0.956, 1." in said
 
@@ -98,18 +98,18 @@ def test_the_chord_shows_its_cuts_and_their_projections(ax):
     z = np.array([1, 0.5 + 0.5j, 1j])
     arc = z / np.abs(z)
     table = dict(zip("txyab", [[0, 0.5, 1], z.real, z.imag, arc.real, arc.imag], strict=True))
-    circle, *_, chord, projections = plots.draw_chord(ax, table)
+    circle, *_, chord, projections = lesson06.draw_chord(ax, table)
     assert np.array_equal(chord.get_xydata(), np.array([z.real, z.imag]).T)
     assert np.array_equal(projections.get_xydata(), np.array([arc.real, arc.imag]).T)
     for artist in (circle, projections, *ax.texts):
         box = artist.get_window_extent()
         assert np.array_equal(box.corners(), np.clip(box.corners(), *ax.bbox.corners()[[0, 3]]))
-    said = plots.describe_chord(table)
+    said = lesson06.describe_chord(table)
     assert "over 90 degrees, cut into 2 equal steps" in said
 
 
 def test_motions_are_carried_points_and_speeds(motions):
-    table = plots.path_table(*motions)
+    table = lesson06.path_table(*motions)
     t = table["t [1]"]
     assert np.abs(table["geodesic x [1]"] - np.cos(2 * t)).max() < 1e-15
     assert (
@@ -126,13 +126,13 @@ def test_paths_and_speeds_show_both_motions(ax, motions):
     t, paths, speeds = motions
     sphere = plt.figure().add_subplot(projection="space")
     for name, path, speed in zip(
-        paths, plots.draw_paths(sphere, paths), plots.draw_speeds(ax, t, speeds), strict=True
+        paths, lesson06.draw_paths(sphere, paths), lesson06.draw_speeds(ax, t, speeds), strict=True
     ):
         assert np.array_equal(path.get_data_3d(), paths[name].T)
         assert np.array_equal(speed.get_xydata(), np.transpose([t, speeds[name]]))
         assert path.get_color() == speed.get_color()
     plt.close(sphere.figure)
-    said = plots.describe_paths(paths, speeds)
+    said = lesson06.describe_paths(paths, speeds)
     assert "the geodesic takes the steps 57, 57 degrees; its speed is 2.00 at the start" in said
     assert "0.91 at the start, 3.11 in the middle, 0.91 at the end" in said
 
@@ -152,7 +152,7 @@ def test_the_table_holds_rotation_vectors():
 @pytest.mark.source("BK Fig. 4")
 def test_paths_coordinates_and_differences_are_those_of_the_table(ax):
     fig, ax3d = plt.subplots(subplot_kw={"projection": "3d"})
-    lines = plots.draw_coordinate_paths(ax3d, COORDINATES)
+    lines = lesson09.draw_coordinate_paths(ax3d, COORDINATES)
     sigma = [rb.log_so3(curve(CURVE_TIMES)).T for curve in CURVES.values()]
     for line, path in zip(lines, sigma, strict=True):
         assert np.array_equal(line.get_data_3d(), path)
@@ -161,14 +161,14 @@ def test_paths_coordinates_and_differences_are_those_of_the_table(ax):
     )
     plt.close(fig)
     for line, part in zip(
-        plots.draw_coordinates(ax, COORDINATES), np.concatenate(sigma), strict=True
+        lesson09.draw_coordinates(ax, COORDINATES), np.concatenate(sigma), strict=True
     ):
         assert np.array_equal(line.get_ydata(), part)
     apart = sigma[1] - sigma[0]
-    for line, part in zip(plots.draw_difference(ax, COORDINATES), apart, strict=True):
+    for line, part in zip(lesson09.draw_difference(ax, COORDINATES), apart, strict=True):
         assert np.array_equal(line.get_ydata(), part)
     distance = np.linalg.norm(apart, axis=0)
-    said = plots.describe_coordinates(COORDINATES)
+    said = lesson09.describe_coordinates(COORDINATES)
     assert (
         f"most at t = {CURVE_TIMES[distance.argmax()]:g}, by {distance.max():.2g} rad in length"
         in said
@@ -176,30 +176,30 @@ def test_paths_coordinates_and_differences_are_those_of_the_table(ax):
 
 
 def test_equal_curves_are_said_to_coincide():
-    same = plots.coordinate_table(dict.fromkeys(CURVES, CURVES["optimum"]), CURVE_TIMES)
-    assert plots.describe_coordinates(same).endswith("They coincide at all times.")
+    same = lesson09.coordinate_table(dict.fromkeys(CURVES, CURVES["optimum"]), CURVE_TIMES)
+    assert lesson09.describe_coordinates(same).endswith("They coincide at all times.")
 
 
 def test_excess_is_drawn_on_logarithmic_axes(ax):
     scale = np.array([0.25, 0.5, 1])
     table = {"scale [1]": scale, "one excess [1]": scale**4, "two excess [1]": 2 * scale**4}
-    one, two, slope = plots.draw_excess(ax, table)
+    one, two, slope = lesson09.draw_excess(ax, table)
     assert np.array_equal(one.get_ydata(), scale**4)
     assert np.array_equal(two.get_ydata(), 2 * scale**4)
     assert np.allclose(np.diff(np.log(slope.get_ydata())), 4 * np.log(2))
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
-    assert "one from 3.9e-03 to 1; two from 7.8e-03 to 2" in plots.describe_excess(table)
+    assert "one from 3.9e-03 to 1; two from 7.8e-03 to 2" in lesson09.describe_excess(table)
 
 
 def test_speeds_are_those_of_the_motion():
-    table = plots.profile_table(MOTION, 1, 5)
+    table = lesson14.profile_table(MOTION, 1, 5)
     assert table["t [s]"].tolist() == [0, 1, 2, 3, 4]
     assert np.allclose(table["angular speed [rad/s]"], [0.5, 0.5, 0, 0, 0], atol=1e-14)
     assert np.allclose(table["speed [m/s]"], 2.5, atol=1e-14)
 
 
 def test_accelerations_are_those_of_the_body():
-    table = plots.profile_table(SMOOTH, 2, 9)
+    table = lesson14.profile_table(SMOOTH, 2, 9)
     h = 1e-4
     for t, w, d in zip(*table.values(), strict=True):
         if t in (0, 2, 4):
@@ -212,7 +212,7 @@ def test_accelerations_are_those_of_the_body():
 
 def test_each_column_has_its_axes_and_the_knots_their_lines():
     fig, axes = plt.subplots(2)
-    lines = plots.draw_profiles(axes, PROFILES, [0, 1.5])
+    lines = lesson14.draw_profiles(axes, PROFILES, [0, 1.5])
     for ax, line, label in zip(axes, lines, ("speed\n(m/s)", "turn\n(rad/s)"), strict=True):
         assert line.axes is ax
         assert ax.get_ylabel() == label
@@ -226,7 +226,7 @@ def test_each_column_has_its_axes_and_the_knots_their_lines():
 
 
 def test_what_is_said():
-    assert plots.describe_profiles(PROFILES, [0, 1.5]) == (
+    assert lesson14.describe_profiles(PROFILES, [0, 1.5]) == (
         "Over time, with dotted lines where poses are reached: speed (m/s), turn (rad/s). "
         "They go: speed up to 2.5 m/s at 1 s; turn up to 1 rad/s at 0 s. "
         "The poses are reached at 0, 1.5 s."
@@ -235,14 +235,16 @@ def test_what_is_said():
 
 def test_what_never_changes_has_axes_too():
     fig, axes = plt.subplots(2)
-    plots.draw_profiles(axes, PROFILES | {"speed [m/s]": [0, 0, 0], "turn [rad/s]": [-1, 0, 3]}, [])
+    lesson14.draw_profiles(
+        axes, PROFILES | {"speed [m/s]": [0, 0, 0], "turn [rad/s]": [-1, 0, 3]}, []
+    )
     assert [ax.get_ylim() for ax in axes] == [(0, 1), pytest.approx((-1.08, 3.24))]
     plt.close(fig)
 
 
 def test_of_rotations_alone_there_is_no_profile():
     with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) wanted"):
-        plots.profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)
+        lesson14.profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)
 
 
 @pytest.mark.source("RR (8)")
@@ -251,11 +253,11 @@ def test_angles_are_drawn_in_degrees_and_described():
     letters = {"α": -t, "β": -t, "γ": 2 * t}
     table = {"t [1]": t} | {f"slow {name} [rad]": angle for name, angle in letters.items()}
     fig, ax = plt.subplots()
-    lines = plots.draw_angles([ax], table)
+    lines = lesson03.draw_angles([ax], table)
     for line, (name, angle) in zip(lines, letters.items(), strict=True):
         assert line.get_label() == name
         assert np.array_equal(line.get_ydata(), np.degrees(angle))
     assert ax.get_title() == "slow"
     plt.close(fig)
-    said = plots.describe_angles(table)
+    said = lesson03.describe_angles(table)
     assert "slow: β goes to -57 degrees, and the middle half of α's change takes 50.0 %" in said

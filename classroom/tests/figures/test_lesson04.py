@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse.draw import repairs
+from rbclassroom.figures import lesson04
 
 STEP = rb.exp_so3([0.01, 0.02, -0.03])
 M = np.random.default_rng(1).normal(size=(30, 2, 2))
 M = M[np.linalg.det(M) > 0.1]
-POINTS = repairs.shadows(M)
-TABLE = repairs.shadow_table(POINTS)
+POINTS = lesson04.shadows(M)
+TABLE = lesson04.shadow_table(POINTS)
 
 
 def test_a_matrix_in_single_precision_drifts_and_a_repaired_one_does_not():
     ways = {"left alone": (STEP, None), "repaired": (STEP, rb.project_so)}
-    data = repairs.drift_table(2000, ways)
+    data = lesson04.drift_table(2000, ways)
     counts = data["steps [1]"]
     assert counts[0] == 1
     assert counts[-1] == 2000
@@ -35,18 +35,18 @@ def test_a_matrix_in_single_precision_drifts_and_a_repaired_one_does_not():
 def test_a_first_order_step_stretches():
     h = 0.02
     factor = np.eye(3) + rb.hat_so3([0, 0, h])
-    defect = repairs.drift_table(100, {"first": (factor, None)})["first [1]"][-1]
+    defect = lesson04.drift_table(100, {"first": (factor, None)})["first [1]"][-1]
     assert defect == pytest.approx(np.sqrt(2) * ((1 + h * h) ** 100 - 1), rel=1e-3)
 
 
 def test_the_drift_is_drawn_and_described():
     ways = {"a": (STEP, None), "b": (STEP, rb.project_so), "c": (np.eye(3) + STEP / 9, None)}
-    data = repairs.drift_table(200, ways)
+    data = lesson04.drift_table(200, ways)
     fig, ax = plt.subplots()
-    lines = repairs.draw_drift(ax, data)
+    lines = lesson04.draw_drift(ax, data)
     assert [line.get_label() for line in lines] == ["a", "b", "c"]
     assert np.array_equal(lines[1].get_ydata(), data["b [1]"])
-    assert f"After 200 products it is, a: {data['a [1]'][-1]:.0e}" in repairs.describe_drift(data)
+    assert f"After 200 products it is, a: {data['a [1]'][-1]:.0e}" in lesson04.describe_drift(data)
     plt.close(fig)
 
 
@@ -54,9 +54,9 @@ def test_the_drift_is_drawn_and_described():
 def test_columns_are_arrows_with_what_they_miss(axes):
     over, turned = np.array([[2.0, 0.5], [0, -1]]), rb.project_so([[0, -2], [3, 0]])
     matrices = {"M": over, "turned": turned}
-    data = repairs.column_table(matrices)
+    data = lesson04.column_table(matrices)
     assert list(data) == ["M x [1]", "M y [1]", "turned x [1]", "turned y [1]"]
-    given, behind, before, *misses = repairs.draw_columns(axes, matrices)
+    given, behind, before, *misses = lesson04.draw_columns(axes, matrices)
     for arrows, name in ((given, "M"), (behind, "M"), (before, "turned")):
         assert np.array_equal([arrows.U, arrows.V], [data[f"{name} {axis} [1]"] for axis in "xy"])
         assert np.all(arrows.get_offsets() == 0)
@@ -69,7 +69,7 @@ def test_columns_are_arrows_with_what_they_miss(axes):
     assert axes[0].get_title() == "M\nmirrors"
     assert axes[1].get_title() == f"turned\nturns, misses {missed:.2f}"
     assert np.abs(ends).max() < min(ax.get_xlim()[1] for ax in axes)
-    said = repairs.describe_columns(matrices)
+    said = lesson04.describe_columns(matrices)
     assert "then those of turned, with M's behind in grey. M mirrors." in said
     assert f"turned turns, {missed:.2f} away" in said
 
@@ -98,7 +98,7 @@ def test_the_nearest_rotation_lies_on_the_ray_and_gram_schmidt_on_that_of_the_fi
 
 
 def test_a_line_runs_from_each_matrix_to_each_answer(axes):
-    artists = repairs.draw_shadows(axes, POINTS)
+    artists = lesson04.draw_shadows(axes, POINTS)
     assert len(artists) == 2 * (1 + len(M))
     for k, name in enumerate(["nearest rotation", "Gram–Schmidt"]):
         dots, *lines = artists[k * (1 + len(M)) :][: 1 + len(M)]
@@ -111,13 +111,13 @@ def test_a_line_runs_from_each_matrix_to_each_answer(axes):
 @pytest.mark.source("BK Prop. 3")
 def test_in_turned_frames_the_nearest_rotation_is_one_and_gram_schmidt_finds_others(axes):
     angles = np.linspace(0, 2 * np.pi, 25)
-    table = repairs.frame_table(M[0], angles)
+    table = lesson04.frame_table(M[0], angles)
     (z,), (m,) = turn_and_mirror(M[:1])
     assert np.abs(table["nearest rotation [rad]"] - np.angle(z)).max() < 1e-14
     seen = np.exp(1j * table["Gram–Schmidt [rad]"])
     wanted = z + m * np.exp(-2j * angles)  # the mirror part turns twice as fast
     assert np.abs(seen - wanted / abs(wanted)).max() < 1e-13
-    lines = repairs.draw_frames(axes[0], table)
+    lines = lesson04.draw_frames(axes[0], table)
     for line, name in zip(lines, ["nearest rotation", "Gram–Schmidt"], strict=True):
         assert np.array_equal(line.get_ydata(), np.degrees(table[f"{name} [rad]"]))
         assert line.get_label() == name
@@ -126,12 +126,12 @@ def test_in_turned_frames_the_nearest_rotation_is_one_and_gram_schmidt_finds_oth
 def test_descriptions_give_numbers():
     z, m = turn_and_mirror(M)
     off = np.degrees(np.abs(np.angle((z + m) / z))).max()
-    assert f"{len(M)} matrices" in repairs.describe_shadows(POINTS)
-    assert f"by up to {off:.0f} degrees" in repairs.describe_shadows(POINTS)
-    far = repairs.frame_table(np.array([[-1, 0.3], [0.3, -1]]), np.linspace(0, 6, 50))
-    assert "nearest rotation finds 180.0 degrees in every" in repairs.describe_frames(far).replace(
+    assert f"{len(M)} matrices" in lesson04.describe_shadows(POINTS)
+    assert f"by up to {off:.0f} degrees" in lesson04.describe_shadows(POINTS)
+    far = lesson04.frame_table(np.array([[-1, 0.3], [0.3, -1]]), np.linspace(0, 6, 50))
+    assert "nearest rotation finds 180.0 degrees in every" in lesson04.describe_frames(far).replace(
         "-", ""
     )
-    said = repairs.describe_frames(repairs.frame_table(np.diag([2.0, 1]), [0, np.pi / 4]))
+    said = lesson04.describe_frames(lesson04.frame_table(np.diag([2.0, 1]), [0, np.pi / 4]))
     assert "nearest rotation finds 0.0 degrees in every frame" in said
     assert "Gram–Schmidt finds -18.4 to 0.0 degrees" in said

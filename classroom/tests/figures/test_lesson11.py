@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse.draw import casteljau
+from rbclassroom.figures import lesson11
 
 T = np.linspace(0, 1, 11)
 POINTS = np.array([[0, 0], [1, 2], [3, 2.5], [4, 0.5]])
 SIGMA = np.pi / 6 * np.array([1, 2, 3])  # BK (21)
 ENDS = np.eye(3), rb.exp_so3(SIGMA), SIGMA, SIGMA + np.array([5, 0, 0])
 V = np.array([0, -0.8, 0.6])
-TABLE = casteljau.casteljau_table(T, POINTS, ENDS, V)
+TABLE = lesson11.casteljau_table(T, POINTS, ENDS, V)
 
 
 def level(name, k):
@@ -49,7 +49,7 @@ def test_the_control_points_have_the_ends():
 
 
 def test_what_moves_is_what_the_table_says(axes):
-    update = casteljau.moving_casteljau(axes, T, POINTS, ENDS, V)
+    update = lesson11.moving_casteljau(axes, T, POINTS, ENDS, V)
     for i in (0, 4, 10, 7):
         clock, *artists = update(i)
         assert clock.get_text() == f"t = {T[i]:.2f}"
@@ -65,7 +65,7 @@ def test_what_moves_is_what_the_table_says(axes):
 
 
 def test_legs_are_straight_in_the_plane_and_images_of_geodesics_on_the_sphere(axes):
-    update = casteljau.moving_casteljau(axes, T, POINTS, ENDS, V)
+    update = lesson11.moving_casteljau(axes, T, POINTS, ENDS, V)
     straight, arc = (drawn(update(4)[k]) for k in (2, 6))
     a, b = level("plane", 2)[..., 4]
     assert np.abs(straight - (a[:, None] + np.outer(b - a, np.linspace(0, 1, 33)))).max() < 1e-12
@@ -77,7 +77,7 @@ def test_legs_are_straight_in_the_plane_and_images_of_geodesics_on_the_sphere(ax
 
 
 def test_control_points_have_names_and_legs(axes):
-    casteljau.moving_casteljau(axes, T, POINTS, ENDS, V)
+    lesson11.moving_casteljau(axes, T, POINTS, ENDS, V)
     for ax, name, words in zip(
         axes,
         ("plane", "sphere"),
@@ -91,7 +91,7 @@ def test_control_points_have_names_and_legs(axes):
 
 
 def test_the_description_measures_the_legs():
-    said = casteljau.describe_casteljau(ENDS)
+    said = lesson11.describe_casteljau(ENDS)
     first = np.degrees(np.linalg.norm(SIGMA) / 3)
     last = np.degrees(np.linalg.norm(SIGMA + np.array([5, 0, 0])) / 3)
     assert f"next are {first:.0f}, " in said

@@ -1,0 +1,1 @@
+"""Figures that one lesson shows: tables, drawings and descriptions, a module for each lesson."""

@@ -1,0 +1,190 @@
+"""Lesson 8: spins of a book, its angular momentum, and carried arrows."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from rbcourse import Array, pose_from_components
+from rbcourse.draw.bodies import draw_box, move_box
+from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.spheres import AZIMUTH, ELEVATION, draw_sphere
+
+
+def spin_table(t: Array, spins: Mapping[str, Array]) -> Table:
+    """Return angular velocities over time, shape (times, 3), body frame, as a table."""
+    table = {"t [1]": t}
+    for name, w in spins.items():
+        table |= {f"{name} w{i + 1} [rad]": w[:, i] for i in range(3)}
+    return table
+
+
+def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> list[Any]:
+    """Draw the components of angular velocities, shape (times, 3), over time, each on its axes."""
+    lines: list[Any] = []
+    for ax, (name, w) in zip(axes, spins.items(), strict=True):
+        for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True)):
+            lines += ax.plot(t, w[:, i], color=COLOURS[axis], ls=dash, label=f"ω{'₁₂₃'[i]}")
+        ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]))
+        ax.set_xticks(np.linspace(t[0], t[-1], 5))
+    axes[0].set_ylabel("rad per unit time")
+    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    return lines
+
+
+def describe_spins(spins: Mapping[str, Array]) -> str:
+    """Return in words what `draw_spins` shows."""
+    said = []
+    for name, w in spins.items():
+        main = w[:, np.abs(w[0]).argmax()]
+        flips = np.count_nonzero(np.diff(main > 0))
+        said.append(f"{name}: it changes its sign {flips} times" if flips else f"{name}: it stays")
+    return (
+        "The three components of the angular velocity of a free body over time, for spins that "
+        f"start nearly about one axis. What becomes of the largest component: {'; '.join(said)}."
+    )
+
+
+def momentum_directions(moments: ArrayLike, w: Array) -> Array:
+    """Return the directions of the angular momentum in the body frame, shape (paths, times, 3).
+
+    `moments` are the principal moments of inertia, the second one between the others, and w the
+    angular velocities in the body frame, shape (times, paths, 3).
+    """
+    momentum = np.swapaxes(w * np.asarray(moments), 0, 1)
+    return momentum / np.linalg.norm(momentum, axis=-1, keepdims=True)
+
+
+def momentum_table(directions: Array) -> Table:
+    """Return `momentum_directions` as a table, with the number of the path."""
+    numbers = np.broadcast_to(np.arange(len(directions))[:, None], directions.shape[:2])
+    columns = {f"{axis} [1]": directions[..., i] for i, axis in enumerate("xyz")}
+    return {"path [1]": numbers, **columns}
+
+
+def draw_momenta(ax: Any, directions: Array) -> list[Any]:
+    """Draw closed paths of the angular momentum through the body, on the unit sphere.
+
+    A path has the colour of the axis that it goes round; black are those that pass close to the
+    middle one. Return a line for each.
+    """
+    draw_sphere(ax)
+    lines: list[Any] = []
+    for path in directions:
+        colour = COLOURS["xyz"[_goes_round(path)]]
+        if _comes_near_axis_2(path):
+            colour = COLOURS["optimum"]
+        lines += ax.plot(*path.T, color=colour, lw=2)
+    for name, end in zip("123", 1.1 * np.eye(3), strict=True):
+        for place in (end, -end):
+            ax.text(*place, name, ha="center", va="center")
+    return lines
+
+
+def describe_momenta(directions: Array) -> str:
+    """Return in words what `draw_momenta` shows."""
+    rounds = [_goes_round(path) for path in directions]
+    near = sum(_comes_near_axis_2(path) for path in directions)
+    return (
+        f"{len(rounds)} paths of the angular momentum on a sphere that is fixed in the body: "
+        f"{rounds.count(0)} go round axis 1, {rounds.count(2)} round axis 3, "
+        f"{rounds.count(1) or 'none'} round axis 2. Black: the {near} that pass close to axis 2."
+    )
+
+
+def _comes_near_axis_2(path: Array) -> bool:
+    return bool(np.abs(path[:, 1]).max() > 0.99)
+
+
+def _goes_round(path: Array) -> int:
+    """Return the axis along which the component of a path keeps its sign, the farthest from 0."""
+    low, high = path.min(axis=0), path.max(axis=0)
+    return int(np.where(low * high > 0, np.abs(path).min(axis=0), 0).argmax())
+
+
+def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
+    """Draw a book in its first orientation, with a pin in its middle axis; return what turns it.
+
+    R are its orientations at the times t, such that the angular momentum is vertical, as a line
+    through its centre says; `edges` are its edges along its axes, in m, the pin along the second.
+    ``update(i)`` turns the book to orientation i and returns the artists that move.
+    """
+    poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
+    reach = 0.5 * float(np.linalg.norm(edges))
+    ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
+    label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
+    ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
+    clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
+    book = draw_box(ax, poses[0], edges)
+    pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
+    ax.fit(np.full(3, -reach), np.full(3, reach), zoom=1.5)
+    ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
+
+    def update(i: int) -> list[Any]:
+        move_box(book, poses[i], edges)
+        ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
+        pin.set_data_3d(*ends.T)
+        clock.set_text(f"t = {t[i]:.1f}")
+        return [book, pin, clock]
+
+    return update
+
+
+def describe_book(t: Array, R: Array) -> str:
+    """Return in words what `moving_book` shows."""
+    height = R[:, 2, 1]
+    start = "up" if height[0] > 0 else "down"
+    over = ", ".join(f"{x:.1f}" for x in t[1:][np.diff(height > 0)])
+    fate = f"turns over at t = {over}" if over else "stays there"
+    return f"A book spins freely, with a pin in its middle axis. It starts {start}, and {fate}."
+
+
+CARRIED = {
+    "constant in the room": ("reference", 0.0),
+    "parallel": ("path", 0.5),
+    "constant in the body": ("z", 1.0),
+}
+"""How an arrow may be carried by a body that turns: its colour, and its share of the turn."""
+
+
+def carried_table(turned: Array) -> dict[str, Array]:
+    """Return the ends of arrows that a body carries three ways, turned by these angles."""
+    data = {"turn [rad]": np.asarray(turned)}
+    for name, (_, share) in CARRIED.items():
+        angle = np.pi / 6 + share * np.asarray(turned)
+        data |= {f"{name} x [1]": np.cos(angle), f"{name} y [1]": np.sin(angle)}
+    return data
+
+
+def draw_carried(axes: Sequence[Axes], turned: Array) -> list[Any]:
+    """Draw a body that turns in the plane, and an arrow carried three ways: BK (9)."""
+    data = carried_table(turned)
+    arrows: list[Any] = []
+    for k, (ax, angle) in enumerate(zip(axes, turned, strict=True)):
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        corners = turn @ np.array([[-0.7, 0.7, 0.7, -0.7], [-0.4, -0.4, 0.4, 0.4]])
+        ax.fill(*corners, facecolor="0.93", edgecolor="0.5")
+        ax.plot(*turn @ [[0.55], [0.25]], "o", color="0.5")  # a mark on the body
+        for name, (colour, _) in CARRIED.items():
+            x, y = data[f"{name} x [1]"][k], data[f"{name} y [1]"][k]
+            arrows += ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
+            head = (3, 0, np.degrees(np.arctan2(y, x)) - 90)
+            ax.plot(x, y, marker=head, ms=12, color=COLOURS[colour])
+        ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), aspect="equal")
+        ax.set_title(f"turned by {np.degrees(angle):.0f}°")
+        ax.set_axis_off()
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return arrows
+
+
+def describe_carried(turned: Array) -> str:
+    """Return in words what `draw_carried` shows."""
+    angles = ", ".join(f"{np.degrees(angle):.0f}" for angle in turned)
+    return (
+        f"A body turns in the plane, by {angles} degrees, and carries an arrow three ways: "
+        "constant in the room it stays, constant in the body it turns along, and parallel it turns "
+        "by half as much."
+    )
