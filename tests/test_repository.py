@@ -1,5 +1,6 @@
 """The files round the package agree with each other, and the package works without them."""
 
+import doctest
 import importlib.metadata
 import json
 import os
@@ -66,6 +67,16 @@ def test_the_environment_is_what_the_package_and_its_extras_need():
 
 def test_the_core_needs_numpy_and_scipy_only():
     assert {Requirement(line).name for line in PROJECT["dependencies"]} == {"numpy", "scipy"}
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/conventions.md"])
+def test_examples_of_documents_run(document, tmp_path, monkeypatch):
+    """Their files are written to another folder."""
+    monkeypatch.chdir(tmp_path)
+    options = {"optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
+    failed, tried = doctest.testfile(str(ROOT / document), module_relative=False, **options)
+    assert tried > 5
+    assert not failed
 
 
 def test_binder_gets_the_same_environment():

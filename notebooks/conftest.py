@@ -16,7 +16,7 @@ from shown import not_shown, start_recording
 from rbclassroom.course.agreement import changed_lines, stale_figures
 from rbclassroom.course.notebooks import kernel_address, lesson_paths, normalised
 
-ROOT = Path(__file__).parent
+ROOT = Path(__file__).parents[1]
 LESSONS = lesson_paths(ROOT / "notebooks")
 
 
@@ -33,13 +33,6 @@ def pytest_collect_file(file_path, parent):
     """Collect a lesson as such; other notebooks are nbval's alone."""
     collected = yield
     return [Lesson.from_parent(parent, path=file_path)] if file_path in LESSONS else collected
-
-
-@pytest.fixture(autouse=True)
-def _elsewhere(request, tmp_path_factory, monkeypatch):
-    """Let examples of README.md and docs/conventions.md write their files into another folder."""
-    if request.node.path.suffix == ".md":
-        monkeypatch.chdir(tmp_path_factory.mktemp("examples"))
 
 
 class Lesson(IPyNbFile):
