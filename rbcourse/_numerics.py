@@ -28,9 +28,11 @@ def matvec(A: Array, x: Array) -> Array:
 
 
 def cross(x: Array, y: Array, axis: int = -1) -> Array:
-    """Return x × y, several times as fast as NumPy's; the axis is that of the components."""
-    (a, b, c), (u, v, w) = np.moveaxis(x, axis, 0), np.moveaxis(y, axis, 0)
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u], axis=axis)
+    """Return x × y, several times as fast as NumPy's; the components are on the axis 0 or −1."""
+    product = np.empty(np.broadcast(x, y).shape)
+    (a, b, c), (u, v, w), parts = (z if axis == 0 else z.T for z in (x, y, product))
+    parts[0], parts[1], parts[2] = b * w - c * v, c * u - a * w, a * v - b * u
+    return product
 
 
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbcourse._chebyshev import along, chebyshev, grid
-from rbcourse._numerics import Array, blocks
+from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves import Ends
 from rbcourse.functionals import Functional
 from rbcourse.relaxation import cayley
@@ -98,7 +98,7 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
     def rate(w: Array) -> Array:
         return gyration * w.take(after, axis=-1) * w.take(before, axis=-1)
 
-    path = [(axes.mT @ w0[..., None])[..., 0]]
+    path = [matvec(axes.mT, w0)]
     size = np.linalg.norm(moments * path[0], axis=-1)
     for h in np.diff(t):
         w = path[-1]

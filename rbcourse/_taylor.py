@@ -7,10 +7,12 @@ Quaternions are (w, x, y, z).
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from rbcourse._numerics import Array
+from rbcourse._numerics import cross as cross_product
 
 Jet = list[Array]
 
@@ -128,7 +130,7 @@ def dot(x: Jet, y: Jet) -> Jet:
 
 def cross(x: Jet, y: Jet) -> Jet:
     """Return the jet of the cross product of two vectors, by Leibniz's rule."""
-    return _leibniz(_cross, x, y)
+    return _leibniz(partial(cross_product, axis=0), x, y)
 
 
 def matrix(q: Array, scale: float | Array = 1.0) -> Array:
@@ -197,11 +199,6 @@ def _imaginary(p: Array, q: Array) -> Array:
 
 def _dot(x: Array, y: Array) -> Array:
     return np.einsum("i...,i...->...", x, y)
-
-
-def _cross(x: Array, y: Array) -> Array:
-    (a, b, c), (u, v, w) = x, y
-    return np.stack([b * w - c * v, c * u - a * w, a * v - b * u])
 
 
 def _leibniz(op: Callable[[Array, Array], Array], x: Jet, y: Jet) -> Jet:

@@ -22,7 +22,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, cross, matvec
 from rbcourse.so3 import hat
 
 
@@ -153,32 +153,32 @@ class Effort:
     def torque(self, w: Array, a: Array) -> Array:
         """Return τ = G w' + w × G w, over a third of the trace of G."""
         G = self.G[:, None]
-        return _times(G, a) + _cross(w, _times(G, w))
+        return matvec(G, a) + cross(w, matvec(G, w))
 
     def deviation(self, w: Array, a: Array) -> Array:
         """Return a root of M times the torque."""
-        return _times(self.root[:, None], self.torque(w, a))
+        return matvec(self.root[:, None], self.torque(w, a))
 
     def deviation_by(self, w: Array, a: Array) -> list[Array]:
         """Return the derivatives of that by w and w'."""
         G, root = self.G[:, None], self.root[:, None]
-        T0 = hat(w) @ G - hat(_times(G, w))
+        T0 = hat(w) @ G - hat(matvec(G, w))
         return [root @ T0, np.broadcast_to(root @ G, T0.shape)]
 
     def p(self, w: Array, a: Array, b: Array) -> Array:
         """Return G (v' + w × v) − h × v, v = M τ."""
         G, M = self.G[:, None], self.M[:, None]
-        h, h_rate = _times(G, w), _times(G, a)
-        torque_rate = _times(G, b) + _cross(a, h) + _cross(w, h_rate)
-        v, v_rate = _times(M, h_rate + _cross(w, h)), _times(M, torque_rate)
-        return _times(G, v_rate + _cross(w, v)) - _cross(h, v)
+        h, h_rate = matvec(G, w), matvec(G, a)
+        torque_rate = matvec(G, b) + cross(a, h) + cross(w, h_rate)
+        v, v_rate = matvec(M, h_rate + cross(w, h)), matvec(M, torque_rate)
+        return matvec(G, v_rate + cross(w, v)) - cross(h, v)
 
     def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
         """Return the derivatives of p by w, w' and w''."""
         G, M = self.G[:, None], self.M[:, None]
-        W, H = hat(w), hat(_times(G, w))
-        T0, T1 = W @ G - H, hat(a) @ G - hat(_times(G, a))  # of τ by w; of τ' by w
-        V, GM, QM = hat(_times(M, self.torque(w, a))), G @ M, (G @ W - H) @ M
+        W, H = hat(w), hat(matvec(G, w))
+        T0, T1 = W @ G - H, hat(a) @ G - hat(matvec(G, a))  # of τ by w; of τ' by w
+        V, GM, QM = hat(matvec(M, self.torque(w, a))), G @ M, (G @ W - H) @ M
         by_w = GM @ T1 + QM @ T0 - G @ V + V @ G
         return [by_w, GM @ T0 + QM @ G, np.broadcast_to(GM @ G, W.shape)]
 
@@ -203,7 +203,7 @@ class Jerk:
 
     def deviation(self, w: Array, a: Array, b: Array) -> Array:
         """Return j."""
-        return b + _cross(w, a) / 2
+        return b + cross(w, a) / 2
 
     def deviation_by(self, w: Array, a: Array, b: Array) -> list[Array]:
         """Return the derivatives of j by w, w' and w''."""
@@ -212,14 +212,14 @@ class Jerk:
 
     def p(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> Array:
         """Return j'' + ½ w × j' + w' × j; d and e are the third and fourth derivatives of w."""
-        j, j_rate = self.deviation(w, a, b), d + _cross(w, b) / 2
-        j_bend = e + (_cross(a, b) + _cross(w, d)) / 2
-        return j_bend + _cross(w, j_rate) / 2 + _cross(a, j)
+        j, j_rate = self.deviation(w, a, b), d + cross(w, b) / 2
+        j_bend = e + (cross(a, b) + cross(w, d)) / 2
+        return j_bend + cross(w, j_rate) / 2 + cross(a, j)
 
     def p_by(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> list[Array]:
         """Return the derivatives of p by w and its four derivatives."""
         W, A, B, D = hat(w), hat(a), hat(b), hat(d)
-        J, J_rate = B + hat(_cross(w, a)) / 2, D + hat(_cross(w, b)) / 2
+        J, J_rate = B + hat(cross(w, a)) / 2, D + hat(cross(w, b)) / 2
         return [
             -(D + J_rate + W @ B / 2 + A @ A) / 2,
             A @ W / 2 - B / 2 - J,
@@ -227,16 +227,3 @@ class Jerk:
             W,
             np.broadcast_to(np.eye(3), W.shape),
         ]
-
-
-def _times(A: Array, x: Array) -> Array:
-    return (A @ x[..., None])[..., 0]
-
-
-def _cross(x: Array, y: Array) -> Array:
-    """Return x × y, several times as fast as NumPy's."""
-    a, b, c = x[..., 0], x[..., 1], x[..., 2]
-    u, v, w = y[..., 0], y[..., 1], y[..., 2]
-    product = np.empty_like(x)
-    product[..., 0], product[..., 1], product[..., 2] = b * w - c * v, c * u - a * w, a * v - b * u
-    return product

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_positive, as_symmetric, check_broadcast, first_index
-from rbcourse._numerics import EPS, Array, scaled
+from rbcourse._numerics import EPS, Array, matvec, scaled
 from rbcourse.projection import project_se, project_so
 from rbcourse.se3 import BASIS_SE3, hat_se3
 from rbcourse.so3 import BASIS_SO3, hat_so3, vee
@@ -179,7 +179,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     X, Y = as_finite("X", X, *A.shape[-2:]), as_finite("Y", Y, *A.shape[-2:])
     check_broadcast(G=(G, 2), A=(A, 2), X=(X, 2), Y=(Y, 2))
     x, y = _components(A, X), _components(A, Y)
-    return np.vecdot(x, (G @ y[..., None])[..., 0])
+    return np.vecdot(x, matvec(G, y))
 
 
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, cross
 from rbcourse.curves import (
     Curve,
     Ends,
@@ -361,12 +361,14 @@ def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
     w = _solve(S, _skew(A))
     if len(turned) == 1:
         return [w]
-    S_rate, A_rate = A - _cross(w, S), turned[1] - _cross(w, A)
+    S_rate, A_rate = A - cross(w, S, axis=0), turned[1] - cross(w, A, axis=0)
     a = _solve(S, _skew(A_rate) - _spin(S_rate, w))
     if len(turned) == 2:
         return [w, a]
-    S_bend = A_rate - _cross(a, S) - _cross(w, S_rate)
-    A_bend = turned[2] - _cross(w, turned[1]) - _cross(a, A) - _cross(w, A_rate)
+    S_bend = A_rate - cross(a, S, axis=0) - cross(w, S_rate, axis=0)
+    A_bend = (
+        turned[2] - cross(w, turned[1], axis=0) - cross(a, A, axis=0) - cross(w, A_rate, axis=0)
+    )
     return [w, a, _solve(S, _skew(A_bend) - 2 * _spin(S_rate, a) - _spin(S_bend, w))]
 
 
@@ -384,12 +386,6 @@ def _transposed_times(R: Array, M: Array) -> Array:
         product[i] += R[1, i] * M[1]
         product[i] += R[2, i] * M[2]
     return product
-
-
-def _cross(w: Array, A: Array) -> Array:
-    """Return ŵ A: w × each column."""
-    (x, y, z), (a, b, c) = w, A
-    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a])
 
 
 def _skew(A: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
-from rbcourse._numerics import Array, blocks, scaled
+from rbcourse._numerics import Array, blocks, matvec, scaled
 from rbcourse.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
@@ -326,7 +326,7 @@ class Stationary:
                 by_k[:, each, :, each, :] += P.swapaxes(0, 1)
         system[:, : 3 * n, : 3 * n] = by_k.reshape(count, 3 * n, 3 * n)
         system[:, : 3 * n, 3 * n : -1] = -R.mT.reshape(count, 3 * n, 3)
-        system[:, : 3 * n, -1] = ((pull @ d[..., None])[..., 0] - lacking).reshape(count, 3 * n)
+        system[:, : 3 * n, -1] = (matvec(pull, d) - lacking).reshape(count, 3 * n)
         system[:, 3 * n :, : 3 * n], system[:, 3 * n :, -1] = turned_by_k[:, -1], -d[:, -1]
         x = np.linalg.solve(system[:, :, :-1], system[:, :, -1:])
         turn = d + (turned_by_k.reshape(count, 3 * n, 3 * n) @ x[:, : 3 * n]).reshape(d.shape)

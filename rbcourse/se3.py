@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_single, check_broadcast
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, matvec
 from rbcourse.projection import is_se, is_so
 from rbcourse.so3 import (
     exp_so3,
@@ -125,7 +125,7 @@ def inverse_se3(A: ArrayLike) -> Array:
     """
     R, d = split(as_finite("A", A, 4, 4))
     Rt = np.swapaxes(R, -1, -2)
-    return pose_from_components(Rt, -_apply(Rt, d))
+    return pose_from_components(Rt, -matvec(Rt, d))
 
 
 def pose_from_coordinates(x: ArrayLike) -> Array:
@@ -292,7 +292,7 @@ def exp_se3(S: ArrayLike) -> Array:
     S = as_finite("S", S, 6)
     w, v = S[..., :3], S[..., 3:]
     left_jacobian = np.swapaxes(right_jacobian_so3(w), -1, -2)
-    return pose_from_components(exp_so3(w), _apply(left_jacobian, v))
+    return pose_from_components(exp_so3(w), matvec(left_jacobian, v))
 
 
 def log_se3(A: ArrayLike) -> Array:
@@ -328,7 +328,7 @@ def log_se3(A: ArrayLike) -> Array:
     R, d = split(as_finite("A", A, 4, 4))
     w = log_so3(R)
     left_jacobian_inverse = np.swapaxes(right_jacobian_inverse_so3(w), -1, -2)
-    return np.concatenate([w, _apply(left_jacobian_inverse, d)], axis=-1)
+    return np.concatenate([w, matvec(left_jacobian_inverse, d)], axis=-1)
 
 
 def adjoint_se3(A: ArrayLike) -> Array:
@@ -359,10 +359,6 @@ def adjoint_se3(A: ArrayLike) -> Array:
     Ad[..., :3, :3] = Ad[..., 3:, 3:] = R
     Ad[..., 3:, :3] = hat_so3(d) @ R
     return Ad
-
-
-def _apply(matrix: Array, vector: Array) -> Array:
-    return (matrix @ vector[..., None])[..., 0]
 
 
 def check_path(
