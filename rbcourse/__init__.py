@@ -5,8 +5,9 @@ inner products, `rbcourse.planar` and `rbcourse.arm` the plane, `rbcourse.sampli
 samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f,
 `rbcourse.textbook` the main algorithms as on the board.
 
-Every function raises ValueError, and names the argument, if an array is not finite or does not have
-the stated shape, or if batch shapes do not broadcast. The docstrings name the other errors.
+Every function raises ValueError, and names the argument, if an argument is not what its description
+says: not finite, of another shape, outside the stated range, not symmetric or not positive definite
+where that is stated, or if batch shapes do not broadcast. The docstrings name the other errors.
 """
 
 from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling
@@ -54,6 +55,7 @@ from rbcourse.optimum import (
     minimum_torque_so3,
     stationary_so3,
 )
+from rbcourse.optimum.shooting import shoot_minimum_acceleration_so3
 from rbcourse.paths import Chain, bessel_velocities, chain
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
@@ -93,7 +95,6 @@ from rbcourse.se3 import (
     pose_from_coordinates,
     vee_se3,
 )
-from rbcourse.shooting import shoot_minimum_acceleration_so3
 from rbcourse.so3 import (
     BASIS_SO3,
     angle_between,

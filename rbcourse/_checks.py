@@ -1,4 +1,4 @@
-"""Checks of arguments: shapes, finiteness and ranges, with errors that name the argument."""
+"""Checks of arguments: each raises a ValueError that names the argument and its first bad entry."""
 
 from __future__ import annotations
 
@@ -49,37 +49,19 @@ def as_array(
 
 
 def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
-    """Return `as_array` of the arguments, where no entry may be NaN or infinite.
-
-    Raises
-    ------
-    ValueError
-        As `as_array`; and the message names the first entry that is not finite.
-    """
+    """Return `as_array` of the arguments, where no entry may be NaN or infinite."""
     array = as_array(name, value, *core, stacked=stacked)
     _check_all(np.isfinite(array), name, array, "a finite number")
     return array
 
 
 def as_single(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of one array of the shape `core`, no stack of them.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`.
-    """
+    """Return `as_finite` of one array of the shape `core`, no stack of them."""
     return as_finite(name, value, *core, stacked=False)
 
 
 def as_unit(name: str, value: ArrayLike, size: int) -> Array:
-    """Return `as_finite` of vectors, each over its norm.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first vector that is zero.
-    """
+    """Return `as_finite` of vectors, each over its norm."""
     array = as_finite(name, value, size)
     largest = np.abs(array).max(axis=-1, keepdims=True)
     if not largest.all():
@@ -90,13 +72,7 @@ def as_unit(name: str, value: ArrayLike, size: int) -> Array:
 
 
 def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
-    """Return `as_finite` of square matrices that are symmetric, to 1e-12 of the largest entry.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first matrix that is not symmetric.
-    """
+    """Return `as_finite` of square matrices that are symmetric, to 1e-12 of the largest entry."""
     half = as_finite(name, value, size, size) / 2  # so that nothing overflows
     mirrored = np.swapaxes(half, -1, -2)
     skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (half - mirrored, half))
@@ -135,13 +111,7 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
 
 
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of the arguments, where all entries must lie in [0, 1].
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first entry outside [0, 1].
-    """
+    """Return `as_finite` of the arguments, where all entries must lie in [0, 1]."""
     array = as_finite(name, value, *core)
     _check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
     return array
@@ -154,11 +124,6 @@ def as_time(
 
     A time that is outside by rounding only, by 8 eps of the larger end, becomes that end. The end
     of the domain is one, or one for each time, where the shapes broadcast.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first time outside the domain.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
     if not (np.all(times >= start) and np.all(times <= end)):
@@ -173,26 +138,14 @@ def as_time(
 
 
 def as_duration(name: str, value: ArrayLike) -> Array:
-    """Return durations, all from 1e-100 up: accelerations over shorter ones overflow.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first shorter one.
-    """
+    """Return durations, all from 1e-100 up: accelerations over shorter ones overflow."""
     durations = as_finite(name, value)
     _check_all(durations >= 1e-100, name, durations, "a duration from 1e-100 up")
     return durations
 
 
 def as_angle(angle: ArrayLike) -> Array:
-    """Return angles of rotation, all in [0, π]; what is larger by rounding only becomes π.
-
-    Raises
-    ------
-    ValueError
-        As `as_finite`; and the message names the first angle outside [0, π].
-    """
+    """Return angles of rotation, all in [0, π]; what is larger by rounding only becomes π."""
     angles = as_finite("angle", angle)
     within = (angles >= 0) & (angles <= np.pi * (1 + 4 * EPS))
     _check_all(within, "angle", angles, "an angle in [0, π]")

@@ -31,11 +31,6 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     -------
     ndarray
 
-    Raises
-    ------
-    ValueError
-        If `order` is another, or there are not two, four or six ends.
-
     References
     ----------
     BK 6, BK 6.2.

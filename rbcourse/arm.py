@@ -57,12 +57,6 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
         ``joints``, shape (..., n + 1, 2), the tip last, and ``frames``, shape (..., n, 3), the
         planar poses of the links at their centres.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, there is not one length for each angle, or one is not
-        above 0.
-
     See Also
     --------
     arm_tip_jacobian : How fast the tip goes.
@@ -104,11 +98,6 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     ndarray, shape (..., 2, n)
         In m/rad, world frame. Column k is the vector from joint k to the tip, turned by a quarter
         to the left.
-
-    Raises
-    ------
-    ValueError
-        As for `arm_forward_kinematics`.
 
     Notes
     -----
@@ -199,12 +188,6 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     ndarray, shape (steps + 1, ..., n)
         The first state is the start, the last one the goal, exactly.
 
-    Raises
-    ------
-    ValueError
-        If the angles are not finite, start and goal differ in their number, the batches do not
-        broadcast, or `steps` is not an integer from 1 up.
-
     References
     ----------
     RR 4.1, RR (20), RR (21), with errata 19.
@@ -235,11 +218,6 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     -------
     ndarray, shape (commands + 1, ..., n)
         The first state is the start, exactly. Turns add up.
-
-    Raises
-    ------
-    ValueError
-        If the start is not finite, or a command is malformed; the message says which and why.
 
     See Also
     --------

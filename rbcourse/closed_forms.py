@@ -1,6 +1,7 @@
-"""Other closed forms: six with the boundary conditions of the projected cubic (BK section 1).
+"""Other closed forms, with the boundary conditions of the projected cubic (BK section 1).
 
-Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
+Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm. `CLOSED_FORMS` lists
+those for two rotations and two angular velocities that are compared; a new one is added there.
 """
 
 from __future__ import annotations
@@ -53,12 +54,10 @@ def exponential_cubic_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        How long it takes.
 
     Returns
     -------
@@ -209,11 +208,6 @@ def bezier_long_so3(
         A `Curve` that meets all four ends, with the control points of `bezier_so3`. Where the end
         velocities are large, it may cost less than that.
 
-    Raises
-    ------
-    ValueError
-        As `bezier_so3`.
-
     See Also
     --------
     bezier_so3 : The short way round.
@@ -247,12 +241,10 @@ def cumulative_bezier_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        How long it takes.
 
     Returns
     -------
@@ -310,11 +302,6 @@ def corrected_bezier_so3(
         A `Curve` that meets all four ends: R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B Bézier's
         curve, R_m = R0 exp(σ̂/2) the rotation half-way, and δ(t) of `bezier_deviation`.
 
-    Raises
-    ------
-    ValueError
-        As `bezier_so3`.
-
     See Also
     --------
     bezier_so3 : The curve without the correction.
@@ -326,8 +313,7 @@ def corrected_bezier_so3(
     Near-optimal for small excursions: data s times as large have a relative excess over the
     optimum about s⁸ times as large, that of the other closed forms s⁴ or s² times. δ is of third
     order in the data: where the ends are fast it is large, and makes the curve cost more than
-    Bézier's. Of 1,000 problems each, uniform in balls, ‖σ‖ < 3, it cost more by over a
-    thousandth in 2 to 4 % where ‖w0‖, ‖w1‖ < 6, and in 29 % where they were < 9.
+    Bézier's (see docs/near_optimal.md).
 
     σ is the logarithm of R0ᵀ R1, of any length, that is nearest to the sum of Bézier's three legs.
     Singular set: that of `bezier_so3`, and where two logarithms are equally near.
@@ -368,12 +354,10 @@ def quaternion_cubic_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        How long it takes.
 
     Returns
     -------
@@ -494,10 +478,8 @@ def normal_cubic_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     inertia : array_like, shape (..., 3, 3)
         G, body frame: symmetric and positive definite.
     duration : array_like, shape (...), optional
@@ -584,10 +566,8 @@ def exponential_quintic_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     a0, a1 : array_like, shape (..., 3)
         Angular accelerations w' there, body frame, in rad per unit time squared.
     duration : array_like, shape (...), optional
@@ -607,10 +587,8 @@ def exponential_quintic_so3(
 
     Notes
     -----
-    Near-optimal for small excursions. For random ends, uniform in balls, ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4
-    and ‖a0‖, ‖a1‖ < 8, it costs 1.02 times the optimum in the median, and less than 2.1 times for
-    nine of ten (of 1,000). With ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9 and ‖a0‖, ‖a1‖ < 20 these are 2.0 and 7.4.
-    From rest to rest it is the optimum.
+    Near-optimal for small excursions (see docs/near_optimal.md). From rest to rest it is the
+    optimum.
 
     Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
     `log_so3` chooses. The curve itself is smooth everywhere. Moved ends give the moved curve; but

@@ -90,11 +90,6 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     ndarray, shape (..., 4)
         Unit quaternions.
 
-    Raises
-    ------
-    ValueError
-        If `w` or its norm is not finite, or `w` is not of that shape.
-
     See Also
     --------
     exp_so3 : The same in matrices.

@@ -9,11 +9,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._chebyshev import grid
 from rbcourse._checks import as_inertia, as_positive, as_single, check_broadcast
 from rbcourse._numerics import EPS, Array, blocks
 from rbcourse.curves import Curve, SingularTime, which_curve
-from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.optimum.chebyshev import grid
+from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.paths import smooth_parts
 
 _TOGETHER = 2000  # panels that are evaluated at once

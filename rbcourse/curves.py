@@ -249,13 +249,6 @@ class Curve:
     def __getitem__(self, index: Any) -> Self:
         """Return a curve of the stack, or some as a stack; the index is one for NumPy's arrays.
 
-        Raises
-        ------
-        IndexError
-            If there is no such curve.
-        TypeError
-            If there is no stack.
-
         Examples
         --------
         >>> from rbcourse import exp_so3

@@ -1,6 +1,6 @@
 """How far above the optimum a curve is: its leading term by the ends, and an estimate by the curve.
 
-For small excursions; `study.atlas` has the others.
+For small excursions; `rbclassroom.surveys.atlas` has large ones.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._chebyshev import grid, tails
 from rbcourse._numerics import Array, matvec
 from rbcourse.closed_forms import seen_from_the_middle
 from rbcourse.cost import check_curve, summed
 from rbcourse.curves import Curve, Ends
+from rbcourse.optimum.chebyshev import grid, tails
 from rbcourse.paths import smooth_parts
 from rbcourse.so3 import exp_so3, log_so3
 
@@ -32,11 +32,9 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     Parameters
     ----------
     name : str
-        One of `CLOSED_FORMS`, but not "corrected_bezier_so3", whose leading term is not tabulated.
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+        One of `CLOSED_FORMS` whose leading term is tabulated: not "corrected_bezier_so3".
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
 
     Returns
     -------

@@ -154,11 +154,6 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     -------
     ndarray, shape (...)
 
-    Raises
-    ------
-    ValueError
-        If `G` is not symmetric.
-
     See Also
     --------
     METRIC_SO3, METRIC_SE3 : The metrics that the trace induces.
@@ -196,11 +191,6 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     ndarray, shape (6, 6)
         With three positive and three negative eigenvalues: the "length" of a motion can be 0 or
         imaginary, and its geodesics are screws.
-
-    Raises
-    ------
-    ValueError
-        If `alpha` or `beta` is not a positive number.
 
     References
     ----------
@@ -303,11 +293,6 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
     ndarray, shape (..., 3, 3)
         diag(b² + c², c² + a², a² + b²) m/12, in kg m², in body axes.
 
-    Raises
-    ------
-    ValueError
-        If negative, or `mass` is not a positive number.
-
     See Also
     --------
     weight_from_inertia : The weight W of the metric of this body.
@@ -341,11 +326,6 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         The matrix G of the metric; of a body, its inertia about the origin.
-
-    Raises
-    ------
-    ValueError
-        If `W` is not finite, not of that shape or not symmetric.
 
     See Also
     --------
@@ -599,9 +579,6 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
 
     Raises
     ------
-    ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, or `G` is
-        not symmetric or is singular.
     FloatingPointError
         If the integration fails.
 
@@ -655,13 +632,7 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
 
 
 def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
-    """Return matrices of SO(3) or SE(3), told by their size, and the dimension of the group.
-
-    Raises
-    ------
-    ValueError
-        If `value` is not finite, or neither 3 × 3 nor 4 × 4.
-    """
+    """Return matrices of SO(3) or SE(3), told by their size, and the dimension of the group."""
     A = as_finite(name, value, "n", "n")
     if A.shape[-1] not in (3, 4):
         raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) wanted, got {A.shape}")

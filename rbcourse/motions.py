@@ -21,9 +21,9 @@ from rbcourse._hermite import hermite_stack, stack_terms
 from rbcourse._numerics import EPS, Array, matvec
 from rbcourse.curves import Curve, Ends, geodesic_so3, with_inertia
 from rbcourse.optimum import solve
+from rbcourse.optimum.search import ball, body
 from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic, watched
 from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
-from rbcourse.search import ball, body
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -200,12 +200,6 @@ def projected_cubic_se3(
         A `Curve`: its ``rotation`` is `projected_cubic_so3`, with its ``margin``; the path of the
         origin is the optimum.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast; and as
-        `projected_cubic_so3`.
-
     Warns
     -----
     RuntimeWarning
@@ -282,9 +276,6 @@ def minimum_acceleration_se3(
 
     Raises
     ------
-    ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, `inertia` is
-        not symmetric and positive definite, or `mass` is not positive.
     ConvergenceError
         As `minimum_acceleration_so3`.
 

@@ -220,11 +220,6 @@ class Chain(Curve):
         -------
         ndarray, shape (N − 2, …)
 
-        Raises
-        ------
-        ValueError
-            If `order` is another.
-
         Examples
         --------
         >>> from rbcourse import exp_so3, geodesic_so3

@@ -255,12 +255,6 @@ def interpolate_planar(
         The first pose is the start, the last one the goal, exactly; with `shortest` its theta may
         differ from the goal's by full turns.
 
-    Raises
-    ------
-    ValueError
-        If a pose is not finite or not of that shape, the batches do not broadcast, or `steps` is
-        not an integer from 1 up.
-
     See Also
     --------
     propagate_planar : With ``frame="body"`` and the twist of `log_planar`, the other natural way.

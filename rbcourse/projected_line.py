@@ -208,11 +208,6 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     ndarray
         √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)), accurate to a few eps relative.
 
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, `angle` is outside [0, π], or they do not broadcast.
-
     Notes
     -----
     It vanishes at t = 1/2, angle π only: the middle of the line between rotations a half-turn
@@ -250,12 +245,6 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     ndarray
         θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)); or a
         derivative, accurate to a few eps relative.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, `angle` is outside [0, π], they do not broadcast, or `order`
-        is another.
 
     See Also
     --------
@@ -305,12 +294,6 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     ndarray
         f = sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)), or a derivative; accurate to a few eps
         relative.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, a time is outside [0, 1], `angle` is outside [0, π], they do
-        not broadcast, or `order` is another.
 
     See Also
     --------

@@ -36,11 +36,6 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     -------
     ndarray of bool, shape (...)
 
-    Raises
-    ------
-    ValueError
-        If `M` is not an array of real numbers of that shape, or `atol` is negative or NaN.
-
     See Also
     --------
     project_so : The nearest rotation of what fails.
@@ -74,11 +69,6 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (...)
-
-    Raises
-    ------
-    ValueError
-        If `A` is not an array of real numbers of that shape, n ≥ 1, or `atol` is negative or NaN.
 
     See Also
     --------
@@ -286,11 +276,6 @@ def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return `project_so` of M, and where it is unique: by FOAM, or by the SVD where it has to be.
 
     The rotations lie in the memory as the matrices do: component by component is the fastest.
-
-    Raises
-    ------
-    ValueError
-        If `M` is not finite.
     """
     flat = M.reshape(-1, *M.shape[-2:])
     R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
@@ -349,11 +334,6 @@ def project_se(B: ArrayLike) -> Array:
     -------
     ndarray, shape (..., n + 1, n + 1)
         Poses [[project_so(B1), B2], [0, 1]].
-
-    Raises
-    ------
-    ValueError
-        If `B` is not finite or not of that shape, n ≥ 1.
 
     See Also
     --------

@@ -47,11 +47,6 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     -------
     ndarray of bool, shape (...)
 
-    Raises
-    ------
-    ValueError
-        If `q` is not an array of real numbers of that shape, or `atol` is negative or NaN.
-
     See Also
     --------
     project_quaternion : The nearest unit quaternion of what fails.
@@ -272,11 +267,6 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     -------
     ndarray, shape t.shape + (..., 4)
         Unit quaternions, at constant angular speed.
-
-    Raises
-    ------
-    ValueError
-        If a time lies outside [0, 1].
 
     See Also
     --------

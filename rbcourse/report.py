@@ -213,11 +213,6 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
     animation : Animation
         They appear one by one. A notebook shows a player; ``animation.save(path)`` writes a GIF.
 
-    Raises
-    ------
-    ValueError
-        If `rotation` is neither, or `steps` is not 1 or more.
-
     References
     ----------
     RR 2.2.
@@ -255,12 +250,6 @@ def visualize(
     -------
     figure, animation
         As for `visualize_rotation`.
-
-    Raises
-    ------
-    ValueError
-        If `quaternion` or `naive` is neither True nor False, `rng` makes no random numbers, or
-        `steps` is not 1 or more.
 
     References
     ----------
@@ -344,12 +333,6 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
     animation : Animation
         A frame for each state, or for 40 of them. A notebook shows a player;
         ``animation.save(path)`` writes a GIF.
-
-    Raises
-    ------
-    ValueError
-        If `path` is no such array, or the length is not above 0, or less than 1e-13 of the
-        distance from the origin.
 
     Notes
     -----
@@ -435,11 +418,6 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
         The whole way of the tip, and the arm at its end; pale at its start and on its way.
     animation : Animation
         As for `visualize_path`.
-
-    Raises
-    ------
-    ValueError
-        If `path` is no such array, or there is not one length above 0 for each joint.
 
     References
     ----------

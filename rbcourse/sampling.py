@@ -50,11 +50,6 @@ def arvo_rotation(x: ArrayLike) -> Array:
     ndarray, shape (..., 3, 3)
         Rotation matrices.
 
-    Raises
-    ------
-    ValueError
-        If `x` is not of that shape, or a number lies outside [0, 1].
-
     See Also
     --------
     sample_rotation : Many of them, faster.
@@ -99,11 +94,6 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     ndarray, shape (..., 4)
         Unit quaternions (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂).
 
-    Raises
-    ------
-    ValueError
-        If `x` is not of that shape, or a number lies outside [0, 1].
-
     See Also
     --------
     sample_quaternion : Many of them, faster.
@@ -141,11 +131,6 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     ndarray, shape size + (3, 3)
         To a few eps ``arvo_rotation(rng.random(size + (3,)))``, on every processor.
 
-    Raises
-    ------
-    ValueError
-        If `size` is no shape, or `rng` makes no random numbers.
-
     See Also
     --------
     sample_rotation_naive : What not to do.
@@ -181,11 +166,6 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
         Uniform on the whole sphere: q and −q are equally likely. To a few eps
         ``shoemake_quaternion(rng.random(size + (3,)))``, on every processor.
 
-    Raises
-    ------
-    ValueError
-        If `size` is no shape, or `rng` makes no random numbers.
-
     See Also
     --------
     sample_quaternion_naive : What not to do.
@@ -220,11 +200,6 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
         R_z(α) R_y(β) R_x(γ), each angle uniform on [0, 2π). E tr² is 7/8; for uniform rotations
         it is 1.
 
-    Raises
-    ------
-    ValueError
-        If `size` is no shape, or `rng` makes no random numbers.
-
     See Also
     --------
     sample_rotation : The uniform one.
@@ -257,11 +232,6 @@ def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng
     ndarray, shape size + (4,)
         q_z(γ) q_y(β) q_x(α), each angle uniform on [0, 2π). The first angle turns about x; in
         `sample_rotation_naive` it turns about z. The law of the rotations is the same.
-
-    Raises
-    ------
-    ValueError
-        If `size` is no shape, or `rng` makes no random numbers.
 
     See Also
     --------
@@ -374,11 +344,6 @@ def angle_law(angle: ArrayLike) -> Array:
     ndarray
         Of the same shape.
 
-    Raises
-    ------
-    ValueError
-        If an angle lies outside [0, π].
-
     References
     ----------
     RR 2.
@@ -416,11 +381,6 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
         angle to next, angle to half
             As angle, of the turns from each even draw to the next, and from each draw of the first
             half to its partner in the second: draws that depend on these partners show here.
-
-    Raises
-    ------
-    ValueError
-        If has fewer than 100 members.
 
     References
     ----------

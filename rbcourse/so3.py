@@ -101,11 +101,6 @@ def exp_so3(w: ArrayLike) -> Array:
         a rotation however large a is, but beyond 1/eps ≈ 4.5e15 rad, where neighbouring
         floating-point numbers are turns apart, no digit is significant.
 
-    Raises
-    ------
-    ValueError
-        If `w` or its norm is not finite, or `w` is not of that shape.
-
     See Also
     --------
     log_so3 : The inverse.
@@ -207,11 +202,6 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
         I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps,
         however large a is. Its transpose is the left Jacobian, which gives the velocity in the
         fixed frame.
-
-    Raises
-    ------
-    ValueError
-        If `w` or its norm is not finite, or `w` is not of that shape.
 
     See Also
     --------

@@ -188,7 +188,7 @@ def minimum_torque_so3(
 
     References
     ----------
-    beyond BK 4 (see `rbcourse.functionals.Effort`, with M = I).
+    beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
 
     Examples
     --------

@@ -37,7 +37,7 @@ def returns_a_curve(function):
     return inspect.isclass(kind) and issubclass(kind, rb.Curve)
 
 
-FUNCTIONS = {
+FUNCTIONS = rb.CLOSED_FORMS | {
     name: function
     for name in rb.__all__
     if inspect.isfunction(function := getattr(rb, name)) and returns_a_curve(function)

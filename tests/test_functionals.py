@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse.functionals import BallAcceleration, Effort, Jerk
+from rbcourse.optimum.functionals import BallAcceleration, Effort, Jerk
 
 G = np.array([[2.0, 0.3, -0.1], [0.3, 1.5, 0.2], [-0.1, 0.2, 1.1]])[None]
 FUNCTIONALS = {

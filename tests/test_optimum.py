@@ -11,12 +11,13 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
-from rbcourse import optimum, search
-from rbcourse._chebyshev import grid, interpolation
+from rbcourse import optimum
 from rbcourse.closed_forms import CLOSED_FORMS
 from rbcourse.curves import Ends
-from rbcourse.relaxation import cost_of, relax_ball
-from rbcourse.search import ball, cheapest
+from rbcourse.optimum import search
+from rbcourse.optimum.chebyshev import grid, interpolation
+from rbcourse.optimum.collocation import cost_of, relax_ball
+from rbcourse.optimum.search import ball, cheapest
 
 REST = np.zeros(3)
 ALONG = np.pi / 6 * np.array([1, 2, 3])

@@ -475,7 +475,7 @@ NEEDS_LECTURE = ["course.lecture", "course.rehearsal", "course.votes"]
 NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 EXTRAS = CLASSROOM["optional-dependencies"]
-TEACH = [line for extra in ("lecture", "grading", "book") for line in EXTRAS[extra]]
+TEACH = [line for extra in ("lecture", "grading") for line in EXTRAS[extra]]
 IMPORTED = {  # what is installed, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
@@ -483,7 +483,7 @@ IMPORTED = {  # what is installed, and the modules that need more
         [*DRAW, *CLASSROOM["dependencies"]],
         [*NEEDS_LECTURE, *NEEDS_GRADING, "book"],
     ),
-    "rbclassroom[lecture,grading,book]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], []),
+    "rbclassroom[lecture,grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], []),
 }
 
 

@@ -23,6 +23,8 @@ MOVED = {
     **{f"explore.{name}": f"explorers.{name}" for name in ("recorded", "rotations", "widgets")},
     **{f"study.{name}": f"surveys.{name}" for name in ("atlas", "atlas_figures", "body_atlas")},
     **{f"study.{name}": f"surveys.{name}" for name in ("progress", "survey")},
+    **{name: f"optimum.{name}" for name in ("functionals", "search", "shooting")},
+    "relaxation": "optimum.collocation",
     "draw.casteljau": "figures.lesson11",
     "draw.laws": "figures.lesson13",
     "draw.plots": "figures.lesson06",
@@ -45,7 +47,7 @@ def source_of(path: str) -> str | None:
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
     if code := re.fullmatch(r"(rbcourse|classroom/rbclassroom)/([\w/]+)\.py", path):
-        module = code[2].replace("/", ".")
+        module = code[2].replace("/", ".").removesuffix(".__init__")
         return f"package/{module}.rst" if has_page(module) else None
     return {"docs/ledger.md": "ledger.md", **PAGES}.get(path)
 
@@ -66,12 +68,13 @@ def file_of(module: str) -> str:
 
     Examples
     --------
-    >>> file_of("surveys.atlas")
-    'classroom/rbclassroom/surveys/atlas.py'
+    >>> file_of("surveys.atlas"), file_of("optimum")
+    ('classroom/rbclassroom/surveys/atlas.py', 'rbcourse/optimum/__init__.py')
     """
     package = package_of(module)
     home = f"classroom/{package}" if package == "rbclassroom" else package
-    return f"{home}/{module.replace('.', '/')}.py"
+    path = module.replace(".", "/") + "/__init__" * (module == "optimum")
+    return f"{home}/{path}.py"
 
 
 def has_page(module: str) -> bool:

@@ -25,7 +25,8 @@ HOUSE = {
     "Rotations and poses": "so3 quaternion conversions se3",
     "Projection, sampling, metrics": "projection sampling metrics",
     "Curves": "curves projected_line projected_cubic closed_forms motions paths cost",
-    "The optimum": "optimum functionals relaxation search shooting excess",
+    "The optimum": "optimum optimum.functionals optimum.collocation optimum.search "
+    "optimum.guesses optimum.chebyshev optimum.shooting excess",
     "The plane": "planar arm",
     "Textbook versions, files, the report": "textbook files report",
 }

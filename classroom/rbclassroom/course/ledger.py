@@ -77,6 +77,7 @@ def _functions(root: Path) -> Iterator[tuple[str, str]]:
     paths = ((package, path) for package in packages for path in sorted(package.rglob("*.py")))
     for package, path in paths:
         module = ".".join(path.relative_to(package).with_suffix("").parts)
+        module = module.removesuffix(".__init__")
         body = ast.parse(path.read_text(encoding="utf-8")).body
         for node, below in zip(body, [*body[1:], None], strict=True):
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_":

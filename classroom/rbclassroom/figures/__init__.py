@@ -1,1 +1,1 @@
-"""Figures that one lesson shows: tables, drawings and descriptions, a module for each lesson."""
+"""Figures that one lesson shows: tables, drawings and descriptions, by lesson."""

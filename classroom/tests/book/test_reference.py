@@ -28,6 +28,7 @@ def test_every_public_module_has_a_page_but_those_with_answers():
     names = {".".join(path.with_suffix("").parts) for path in paths if path.stem[0] != "_"}
     listed = [name for names in reference.modules(ROOT).values() for name in names]
     assert len(listed) == len(set(listed))
+    names.add("optimum")  # a package with public functions of its own
     hidden = {"book.conf"} | {name for name in names if ".problems." in name}
     assert set(listed) == names - hidden
     assert len(hidden) == 8

@@ -1,22 +1,25 @@
-"""The optimum by shooting: find the initial values for which the motion reaches its end."""
+"""The optimum by shooting: find the initial values for which the motion reaches its end.
+
+`minimum_acceleration_so3`, in `rbcourse.optimum`, is the faster and more robust way.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._chebyshev import grid
 from rbcourse._numerics import Array
 from rbcourse.curves import Ends
 from rbcourse.optimum import Optimum, solve
-from rbcourse.relaxation import (
+from rbcourse.optimum.chebyshev import grid
+from rbcourse.optimum.collocation import (
     BallStationary,
     Failure,
     Solution,
     in_body,
     rates_at_nodes,
 )
-from rbcourse.search import ball
+from rbcourse.optimum.search import ball
 from rbcourse.so3 import hat_so3, log_so3
 
 NODES = 96
@@ -34,12 +37,10 @@ def shoot_minimum_acceleration_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        How long it takes.
 
     Returns
     -------
@@ -49,8 +50,6 @@ def shoot_minimum_acceleration_so3(
 
     Raises
     ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
         For a single problem, if Newton's method converges from none of its starts: rare for ‖w0‖,
         ‖w1‖ < 12. It takes seconds to say so for ‖w‖ of 30, and minutes for 1000.

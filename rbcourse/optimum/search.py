@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
@@ -10,23 +11,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._chebyshev import along, grid, interpolation
 from rbcourse._numerics import EPS, Array
-from rbcourse._starts import (
-    SAME,
-    between_free_motions,
-    cost_at_nodes,
-    leading_sign,
-    lowered,
-    starts,
-    with_ends,
-    with_full_turns,
-)
 from rbcourse.closed_forms import corrected_bezier_so3
 from rbcourse.curves import Ends
-from rbcourse.functionals import BallAcceleration, Effort, Functional, Jerk
-from rbcourse.projection import nearest
-from rbcourse.relaxation import (
+from rbcourse.optimum.chebyshev import along, grid, interpolation
+from rbcourse.optimum.collocation import (
     BallStationary,
     Failure,
     Solution,
@@ -38,32 +27,56 @@ from rbcourse.relaxation import (
     relax,
     relax_ball,
 )
+from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.optimum.guesses import (
+    SAME,
+    between_free_motions,
+    cost_at_nodes,
+    leading_sign,
+    lowered,
+    starts,
+    with_ends,
+    with_full_turns,
+)
+from rbcourse.projection import nearest
 from rbcourse.so3 import log_so3
 
-COARSE = 17  # nodes, on which curves are started and systems solved;
-FINER = 25  # for bodies, where turns are added;
-FINER_FOR_JERK = 29  # for the jerk, which has higher derivatives;
-LESS_COARSE = 33  # where no solution is found on those that costs no more than a start;
-LEAST_COARSE = 65  # where ‖w0‖ + ‖w1‖ > VERY_FAST
-CLOSE = 1.1  # lowered starts that cost more than this many times the cheapest are dropped,
-NEAR = 0.1  # and those with entries of R that differ by less from those of a cheaper one
-FAST = 24.0  # rad: where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too
-VERY_FAST = 80.0  # rad: where ‖w0‖ + ‖w1‖ is larger they are followed on LEAST_COARSE nodes
-ABOUT = 1.01  # the cost of a start, known at its nodes only, times this is a bound
-SLOW = 0.5  # rad: where all entries of σ, w0 and w1 are smaller one start for a ball does
-FLAT = 0.1  # where less of w, as a share, is across one axis, curves bent aside are tried
-ASIDE = 0.5  # rad
-APART = 3.0  # full turns are added to curves that cost at most 3 times the cheapest,
-LESS_APART = 1.2  # then to the new ones that cost at most 1.2 times the cheapest; and only
-WORTH = 0.3  # where the cheapest costs more than 0.3 times a full turn from rest to rest
-PROMISING = 1.5  # of those, curves that cost more times the cheapest are dropped early
-QUICKLY: Any = {"steps": 40, "worthwhile": 5e-4}  # how starts are lowered
-BRIEFLY: Any = {"steps": 3, "worthwhile": 5e-4}  # with a full turn more
-FARTHER: Any = {"steps": 40, "worthwhile": 1e-4}  # on FINER nodes
-SLOWLY: Any = {"steps": 40, "worthwhile": 1e-6}  # where two curves part
-PATIENTLY: Any = {"steps": 200, "worthwhile": 0.0}  # where nothing else does
 Numbers: TypeAlias = NDArray[np.intp]
 NOTHING = Failure(np.inf, 0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When the search goes further. Ratios are of costs to the cheapest; turns in rad.
+
+    Curves are lowered by at most so many steps, each by at least a share of the cost.
+    """
+
+    nodes: int = 17  # on which curves are started, and the linear systems of a ball solved
+    nodes_for_turns: int = 25  # for bodies, where full turns are added
+    nodes_for_jerk: int = 29  # which has higher derivatives
+    nodes_for_all_starts: int = 33  # where no solution on the first ones costs as little as a start
+    nodes_for_very_fast: int = 65
+    followed: float = 1.1  # lowered starts that cost up to this ratio are followed,
+    same_entries: float = 0.1  # but of those whose entries of R differ by less the cheapest only
+    fast: float = 24.0  # where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too,
+    very_fast: float = 80.0  # and where it is larger than this on `nodes_for_very_fast`
+    known_cost: float = 1.01  # the ratio of a cost to that at the nodes of a start, at most
+    one_start: float = 0.5  # where all entries of σ, w0 and w1 are smaller one start does
+    flat: float = 0.1  # where less of w, as a share, is across one axis, curves are bent
+    bend: float = 0.5  # by so much
+    turned: float = 3.0  # full turns are added to curves that cost up to this ratio,
+    turned_again: float = 1.2  # then to the new ones that cost up to this one; and only
+    worth_a_turn: float = 0.3  # where the cheapest costs more, as a share of a turn from rest
+    promising_turn: float = 1.5  # curves with a full turn more that cost more are dropped early
+    starts: tuple[int, float] = (40, 5e-4)
+    new_turns: tuple[int, float] = (3, 5e-4)
+    on_more_nodes: tuple[int, float] = (40, 1e-4)
+    bent: tuple[int, float] = (40, 1e-6)  # where two curves part
+    last: tuple[int, float] = (200, 0.0)  # where no other lowering is enough
+
+
+LIMITS = Limits()
 
 
 class Task(NamedTuple):
@@ -94,7 +107,7 @@ class Task(NamedTuple):
     equations: BallStationary | Stationary
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
-    nodes: int = COARSE
+    nodes: int = LIMITS.nodes
     known: Mapping[int, Solution] = MappingProxyType({})
 
 
@@ -121,11 +134,11 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
     shown by this; no other one was found.
     """
     largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
-    slow = np.flatnonzero(largest < SLOW)
+    slow = np.flatnonzero(largest < LIMITS.one_start)
     if not len(slow):
         return {}
     curves = corrected_bezier_so3(*ends.take(slow))
-    R = np.ascontiguousarray(curves(grid(COARSE).t).swapaxes(0, 1))
+    R = np.ascontiguousarray(curves(grid(LIMITS.nodes).t).swapaxes(0, 1))
     found = relax_ball(equations.take(slow), R)
     each = zip(slow.tolist(), found, strict=True)
     return {i: one for i, one in each if isinstance(one, Solution)}
@@ -172,7 +185,7 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
         return problem, with_ends(R, rates[which][problem])
 
     equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
-    return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=FINER_FOR_JERK)
+    return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=LIMITS.nodes_for_jerk)
 
 
 def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
@@ -206,14 +219,18 @@ def _searched(task: Task) -> list[Solution | Failure]:
     share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in the turn of a quintic
     fast = np.linalg.norm(ends, axis=-1) @ share
     problem, R = _started(task, which, task.nodes)
-    R, cost = lowered(task.functional.take(problem), R, **QUICKLY)
+    R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
     if isinstance(task.functional, Effort):
         problem, R, cost = _with_more_turns(task, task.functional, problem, R, cost)
     least = partial(_least, len(ends), problem)
-    likely = ~(cost > CLOSE * least(cost)[problem]) & ~_repeated(problem, cost, R)
+    likely = ~(cost > LIMITS.followed * least(cost)[problem]) & ~_repeated(problem, cost, R)
     _follow(task, problem[likely], R[likely], found)
-    again = np.unique(problem[((_costs(found) > ABOUT * least(cost)) | (fast > FAST))[problem]])
-    for n, some in (LESS_COARSE, fast <= VERY_FAST), (LEAST_COARSE, ~(fast <= VERY_FAST)):
+    costly = _costs(found) > LIMITS.known_cost * least(cost)
+    again = np.unique(problem[(costly | (fast > LIMITS.fast))[problem]])
+    for n, some in (
+        (LIMITS.nodes_for_all_starts, fast <= LIMITS.very_fast),
+        (LIMITS.nodes_for_very_fast, ~(fast <= LIMITS.very_fast)),
+    ):
         if some[again].any():
             _follow_on(task, again[some[again]], problem, R, n, found)
     if isinstance(task.functional, Effort):
@@ -228,31 +245,36 @@ def _with_more_turns(
 
     The motion that costs least may turn once or twice more about the axis of a small moment. From
     rest to rest a full turn costs at least 12 (2π)² λ, λ the least eigenvalue of G M G; none is
-    added where the cheapest curve costs less than `WORTH` times that.
+    added where the cheapest curve costs less than `worth_a_turn` times that.
     """
     ends, count = task.equations.ends, len(task.equations.ends)
     full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
     least = _least(count, problem, cost)
-    if not (least > WORTH * full_turn)[problem].any():
+    if not (least > LIMITS.worth_a_turn * full_turn)[problem].any():
         return problem, R, cost
-    some = ~(cost > APART * least[problem]) & ~_repeated(problem, cost, R)
-    problem, R = problem[some], with_ends(_on_nodes(R[some], FINER), ends[problem[some]])
-    R, cost = lowered(effort.take(problem), R, **FARTHER)
+    some = ~(cost > LIMITS.turned * least[problem]) & ~_repeated(problem, cost, R)
+    problem, R = (
+        problem[some],
+        with_ends(_on_nodes(R[some], LIMITS.nodes_for_turns), ends[problem[some]]),
+    )
+    R, cost = lowered(effort.take(problem), R, *LIMITS.on_more_nodes)
     turned = 0
-    for apart in APART, LESS_APART:
+    for apart in LIMITS.turned, LIMITS.turned_again:
         least = _least(count, problem, cost)
         some = ~(cost > apart * least[problem]) & ~_repeated(problem, cost, R)
-        some &= (least > WORTH * full_turn)[problem]
+        some &= (least > LIMITS.worth_a_turn * full_turn)[problem]
         some[:turned] = False
         if not some.any():
             break
         turned = len(some)
         number = np.tile(problem[some], 6)
         more = with_full_turns(R[some], ends[problem[some]], effort.G[problem[some]])
-        more, briefly = lowered(effort.take(number), more, **BRIEFLY)
-        some = ~(briefly > PROMISING * least[number]) & ~_repeated(number, briefly, more)
+        more, briefly = lowered(effort.take(number), more, *LIMITS.new_turns)
+        some = ~(briefly > LIMITS.promising_turn * least[number]) & ~_repeated(
+            number, briefly, more
+        )
         number = number[some]
-        more, cost_of_more = lowered(effort.take(number), more[some], **FARTHER)
+        more, cost_of_more = lowered(effort.take(number), more[some], *LIMITS.on_more_nodes)
         problem, R = np.append(problem, number), np.concatenate([R, more])
         cost = np.append(cost, cost_of_more)
     return problem, R, cost
@@ -273,13 +295,13 @@ def _leave_the_axis(
         if isinstance(one, Solution):
             w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
             size = np.linalg.svd(w, compute_uv=False)
-            if size[0] > 0 and size[1] < FLAT * size[0]:
-                sides = ASIDE * _across(w / size[0], effort.G[i])[:, None]
+            if size[0] > 0 and size[1] < LIMITS.flat * size[0]:
+                sides = LIMITS.bend * _across(w / size[0], effort.G[i])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
                 bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
     number = np.array(problem, int)
-    R, cost = lowered(task.functional.take(number), np.concatenate(bent), **SLOWLY)
+    R, cost = lowered(task.functional.take(number), np.concatenate(bent), *LIMITS.bent)
     cheaper = cost < (1 - SAME) * _costs(found)[number]
     _follow(task, number[cheaper], R[cheaper], found)
 
@@ -310,13 +332,13 @@ def _follow_on(
     more, as_they_are = _started(task, which, n)
     problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
     functional = task.functional.take(problem)
-    bound = ABOUT * _least(len(found), problem, cost_at_nodes(functional, R))
+    bound = LIMITS.known_cost * _least(len(found), problem, cost_at_nodes(functional, R))
     some = (_costs(found) > bound)[problem]
     some[-len(more) :] = True
     _follow(task, problem[some], R[some], found)
     costly = (_costs(found) > bound)[problem]
     if costly.any():
-        R, _ = lowered(functional.take(costly), R[costly], **PATIENTLY)
+        R, _ = lowered(functional.take(costly), R[costly], *LIMITS.last)
         _follow(task, problem[costly], R, found)
         for i in np.flatnonzero(_costs(found) > bound):
             if isinstance(one := found[i], Solution):
@@ -339,7 +361,7 @@ def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
     order, repeated = np.lexsort((cost, problem)), np.zeros(len(problem), bool)
     number, R = problem[order], R[order]
     for after in range(1, np.bincount(problem, minlength=1).max()):
-        near = np.abs(R[after:] - R[:-after]).max(axis=(1, 2, 3)) < NEAR
+        near = np.abs(R[after:] - R[:-after]).max(axis=(1, 2, 3)) < LIMITS.same_entries
         repeated[order[after:]] |= near & (number[after:] == number[:-after])
     return repeated
 

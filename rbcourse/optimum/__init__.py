@@ -9,14 +9,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
 from rbcourse._numerics import Array
 from rbcourse.curves import Curve, Ends, retime, weighted_sums, with_inertia
-from rbcourse.functionals import Functional
+from rbcourse.optimum.chebyshev import along, chebyshev, grid, primitives
+from rbcourse.optimum.collocation import Failure, Solution, orthogonal
+from rbcourse.optimum.functionals import Functional
+from rbcourse.optimum.search import LIMITS, Task, ball, body, cheapest, jerk
 from rbcourse.projected_cubic import ends_of_quintic
-from rbcourse.relaxation import Failure, Solution, orthogonal
-from rbcourse.search import COARSE, Task, ball, body, cheapest, jerk
 
 _FOUND = [
     ("converged", bool),
@@ -40,10 +40,8 @@ def minimum_acceleration_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     inertia : array_like, shape (..., 3, 3), optional
         G, the metric or the inertia of a body, body frame: symmetric and positive definite. By
         default 2 I, the metric (12).
@@ -60,12 +58,8 @@ def minimum_acceleration_so3(
 
     Raises
     ------
-    ValueError
-        If an argument is not finite, not of that shape, the batches do not broadcast, or `inertia`
-        is not symmetric and positive definite.
     ConvergenceError
-        For a single problem, if Newton's method converges from none of its starts. Of 1,000 random
-        problems (see Notes) with ‖w0‖, ‖w1‖ < 50 this happened in none.
+        For a single problem, if Newton's method converges from none of its starts.
 
     Warns
     -----
@@ -93,32 +87,18 @@ def minimum_acceleration_so3(
     these. Steps of Gauss and Newton lower the cost of each. Newton's method for R p = c then goes
     on from the cheapest and from those that cost up to a tenth more; if the result costs more than
     a start, or ‖w0‖ + ‖w1‖ > 24, from all of them, on more nodes. The cheapest curve that it finds
-    is returned. It is stationary. That none costs less is not proven, but was tried on random
-    problems, with σ in a ball of radius π and w0, w1 in larger ones:
-
-    - ‖w0‖, ‖w1‖ < 12, 20,000 problems of two seeds: none costs more than one of the six closed
-      forms with the same ends, nor than what Newton's method finds from `cumulative_bezier_so3`
-      either way round. Turning the room or the body, or reversing time, changes the cost by less
-      than 1e-11, relatively. Eight random starts found no cheaper curve for any of 4,000.
-    - ‖w0‖, ‖w1‖ < 20, 3,000 problems: none costs more than a closed form, one more than a curve
-      that was found from one way round; reversing time changes the cost of 5. Eight random starts
-      found no cheaper curve for any of 1,000.
-    - Bodies whose largest moment is at most ten times the least, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, 3,300
-      problems: all converge. Sixteen random starts of another optimiser found a cheaper curve for
-      6, by less than 0.4 %.
+    is returned. It is stationary. That none costs less is not proven; docs/near_optimal.md tells on
+    which random problems it was tried: for balls with ‖w0‖, ‖w1‖ < 12 no cheaper curve was found,
+    for bodies one in 500 problems. Problems of very thin rods may not converge.
 
     End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
-    R0ᵀR1, the shortest or one with full turns more or the other way round. Of those the cheapest
-    was found for all of 900 such problems with velocities up to 80. About a principal axis of a
-    body these curves are stationary, too. Where the free motion of a body meets the ends, it costs
-    nothing; it was found in all of 800 problems with speeds of 3 to 16.
-
-    Problems of very thin rods may not converge: of 240 with ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 none with the
-    moments (0.01, 1, 1), 28 with (0.0001, 1, 1).
+    R0ᵀR1, the shortest or one with full turns more or the other way round; about a principal axis
+    of a body these curves are stationary, too. Where the free motion of a body meets the ends, it
+    costs nothing.
 
     References
     ----------
-    BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see `rbcourse.functionals.Effort`).
+    BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see `rbcourse.optimum.functionals.Effort`).
 
     Examples
     --------
@@ -154,10 +134,8 @@ def minimum_torque_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     inertia : array_like, shape (..., 3, 3)
         G, body frame: symmetric and positive definite.
     duration : array_like, shape (...), optional
@@ -171,8 +149,6 @@ def minimum_torque_so3(
 
     Raises
     ------
-    ValueError
-        As `minimum_acceleration_so3`.
     ConvergenceError
         As `minimum_acceleration_so3`.
 
@@ -189,14 +165,8 @@ def minimum_torque_so3(
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 3,300 random
-    problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, of bodies whose largest moment is at most ten times the
-    least, converged. Sixteen random starts of another optimiser found a cheaper curve for 2, by
-    less than 0.2 %.
-
-    Thin rods are another matter: with the moments (0.01, 1, 1) 19 to 23 of 60 problems with
-    ‖σ‖ < 2, ‖w0‖, ‖w1‖ < 4 did not converge; with (0.03, 1, 1) all of 240 did, but for 2 of them a
-    start costs less.
+    The curve is found as that of `minimum_acceleration_so3`, and is stationary; problems of thin
+    rods often do not converge (see docs/near_optimal.md).
 
     A turn about one axis is stationary about each principal axis; about that of the largest moment
     it may be a saddle: a curve that leaves the axis can cost a fifth less. Curves bent aside are
@@ -207,7 +177,7 @@ def minimum_torque_so3(
 
     References
     ----------
-    beyond BK 4 (see `rbcourse.functionals.Effort`).
+    beyond BK 4 (see `rbcourse.optimum.functionals.Effort`).
 
     Examples
     --------
@@ -235,10 +205,8 @@ def minimum_jerk_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
     a0, a1 : array_like, shape (..., 3)
         Angular accelerations w' there, body frame, in rad per unit time squared.
     duration : array_like, shape (...), optional
@@ -253,8 +221,6 @@ def minimum_jerk_so3(
 
     Raises
     ------
-    ValueError
-        If an argument is not finite, not of that shape, or the batches do not broadcast.
     ConvergenceError
         As `minimum_acceleration_so3`.
 
@@ -270,19 +236,16 @@ def minimum_jerk_so3(
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary. All of 600 random
-    problems, ‖σ‖ < 3, ‖w0‖, ‖w1‖ < 9, ‖a0‖, ‖a1‖ < 20, converged, and all of 1,200 with these
-    vectors near one axis, ‖w0‖, ‖w1‖ from 5 to 9 and ‖a0‖, ‖a1‖ from 10 to 20. Sixteen random
-    starts of another optimiser found a cheaper curve for one of the latter, by 0.4 %. About one
-    axis it is the cheapest of the quintics to σ with any number of full turns, in all of 1,000
-    problems.
+    The curve is found as that of `minimum_acceleration_so3`, and is stationary (see
+    docs/near_optimal.md). About one axis it is the cheapest of the quintics to σ with any number of
+    full turns.
 
     From rest to rest without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
     costs 1440 ‖σ‖².
 
     References
     ----------
-    beyond BK 5 (see `rbcourse.functionals.Jerk`).
+    beyond BK 5 (see `rbcourse.optimum.functionals.Jerk`).
 
     Examples
     --------
@@ -340,7 +303,7 @@ def stationary_so3(guess: Curve) -> Optimum:
     if not np.isfinite([w0, w1]).all():
         raise ValueError("guess: a curve is NaN, it did not converge")
     task = ball(Ends(R0, R1, w0, w1))
-    R = np.moveaxis(unit(grid(COARSE).t).reshape(COARSE, -1, 3, 3), 0, 1)
+    R = np.moveaxis(unit(grid(LIMITS.nodes).t).reshape(LIMITS.nodes, -1, 3, 3), 0, 1)
     with np.errstate(over="ignore", invalid="ignore"):
         return _optimum(task, task.solver(task.equations, R), guess.duration)
 

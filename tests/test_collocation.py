@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse._chebyshev import grid
 from rbcourse.curves import Ends
-from rbcourse.functionals import Effort
-from rbcourse.relaxation import BallStationary, Failure, Solution, Stationary, relax, relax_ball
+from rbcourse.optimum.chebyshev import grid
+from rbcourse.optimum.collocation import (
+    BallStationary,
+    Failure,
+    Solution,
+    Stationary,
+    relax,
+    relax_ball,
+)
+from rbcourse.optimum.functionals import Effort
 
 COUNT, NODES = 4, 17
 

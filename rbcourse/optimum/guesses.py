@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._chebyshev import along, chebyshev, grid
 from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves import Ends
-from rbcourse.functionals import Functional
-from rbcourse.relaxation import cayley
+from rbcourse.optimum.chebyshev import along, chebyshev, grid
+from rbcourse.optimum.collocation import cayley
+from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
 LONGEST = 100.0  # rad: where the legs of a start are longer no more full turns are tried
@@ -172,9 +172,7 @@ def with_ends(R: Array, ends: Array) -> Array:
     return R
 
 
-def lowered(
-    functional: Functional, R: Array, *, steps: int, worthwhile: float
-) -> tuple[Array, Array]:
+def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> tuple[Array, Array]:
     """Return curves with the same ends, after steps of Gauss and Newton, and their costs.
 
     For R exp(η̂) the rates change by δw = η' + w × η and its derivatives, so the deviation, to first
