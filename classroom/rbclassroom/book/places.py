@@ -25,10 +25,10 @@ MOVED = {
     **{f"study.{name}": f"surveys.{name}" for name in ("progress", "survey")},
     **{name: f"optimum.{name}" for name in ("functionals", "search", "shooting")},
     "relaxation": "optimum.collocation",
-    "draw.casteljau": "figures.lesson11",
-    "draw.laws": "figures.lesson13",
-    "draw.plots": "figures.lesson06",
-    "draw.repairs": "figures.lesson04",
+    "draw.casteljau": "../code/classroom/rbclassroom/figures/lesson11",
+    "draw.laws": "../code/classroom/rbclassroom/figures/lesson13",
+    "draw.plots": "../code/classroom/rbclassroom/figures/lesson06",
+    "draw.repairs": "../code/classroom/rbclassroom/figures/lesson04",
 }
 """Modules whose pages have another address than before: the old page leads to the new one."""
 
@@ -78,14 +78,16 @@ def file_of(module: str) -> str:
 
 
 def has_page(module: str) -> bool:
-    """Tell whether a module has a page: the private ones and the answers to problems have none.
+    """Tell whether a module has a page besides its code.
+
+    Private modules, the figures of one lesson and the answers to problems have none.
 
     Examples
     --------
     >>> has_page("draw.save"), has_page("_foam"), has_page("assignments.problems.arm")
     (True, False, False)
     """
-    return not re.search(r"\b(_|conf$|problems\b)", module)
+    return not re.search(r"\b(_|conf$|problems\b|figures\b)", module)
 
 
 def anchor(key: str) -> str:

@@ -34,7 +34,6 @@ HOUSE = {
 ROOMS = {
     "draw": "Pictures",
     "explorers": "Explorers",
-    "figures": "Figures of one lesson",
     "surveys": "The atlas",
     "course": "For maintainers: lessons run and shown",
     "assignments": "For maintainers: problem sets",
