@@ -144,9 +144,9 @@ def bezier_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+        Rotation matrices at both ends. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
+        Angular velocities there, body frame, in rad per unit time; ‖w‖ times the duration < 3π.
     duration : array_like, shape (...), optional
         How long it takes; velocities are per unit of that time.
 
@@ -159,7 +159,7 @@ def bezier_so3(
     Raises
     ------
     ValueError
-        If a velocity is 3π or more: its leg would be no shortest geodesic.
+        If a velocity times the duration is 3π or more: its leg would be no shortest geodesic.
 
     See Also
     --------
@@ -290,9 +290,9 @@ def corrected_bezier_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1. Validity is not checked; see `project_so`.
+        Rotation matrices at both ends. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time, ‖w‖ < 3π.
+        Angular velocities there, body frame, in rad per unit time; ‖w‖ times the duration < 3π.
     duration : array_like, shape (...), optional
         How long it takes; velocities are per unit of that time.
 
@@ -412,7 +412,7 @@ def cayley_cubic_so3(
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at t = 0 and 1, no half-turn apart. Validity is not checked; see
+        Rotation matrices at both ends, no half-turn apart. Validity is not checked; see
         `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.

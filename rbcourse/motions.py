@@ -185,7 +185,7 @@ def projected_cubic_se3(
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
-        Poses at t = 0 and 1. Validity is not checked (see `project_se`); the last row is not
+        Poses at both ends. Validity is not checked (see `project_se`); the last row is not
         read.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.
@@ -250,7 +250,7 @@ def minimum_acceleration_se3(
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
-        Poses at t = 0 and 1. Validity is not checked (see `project_se`); the last row is not
+        Poses at both ends. Validity is not checked (see `project_se`); the last row is not
         read.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities there, body frame, in rad per unit time.

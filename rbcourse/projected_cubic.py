@@ -111,8 +111,9 @@ def projected_cubic_so3(
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`: the nearest rotations to the cubic M(t) with M(0) = R0, M'(0) = R0 hat_so3(w0),
-        M(1) = R1, M'(1) = R1 hat_so3(w1). It meets all four ends exactly; with ``margin``.
+        A `Curve`: the nearest rotations to the cubic M(t) with M = R0 and M' = R0 hat_so3(w0) at
+        its start, M = R1 and M' = R1 hat_so3(w1) at its end. It meets all four exactly; with
+        ``margin``.
 
     Raises
     ------
