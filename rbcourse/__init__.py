@@ -1,16 +1,16 @@
 """Rigid-body motion, taught by code that runs: rotations, poses, projections and curves.
 
-The names below are the everyday ones. The modules have more: `rbcourse.metrics` the connection and
-inner products, `rbcourse.planar` and `rbcourse.arm` the plane, `rbcourse.sampling` the naive
-samplers and tests of uniformity, `rbcourse.projected_line` the timings θ and f,
-`rbcourse.textbook` the main algorithms as on the board.
+The names below are the everyday ones. The modules have more: `rbcourse.metrics` inner products,
+`rbcourse.connection` the connection, `rbcourse.planar` and `rbcourse.arm` the plane,
+`rbcourse.sampling` the naive samplers and tests of uniformity, `rbcourse.projected_line` the
+timings θ and f, `rbcourse.textbook` the main algorithms as on the board.
 
 Every function raises ValueError, and names the argument, if an argument is not what its description
 says: not finite, of another shape, outside the stated range, not symmetric or not positive definite
 where that is stated, or if batch shapes do not broadcast. The docstrings name the other errors.
 """
 
-from rbcourse import arm, files, metrics, planar, projected_line, quaternion, sampling
+from rbcourse import arm, connection, files, metrics, planar, projected_line, quaternion, sampling
 from rbcourse._numerics import Array
 from rbcourse.closed_forms import (
     CLOSED_FORMS,
@@ -25,6 +25,7 @@ from rbcourse.closed_forms import (
     normal_cubic_so3,
     quaternion_cubic_so3,
 )
+from rbcourse.connection import geodesic_flow
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
@@ -39,7 +40,7 @@ from rbcourse.cost import acceleration_cost, acceleration_cost_parts, jerk_cost,
 from rbcourse.curves import Curve, Ends, geodesic_so3, retime
 from rbcourse.excess import excess_estimate, leading_excess
 from rbcourse.files import read_path, write_path
-from rbcourse.metrics import METRIC_SE3, METRIC_SO3, geodesic_flow
+from rbcourse.metrics import METRIC_SE3, METRIC_SO3
 from rbcourse.motions import (
     geodesic_se3,
     minimum_acceleration_se3,
@@ -211,6 +212,7 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "Array",
     # modules with more
     "arm",
+    "connection",
     "files",
     "metrics",
     "planar",

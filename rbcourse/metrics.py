@@ -1,4 +1,4 @@
-"""Metrics on matrices and on the groups: trace metrics, invariance, the connection, geodesics.
+"""Metrics on matrices and on the groups: trace metrics, invariance, inertia and weight.
 
 Tangent vectors at A are matrices X = A hat(x); x are the components of X in the left-invariant
 frame: an angular velocity on SO(3), a twist (ω, v) on SE(3), both in the body frame.
@@ -6,25 +6,19 @@ frame: an angular velocity on SO(3), a twist (ω, v) on SE(3), both in the body 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_positive, as_symmetric, check_broadcast, first_index
 from rbcourse._numerics import EPS, Array, matvec, scaled
-from rbcourse.projection import project_se, project_so
-from rbcourse.se3 import BASIS_SE3, hat_se3
-from rbcourse.so3 import BASIS_SO3, hat_so3, vee
+from rbcourse.se3 import hat_se3
+from rbcourse.so3 import hat_so3, vee
 
 __all__ = [
     "METRIC_SE3",
     "METRIC_SO3",
     "box_inertia",
-    "christoffel",
     "components_from_tangent",
-    "covariant_derivative",
-    "geodesic_flow",
     "inertia_from_weight",
     "inner_ga",
     "inner_gl",
@@ -32,7 +26,6 @@ __all__ = [
     "inner_se3",
     "inner_so3",
     "semi_riemannian_metric_se3",
-    "structure_constants",
     "tangent_from_components",
     "weight_from_inertia",
 ]
@@ -407,230 +400,6 @@ def weight_of(name: str, G: Array) -> Array:
     return _trace_times_identity(G / 2) - G
 
 
-def structure_constants(basis: ArrayLike) -> Array:
-    """Return C with [L_i, L_j] = C[k, i, j] L_k, summed over k, for a basis of a Lie algebra.
-
-    Parameters
-    ----------
-    basis : array_like, shape (m, n, n)
-        The matrices L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``.
-
-    Returns
-    -------
-    ndarray, shape (m, m, m)
-        Antisymmetric in i and j. For ``BASIS_SO3`` the cross product: C[k, i, j] = ε_ijk.
-
-    Raises
-    ------
-    ValueError
-        If `basis` is not finite or not of that shape, its matrices are linearly dependent, to one
-        part in a million, or a commutator of two of them is, to rounding, no combination of them.
-
-    References
-    ----------
-    BK 2.4, BK (2), BK (3).
-
-    Examples
-    --------
-    >>> C = structure_constants(BASIS_SO3)
-    >>> C[:, 0, 1]  # turning about x and then y, or y and then x, differs by turning about z
-    array([0., 0., 1.])
-    """
-    L = as_finite("basis", basis, "n", "n")
-    if L.ndim != 3 or len(L) == 0:
-        raise ValueError(f"basis: shape (m, n, n) wanted, got {L.shape}")
-    m = len(L)
-    _, exponents = np.frexp(np.abs(L).max(axis=(1, 2)))
-    N = scaled(L)  # so that no size matters
-    columns = N.reshape(m, -1).T
-    condition = np.linalg.cond(columns)
-    if not condition < 1e6:
-        raise ValueError("basis: the matrices are linearly dependent, to one part in a million")
-    products = N[:, None] @ N
-    brackets = (products - products.swapaxes(0, 1)).reshape(m * m, -1).T
-    C = np.zeros((m, m * m))
-    for _ in range(3):  # the normal equations, exact for the standard bases, and what they leave
-        C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
-    if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
-        raise ValueError("basis: a commutator of two of the matrices is no combination of them")
-    k, i, j = np.ix_(exponents, exponents, exponents)
-    return np.ldexp(C.reshape(m, m, m), i + j - k)
-
-
-def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
-    """Return the Christoffel symbols of a left-invariant metric in a left-invariant frame.
-
-    Parameters
-    ----------
-    G : array_like, shape (..., m, m)
-        The metric in that frame: symmetric and not singular, definite or not.
-    basis : array_like, shape (m, n, n)
-        The frame at the identity, such as ``BASIS_SO3`` or ``BASIS_SE3``.
-
-    Returns
-    -------
-    ndarray, shape (..., m, m, m)
-        Γ[i, j, k] with ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. They are the same at all
-        points of the group. The connection is the only one without torsion, Γ[i, j, k] −
-        Γ[i, k, j] = C[i, j, k], that is compatible with the metric: lowered by `G`, Γ is
-        antisymmetric in i and k. Both hold to a few eps times the condition number of `G`.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite or not of that shape, `G` is not symmetric or is singular to
-        rounding, or `basis` is not one of a Lie algebra.
-
-    See Also
-    --------
-    covariant_derivative : What they are for.
-
-    Notes
-    -----
-    Koszul's formula, in which the products of the metric are constant and their derivatives
-    vanish: 2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
-
-    In a left-invariant frame the symbols are *not* symmetric in j and k, as those of coordinates
-    are.
-
-    References
-    ----------
-    BK 2.4, BK (8).
-
-    Examples
-    --------
-    >>> gamma = christoffel(METRIC_SO3, BASIS_SO3)  # half of the cross product
-    >>> gamma[:, 0, 1] + 0.0
-    array([0. , 0. , 0.5])
-    """
-    C = structure_constants(basis)
-    m = len(C)
-    G = scaled(as_symmetric("G", G, m))  # its size does not matter
-    sizes = np.abs(np.linalg.eigvalsh(G))
-    singular = sizes.min(axis=-1) <= m * EPS * sizes.max(axis=-1)
-    if singular.any():
-        raise ValueError(f"{first_index('G', singular)} is singular")
-    lowered = np.einsum("mki,...mj->...kij", C, G)  # ⟨[L_k, L_i], L_j⟩
-    symmetric = lowered + np.swapaxes(lowered, -1, -2)
-    columns = symmetric.reshape(*G.shape[:-1], m * m)
-    raised = np.linalg.solve(G, columns).reshape(symmetric.shape)
-    return (C + raised) / 2
-
-
-def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
-    """Return the covariant derivative of a field x along a curve with the velocity v.
-
-    Parameters
-    ----------
-    gamma : array_like, shape (..., m, m, m)
-        Christoffel symbols, as `christoffel` returns them.
-    v : array_like, shape (..., m)
-        The velocity, in components of the left-invariant frame: an angular velocity or a twist.
-    x, x_dot : array_like, shape (..., m)
-        The field along the curve, in such components, and their derivatives with respect to time.
-
-    Returns
-    -------
-    ndarray, shape (..., m)
-        x_dot[i] + gamma[i, j, k] v[j] x[k], summed over j and k. With x = v it is the acceleration
-        (9), which vanishes along geodesics: (8), for the components of the velocity. With
-        x_dot = 0 it is ∇_v x of left-invariant fields.
-
-    References
-    ----------
-    BK 2.4, BK (8), BK (9).
-
-    Examples
-    --------
-    >>> gamma = christoffel(METRIC_SE3, BASIS_SE3)
-    >>> S = [0, 0, 2, 3, 0, 0]  # a constant twist: the origin runs on a circle
-    >>> covariant_derivative(gamma, S, S, np.zeros(6)) + 0.0  # ω × v, to its centre
-    array([0., 0., 0., 0., 6., 0.])
-    """
-    v = as_finite("v", v, "n")
-    m = v.shape[-1]
-    gamma = as_finite("gamma", gamma, m, m, m)
-    x, x_dot = as_finite("x", x, m), as_finite("x_dot", x_dot, m)
-    check_broadcast(gamma=(gamma, 3), v=(v, 1), x=(x, 1), x_dot=(x_dot, 1))
-    return x_dot + np.einsum("...ijk,...j,...k->...i", gamma, v, x)
-
-
-def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
-    """Return where the geodesics that start at A0 with the velocity v0 are at the times t.
-
-    Parameters
-    ----------
-    G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
-        The matrix of a left-invariant metric: symmetric and not singular, definite or not. Of a
-        body that turns freely, its inertia.
-    A0 : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses at t = 0. Validity is not checked; see `project_so`, `project_se`.
-    v0 : array_like, shape (..., 3) or (..., 6)
-        Angular velocities there, or twists (ω, v), body frame.
-    t : array_like, any shape
-        Times, in any order, negative ones too.
-
-    Returns
-    -------
-    A : ndarray, shape t.shape + (..., 3, 3) or (..., 4, 4)
-        Rotations or poses.
-    v : ndarray, shape t.shape + (..., 3) or (..., 6)
-        Their velocities, in the body frame: vᵀ G v is constant.
-
-    Raises
-    ------
-    FloatingPointError
-        If the integration fails.
-
-    See Also
-    --------
-    geodesic_so3, geodesic_se3 : In closed form, from end to end, for the metrics (12) and (14).
-    screw_se3 : For the metric (10).
-
-    Notes
-    -----
-    Singular set: none. The momentum in the fixed frame is constant, so that no velocity reaches
-    infinity in finite time. On SE(3), of an indefinite metric, it may grow exponentially; where it
-    leaves the range of the floating-point numbers the integration fails.
-
-    Solves A' = A hat(v) and (8) in the form v'_i = −Γ_ijk v_j v_k, on SO(3) Euler's equations, by
-    an eighth-order Runge–Kutta method at a relative tolerance of 3e-14. The members of a batch of
-    N share its steps, a tenth of a rad where all moments are alike and shorter otherwise, and its
-    tolerance: that of a single one may be up to √N times larger.
-
-    References
-    ----------
-    BK 2.4, BK (8); where the paper prints the equation with the second derivatives of coordinates,
-    which would need the symbols of these, not those of the left-invariant frame.
-
-    Examples
-    --------
-    >>> G, spin = np.diag([1.0, 2, 3]), [0.01, 3, 0]  # about the middle axis, not quite
-    >>> R, w = geodesic_flow(G, np.eye(3), spin, [0, 6])
-    >>> w[:, 1].round(1)  # it flips
-    array([ 3., -3.])
-    """
-    A0, m = as_rotation_or_pose("A0", A0)
-    G, v0, times = as_symmetric("G", G, m), as_finite("v0", v0, m), as_finite("t", t)
-    batch = check_broadcast(G=(G, 2), A0=(A0, 2), v0=(v0, 1))
-    basis, project = (BASIS_SO3, project_so) if m == 3 else (BASIS_SE3, project_se)
-    gamma = christoffel(G, basis)
-    A0 = np.broadcast_to(project(A0), batch + A0.shape[-2:])
-    v0 = np.broadcast_to(v0, (*batch, m))
-    speed = float(np.abs(v0).max(initial=0)) or 1.0
-    v0, times = v0 / speed, times * speed  # γ_sv(t) = γ_v(st)
-
-    def flow(_: float, state: Array) -> Array:
-        A, v = state[: A0.size].reshape(A0.shape), state[A0.size :].reshape(v0.shape)
-        turning = np.einsum("...ijk,...j,...k->...i", gamma, v, v)
-        return _joined(A @ np.tensordot(v, basis, 1), -turning)
-
-    scales = _joined(*_scales(A0, v0, np.abs(times).max(initial=0)))
-    states = _integrate(flow, _joined(A0, v0), scales, times.ravel())
-    A, v = states[:, : A0.size], states[:, A0.size :]
-    return project(A.reshape(times.shape + A0.shape)), speed * v.reshape(times.shape + v0.shape)
-
-
 def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
     """Return matrices of SO(3) or SE(3), told by their size, and the dimension of the group."""
     A = as_finite(name, value, "n", "n")
@@ -657,41 +426,3 @@ def _trace(X: ArrayLike, Y: ArrayLike, size: int | str) -> Array:
 def _trace_times_identity(matrix: Array) -> Array:
     trace: Array = np.trace(matrix, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
     return trace
-
-
-def _scales(A0: Array, v0: Array, last: float) -> tuple[Array, Array]:
-    """Return how large the entries of A and v are: those of ω, v and d each in their own unit."""
-    speeds = np.abs(v0).reshape(*v0.shape[:-1], v0.shape[-1] // 3, 3).max(axis=-1)
-    speeds = np.where(speeds == 0, speeds.max(axis=-1, keepdims=True), speeds)
-    speeds = np.where(speeds < 1e-200, 1.0, speeds)  # at rest
-    scales = np.ones(A0.shape)
-    if A0.shape[-1] == 4:
-        path = np.abs(A0[..., :3, 3]).max(axis=-1) + last * speeds[..., 1]
-        scales[..., :3, 3] = path[..., None]
-    return scales, np.repeat(speeds, 3, axis=-1)
-
-
-def _joined(A: Array, v: Array) -> Array:
-    return np.concatenate([A.ravel(), v.ravel()])
-
-
-def _integrate(
-    flow: Callable[[float, Array], Array], start: Array, scales: Array, times: Array
-) -> Array:
-    """Return the states at the times, a row for each; they are `start` at t = 0."""
-    from scipy.integrate import solve_ivp
-
-    states = np.broadcast_to(start, (len(times), len(start))).copy()
-    for side in (times > 0, times < 0):
-        stops, where = np.unique(times[side], return_inverse=True)
-        if stops.size == 0:
-            continue
-        order = np.argsort(np.abs(stops))
-        end = float(stops[order[-1]])
-        way = solve_ivp(
-            flow, (0.0, end), start, "DOP853", stops[order], rtol=3e-14, atol=1e-14 * scales
-        )
-        if not way.success:
-            raise FloatingPointError(f"a geodesic cannot be followed to its end: {way.message}")
-        states[side] = way.y.T[np.argsort(order)][where]
-    return states

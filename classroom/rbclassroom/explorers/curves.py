@@ -17,10 +17,11 @@ from rbcourse import (
     screw_from_pose,
     screw_se3,
 )
+from rbcourse.connection import geodesic_flow
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
-from rbcourse.metrics import box_inertia, geodesic_flow
+from rbcourse.metrics import box_inertia
 from rbcourse.projected_line import f, line_singular_value, theta
 
 _TIMES = np.linspace(0, 1, 101)

@@ -26,7 +26,7 @@ def indefinite_metrics(m, count=100):
 @pytest.mark.source("BK (2)", "BK (3)", "BK 2.4")
 @pytest.mark.parametrize(("basis", "m"), GROUPS)
 def test_structure_constants_give_the_commutators(basis, m):
-    C = rb.metrics.structure_constants(basis)
+    C = rb.connection.structure_constants(basis)
     for i, j in np.ndindex(m, m):
         bracket = basis[i] @ basis[j] - basis[j] @ basis[i]
         assert np.array_equal(np.einsum("k,kab->ab", C[:, i, j], basis), bracket)
@@ -37,8 +37,8 @@ def test_structure_constants_in_another_basis(condition):
     rng = np.random.default_rng(0)
     Q, P = np.linalg.qr(rng.normal(size=(2, 6, 6)))[0]
     change = (Q * np.geomspace(1, 1 / condition, 6)) @ P
-    C = rb.metrics.structure_constants(np.einsum("ij,jab->iab", change, rb.BASIS_SE3))
-    standard = rb.metrics.structure_constants(rb.BASIS_SE3)
+    C = rb.connection.structure_constants(np.einsum("ij,jab->iab", change, rb.BASIS_SE3))
+    standard = rb.connection.structure_constants(rb.BASIS_SE3)
     wanted = np.einsum("kc,kij,ai,bj->cab", np.linalg.inv(change), standard, change, change)
     assert np.abs(C - wanted).max() < 1e-13 * condition
 
@@ -46,13 +46,13 @@ def test_structure_constants_in_another_basis(condition):
 def test_a_bracket_that_sticks_out_a_little_is_seen():
     L = [rb.BASIS_SO3[0] + 1e-7 * np.eye(3), rb.BASIS_SO3[1], rb.BASIS_SO3[2] + 1e-10]
     with pytest.raises(ValueError, match="a commutator of two"):
-        rb.metrics.structure_constants(L)
+        rb.connection.structure_constants(L)
 
 
 def test_structure_constants_of_bases_of_any_size():
     sizes = np.array([1e-150, 1.0, 1e120])
-    C = rb.metrics.structure_constants(sizes[:, None, None] * rb.BASIS_SO3)
-    wanted = rb.metrics.structure_constants(rb.BASIS_SO3)
+    C = rb.connection.structure_constants(sizes[:, None, None] * rb.BASIS_SO3)
+    wanted = rb.connection.structure_constants(rb.BASIS_SO3)
     wanted = wanted * sizes[:, None] * sizes / sizes[:, None, None]
     assert np.allclose(C, wanted, rtol=4 * EPS, atol=0)
 
@@ -62,7 +62,7 @@ def test_structure_constants_of_bases_of_any_size():
 @pytest.mark.parametrize("metrics", [random_metrics, indefinite_metrics])
 def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(basis, m, metrics):
     G = metrics(m)
-    gamma, C = rb.metrics.christoffel(G, basis), rb.metrics.structure_constants(basis)
+    gamma, C = rb.connection.christoffel(G, basis), rb.connection.structure_constants(basis)
     condition, size = np.linalg.cond(G), np.abs(G).max(axis=(-2, -1))
     torsion = gamma - np.swapaxes(gamma, -1, -2) - C
     assert np.all(np.abs(torsion).max(axis=(-3, -2, -1)) < 1e-14 * condition)
@@ -73,10 +73,10 @@ def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(basis, 
 
 @pytest.mark.source("BK (9)", "BK 2.4")
 def test_a_bi_invariant_metric_has_half_the_commutator():
-    C = rb.metrics.structure_constants(rb.BASIS_SO3)
-    assert np.array_equal(rb.metrics.christoffel(rb.METRIC_SO3, rb.BASIS_SO3), C / 2)
-    C = rb.metrics.structure_constants(rb.BASIS_SE3)
-    gamma = rb.metrics.christoffel(rb.metrics.semi_riemannian_metric_se3(2, 3), rb.BASIS_SE3)
+    C = rb.connection.structure_constants(rb.BASIS_SO3)
+    assert np.array_equal(rb.connection.christoffel(rb.METRIC_SO3, rb.BASIS_SO3), C / 2)
+    C = rb.connection.structure_constants(rb.BASIS_SE3)
+    gamma = rb.connection.christoffel(rb.metrics.semi_riemannian_metric_se3(2, 3), rb.BASIS_SE3)
     assert np.abs(gamma - C / 2).max() < 4 * EPS
 
 
@@ -85,10 +85,10 @@ def test_the_acceleration_is_the_one_that_the_curves_give():
     rng = np.random.default_rng(1)
     A0, A1 = rb.exp_se3(rng.normal(size=(2, 6)))
     c = rb.projected_cubic_se3(A0, A1, *rng.normal(size=(4, 3)))
-    gamma = rb.metrics.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
+    gamma = rb.connection.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     t, h = np.linspace(0.1, 0.9, 9), 1e-4
     v, v_dot = c(t, 1), (c(t + h, 1) - c(t - h, 1)) / (2 * h)
-    assert np.abs(rb.metrics.covariant_derivative(gamma, v, v, v_dot) - c(t, 2)).max() < 1e-5
+    assert np.abs(rb.connection.covariant_derivative(gamma, v, v, v_dot) - c(t, 2)).max() < 1e-5
 
 
 @pytest.mark.source("BK (9)", "BK 2.4")
@@ -99,20 +99,22 @@ def test_the_acceleration_is_the_ambient_one_projected_on_the_tangent_space():
     h = 1e-4
     before, at, after = (R0 @ rb.exp_so3(w * t + a * t**2 / 2) for t in (-h, 0, h))
     projected = rb.metrics.components_from_tangent(R0, (before - 2 * at + after) / h**2)
-    gamma = rb.metrics.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
-    assert np.abs(rb.metrics.covariant_derivative(gamma, w, w, a) - projected).max() < 1e-6
+    gamma = rb.connection.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
+    assert np.abs(rb.connection.covariant_derivative(gamma, w, w, a) - projected).max() < 1e-6
 
 
 @pytest.mark.source("BK 2.4", "errata 22")
 def test_the_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
     """A is no tangent vector at A: it has no components there, so nothing would turn along."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
-    gamma = rb.metrics.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
+    gamma = rb.connection.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
     corrected = rb.metrics.components_from_tangent(A, rb.metrics.tangent_from_components(A, S))
     assert np.abs(printed[:3]).max() < 8 * EPS
     wanted = [0, 0, 0, 0, 6, 0]  # of the origin that runs on a circle, ω × v
-    at = [rb.metrics.covariant_derivative(gamma, x, S, np.zeros(6)) for x in (printed, corrected)]
+    at = [
+        rb.connection.covariant_derivative(gamma, x, S, np.zeros(6)) for x in (printed, corrected)
+    ]
     assert np.abs(at[1] - wanted).max() < 1e-13
     assert np.abs(at[0] - wanted).max() > 1
 
@@ -123,10 +125,10 @@ def test_products_change_as_the_metric_says(basis, m):
     """d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩, for any metric."""
     v, x, y, dx, dy = np.random.default_rng(4).normal(size=(5, 100, m))
     G = random_metrics(m)
-    gamma = rb.metrics.christoffel(G, basis)
+    gamma = rb.connection.christoffel(G, basis)
     Dx, Dy = (
-        rb.metrics.covariant_derivative(gamma, v, x, dx),
-        rb.metrics.covariant_derivative(gamma, v, y, dy),
+        rb.connection.covariant_derivative(gamma, v, x, dx),
+        rb.connection.covariant_derivative(gamma, v, y, dy),
     )
     by_connection = np.einsum("bij,bi,bj->b", G, Dx, y) + np.einsum("bij,bi,bj->b", G, x, Dy)
     by_components = np.einsum("bij,bi,bj->b", G, dx, y) + np.einsum("bij,bi,bj->b", G, x, dy)
@@ -173,7 +175,7 @@ def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
     """It has Γ^i_ik for Γ^i_jk, and with the frame's symbols ä of coordinates for ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3])
-    gamma = rb.metrics.christoffel(inertia, rb.BASIS_SO3)
+    gamma = rb.connection.christoffel(inertia, rb.BASIS_SO3)
     euler = np.linalg.solve(inertia, np.cross(inertia @ w, w))
     corrected = -np.einsum("ijk,j,k->i", gamma, w, w)
     assert np.abs(corrected - euler).max() < 40 * EPS
@@ -187,7 +189,7 @@ def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
     ways = rb.geodesic_flow(rb.METRIC_SO3, rb.exp_so3(sigma), w, [-h, 0, h])[0]
     before, at, ahead = rb.log_so3(ways)
     velocity, acceleration = (ahead - before) / (2 * h), (before - 2 * at + ahead) / h**2
-    frame = rb.metrics.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
+    frame = rb.connection.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
     assert np.abs(acceleration + np.einsum("ijk,j,k->i", frame, velocity, velocity)).max() > 0.1
 
 
@@ -300,8 +302,8 @@ def test_a_fast_flight_does_not_disturb_the_turning():
 
 @pytest.mark.parametrize("size", [1e-320, 1e-310, 1e-200, 1e200, 1e308])
 def test_the_size_of_a_metric_does_not_matter(size):
-    gamma = rb.metrics.christoffel(size * np.eye(3), rb.BASIS_SO3)
-    assert np.array_equal(gamma, rb.metrics.structure_constants(rb.BASIS_SO3) / 2)
+    gamma = rb.connection.christoffel(size * np.eye(3), rb.BASIS_SO3)
+    assert np.array_equal(gamma, rb.connection.structure_constants(rb.BASIS_SO3) / 2)
     metric = np.array([1, 2, 3]) * min(size, 1e307)
     ways = [rb.geodesic_flow(G, np.eye(3), [1, 2, 3], 1) for G in (np.diag(metric), INERTIA)]
     assert np.abs(ways[0][1] - ways[1][1]).max() < (1e-11 if size > 1e-300 else 1e-2)
@@ -323,29 +325,32 @@ def test_an_integration_that_fails_is_no_curve(monkeypatch):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: rb.metrics.structure_constants(np.eye(3)), r"basis: shape \(m, n, n\) wanted"),
-        (lambda: rb.metrics.structure_constants([np.eye(2), 2 * np.eye(2)]), "linearly dependent"),
-        (lambda: rb.metrics.structure_constants(rb.BASIS_SO3[:2]), "a commutator of two"),
+        (lambda: rb.connection.structure_constants(np.eye(3)), r"basis: shape \(m, n, n\) wanted"),
         (
-            lambda: rb.metrics.structure_constants([1e6 * np.eye(3), *rb.BASIS_SO3[:2]]),
+            lambda: rb.connection.structure_constants([np.eye(2), 2 * np.eye(2)]),
+            "linearly dependent",
+        ),
+        (lambda: rb.connection.structure_constants(rb.BASIS_SO3[:2]), "a commutator of two"),
+        (
+            lambda: rb.connection.structure_constants([1e6 * np.eye(3), *rb.BASIS_SO3[:2]]),
             "a commutator of two",
         ),
         (
-            lambda: rb.metrics.structure_constants(np.ones((0, 3, 3))),
+            lambda: rb.connection.structure_constants(np.ones((0, 3, 3))),
             r"basis: shape \(m, n, n\) wanted",
         ),
         (
-            lambda: rb.metrics.christoffel(np.eye(6), rb.BASIS_SO3),
+            lambda: rb.connection.christoffel(np.eye(6), rb.BASIS_SO3),
             r"G: shape \(\.\.\., 3, 3\) wanted",
         ),
-        (lambda: rb.metrics.christoffel(np.eye(3, k=1), rb.BASIS_SO3), "G is not symmetric"),
-        (lambda: rb.metrics.christoffel(np.ones((3, 3)), rb.BASIS_SO3), "G is singular"),
+        (lambda: rb.connection.christoffel(np.eye(3, k=1), rb.BASIS_SO3), "G is not symmetric"),
+        (lambda: rb.connection.christoffel(np.ones((3, 3)), rb.BASIS_SO3), "G is singular"),
         (
-            lambda: rb.metrics.covariant_derivative(np.zeros((3, 3, 3)), [1, 2], [1, 2], [1, 2]),
+            lambda: rb.connection.covariant_derivative(np.zeros((3, 3, 3)), [1, 2], [1, 2], [1, 2]),
             r"gamma: shape \(\.\.\., 2, 2, 2\) wanted",
         ),
         (
-            lambda: rb.metrics.covariant_derivative(np.zeros((2, 1, 1, 1)), [[1]] * 3, [1], [1]),
+            lambda: rb.connection.covariant_derivative(np.zeros((2, 1, 1, 1)), [[1]] * 3, [1], [1]),
             r"broadcast: gamma \(2,\), v \(3,\), x \(\), x_dot \(\)",
         ),
         (
