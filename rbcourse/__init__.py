@@ -12,13 +12,10 @@ where that is stated, or if batch shapes do not broadcast. The docstrings name t
 
 from rbcourse import arm, connection, files, metrics, planar, projected_line, quaternion, sampling
 from rbcourse._numerics import Array
+from rbcourse.bezier import bezier_long_so3, bezier_so3, corrected_bezier_so3, cumulative_bezier_so3
 from rbcourse.closed_forms import (
     CLOSED_FORMS,
-    bezier_long_so3,
-    bezier_so3,
     cayley_cubic_so3,
-    corrected_bezier_so3,
-    cumulative_bezier_so3,
     exponential_cubic_long_so3,
     exponential_cubic_so3,
     exponential_quintic_so3,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._numerics import Array, matvec
-from rbcourse.closed_forms import seen_from_the_middle
+from rbcourse.bezier import seen_from_the_middle
 from rbcourse.cost import check_curve, summed
 from rbcourse.curves import Curve, Ends
 from rbcourse.optimum.chebyshev import grid, tails

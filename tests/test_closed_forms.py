@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse._hermite import hermite
-from rbcourse.closed_forms import other_way
+from rbcourse._quaternion_curve import other_way
 from rbcourse.curves import Ends
 
 pytestmark = pytest.mark.source("BK 1")

@@ -9,7 +9,7 @@ import pytest
 import rbcourse as rb
 from rbclassroom.surveys import atlas
 from rbcourse import excess
-from rbcourse.closed_forms import bezier_deviation
+from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 
 ROOT = Path(__file__).parents[1]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbcourse._numerics import EPS, Array
-from rbcourse.closed_forms import corrected_bezier_so3
+from rbcourse.bezier import corrected_bezier_so3
 from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import along, grid, interpolation
 from rbcourse.optimum.collocation import (

@@ -24,7 +24,7 @@ from rbclassroom.course.ledger import GROUPS, MISPRINTS, WHAT, Entry
 HOUSE = {
     "Rotations and poses": "so3 quaternion conversions se3",
     "Projection, sampling, metrics": "projection sampling metrics connection",
-    "Curves": "curves projected_line projected_cubic closed_forms motions paths cost",
+    "Curves": "curves projected_line projected_cubic closed_forms bezier motions paths cost",
     "The optimum": "optimum optimum.functionals optimum.collocation optimum.search "
     "optimum.guesses optimum.chebyshev optimum.shooting excess",
     "The plane": "planar arm",

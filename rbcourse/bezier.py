@@ -1,0 +1,388 @@
+"""Bézier curves of rotations: by geodesics, cumulative, and less their leading deviation."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._checks import first_index
+from rbcourse._numerics import Array, matvec
+from rbcourse._quaternion_curve import QuaternionCurve, other_way
+from rbcourse._taylor import (
+    Jet,
+    exp,
+    product,
+    slerp,
+    times,
+)
+from rbcourse.conversions import quaternion_from_matrix, quaternion_from_rotation_vector
+from rbcourse.curves import (
+    Ends,
+    identity,
+)
+from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
+from rbcourse.so3 import exp_so3, log_so3
+
+Legs = tuple[Array, Array, Array]
+
+
+def bezier_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> Bezier:
+    """Return the cubic Bézier curve with these ends: de Casteljau's construction by geodesics.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at both ends. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time; ‖w‖ times the duration < 3π.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
+
+    Returns
+    -------
+    Bezier
+        A `Curve` that meets all four ends, with the control points R0, R0 exp(ŵ0/3),
+        R1 exp(−ŵ1/3), R1.
+
+    Raises
+    ------
+    ValueError
+        If a velocity times the duration is 3π or more: its leg would be no shortest geodesic.
+
+    See Also
+    --------
+    cumulative_bezier_so3 : From the same control points, faster to evaluate.
+    corrected_bezier_so3 : Nearer to the optimum.
+
+    Notes
+    -----
+    Singular set: the two inner control points a half-turn apart; the geodesic between them is that
+    of `log_so3`. No other leg can become a half-turn: those of the next level are, by the triangle
+    inequality, never longer than the longest two before.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    BK 1, its references 3 to 5.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    return _bezier(*_slow_ends(R0, R1, w0, w1, duration))
+
+
+def bezier_long_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> Bezier:
+    """Return the Bézier curve with these ends whose middle leg turns the other way round.
+
+    Parameters
+    ----------
+    R0, R1, w0, w1 : array_like
+        As for `bezier_so3`.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
+
+    Returns
+    -------
+    Bezier
+        A `Curve` that meets all four ends, with the control points of `bezier_so3`. Where the end
+        velocities are large, it may cost less than that.
+
+    See Also
+    --------
+    bezier_so3 : The short way round.
+
+    Notes
+    -----
+    Singular set: that of `bezier_so3`; and the two inner control points equal, where no axis is the
+    other one, and the curve is that of `bezier_so3`.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    beyond BK 10.
+
+    Examples
+    --------
+    >>> from rbcourse import acceleration_cost, exp_so3
+    >>> ends = np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, -2.4], [0, 0, -2.4]
+    >>> [float(acceleration_cost(c(*ends)).round(1)) for c in (bezier_so3, bezier_long_so3)]
+    [365.0, 136.3]
+    """
+    ends, T, (first, middle, last) = _slow_ends(R0, R1, w0, w1, duration)
+    return _bezier(ends, T, (first, other_way(middle), last))
+
+
+def cumulative_bezier_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> CumulativeBezier:
+    """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
+
+    Parameters
+    ----------
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        The boundary conditions, see `Ends`.
+    duration : array_like, shape (...), optional
+        How long it takes.
+
+    Returns
+    -------
+    CumulativeBezier
+        A `Curve` that meets all four ends: v₁ = w0/3, v₃ = w1/3, v₂ the shortest turn between, and
+        β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³.
+
+    See Also
+    --------
+    bezier_so3 : De Casteljau's construction, from the same control points.
+
+    Notes
+    -----
+    Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where v₂ is what `log_so3`
+    chooses. The curve itself is smooth everywhere.
+
+    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+
+    References
+    ----------
+    BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit quaternion
+    curves with simple high order derivatives, SIGGRAPH 1995.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = cumulative_bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    halves = np.stack(bezier_legs(ends), axis=-2) / 2
+    return CumulativeBezier(duration=T, start=quaternion_from_matrix(ends.R0), controls=halves)
+
+
+def corrected_bezier_so3(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
+) -> CorrectedBezier:
+    """Return Bézier's curve less its leading deviation from the optimum.
+
+    Parameters
+    ----------
+    R0, R1 : array_like, shape (..., 3, 3)
+        Rotation matrices at both ends. Validity is not checked; see `project_so`.
+    w0, w1 : array_like, shape (..., 3)
+        Angular velocities there, body frame, in rad per unit time; ‖w‖ times the duration < 3π.
+    duration : array_like, shape (...), optional
+        How long it takes; velocities are per unit of that time.
+
+    Returns
+    -------
+    CorrectedBezier
+        A `Curve` that meets all four ends: R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B Bézier's
+        curve, R_m = R0 exp(σ̂/2) the rotation half-way, and δ(t) of `bezier_deviation`.
+
+    See Also
+    --------
+    bezier_so3 : The curve without the correction.
+    minimum_acceleration_so3 : The optimum.
+    excess_estimate : How far above the optimum a curve is.
+
+    Notes
+    -----
+    Near-optimal for small excursions: data s times as large have a relative excess over the
+    optimum about s⁸ times as large, that of the other closed forms s⁴ or s² times. δ is of third
+    order in the data: where the ends are fast it is large, and makes the curve cost more than
+    Bézier's (see docs/near_optimal.md).
+
+    σ is the logarithm of R0ᵀ R1, of any length, that is nearest to the sum of Bézier's three legs.
+    Singular set: that of `bezier_so3`, and where two logarithms are equally near.
+
+    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+
+    References
+    ----------
+    beyond BK 10.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> R1 = exp_so3([0, 0, 1.5])
+    >>> c = corrected_bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
+    >>> c([0, 1], 1).round(12) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    ends, T, legs = _slow_ends(R0, R1, w0, w1, duration)
+    curve = _bezier(ends, T, legs)
+    sigma = nearest_turn(log_so3(ends.turn), legs[0] + legs[1] + legs[2])
+    deviation = bezier_deviation(sigma, *seen_from_the_middle(sigma, ends.w0, ends.w1))
+    middle = quaternion_from_rotation_vector(sigma / 2)
+    points = quaternion_multiply(quaternion_conjugate(middle)[..., None, :], curve.controls)
+    pure = [np.concatenate([np.zeros_like(c[..., :1]), c], axis=-1) for c in deviation]
+    return CorrectedBezier(
+        duration=T,
+        start=quaternion_multiply(curve.start, middle),
+        controls=np.concatenate([points, np.stack(pure, axis=-2)], axis=-2),
+    )
+
+
+def bezier_legs(ends: Ends) -> Legs:
+    """Return the turns from each of Bézier's control points to the next, the shortest."""
+    first, last = ends.w0 / 3, ends.w1 / 3
+    return first, log_so3(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
+
+
+def _slow_ends(
+    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
+) -> tuple[Ends, Array, Legs]:
+    """Return ends for the time from 0 to 1, the duration, and Bézier's legs, of less than π."""
+    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    for name, w in (("w0", ends.w0), ("w1", ends.w1)):
+        angle = np.linalg.norm(w, axis=-1)
+        fast = angle >= 3 * np.pi
+        if fast.any():
+            raise ValueError(
+                f"{first_index(name, fast)}: a norm below 3π is wanted, got {angle[fast][0]:.4g}"
+            )
+    return ends, T, bezier_legs(ends)
+
+
+def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
+    """Return e, the mean of two end velocities less σ, and d, their difference.
+
+    The velocities are carried to the rotation half-way, R0 exp(σ̂/2), parallel in a bi-invariant
+    metric: the body axes turn by σ/2 on each half of the way, and what is parallel by half of that.
+
+    Parameters
+    ----------
+    sigma : ndarray, shape (..., 3)
+        A logarithm of R0ᵀ R1.
+    w0, w1 : ndarray, shape (..., 3)
+        Angular velocities at the ends, body frame.
+
+    Returns
+    -------
+    e, d : ndarray, shape (..., 3)
+        0 for the geodesic at constant speed.
+    """
+    quarter = exp_so3(sigma / 4)
+    u0, u1 = matvec(quarter.mT, w0), matvec(quarter, w1)
+    return (u0 + u1) / 2 - sigma, u1 - u0
+
+
+def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
+    """Return what Bézier's curve is away from the optimum, to third order, as a polynomial.
+
+    The deviation, a rotation vector, is δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴), u = 2t − 1.
+
+    Parameters
+    ----------
+    sigma, e, d : ndarray, shape (..., 3)
+        The displacement, and the velocities of `seen_from_the_middle`.
+
+    Returns
+    -------
+    list of ndarray, shape (..., 3)
+        c₀, …, c₄: sums of triple products a × (b × c); in the code ``sed`` is σ × (e × d).
+
+    References
+    ----------
+    beyond BK 10.
+    """
+    first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
+    second = np.stack([sigma, sigma, e, sigma, sigma, e, sigma, e])
+    third = np.stack([e, d, d, e, d, d, d, d])
+    sse, ssd, sed, ese, esd, eed, dsd, ded = np.cross(first, np.cross(second, third))
+    return [
+        (17 * sed - 10 * ssd - 13 * esd) / 1080 + 97 * eed / 15120,
+        11 * ded / 6048 - sse / 90 - ese / 60 - dsd / 720,
+        sed / 180 - esd / 120 + 3 * eed / 560,
+        17 * ded / 30240 - ese / 90,
+        eed / 504,
+    ]
+
+
+def nearest_turn(turn: Array, way: Array) -> Array:
+    """Return the turns to the same rotations, by full turns more or fewer, nearest to `way`."""
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    axis = turn / np.where(angle == 0, 1, angle)
+    more = (np.sum(way * axis, axis=-1, keepdims=True) - angle) / (2 * np.pi)
+    return turn + 2 * np.pi * np.round(more) * axis
+
+
+class CumulativeBezier(QuaternionCurve):
+    """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), β the cumulative Bernstein polynomials."""
+
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return the product of exp(βᵢ vᵢ/2)."""
+        s = 1 - t
+        shares: list[Jet] = [
+            [t * (1 + s + s * s), 3 * s * s, -6 * s, 6 + 0 * t],
+            [t * t * (1 + 2 * s), 6 * t * s, 6 * (s - t), -12 + 0 * t],
+            [t * t * t, 3 * t * t, 6 * t, 6 + 0 * t],
+        ]
+        first, second, third = (
+            exp([beta * half for beta in share[: order + 1]])
+            for share, half in zip(shares, controls, strict=True)
+        )
+        return product(product(first, second), third)
+
+
+class Bezier(QuaternionCurve):
+    """The `Curve` of de Casteljau's construction, geodesics in the place of straight lines."""
+
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return what the construction comes to from four control points."""
+        share = [identity(t, k) for k in range(order + 1)]
+        points = [[point, *[np.zeros_like(point)] * order] for point in controls]
+        while len(points) > 1:
+            points = [slerp(a, b, share) for a, b in pairwise(points)]
+        return points[0]
+
+
+def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
+    point = np.broadcast_to(np.eye(4)[0], (*T.shape, 4))
+    points = [point]
+    for leg in legs:
+        point = quaternion_multiply(point, quaternion_from_rotation_vector(leg))
+        points.append(point)
+    return Bezier(
+        duration=T, start=quaternion_from_matrix(ends.R0), controls=np.stack(points, axis=-2)
+    )
+
+
+class CorrectedBezier(Bezier):
+    """The `Curve` of de Casteljau's construction, less its leading deviation from the optimum.
+
+    It is seen from the rotation half-way: there moving by −δ is exp(−δ̂/2) on both sides.
+    """
+
+    def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
+        """Return exp(−δ/4) Q exp(−δ/4), from four points and the coefficients of δ."""
+        points, deviation = controls[:4], controls[4:, 1:]
+        moved = exp([x / -4 for x in _clamped(deviation, t, order)])
+        return product(product(moved, super().quaternion(points, t, order)), moved)
+
+
+def _clamped(coefficients: Array, t: Array, order: int) -> Jet:
+    """Return the jet of t² (1 − t)² (c₀ + c₁ u + …), u = 2t − 1."""
+    s = 1 - t
+    bump: Jet = [t * t * s * s, 2 * t * s * (s - t), 2 - 12 * t * s, 12 * (t - s)]
+    powers: Jet = []
+    for _ in range(order + 1):
+        powers.append(sum(c * (t - s) ** k for k, c in enumerate(coefficients)))
+        coefficients = np.stack([2 * k * c for k, c in enumerate(coefficients)][1:])
+    return times(bump[: order + 1], powers)
