@@ -127,7 +127,8 @@ def render(found: dict[str, Entry]) -> str:
     for title, keys in GROUPS.items():
         rows = []
         for key in keys:
-            modules = {name.rsplit(".", 1)[0]: None for name in found[key].functions}
+            places = dict.fromkeys(map(_place, found[key].functions))
+            modules = sorted(places, key=lambda name: name.startswith("_"))  # these last
             lessons = {lesson[:2]: None for lesson in found[key].lessons}
             rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
         lines += ["", f"## {title}", ""]
@@ -146,6 +147,12 @@ def render(found: dict[str, Entry]) -> str:
     lines += _table(("", "where", "as printed in our copy", "what holds"), rows)
     lines.append("")
     return "\n".join(lines)
+
+
+def _place(function: str) -> str:
+    """Return the module of a function; in a folder, as `draw` and the classroom's, the folder."""
+    module = function.rsplit(".", 1)[0]
+    return module if module.startswith("optimum") else module.split(".")[0]
 
 
 def _table(head: tuple[str, ...], rows: Iterable[Iterable[str]]) -> list[str]:

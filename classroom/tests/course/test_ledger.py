@@ -27,8 +27,8 @@ def test_the_stored_ledger_is_fresh(found):
 
 def test_its_lines_can_be_read():
     entries = PAGE.partition("## Misprints")[0].splitlines()
-    assert max(map(len, entries)) <= 180
-    assert "| BK (16) | the angle θ(t) | projected_line, explorers.curves | 06 |" in entries
+    assert max(map(len, entries)) <= 160
+    assert "| BK (16) | the angle θ(t) | projected_line, explorers | 06 |" in entries
 
 
 def test_every_entry_has_function_test_and_lesson(found):
