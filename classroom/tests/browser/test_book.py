@@ -14,6 +14,7 @@ from pixels import shown
 ROOT = Path(__file__).parents[3]
 BOOK = ROOT / "book"
 PAGES = sorted(path.relative_to(BOOK).as_posix() for path in BOOK.rglob("*.html"))
+MOVED = [name for name in PAGES if 'http-equiv="refresh"' in (BOOK / name).read_text("utf-8")]
 LIVING = [name for name in PAGES if "<script>{" in (BOOK / name).read_text("utf-8")]
 
 # formulas that were not set, and whether they were set wrongly
@@ -96,11 +97,21 @@ def test_it_is_the_same_each_time(tmp_path):
     assert [x for x in files if (again / x).read_bytes() != (BOOK / x).read_bytes()] == []
 
 
+def test_a_page_that_moved_leads_to_its_new_address(page):
+    assert len(MOVED) >= 20
+    for name in MOVED:
+        page.goto((BOOK / name).as_uri())
+        page.wait_for_url(lambda url, old=name: not url.endswith(old))
+        assert page.title() not in ("", "Moved"), name
+
+
 @pytest.mark.parametrize("folder", sorted({name.rpartition("/")[0] for name in PAGES}))
 def test_pages_show_all_they_have_on_every_screen(folder, page):
     """Light and dark, on a desk and on a phone."""
     wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-    for name in (name for name in PAGES if name.rpartition("/")[0] == folder):
+    for name in PAGES:
+        if name in MOVED or name.rpartition("/")[0] != folder:
+            continue
         page.goto((BOOK / name).as_uri())
         assert page.evaluate(FORMULAS) == [], name
         for scheme in ("dark", "light"):
