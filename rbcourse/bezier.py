@@ -345,7 +345,7 @@ class Bezier(QuaternionCurve):
     """The `Curve` of de Casteljau's construction, geodesics in the place of straight lines."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return what the construction comes to from four control points."""
+        """Return the point of the construction, from four control points."""
         share = [identity(t, k) for k in range(order + 1)]
         points = [[point, *[np.zeros_like(point)] * order] for point in controls]
         while len(points) > 1:

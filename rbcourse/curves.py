@@ -288,7 +288,7 @@ class Curve:
     def values(self, t: Array, order: int) -> Array:
         """Return all curves of a stack with one axis, as if they took from 0 to 1.
 
-        This is all that a kind of curve has to say.
+        Each subclass defines this method.
 
         Parameters
         ----------

@@ -488,7 +488,9 @@ IMPORTED = {  # what is installed, and the modules that need more
 
 
 @pytest.mark.parametrize("case", IMPORTED)
-def test_wheels_import_completely_with_what_they_declare(wheel, classroom_wheel, tmp_path, case):
+def test_wheels_import_completely_with_their_declared_dependencies(
+    wheel, classroom_wheel, tmp_path, case
+):
     """In an environment that has nothing else: links to the distributions, and the wheels."""
     installed, without = IMPORTED[case]
     package = case.partition("[")[0]

@@ -362,7 +362,7 @@ class Optimum(Curve):
     functional: Functional
     series: Array  # of the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
     constant: Array  # c for the time from 0 to 1
-    found: NDArray[np.void]  # what is told of each problem, by `_FOUND`
+    found: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
 
     @property
     def c(self) -> Array:
