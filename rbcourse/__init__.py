@@ -8,6 +8,10 @@ timings θ and f, `rbcourse.textbook` the main algorithms as on the board.
 Every function raises ValueError, and names the argument, if an argument is not what its description
 says: not finite, of another shape, outside the stated range, not symmetric or not positive definite
 where that is stated, or if batch shapes do not broadcast. The docstrings name the other errors.
+
+Validity of rotation matrices and poses is not checked unless a docstring says so: `project_so` and
+`project_se` return the nearest valid ones. The last row of a pose is not read. Angles are in rad,
+lengths in m; angular velocities and twists (ω, v) are in the body frame, per unit of time.
 """
 
 from rbcourse import arm, connection, files, metrics, planar, projected_line, quaternion, sampling

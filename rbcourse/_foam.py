@@ -51,10 +51,8 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
     singular set of `project_so`; where an entry of M is not finite; and perhaps where ‖M‖ is
     extreme.
 
-    References
-    ----------
-    BK Prop. 2; F. L. Markley, Attitude determination using vector observations: a fast optimal
-    matrix algorithm, J. Astronautical Sciences 41, 1993.
+    Source: BK Prop. 2; F. L. Markley, Attitude determination using vector observations: a fast
+    optimal matrix algorithm, J. Astronautical Sciences 41, 1993.
 
     Examples
     --------

@@ -17,6 +17,8 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     with its ends the line has the least ∫ ‖x'‖² dt, the cubic the least ∫ ‖x''‖² dt, and the
     quintic the least ∫ ‖x'''‖² dt.
 
+    Source: BK 6, BK 6.2.
+
     Parameters
     ----------
     ends : sequence of array_like
@@ -30,10 +32,6 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     Returns
     -------
     ndarray
-
-    References
-    ----------
-    BK 6, BK 6.2.
 
     Examples
     --------

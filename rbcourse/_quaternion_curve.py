@@ -24,9 +24,7 @@ from rbcourse.curves import (
 class QuaternionCurve(Curve):
     """A `Curve` that is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
 
-    References
-    ----------
-    BK 1.
+    Source: BK 1.
     """
 
     start: Array  # the fixed rotation as a quaternion, shape (..., 4)

@@ -43,6 +43,8 @@ class Posture(NamedTuple):
 def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     """Return where the joints, the tip and the frames of the links are.
 
+    Source: RR 4.
+
     Parameters
     ----------
     q : array_like, shape (..., n)
@@ -56,15 +58,6 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     Posture
         ``joints``, shape (..., n + 1, 2), the tip last, and ``frames``, shape (..., n, 3), the
         planar poses of the links at their centres.
-
-    See Also
-    --------
-    arm_tip_jacobian : How fast the tip goes.
-    matrix_from_planar : The frames as matrices.
-
-    References
-    ----------
-    RR 4.
 
     Examples
     --------
@@ -86,6 +79,8 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the matrix that takes joint velocities to the velocity of the tip.
 
+    Source: RR 4.
+
     Parameters
     ----------
     q : array_like, shape (..., n)
@@ -104,10 +99,6 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     Singular set: where all links lie on one line, stretched or folded, the tip cannot move along
     it, and the rank is 1.
 
-    References
-    ----------
-    RR 4.
-
     Examples
     --------
     >>> arm_tip_jacobian([0, np.pi / 2]).round(12)
@@ -121,6 +112,8 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
 def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the two sets of joint angles that bring the tip of a two-link arm to a place.
+
+    Source: RR 4.
 
     Parameters
     ----------
@@ -144,10 +137,6 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     -----
     Singular set: where the links lie on one line both solutions are the same, up to full turns.
     Where equal links fold up, the tip is at the base whatever the first angle is; one is taken.
-
-    References
-    ----------
-    RR 4.
 
     Examples
     --------
@@ -176,6 +165,8 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
     """Return the path that takes each joint angle evenly from its start to its goal.
 
+    Source: RR 4.1, RR (20), RR (21), with errata 19.
+
     Parameters
     ----------
     start, goal : array_like, shape (..., n)
@@ -187,10 +178,6 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     -------
     ndarray, shape (steps + 1, ..., n)
         The first state is the start, the last one the goal, exactly.
-
-    References
-    ----------
-    RR 4.1, RR (20), RR (21), with errata 19.
 
     Examples
     --------
@@ -206,6 +193,8 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     """Return the path that a plan makes an arm go, one state more than commands.
 
+    Source: RR 4.2, RR (22), RR (23), with errata 20.
+
     Parameters
     ----------
     start : array_like, shape (..., n)
@@ -218,14 +207,6 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     -------
     ndarray, shape (commands + 1, ..., n)
         The first state is the start, exactly. Turns add up.
-
-    See Also
-    --------
-    save_plan, load_plan : Plans as files.
-
-    References
-    ----------
-    RR 4.2, RR (22), RR (23), with errata 20.
 
     Examples
     --------

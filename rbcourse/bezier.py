@@ -33,6 +33,8 @@ def bezier_so3(
 ) -> Bezier:
     """Return the cubic Bézier curve with these ends: de Casteljau's construction by geodesics.
 
+    Source: BK 1, its references 3 to 5.
+
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
@@ -66,10 +68,6 @@ def bezier_so3(
 
     Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
 
-    References
-    ----------
-    BK 1, its references 3 to 5.
-
     Examples
     --------
     >>> from rbcourse import exp_so3
@@ -87,6 +85,8 @@ def bezier_long_so3(
 ) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
+    Source: beyond BK 10.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like
@@ -100,20 +100,12 @@ def bezier_long_so3(
         A `Curve` that meets all four ends, with the control points of `bezier_so3`. Where the end
         velocities are large, it may cost less than that.
 
-    See Also
-    --------
-    bezier_so3 : The short way round.
-
     Notes
     -----
     Singular set: that of `bezier_so3`; and the two inner control points equal, where no axis is the
     other one, and the curve is that of `bezier_so3`.
 
     Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
-
-    References
-    ----------
-    beyond BK 10.
 
     Examples
     --------
@@ -131,6 +123,9 @@ def cumulative_bezier_so3(
 ) -> CumulativeBezier:
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
+    Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
+    quaternion curves with simple high order derivatives, SIGGRAPH 1995.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
@@ -144,21 +139,12 @@ def cumulative_bezier_so3(
         A `Curve` that meets all four ends: v₁ = w0/3, v₃ = w1/3, v₂ the shortest turn between, and
         β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³.
 
-    See Also
-    --------
-    bezier_so3 : De Casteljau's construction, from the same control points.
-
     Notes
     -----
     Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where v₂ is what `log_so3`
     chooses. The curve itself is smooth everywhere.
 
     Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
-
-    References
-    ----------
-    BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit quaternion
-    curves with simple high order derivatives, SIGGRAPH 1995.
 
     Examples
     --------
@@ -179,6 +165,8 @@ def corrected_bezier_so3(
 ) -> CorrectedBezier:
     """Return Bézier's curve less its leading deviation from the optimum.
 
+    Source: beyond BK 10.
+
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
@@ -194,12 +182,6 @@ def corrected_bezier_so3(
         A `Curve` that meets all four ends: R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B Bézier's
         curve, R_m = R0 exp(σ̂/2) the rotation half-way, and δ(t) of `bezier_deviation`.
 
-    See Also
-    --------
-    bezier_so3 : The curve without the correction.
-    minimum_acceleration_so3 : The optimum.
-    excess_estimate : How far above the optimum a curve is.
-
     Notes
     -----
     Near-optimal for small excursions: data s times as large have a relative excess over the
@@ -211,10 +193,6 @@ def corrected_bezier_so3(
     Singular set: that of `bezier_so3`, and where two logarithms are equally near.
 
     Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
-
-    References
-    ----------
-    beyond BK 10.
 
     Examples
     --------
@@ -288,6 +266,8 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
 
     The deviation, a rotation vector, is δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴), u = 2t − 1.
 
+    Source: beyond BK 10.
+
     Parameters
     ----------
     sigma, e, d : ndarray, shape (..., 3)
@@ -297,10 +277,6 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
     -------
     list of ndarray, shape (..., 3)
         c₀, …, c₄: sums of triple products a × (b × c); in the code ``sed`` is σ × (e × d).
-
-    References
-    ----------
-    beyond BK 10.
     """
     first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
     second = np.stack([sigma, sigma, e, sigma, sigma, e, sigma, e])

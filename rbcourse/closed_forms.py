@@ -42,6 +42,8 @@ def exponential_cubic_so3(
 ) -> ExponentialCubic:
     """Return R0 exp(σ̂(t)), σ(t) the cubic in exponential coordinates about R0 with these ends.
 
+    Source: BK 1, its reference 13.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
@@ -55,10 +57,6 @@ def exponential_cubic_so3(
         A `Curve` that meets all four ends: σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1)
         by `right_jacobian_inverse_so3`.
 
-    See Also
-    --------
-    projected_cubic_so3 : In the space of matrices.
-
     Notes
     -----
     Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
@@ -66,10 +64,6 @@ def exponential_cubic_so3(
     optimum among all curves that turn by this vector.
 
     Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
-
-    References
-    ----------
-    BK 1, its reference 13.
 
     Examples
     --------
@@ -89,6 +83,8 @@ def exponential_cubic_long_so3(
 ) -> ExponentialCubic:
     """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
 
+    Source: beyond BK 10.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like
@@ -101,18 +97,10 @@ def exponential_cubic_long_so3(
     ExponentialCubic
         A `Curve` that meets all four ends, with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1).
 
-    See Also
-    --------
-    exponential_cubic_so3 : The short way round.
-
     Notes
     -----
     Singular set: that of `exponential_cubic_so3`; and R0 = R1, where no axis is the other one, and
     the curve is that of `exponential_cubic_so3`.
-
-    References
-    ----------
-    beyond BK 10.
 
     Examples
     --------
@@ -130,6 +118,8 @@ def quaternion_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> QuaternionCubic:
     """Return the projection of a cubic in R⁴ on the unit quaternions: BK's idea in another space.
+
+    Source: BK 1, BK Remark 7.
 
     Parameters
     ----------
@@ -149,10 +139,6 @@ def quaternion_cubic_so3(
     ValueError
         From the curve, when called at a time when the cubic is zero, to rounding.
 
-    See Also
-    --------
-    projected_cubic_so3 : The same with matrices.
-
     Notes
     -----
     Singular set: R0 and R1 a half-turn apart, where q1 and −q1 are equally near: the one that
@@ -162,10 +148,6 @@ def quaternion_cubic_so3(
     and its cube.
 
     Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
-
-    References
-    ----------
-    BK 1, BK Remark 7.
 
     Examples
     --------
@@ -187,6 +169,8 @@ def cayley_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> CayleyCubic:
     """Return the cubic in Cayley's parameters about R0 with these ends.
+
+    Source: BK 1, its reference 8.
 
     Parameters
     ----------
@@ -210,20 +194,12 @@ def cayley_cubic_so3(
     ValueError
         If R0 and R1 are a half-turn apart, to rounding.
 
-    See Also
-    --------
-    exponential_cubic_so3 : The same in exponential coordinates.
-
     Notes
     -----
     Singular set: half-turns, which have no such parameters. No curve ever turns by 180° from R0,
     so near them it is a long way round: the cost grows without bound.
 
     Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
-
-    References
-    ----------
-    BK 1, its reference 8.
 
     Examples
     --------
@@ -254,6 +230,9 @@ def normal_cubic_so3(
     duration: ArrayLike = 1.0,
 ) -> NormalCubic:
     """Return the cubic with these ends in normal coordinates of a body's metric, to second order.
+
+    Source: beyond BK 7; R. Zimmermann, Hermite interpolation and data processing errors on
+    Riemannian matrix manifolds, SIAM Journal on Scientific Computing 2020.
 
     Parameters
     ----------
@@ -302,11 +281,6 @@ def normal_cubic_so3(
 
     Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
 
-    References
-    ----------
-    beyond BK 7; R. Zimmermann, Hermite interpolation and data processing errors on Riemannian
-    matrix manifolds, SIAM Journal on Scientific Computing 2020.
-
     Examples
     --------
     >>> from rbcourse import exp_so3
@@ -343,6 +317,8 @@ def exponential_quintic_so3(
 ) -> ExponentialQuintic:
     """Return R0 exp(σ̂(t)), σ(t) the quintic with these ends: near-optimal minimum jerk.
 
+    Source: beyond BK 8; the cubic is in BK 1, its reference 13.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
@@ -372,10 +348,6 @@ def exponential_quintic_so3(
     Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
     `log_so3` chooses. The curve itself is smooth everywhere. Moved ends give the moved curve; but
     run backwards, from R1 to R0, it is another one.
-
-    References
-    ----------
-    beyond BK 8; the cubic is in BK 1, its reference 13.
 
     Examples
     --------

@@ -23,6 +23,8 @@ __all__ = ["christoffel", "covariant_derivative", "geodesic_flow", "structure_co
 def structure_constants(basis: ArrayLike) -> Array:
     """Return C with [L_i, L_j] = C[k, i, j] L_k, summed over k, for a basis of a Lie algebra.
 
+    Source: BK 2.4, BK (2), BK (3).
+
     Parameters
     ----------
     basis : array_like, shape (m, n, n)
@@ -38,10 +40,6 @@ def structure_constants(basis: ArrayLike) -> Array:
     ValueError
         If `basis` is not finite or not of that shape, its matrices are linearly dependent, to one
         part in a million, or a commutator of two of them is, to rounding, no combination of them.
-
-    References
-    ----------
-    BK 2.4, BK (2), BK (3).
 
     Examples
     --------
@@ -73,6 +71,8 @@ def structure_constants(basis: ArrayLike) -> Array:
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols of a left-invariant metric in a left-invariant frame.
 
+    Source: BK 2.4, BK (8).
+
     Parameters
     ----------
     G : array_like, shape (..., m, m)
@@ -94,10 +94,6 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
         If an argument is not finite or not of that shape, `G` is not symmetric or is singular to
         rounding, or `basis` is not one of a Lie algebra.
 
-    See Also
-    --------
-    covariant_derivative : What they are for.
-
     Notes
     -----
     Koszul's formula, in which the products of the metric are constant and their derivatives
@@ -105,10 +101,6 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
 
     In a left-invariant frame the symbols are *not* symmetric in j and k, as those of coordinates
     are.
-
-    References
-    ----------
-    BK 2.4, BK (8).
 
     Examples
     --------
@@ -134,6 +126,8 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
 def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
     """Return the covariant derivative of a field x along a curve with the velocity v.
 
+    Source: BK 2.4, BK (8), BK (9).
+
     Parameters
     ----------
     gamma : array_like, shape (..., m, m, m)
@@ -149,10 +143,6 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
         x_dot[i] + gamma[i, j, k] v[j] x[k], summed over j and k. With x = v it is the acceleration
         (9), which vanishes along geodesics: (8), for the components of the velocity. With
         x_dot = 0 it is ∇_v x of left-invariant fields.
-
-    References
-    ----------
-    BK 2.4, BK (8), BK (9).
 
     Examples
     --------
@@ -172,6 +162,9 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
 
 def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
     """Return where the geodesics that start at A0 with the velocity v0 are at the times t.
+
+    Source: BK 2.4, BK (8); where the paper prints the equation with the second derivatives of
+    coordinates, which would need the symbols of these, not those of the left-invariant frame.
 
     Parameters
     ----------
@@ -212,11 +205,6 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     an eighth-order Runge–Kutta method at a relative tolerance of 3e-14. The members of a batch of
     N share its steps, a tenth of a rad where all moments are alike and shorter otherwise, and its
     tolerance: that of a single one may be up to √N times larger.
-
-    References
-    ----------
-    BK 2.4, BK (8); where the paper prints the equation with the second derivatives of coordinates,
-    which would need the symbols of these, not those of the left-invariant frame.
 
     Examples
     --------

@@ -14,6 +14,8 @@ from rbcourse.quaternion import canonical_quaternion
 def matrix_from_quaternion(q: ArrayLike) -> Array:
     """Return the rotation matrix R of a unit quaternion; q and −q give the same.
 
+    Source: RR 2.2.
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -23,14 +25,6 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         Its columns are the images of the three axes.
-
-    See Also
-    --------
-    quaternion_from_matrix : The inverse.
-
-    References
-    ----------
-    RR 2.2.
 
     Examples
     --------
@@ -48,6 +42,8 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     The ten products of two components of q are linear in R. They form the matrix 4 q qᵀ; its row
     with the largest diagonal entry is a multiple of q that never vanishes.
 
+    Source: BK Remark 7.
+
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
@@ -61,10 +57,6 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     Notes
     -----
     Singular set: half-turns, where `canonical_quaternion` says which of q and −q is returned.
-
-    References
-    ----------
-    BK Remark 7.
 
     Examples
     --------
@@ -80,6 +72,8 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
 def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     """Return the quaternion of the rotation by ‖w‖ about w: (cos a/2, sin(a/2) w/a), a = ‖w‖.
 
+    Source: BK 2.5, RR 2.2.
+
     Parameters
     ----------
     w : array_like, shape (..., 3)
@@ -89,14 +83,6 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4)
         Unit quaternions.
-
-    See Also
-    --------
-    exp_so3 : The same in matrices.
-
-    References
-    ----------
-    BK 2.5, RR 2.2.
 
     Examples
     --------
@@ -128,6 +114,8 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same.
 
+    Source: BK 2.5, RR 2.2.
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -138,17 +126,9 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps.
 
-    See Also
-    --------
-    log_so3 : The same from matrices.
-
     Notes
     -----
     Singular set: half-turns, where `canonical_quaternion` chooses the axis.
-
-    References
-    ----------
-    BK 2.5, RR 2.2.
 
     Examples
     --------
@@ -168,6 +148,8 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     Read from the left, each turn is about an axis of the *body*: first z, then the new y, then
     the newest x. Read from the right, each is about a *fixed* axis: first x, then y, then z.
 
+    Source: RR 2.1, RR (7), RR (8).
+
     Parameters
     ----------
     angles : array_like, shape (..., 3)
@@ -177,14 +159,6 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         Rotation matrices.
-
-    See Also
-    --------
-    zyx_from_matrix : The inverse.
-
-    References
-    ----------
-    RR 2.1, RR (7), RR (8).
 
     Examples
     --------
@@ -200,6 +174,8 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
 def zyx_from_matrix(R: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ).
 
+    Source: RR 2.1, RR (7), RR (8).
+
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
@@ -210,10 +186,6 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     ndarray, shape (..., 3)
         Angles in rad, as `zyx_from_quaternion` returns them. They give R back to a few eps, in
         gimbal lock to 40 eps.
-
-    References
-    ----------
-    RR 2.1, RR (7), RR (8).
 
     Examples
     --------
@@ -226,6 +198,8 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
 def quaternion_from_zyx(angles: ArrayLike) -> Array:
     """Return the quaternion q_z(α) q_y(β) q_x(γ): yaw, pitch and roll.
 
+    Source: RR 2.2, where α turns about x and γ about z.
+
     Parameters
     ----------
     angles : array_like, shape (..., 3)
@@ -235,14 +209,6 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4)
         Unit quaternions.
-
-    See Also
-    --------
-    matrix_from_zyx : The same in matrices, and how to read it.
-
-    References
-    ----------
-    RR 2.2, where α turns about x and γ about z.
 
     Examples
     --------
@@ -262,6 +228,9 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Of the half angles only two combinations enter: w + y and z − x are multiples of the cosine and
     the sine of (α − γ)/2, w − y and z + x of those of (α + γ)/2, and β weighs the two.
 
+    Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
+    17(11), 2022.
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -278,11 +247,6 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Singular set: gimbal lock, β = ±π/2. The axes of α and γ coincide, and only α − γ, or α + γ for
     β = −π/2, is determined. There γ = 0 is returned; what is nearer than 16 eps to it counts as
     locked. Close to it α and γ are accurate to eps over the distance, their combination to eps.
-
-    References
-    ----------
-    RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE 17(11),
-    2022.
 
     Examples
     --------

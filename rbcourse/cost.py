@@ -33,6 +33,9 @@ def acceleration_cost(
 ) -> Array:
     """Return L_a, the integral of the squared acceleration in metric (12) or (14), or of a body.
 
+    Source: BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for
+    other inertias beyond BK 1.
+
     Parameters
     ----------
     curve : Curve
@@ -84,11 +87,6 @@ def acceleration_cost(
     On SE(3) the two parts have different units; their sum, and any ratio of sums, depends on the
     unit of length, unless inertia and mass are those of a body.
 
-    References
-    ----------
-    BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for other
-    inertias beyond BK 1.
-
     Examples
     --------
     >>> from rbcourse import exp_so3, geodesic_so3, projected_line_so3
@@ -115,6 +113,8 @@ def acceleration_cost_parts(
 ) -> tuple[Array, Array]:
     """Return the two parts of `acceleration_cost`: of the rotation, and of the translation.
 
+    Source: BK (18); for other inertias beyond BK 1.
+
     Parameters
     ----------
     curve : Curve
@@ -133,10 +133,6 @@ def acceleration_cost_parts(
     ------
     ValueError, RuntimeError
         As `acceleration_cost`.
-
-    References
-    ----------
-    BK (18); for other inertias beyond BK 1.
 
     Examples
     --------
@@ -167,6 +163,8 @@ def acceleration_cost_parts(
 def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Array:
     """Return the integral of the squared torque on a body that turns so.
 
+    Source: beyond BK 4.
+
     Parameters
     ----------
     curve : Curve
@@ -188,14 +186,6 @@ def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Arr
     RuntimeError
         As `acceleration_cost`.
 
-    See Also
-    --------
-    minimum_torque_so3 : The curve for which it is least.
-
-    References
-    ----------
-    beyond BK 4.
-
     Examples
     --------
     >>> from rbcourse import exp_so3, geodesic_so3
@@ -212,6 +202,8 @@ def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Arr
 
 def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     """Return the integral of the squared covariant jerk in metric (12).
+
+    Source: beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
 
     Parameters
     ----------
@@ -232,18 +224,10 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     RuntimeError
         As `acceleration_cost`, or if the acceleration of a `chain` jumps.
 
-    See Also
-    --------
-    minimum_jerk_so3 : The curve for which it is least.
-
     Notes
     -----
     w'' + ½ w × w' is the covariant derivative of the acceleration. With ∫ 2 ‖w''‖² dt a motion and
     the motion seen from the body, Rᵀ(t), would cost different amounts.
-
-    References
-    ----------
-    beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
 
     Examples
     --------

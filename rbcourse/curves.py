@@ -40,16 +40,14 @@ class Ends(_Ends):
 
     It is a tuple, so that the makers of curves take it as ``make(*ends)``.
 
+    Source: BK 6.2.
+
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices. Validity is not checked; see `project_so`.
     w0, w1 : array_like, shape (..., 3)
         Angular velocities, body frame, in rad per unit time.
-
-    References
-    ----------
-    BK 6.2.
 
     Examples
     --------
@@ -133,6 +131,8 @@ class Curve:
     ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed as an array of that
     shape is: ``c[2]`` is its third curve. All array attributes begin with the axes of the stack.
 
+    Source: BK (1), BK (9), BK 6.
+
     Attributes
     ----------
     duration : ndarray, shape (...)
@@ -141,10 +141,6 @@ class Curve:
         The shape of the stack; ``()`` for a single curve.
     domain : tuple of float
         The first and the last time; of a stack, the times that all curves have; of none, all.
-
-    References
-    ----------
-    BK (1), BK (9), BK 6.
     """
 
     duration: Array
@@ -339,16 +335,14 @@ class Curve:
 class AlongGeodesic(Curve):
     """The `Curve` R0 exp(σ̂ p(t)) on the geodesic from R0 to R0 exp(σ̂); here p(t) = t.
 
+    Source: BK 6.1.
+
     Attributes
     ----------
     R0 : ndarray, shape (..., 3, 3)
         The start.
     rotation_vector : ndarray, shape (..., 3)
         σ, which turns R0 into the goal; body frame, in rad.
-
-    References
-    ----------
-    BK 6.1.
     """
 
     rotation_vector: Array
@@ -413,6 +407,8 @@ def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
 def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> AlongGeodesic:
     """Return the shortest curve from R0 to R1, at constant angular velocity.
 
+    Source: BK 6.1.
+
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
@@ -436,10 +432,6 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     Singular set: between rotations a half-turn apart two geodesics are shortest. The one about the
     axis whose component of largest magnitude (the first of equals, body frame) is positive is
     returned; read it in ``rotation_vector``. R0 = R1 gives the constant curve.
-
-    References
-    ----------
-    BK 6.1.
 
     Examples
     --------
@@ -490,10 +482,6 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     ValueError
         If `curve` is no `Curve`, `duration` is not from 1e-100 up or does not broadcast with the
         stack, or vanishes beside the first time.
-
-    See Also
-    --------
-    chain : Through many poses, at times of your own.
 
     Examples
     --------

@@ -29,6 +29,8 @@ SPEED_LIMIT = 2.5
 def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Array:
     """Return the leading term of a closed form's excess over the optimum, from the ends alone.
 
+    Source: beyond BK 10; docs/near_optimal.md derives E.
+
     Parameters
     ----------
     name : str
@@ -50,10 +52,6 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     ValueError
         If `name` is not one of these.
 
-    See Also
-    --------
-    excess_estimate : Closer, by the curve, and for larger excursions.
-
     Notes
     -----
     Domain: small excursions. The relative error falls with the square of their size, for
@@ -63,10 +61,6 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     smaller than is usual for such data, as for velocities along σ, it can be larger.
 
     Singular set: R0 and R1 a half-turn apart, where σ is what `log_so3` chooses.
-
-    References
-    ----------
-    beyond BK 10; docs/near_optimal.md derives E.
 
     Examples
     --------
@@ -113,6 +107,8 @@ def _forms() -> dict[str, tuple[Array, Array]]:
 def excess_estimate(curve: Curve) -> Array:
     """Return about how far above the optimum with the same ends a curve is, without solving.
 
+    Source: beyond BK 11; BK (19).
+
     Parameters
     ----------
     curve : Curve
@@ -151,10 +147,6 @@ def excess_estimate(curve: Curve) -> Array:
     order the fourth derivative of its deviation δ from the optimum, with δ = δ' = 0 at both ends.
     So δ'' is the second integral of r without its linear part, and ∫ ‖δ''‖² what it costs too much,
     all vectors carried parallel to the rotation half-way.
-
-    References
-    ----------
-    beyond BK 11; BK (19).
 
     Examples
     --------

@@ -71,11 +71,6 @@ def write_path(
     ValueError
         If an argument is malformed, or the format cannot hold it; nothing is written.
 
-    See Also
-    --------
-    read_path : The inverse.
-    save_plan : For commands.
-
     Notes
     -----
     CSV: a line of names with their units and, for velocities, the frame; then a line for each time:
@@ -138,10 +133,6 @@ def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
     OSError
         If it cannot be read.
 
-    See Also
-    --------
-    chain : The curve through such poses.
-
     Notes
     -----
     Quaternions in files of other programs have few digits: the nearest unit quaternion is used.
@@ -167,6 +158,8 @@ def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
 def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     """Write a plan as CSV: a line of names with their units, then a line for each command.
 
+    Source: RR 3.2, RR 4.2.
+
     Parameters
     ----------
     file : str or Path
@@ -182,15 +175,6 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     ------
     ValueError
         If the plan or a command is malformed, or the kind is unknown; nothing is written.
-
-    See Also
-    --------
-    load_plan : The inverse; it returns the same numbers.
-    propagate_planar, propagate_joints : What comes of a plan.
-
-    References
-    ----------
-    RR 3.2, RR 4.2.
     """
     commands = as_plan(plan, "n")  # how many joints there are, the first of them tells
     names = _velocities(kind, commands[0][0].size if commands else 0)
@@ -200,6 +184,8 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
 
 def load_plan(file: str | Path, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote; all of it, or nothing.
+
+    Source: RR 3.2, RR 4.2.
 
     Parameters
     ----------
@@ -219,10 +205,6 @@ def load_plan(file: str | Path, kind: str) -> Commands:
         If there is anything else in the file; the message gives the line and the reason.
     OSError
         If it cannot be read.
-
-    References
-    ----------
-    RR 3.2, RR 4.2.
     """
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))

@@ -40,6 +40,8 @@ METRIC_SO3.flags.writeable = METRIC_SE3.flags.writeable = False
 def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors of GL(n) at one point: the sum of the products of entries.
 
+    Source: BK 3.1, BK (11), BK Prop. 1.
+
     Parameters
     ----------
     X, Y : array_like, shape (..., n, n)
@@ -48,18 +50,10 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     -------
     ndarray, shape (...)
 
-    See Also
-    --------
-    inner_left_invariant : Any metric that moves along with the body.
-
     Notes
     -----
     Invariant under rotations and reflections on either side: ``inner_gl(L @ X @ R, L @ Y @ R)`` is
     the same. Not under other matrices.
-
-    References
-    ----------
-    BK 3.1, BK (11), BK Prop. 1.
 
     Examples
     --------
@@ -74,14 +68,12 @@ def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
 
     Arguments, result and errors are those of `inner_gl`, for n = 3.
 
+    Source: BK 3.1, BK (12), BK Prop. 1, BK Remark 1, BK Remark 2.
+
     Notes
     -----
     Invariant under rotations on both sides. It is twice the kinetic energy of a ball with the
     moment of inertia 2.
-
-    References
-    ----------
-    BK 3.1, BK (12), BK Prop. 1, BK Remark 1, BK Remark 2.
 
     Examples
     --------
@@ -96,9 +88,7 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
 
     Arguments, result and errors are those of `inner_gl`, for matrices of size n + 1.
 
-    References
-    ----------
-    BK 3.2, BK (13).
+    Source: BK 3.2, BK (13).
 
     Examples
     --------
@@ -113,14 +103,12 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
 
     Arguments, result and errors are those of `inner_gl`, for n = 4.
 
+    Source: BK 3.2, BK (14), BK Remark 3, BK Remark 4, BK Remark 5.
+
     Notes
     -----
     Invariant under poses on the left; on the right under rotations only. It is twice the kinetic
     energy of a ball of mass 1 and moment of inertia 2 whose centre is the body's origin.
-
-    References
-    ----------
-    BK 3.2, BK (14), BK Remark 3, BK Remark 4, BK Remark 5.
 
     Examples
     --------
@@ -134,6 +122,8 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike) -> Array:
     """Return ⟨X, Y⟩ at A of the left-invariant metric with the matrix G: xᵀ G y.
 
+    Source: BK 2.3, BK (6), BK (7).
+
     Parameters
     ----------
     G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
@@ -146,15 +136,6 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     Returns
     -------
     ndarray, shape (...)
-
-    See Also
-    --------
-    METRIC_SO3, METRIC_SE3 : The metrics that the trace induces.
-    semi_riemannian_metric_se3 : The one whose geodesics are screws.
-
-    References
-    ----------
-    BK 2.3, BK (6), BK (7).
 
     Examples
     --------
@@ -173,6 +154,8 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     """Return [[alpha I, beta I], [beta I, 0]]: invariant on both sides, and indefinite.
 
+    Source: BK 2.6, BK (10).
+
     Parameters
     ----------
     alpha, beta : float
@@ -184,10 +167,6 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     ndarray, shape (6, 6)
         With three positive and three negative eigenvalues: the "length" of a motion can be 0 or
         imaginary, and its geodesics are screws.
-
-    References
-    ----------
-    BK 2.6, BK (10).
 
     Examples
     --------
@@ -205,6 +184,8 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     """Return the tangent vector X = A hat(x): the left-invariant field of x, at A.
 
+    Source: BK 2.2, BK (4), BK (5).
+
     Parameters
     ----------
     A : array_like, shape (..., 3, 3) or (..., 4, 4)
@@ -215,14 +196,6 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3) or (..., 4, 4)
-
-    See Also
-    --------
-    components_from_tangent : The inverse.
-
-    References
-    ----------
-    BK 2.2, BK (4), BK (5).
 
     Examples
     --------
@@ -239,6 +212,8 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     """Return the components x of a tangent vector X at A: vee(A⁻¹ X), with Rᵀ for R⁻¹.
 
+    Source: BK 2.2, BK (1), BK (5).
+
     Parameters
     ----------
     A : array_like, shape (..., 3, 3) or (..., 4, 4)
@@ -250,14 +225,6 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3) or (..., 6)
         Angular velocities, or twists (ω, v), body frame. Those of A' are the velocity of BK (1).
-
-    See Also
-    --------
-    tangent_from_components : The inverse.
-
-    References
-    ----------
-    BK 2.2, BK (1), BK (5).
 
     Examples
     --------
@@ -286,10 +253,6 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
     ndarray, shape (..., 3, 3)
         diag(b² + c², c² + a², a² + b²) m/12, in kg m², in body axes.
 
-    See Also
-    --------
-    weight_from_inertia : The weight W of the metric of this body.
-
     Examples
     --------
     >>> box_inertia([1, 2, 3], 12)
@@ -310,6 +273,8 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
 def inertia_from_weight(W: ArrayLike) -> Array:
     """Return tr(W) I − W: the metric that tr(XᵀY W) induces on SO(3).
 
+    Source: BK 3, for the metrics that the paper leaves to a later publication.
+
     Parameters
     ----------
     W : array_like, shape (..., 3, 3)
@@ -319,15 +284,6 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         The matrix G of the metric; of a body, its inertia about the origin.
-
-    See Also
-    --------
-    weight_from_inertia : The inverse, and which metrics are reached.
-    project_so_weighted : The nearest rotation in that metric.
-
-    References
-    ----------
-    BK 3, for the metrics that the paper leaves to a later publication.
 
     Examples
     --------
@@ -342,6 +298,8 @@ def inertia_from_weight(W: ArrayLike) -> Array:
 
 def weight_from_inertia(G: ArrayLike) -> Array:
     """Return the weight W with tr(W) I − W = G: tr(G)/2 I − G.
+
+    Source: BK 3, for the metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
@@ -359,20 +317,12 @@ def weight_from_inertia(G: ArrayLike) -> Array:
         If `G` is not finite, not of that shape, not symmetric, or its eigenvalues, the principal
         moments of inertia, do not satisfy the triangle inequality.
 
-    See Also
-    --------
-    inertia_from_weight : The inverse.
-
     Notes
     -----
     Every body satisfies the inequality, because each eigenvalue of W is ∫ x² dm along an axis. A
     flat body reaches equality: the eigenvalue across it is 0, and W has rank 2. A rod without
     thickness has the moments 0, I, I, and a W of rank 1. A G that violates the inequality belongs
     to no body, and no W without negative eigenvalues induces it.
-
-    References
-    ----------
-    BK 3, for the metrics that the paper leaves to a later publication.
 
     Examples
     --------

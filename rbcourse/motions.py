@@ -30,6 +30,8 @@ from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
 class RigidMotion(Curve):
     """The `Curve` on SE(3) of a rotation R(t) and a polynomial path d(t) of a point of the body.
 
+    Source: BK 6.3.
+
     Attributes
     ----------
     rotation : Curve
@@ -39,10 +41,6 @@ class RigidMotion(Curve):
         from 0 to 1: in m, fixed frame; of the point `centre`.
     centre : ndarray, shape (..., 3)
         The point of the body that the path is of, body frame, in m; 0 is the origin.
-
-    References
-    ----------
-    BK 6.3.
     """
 
     rotation: Curve
@@ -130,6 +128,8 @@ def rigid_motion(
 def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> RigidMotion:
     """Return the shortest curve from A0 to A1 in metric (14): turn and straight line at once.
 
+    Source: BK 2.6, BK (14).
+
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
@@ -150,10 +150,6 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     Notes
     -----
     Singular set: half-turns, as for `geodesic_so3`.
-
-    References
-    ----------
-    BK 2.6, BK (14).
 
     Examples
     --------
@@ -182,6 +178,8 @@ def projected_cubic_se3(
 ) -> ProjectedMotion:
     """Return the near-optimal minimum-acceleration motion: projected cubic, and a cubic in R³.
 
+    Source: BK 6.3, BK Prop. 5.
+
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
@@ -205,17 +203,9 @@ def projected_cubic_se3(
     RuntimeWarning
         If ``margin`` is below 1e-6.
 
-    See Also
-    --------
-    minimum_acceleration_se3 : The optimum with the same ends.
-
     Notes
     -----
     Singular set: as for `projected_cubic_so3`.
-
-    References
-    ----------
-    BK 6.3, BK Prop. 5.
 
     Examples
     --------
@@ -246,6 +236,8 @@ def minimum_acceleration_se3(
     duration: ArrayLike = 1.0,
 ) -> RigidMotion:
     """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic.
+
+    Source: BK 6.3; for bodies beyond BK 9.
 
     Parameters
     ----------
@@ -295,10 +287,6 @@ def minimum_acceleration_se3(
     mass r, d_c = d + R r. So the ends become those of the centre, d_c' = d' + R (w × r), and its
     path is a cubic; the origin runs round it.
 
-    References
-    ----------
-    BK 6.3; for bodies beyond BK 9.
-
     Examples
     --------
     >>> from rbcourse import pose_from_coordinates
@@ -320,6 +308,8 @@ def minimum_acceleration_se3(
 
 def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
     """Return the screw motion from A0 to A1: about one axis, at constant twist.
+
+    Source: BK 2.6.
 
     Parameters
     ----------
@@ -348,10 +338,6 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
     the origin does not depend on how the body turns. And it depends on which point of the body is
     called the origin only as its displacement does: every point runs on a helix about the axis.
 
-    References
-    ----------
-    BK 2.6.
-
     Examples
     --------
     >>> A1 = exp_se3([0, 0, np.pi, 0, -np.pi, 2])  # half round the line x = 1, 2 m up
@@ -373,6 +359,8 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
 class ScrewMotion(Curve):
     """The `Curve` A0 exp_se3(S t), of constant twist S.
 
+    Source: BK 2.6.
+
     Attributes
     ----------
     A0 : ndarray, shape (..., 4, 4)
@@ -381,10 +369,6 @@ class ScrewMotion(Curve):
         S times the duration.
     twist : ndarray, shape (..., 6)
         S = (ω, v), body frame.
-
-    References
-    ----------
-    BK 2.6.
     """
 
     A0: Array
@@ -413,6 +397,8 @@ class ScrewMotion(Curve):
 def screw_from_pose(A: ArrayLike) -> Screw:
     """Return the screw of a displacement, in the fixed frame: axis, point, angle and slide.
 
+    Source: BK 2.6.
+
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
@@ -424,20 +410,12 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     Screw
         ``axis``, ``point``, ``angle`` and ``slide``, and their ``pitch``.
 
-    See Also
-    --------
-    screw_se3 : The motion about this screw.
-
     Notes
     -----
     Singular set: a half-turn has two screws, the axis of `log_so3` is taken. Where nothing turns
     no axis is distinguished; what turns by rounding only, less than 8 eps, counts as a slide alone.
     Near there axis, slide and pitch are uncertain by a few eps over the angle, relatively, and the
     point, far away, by a few eps ‖d‖ over its square.
-
-    References
-    ----------
-    BK 2.6.
 
     Examples
     --------

@@ -36,6 +36,8 @@ def chain(
 ) -> Chain:
     """Return a curve that is at given poses at given times, joined by two-point curves.
 
+    Source: BK 6, BK 6.3.
+
     Parameters
     ----------
     times : array_like, shape (N,)
@@ -105,10 +107,6 @@ def chain(
 
     Singular set: that of the legs; half-turns between neighbours are refused, as they leave open
     which way to turn. Where a leg is to turn by more than that, put a pose between.
-
-    References
-    ----------
-    BK 6, BK 6.3.
 
     Examples
     --------
@@ -330,10 +328,6 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     ValueError
         If times do not increase, a matrix is no pose or no rotation, or neighbours are a half-turn
         apart, to 1e-6.
-
-    See Also
-    --------
-    chain : The curve; it takes these velocities but at its ends, where it rests.
 
     Notes
     -----

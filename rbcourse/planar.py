@@ -35,6 +35,8 @@ Commands: TypeAlias = list[tuple[Array, float]]
 def matrix_from_planar(pose: ArrayLike) -> Array:
     """Return the matrices [[cos θ, −sin θ, x], [sin θ, cos θ, y], [0, 0, 1]] of planar poses.
 
+    Source: RR 3.1.
+
     Parameters
     ----------
     pose : array_like, shape (..., 3)
@@ -44,14 +46,6 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3, 3)
         Elements of SE(2); they carry coordinates of the body to those of the world.
-
-    See Also
-    --------
-    planar_from_matrix : The inverse, up to multiples of 2π.
-
-    References
-    ----------
-    RR 3.1.
 
     Examples
     --------
@@ -72,6 +66,8 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
 def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices.
 
+    Source: RR 3.1.
+
     Parameters
     ----------
     A : array_like, shape (..., 3, 3)
@@ -88,10 +84,6 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     Singular set: blocks [[a, b], [b, −a]], reflections and zero among them, to which no rotation
     is nearest; theta is 0 there. At θ = ±π the sign is that of the rounding.
 
-    References
-    ----------
-    RR 3.1.
-
     Examples
     --------
     >>> planar_from_matrix([[0, -1, 4], [1, 0, 5], [0, 0, 1]]).round(4)
@@ -107,6 +99,8 @@ def planar_from_matrix(A: ArrayLike) -> Array:
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     """Return the pose that is `step`, seen from `pose`: the product of the two, turns kept.
 
+    Source: RR 3.2.
+
     Parameters
     ----------
     pose : array_like, shape (..., 3)
@@ -118,10 +112,6 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3)
         In the frame of the world. Its matrix is the product of theirs, and the angles add up.
-
-    References
-    ----------
-    RR 3.2.
 
     Examples
     --------
@@ -137,6 +127,8 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
 def inverse_planar(pose: ArrayLike) -> Array:
     """Return the pose of the world, seen from the body.
 
+    Source: RR 3.2.
+
     Parameters
     ----------
     pose : array_like, shape (..., 3)
@@ -146,10 +138,6 @@ def inverse_planar(pose: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 3)
         In the frame of the body: `compose_planar` of the two is (0, 0, 0).
-
-    References
-    ----------
-    RR 3.2.
 
     Examples
     --------
@@ -164,6 +152,8 @@ def inverse_planar(pose: ArrayLike) -> Array:
 def exp_planar(S: ArrayLike) -> Array:
     """Return the pose that the constant body twist S reaches from (0, 0, 0) in unit time.
 
+    Source: RR 3.2.
+
     Parameters
     ----------
     S : array_like, shape (..., 3)
@@ -176,19 +166,10 @@ def exp_planar(S: ArrayLike) -> Array:
         (x, y, omega): an arc of the angle omega was run through. (x, y) is its chord, that is
         (vx, vy), turned by omega/2, times sin(omega/2) / (omega/2).
 
-    See Also
-    --------
-    log_planar : The inverse.
-    exp_se3 : The same in space, where the angular part stands first.
-
     Notes
     -----
     No singular set; omega = 0 gives the translation exactly. `matrix_from_planar` of it is the
     exponential of the matrix [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]].
-
-    References
-    ----------
-    RR 3.2.
 
     Examples
     --------
@@ -204,6 +185,8 @@ def exp_planar(S: ArrayLike) -> Array:
 def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist that reaches a pose from (0, 0, 0) in unit time, by the short way.
 
+    Source: RR 3.1.
+
     Parameters
     ----------
     pose : array_like, shape (..., 3)
@@ -218,10 +201,6 @@ def log_planar(pose: ArrayLike) -> Array:
     -----
     Singular set: half-turns, which two twists reach. π itself is to the left, −π to the right;
     beyond, rounding decides.
-
-    References
-    ----------
-    RR 3.1.
 
     Examples
     --------
@@ -239,6 +218,8 @@ def interpolate_planar(
 ) -> Array:
     """Return the path from one pose to another that blends x, y and theta evenly.
 
+    Source: RR 3.1, RR (14), RR (15), RR (16).
+
     Parameters
     ----------
     start, goal : array_like, shape (..., 3)
@@ -255,10 +236,6 @@ def interpolate_planar(
         The first pose is the start, the last one the goal, exactly; with `shortest` its theta may
         differ from the goal's by full turns.
 
-    See Also
-    --------
-    propagate_planar : With ``frame="body"`` and the twist of `log_planar`, the other natural way.
-
     Notes
     -----
     The place goes straight at constant speed and the body turns at a constant rate. Which point
@@ -266,10 +243,6 @@ def interpolate_planar(
 
     Singular set of `shortest`: angles that differ by half a turn, where either way is as short.
     From 0, π is to the left and −π to the right; beyond, rounding decides.
-
-    References
-    ----------
-    RR 3.1, RR (14), RR (15), RR (16).
 
     Examples
     --------
@@ -289,6 +262,8 @@ def interpolate_planar(
 
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
     """Return the path that a plan makes a planar body go, one state more than commands.
+
+    Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Parameters
     ----------
@@ -312,19 +287,11 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
         If the start is not finite or not of that shape, `frame` is neither of the two, or a
         command is malformed; the message says which and why.
 
-    See Also
-    --------
-    save_plan, load_plan : Plans as files.
-
     Notes
     -----
     In the world's frame a command adds velocity times duration. In the body's it is a constant
     twist, and the body runs through an arc, or a line: `exp_planar`, no small steps. The path has
     the ends of the commands only; cut a command into shorter ones to see what is between them.
-
-    References
-    ----------
-    RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
     --------

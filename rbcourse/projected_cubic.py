@@ -28,6 +28,8 @@ from rbcourse.so3 import hat
 class ProjectedPolynomial(Curve):
     """The `Curve` of the nearest rotations to a polynomial M(t) in the space of matrices.
 
+    Source: BK 6, BK 6.2.
+
     Attributes
     ----------
     ends : ndarray, shape (..., n, 3, 3)
@@ -39,10 +41,6 @@ class ProjectedPolynomial(Curve):
         of a poor cubic, a large one certifies nothing (see docs/near_optimal.md).
     margin_time : ndarray, shape (...)
         When that is.
-
-    References
-    ----------
-    BK 6, BK 6.2.
     """
 
     ends: Array
@@ -101,6 +99,8 @@ def projected_cubic_so3(
 ) -> ProjectedPolynomial:
     """Return the projection of the cubic with these ends: near-optimal minimum acceleration.
 
+    Source: BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
@@ -142,10 +142,6 @@ def projected_cubic_so3(
 
     Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1.
 
-    References
-    ----------
-    BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
-
     Examples
     --------
     >>> from rbcourse import exp_so3
@@ -170,6 +166,8 @@ def weighted_cubic_so3(
     duration: ArrayLike = 1.0,
 ) -> ProjectedPolynomial:
     """Return the projection of the cubic with these ends in the metric of a body's inertia.
+
+    Source: BK 6.2, BK Prop. 3; beyond BK 6: the paper leaves such metrics to a later publication.
 
     Parameters
     ----------
@@ -215,10 +213,6 @@ def weighted_cubic_so3(
 
     Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 and Qᵀ G Q.
 
-    References
-    ----------
-    BK 6.2, BK Prop. 3; beyond BK 6: the paper leaves such metrics to a later publication.
-
     Examples
     --------
     >>> from rbcourse import exp_so3
@@ -247,6 +241,8 @@ def projected_quintic_so3(
     duration: ArrayLike = 1.0,
 ) -> ProjectedPolynomial:
     """Return the projection of the quintic with these ends: a curve with given accelerations.
+
+    Source: BK 6, BK Prop. 3.
 
     Parameters
     ----------
@@ -281,10 +277,6 @@ def projected_quintic_so3(
     the optimum for a turn by 60°, and 11.6 times for 120°.
 
     Singular set and invariance: as for `projected_cubic_so3`.
-
-    References
-    ----------
-    BK 6, BK Prop. 3.
 
     Examples
     --------

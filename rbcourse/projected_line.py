@@ -39,15 +39,13 @@ _PI_REST = 1.2246467991473532e-16  # π − np.pi
 class ProjectedLine(AlongGeodesic):
     """The projection of a straight line between two rotations: p(t) = θ(f(t)).
 
+    Source: BK Prop. 6, BK (15), BK (17).
+
     Attributes
     ----------
     margin : ndarray, shape (...)
         The least sum, over the line, of the two smallest eigenvalues of RᵀM, M on the line and R
         its projection: 2 cos(‖σ‖/2). At 0 the projection of the middle is not unique.
-
-    References
-    ----------
-    BK Prop. 6, BK (15), BK (17).
     """
 
     timing: Progress
@@ -117,6 +115,8 @@ def projected_line_so3(
 ) -> ProjectedLine:
     """Return the projection on SO(3) of the line R0 + (R1 − R0) f(t), in closed form.
 
+    Source: BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
+
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
@@ -157,10 +157,6 @@ def projected_line_so3(
     curve raises at that time. Near it the projection is accurate to eps over the sum of the two
     smallest eigenvalues of RᵀM, which ``margin`` bounds from below.
 
-    References
-    ----------
-    BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
-
     Examples
     --------
     >>> from rbcourse import exp_so3, log_so3
@@ -196,6 +192,8 @@ def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     """Return s(t): the line (1 − t) I + t R2 has the singular values 1, s(t), s(t).
 
+    Source: BK (17).
+
     Parameters
     ----------
     t : array_like
@@ -213,10 +211,6 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     It vanishes at t = 1/2, angle π only: the middle of the line between rotations a half-turn
     apart has no unique nearest rotation.
 
-    References
-    ----------
-    BK (17).
-
     Examples
     --------
     >>> line_singular_value([0, 0.5, 1], np.pi / 2).round(3)
@@ -230,6 +224,9 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
     The nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)). For a line that is run
     through as f(t), θ is ``theta(f(t), angle)``.
+
+    Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², where the paper
+    prints s, with s from BK (17).
 
     Parameters
     ----------
@@ -246,19 +243,10 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
         θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)); or a
         derivative, accurate to a few eps relative.
 
-    See Also
-    --------
-    f : The inverse function of t.
-
     Notes
     -----
     Angle 0: the limit, θ(t) = t. Angle π is singular: θ is 0 before t = 1/2, 1/2 there and 1 after
     it. `numpy.pi` is less than π by 1.2e-16, so there the jump has the finite slope 1e16.
-
-    References
-    ----------
-    BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², where the paper prints
-    s, with s from BK (17).
 
     Examples
     --------
@@ -280,6 +268,8 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     It is the inverse of `theta`: theta(f(t)) = t. Rounding f disturbs that by up to
     eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, the greatest slope of θ.
 
+    Source: BK Cor. 2.
+
     Parameters
     ----------
     t : array_like
@@ -295,18 +285,10 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
         f = sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)), or a derivative; accurate to a few eps
         relative.
 
-    See Also
-    --------
-    theta : The inverse function of t.
-
     Notes
     -----
     Angle 0: the limit, f(t) = t. Angle π is singular: f is 0 at t = 0, 1 at t = 1, and 1/2 at all
     times between. `numpy.pi` is less than π by 1.2e-16, so there f' is about 1e16 at the ends.
-
-    References
-    ----------
-    BK Cor. 2.
 
     Examples
     --------

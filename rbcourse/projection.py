@@ -25,6 +25,8 @@ NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see marg
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """Tell which matrices are rotations: MᵀM = I and det M = 1.
 
+    Source: RR 1.1, RR (1), RR (2); BK 2.1.
+
     Parameters
     ----------
     M : array_like, shape (..., n, n)
@@ -35,14 +37,6 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (...)
-
-    See Also
-    --------
-    project_so : The nearest rotation of what fails.
-
-    References
-    ----------
-    RR 1.1, RR (1), RR (2); BK 2.1.
 
     Examples
     --------
@@ -59,6 +53,8 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """Tell which matrices are poses [[R, d], [0, 1]], R a rotation and d finite.
 
+    Source: RR 1.3; BK 2.1.
+
     Parameters
     ----------
     A : array_like, shape (..., n + 1, n + 1)
@@ -69,14 +65,6 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (...)
-
-    See Also
-    --------
-    project_se : The nearest pose of what fails.
-
-    References
-    ----------
-    RR 1.3; BK 2.1.
 
     Examples
     --------
@@ -92,6 +80,10 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 
 def project_so(M: ArrayLike) -> Array:
     """Return the rotation nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
+
+    Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. Many 3 × 3 matrices are
+    projected by FOAM (see `rbcourse._foam`); few, those near the singular set, and those of other
+    sizes by the SVD.
 
     Parameters
     ----------
@@ -119,12 +111,6 @@ def project_so(M: ArrayLike) -> Array:
 
     The paper prints U Vᵀ, which is a reflection where det M < 0.
 
-    References
-    ----------
-    BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. Many 3 × 3 matrices are
-    projected by FOAM (see `rbcourse._foam`); few, those near the singular set, and those of other
-    sizes by the SVD.
-
     Examples
     --------
     >>> project_so([[0, -2], [3, 0]])
@@ -136,6 +122,8 @@ def project_so(M: ArrayLike) -> Array:
 
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     """Return the rotation R with the least √tr(XᵀX W), X = M − R: `project_so` of M W.
+
+    Source: BK 4, for metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
@@ -172,10 +160,6 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     determines the rotation wherever M keeps that rank. One of rank n − 2 or less never does: a rod
     without thickness may be turned about itself, and one of the nearest rotations is returned.
 
-    References
-    ----------
-    BK 4, for metrics that the paper leaves to a later publication.
-
     Examples
     --------
     >>> M = [[1, -0.2], [0, 1]]  # which axis has turned? the one of less weight
@@ -197,6 +181,8 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     """Return the columns of M made orthonormal, from left to right, as Gram and Schmidt do.
 
+    Source: BK 4, BK Remark 6, BK Prop. 3.
+
     Parameters
     ----------
     M : array_like, shape (..., n, n)
@@ -214,14 +200,6 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     ------
     ValueError
         If a column depends on those before it, to rounding.
-
-    See Also
-    --------
-    project_so : The nearest rotation, which prefers no column.
-
-    References
-    ----------
-    BK 4, BK Remark 6, BK Prop. 3.
 
     Examples
     --------
@@ -249,6 +227,8 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 def distance_to_so(M: ArrayLike) -> Array:
     """Return ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)², the last σ signed as det M.
 
+    Source: BK 4, BK Remark 6; where the paper prints the square, and no sign.
+
     Parameters
     ----------
     M : array_like, shape (..., n, n)
@@ -258,10 +238,6 @@ def distance_to_so(M: ArrayLike) -> Array:
     -------
     ndarray, shape (...)
         In the Frobenius norm; σ are the singular values, the last one the smallest.
-
-    References
-    ----------
-    BK 4, BK Remark 6; where the paper prints the square, and no sign.
 
     Examples
     --------
@@ -325,6 +301,8 @@ def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
 def project_se(B: ArrayLike) -> Array:
     """Return the pose nearest to B: its rotation block projected, its translation kept.
 
+    Source: BK 5, BK Prop. 4, BK Prop. 5; RR 1.6.
+
     Parameters
     ----------
     B : array_like, shape (..., n + 1, n + 1)
@@ -334,14 +312,6 @@ def project_se(B: ArrayLike) -> Array:
     -------
     ndarray, shape (..., n + 1, n + 1)
         Poses [[project_so(B1), B2], [0, 1]].
-
-    See Also
-    --------
-    project_so : What happens to B1, and where that is not unique.
-
-    References
-    ----------
-    BK 5, BK Prop. 4, BK Prop. 5; RR 1.6.
 
     Examples
     --------

@@ -36,6 +36,8 @@ _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """Tell which quaternions have norm 1.
 
+    Source: RR 1.2, RR (3).
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -46,15 +48,6 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (...)
-
-    See Also
-    --------
-    project_quaternion : The nearest unit quaternion of what fails.
-    is_so : The same question for rotation matrices.
-
-    References
-    ----------
-    RR 1.2, RR (3).
 
     Examples
     --------
@@ -70,6 +63,8 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Return Hamilton's product p q: turn by q first, then by p.
 
+    Source: RR 2.2.
+
     Parameters
     ----------
     p, q : array_like, shape (..., 4)
@@ -79,10 +74,6 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4)
         Its norm is the product of the norms.
-
-    References
-    ----------
-    RR 2.2.
 
     Examples
     --------
@@ -97,6 +88,8 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
 def quaternion_conjugate(q: ArrayLike) -> Array:
     """Return (w, −x, −y, −z): for a unit quaternion its inverse, the turn back.
 
+    Source: RR 2.2.
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -104,10 +97,6 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4)
-
-    References
-    ----------
-    RR 2.2.
 
     Examples
     --------
@@ -120,6 +109,8 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
 def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     """Rotate points: the vector part of q p q⁻¹.
 
+    Source: RR 2.2.
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -130,10 +121,6 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-
-    References
-    ----------
-    RR 2.2.
 
     Examples
     --------
@@ -149,6 +136,8 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
 def project_quaternion(q: ArrayLike) -> Array:
     """Return the unit quaternion nearest to q: q over its norm.
 
+    Source: RR 1.5, RR (6), RR Fig. 2.
+
     Parameters
     ----------
     q : array_like, shape (..., 4)
@@ -163,14 +152,6 @@ def project_quaternion(q: ArrayLike) -> Array:
     ValueError
         If zero, the singular set: all unit quaternions are equally near to zero.
 
-    See Also
-    --------
-    project_so : The same for matrices.
-
-    References
-    ----------
-    RR 1.5, RR (6), RR Fig. 2.
-
     Examples
     --------
     >>> project_quaternion([10, 10, 10, 10])
@@ -181,6 +162,8 @@ def project_quaternion(q: ArrayLike) -> Array:
 
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return the one of q and −q with w ≥ 0: one quaternion for each rotation.
+
+    Source: BK Remark 7.
 
     Parameters
     ----------
@@ -196,10 +179,6 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     Singular set: at a half-turn w = 0, and q and −q are equally good. The one whose component of
     largest magnitude is positive is returned, with w = 0; of components that are equal to 1e-8 the
     first. What differs from a half-turn by rounding only, w below 4 eps, counts as one.
-
-    References
-    ----------
-    BK Remark 7.
 
     Examples
     --------
@@ -256,6 +235,8 @@ def continuous_quaternions(q: ArrayLike) -> Array:
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
+    Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
+
     Parameters
     ----------
     q0, q1 : array_like, shape (..., 4)
@@ -268,18 +249,10 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     ndarray, shape t.shape + (..., 4)
         Unit quaternions, at constant angular speed.
 
-    See Also
-    --------
-    geodesic_so3 : The same curve in matrices, with its velocity.
-
     Notes
     -----
     Singular set: where q0 · q1 = 0, to 4 eps, the rotations are a half-turn apart and both arcs
     are shortest; the one to q1 as given is taken. Equal quaternions need no care.
-
-    References
-    ----------
-    BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Examples
     --------
@@ -306,6 +279,8 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     The other way round on the great circle of `slerp`: where that one turns by the angle a about
     an axis, this one turns by 2π − a about the opposite axis. It ends at the other of q1 and −q1.
 
+    Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
+
     Parameters
     ----------
     q0, q1 : array_like, shape (..., 4)
@@ -323,10 +298,6 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     ValueError
         As for `slerp`; and if q0 and q1 are the same rotation to 4 eps, the singular set: the long
         way is then a full turn about any axis. Near it the axis is accurate to eps over ‖q1 − q0‖.
-
-    References
-    ----------
-    BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Examples
     --------

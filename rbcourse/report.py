@@ -62,9 +62,7 @@ def check_SOn(m: ArrayLike, epsilon: float = 0.01) -> bool:
     Only one square matrix of finite real numbers can pass; [[1]] is in SO(1). A negative or NaN
     epsilon is a ValueError.
 
-    References
-    ----------
-    RR 1.1, RR (1), RR (2).
+    Source: RR 1.1, RR (1), RR (2).
 
     Examples
     --------
@@ -77,9 +75,7 @@ def check_SOn(m: ArrayLike, epsilon: float = 0.01) -> bool:
 def check_quaternion(v: ArrayLike, epsilon: float = 0.01) -> bool:
     """Tell whether v is a unit quaternion (w, x, y, z): its norm is 1 within epsilon.
 
-    References
-    ----------
-    RR 1.2, RR (3).
+    Source: RR 1.2, RR (3).
 
     Examples
     --------
@@ -95,9 +91,7 @@ def check_SEn(m: ArrayLike, epsilon: float = 0.01) -> bool:
     Only one matrix of 2 × 2 or larger can pass; the rotation and the last row are taken within
     epsilon, as `check_SOn` takes them.
 
-    References
-    ----------
-    RR 1.3.
+    Source: RR 1.3.
 
     Examples
     --------
@@ -112,9 +106,7 @@ def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
     m is any square matrix, singular or reflected too; anything else is a ValueError.
 
-    References
-    ----------
-    RR 1.4, RR (4), RR (5), RR Fig. 1.
+    Source: RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Examples
     --------
@@ -131,9 +123,7 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
     v has four finite real numbers (w, x, y, z), not all zero; anything else is a ValueError.
 
-    References
-    ----------
-    RR 1.5, RR (6), RR Fig. 2.
+    Source: RR 1.5, RR (6), RR Fig. 2.
 
     Examples
     --------
@@ -149,9 +139,7 @@ def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     m is any matrix (n + 1, n + 1), n ≥ 1: its rotation is corrected, its translation kept, and the
     last row replaced by 0, …, 0, 1. Anything else is a ValueError.
 
-    References
-    ----------
-    RR 1.6, RR Fig. 3.
+    Source: RR 1.6, RR Fig. 3.
 
     Examples
     --------
@@ -169,9 +157,7 @@ def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
     With ``naive=True`` three angles are uniform, and the rotation is not; with False it is, by
     Arvo's method. `rng` is a Generator, a seed or None.
 
-    References
-    ----------
-    RR 2.1.
+    Source: RR 2.1.
 
     Examples
     --------
@@ -184,9 +170,7 @@ def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
 def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
     """Return a random unit quaternion, shape (4,); uniform, by Shoemake's method, if not naive.
 
-    References
-    ----------
-    RR 2.2.
+    Source: RR 2.2.
 
     Examples
     --------
@@ -198,6 +182,8 @@ def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
 
 def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure, Animation]:
     """Show how a rotation carries v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) over the sphere.
+
+    Source: RR 2.2.
 
     Parameters
     ----------
@@ -212,10 +198,6 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
         The sphere with all images.
     animation : Animation
         They appear one by one. A notebook shows a player; ``animation.save(path)`` writes a GIF.
-
-    References
-    ----------
-    RR 2.2.
 
     Examples
     --------
@@ -235,6 +217,8 @@ def visualize(
 ) -> tuple[Figure, Animation]:
     """Show where 100 random rotations carry v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0).
 
+    Source: RR 2.2, RR Fig. 4, RR Fig. 5.
+
     Parameters
     ----------
     quaternion : bool
@@ -250,10 +234,6 @@ def visualize(
     -------
     figure, animation
         As for `visualize_rotation`.
-
-    References
-    ----------
-    RR 2.2, RR Fig. 4, RR Fig. 5.
 
     Examples
     --------
@@ -279,9 +259,7 @@ def interpolate_rigid_body(
     Poses are (x, y, theta) in m, m and rad, shape (3,); the path has the shape (steps + 1, 3).
     With `shortest` the body turns the short way. See `rbcourse.planar.interpolate_planar`.
 
-    References
-    ----------
-    RR 3.1, RR (14), RR (15), RR (16).
+    Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Examples
     --------
@@ -301,9 +279,7 @@ def forward_propagate_rigid_body(
     durations from 0 up, in s. `frame`, "world" as in the report or "body", says along whose axes
     vx and vy are. See `rbcourse.planar.propagate_planar`.
 
-    References
-    ----------
-    RR 3.2, RR (17), RR (18), RR (19).
+    Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
     --------
@@ -317,6 +293,8 @@ def forward_propagate_rigid_body(
 
 def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Figure, Animation]:
     """Show a path of planar poses: a rectangle that turns with its pose, and its way.
+
+    Source: RR 3.3, RR Fig. 6, RR Fig. 7.
 
     Parameters
     ----------
@@ -338,10 +316,6 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
     -----
     Lines join the states. To see the arc of a command in the frame of the body, cut it into shorter
     ones first.
-
-    References
-    ----------
-    RR 3.3, RR Fig. 6, RR Fig. 7.
 
     Examples
     --------
@@ -368,9 +342,7 @@ def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Ar
     Angles are in rad, shape (n,), n = 2 for the arm of the report; the path has the shape
     (steps + 1, n). See `rbcourse.arm.interpolate_joints`.
 
-    References
-    ----------
-    RR 4.1, RR (20), RR (21).
+    Source: RR 4.1, RR (20), RR (21).
 
     Examples
     --------
@@ -388,9 +360,7 @@ def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
     (velocity, duration), with the velocities of the joints in rad/s and durations from 0 up, in s.
     See `rbcourse.arm.propagate_joints`.
 
-    References
-    ----------
-    RR 4.2, RR (22), RR (23).
+    Source: RR 4.2, RR (22), RR (23).
 
     Examples
     --------
@@ -405,6 +375,8 @@ def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
 def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[Figure, Animation]:
     """Show a path of an arm: its links in blue, and the way of its tip, a red curve that grows.
 
+    Source: RR 4.3, RR Fig. 8, RR Fig. 9.
+
     Parameters
     ----------
     path : array_like, shape (states, n)
@@ -418,10 +390,6 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
         The whole way of the tip, and the arm at its end; pale at its start and on its way.
     animation : Animation
         As for `visualize_path`.
-
-    References
-    ----------
-    RR 4.3, RR Fig. 8, RR Fig. 9.
 
     Examples
     --------

@@ -40,6 +40,9 @@ def arvo_rotation(x: ArrayLike) -> Array:
     A random turn about z, then a half-turn about a random axis V: −M B with M = I − 2 V Vᵀ, the
     reflection across V, and B = R_z(θ).
 
+    Source: RR 2.1, RR (9), RR (10), RR (11); J. Arvo, Fast random rotation matrices, Graphics Gems
+    III, 1992.
+
     Parameters
     ----------
     x : array_like, shape (..., 3)
@@ -50,19 +53,10 @@ def arvo_rotation(x: ArrayLike) -> Array:
     ndarray, shape (..., 3, 3)
         Rotation matrices.
 
-    See Also
-    --------
-    sample_rotation : Many of them, faster.
-
     Notes
     -----
     M B, as printed, has the determinant −1 always. Its first column negated is uniform too: it is
     −M B diag(1, −1, −1), a uniform rotation times a fixed one.
-
-    References
-    ----------
-    RR 2.1, RR (9), RR (10), RR (11); J. Arvo, Fast random rotation matrices, Graphics Gems III,
-    1992.
 
     Examples
     --------
@@ -84,6 +78,9 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
 
     Two circles, in the planes (w, z) and (x, y), whose squared radii s and 1 − s add to 1.
 
+    Source: RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid
+    body path planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
+
     Parameters
     ----------
     x : array_like, shape (..., 3)
@@ -93,15 +90,6 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 4)
         Unit quaternions (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂).
-
-    See Also
-    --------
-    sample_quaternion : Many of them, faster.
-
-    References
-    ----------
-    RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid body path
-    planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
 
     Examples
     --------
@@ -117,6 +105,8 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
 
 def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random rotation matrices.
+
+    Source: RR 2.1, RR (9), RR (10), RR (11).
 
     Parameters
     ----------
@@ -136,10 +126,6 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     sample_rotation_naive : What not to do.
     uniformity_tests : How to tell.
 
-    References
-    ----------
-    RR 2.1, RR (9), RR (10), RR (11).
-
     Examples
     --------
     >>> R = sample_rotation(1000, rng=1)
@@ -151,6 +137,8 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
 
 def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random unit quaternions.
+
+    Source: RR 2.2, RR (13).
 
     Parameters
     ----------
@@ -166,14 +154,6 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
         Uniform on the whole sphere: q and −q are equally likely. To a few eps
         ``shoemake_quaternion(rng.random(size + (3,)))``, on every processor.
 
-    See Also
-    --------
-    sample_quaternion_naive : What not to do.
-
-    References
-    ----------
-    RR 2.2, RR (13).
-
     Examples
     --------
     >>> q = sample_quaternion((2, 500), rng=1)
@@ -185,6 +165,8 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
 
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return rotation matrices of three uniform angles about z, y and x: not uniform.
+
+    Source: RR 2.1, RR (7), RR (8).
 
     Parameters
     ----------
@@ -200,14 +182,6 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
         R_z(α) R_y(β) R_x(γ), each angle uniform on [0, 2π). E tr² is 7/8; for uniform rotations
         it is 1.
 
-    See Also
-    --------
-    sample_rotation : The uniform one.
-
-    References
-    ----------
-    RR 2.1, RR (7), RR (8).
-
     Examples
     --------
     >>> sample_rotation_naive(5, rng=1).shape
@@ -218,6 +192,8 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
 
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return unit quaternions of three uniform angles about x, y and z: not uniform.
+
+    Source: RR 2.2, RR (12).
 
     Parameters
     ----------
@@ -232,14 +208,6 @@ def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng
     ndarray, shape size + (4,)
         q_z(γ) q_y(β) q_x(α), each angle uniform on [0, 2π). The first angle turns about x; in
         `sample_rotation_naive` it turns about z. The law of the rotations is the same.
-
-    See Also
-    --------
-    sample_quaternion : The uniform one.
-
-    References
-    ----------
-    RR 2.2, RR (12).
 
     Examples
     --------
@@ -334,6 +302,8 @@ def angle_law(angle: ArrayLike) -> Array:
 
     Its density is (1 − cos a)/π: large turns are common, small ones are rare.
 
+    Source: RR 2.
+
     Parameters
     ----------
     angle : array_like
@@ -343,10 +313,6 @@ def angle_law(angle: ArrayLike) -> Array:
     -------
     ndarray
         Of the same shape.
-
-    References
-    ----------
-    RR 2.
 
     Examples
     --------
@@ -359,6 +325,8 @@ def angle_law(angle: ArrayLike) -> Array:
 
 def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     """Return statistics that tell whether rotations are uniform and independent.
+
+    Source: RR 2; J. Arvo, Fast random rotation matrices, Graphics Gems III, 1992.
 
     Parameters
     ----------
@@ -381,10 +349,6 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
         angle to next, angle to half
             As angle, of the turns from each even draw to the next, and from each draw of the first
             half to its partner in the second: draws that depend on these partners show here.
-
-    References
-    ----------
-    RR 2; J. Arvo, Fast random rotation matrices, Graphics Gems III, 1992.
 
     Examples
     --------

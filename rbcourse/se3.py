@@ -24,6 +24,8 @@ from rbcourse.so3 import (
 def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     """Return the pose [[R, d], [0, 1]].
 
+    Source: BK 2.1.
+
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
@@ -34,15 +36,6 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4, 4)
-
-    See Also
-    --------
-    components_from_pose : The inverse.
-    pose_from_coordinates : The same from exponential coordinates.
-
-    References
-    ----------
-    BK 2.1.
 
     Examples
     --------
@@ -60,6 +53,8 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
 def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
     """Return the rotation R and the position d of a pose [[R, d], [0, 1]].
 
+    Source: BK 2.1.
+
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
@@ -71,14 +66,6 @@ def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
         Rotation matrices.
     d : ndarray, shape (..., 3)
         Positions, in m, fixed frame.
-
-    See Also
-    --------
-    pose_from_components : The inverse.
-
-    References
-    ----------
-    BK 2.1.
 
     Examples
     --------
@@ -104,6 +91,8 @@ def join(R: Array, d: Array) -> Array:
 def inverse_se3(A: ArrayLike) -> Array:
     """Return the inverse of a pose: [[Rᵀ, −Rᵀ d], [0, 1]].
 
+    Source: BK 2.1.
+
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
@@ -112,10 +101,6 @@ def inverse_se3(A: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4, 4)
-
-    References
-    ----------
-    BK 2.1.
 
     Examples
     --------
@@ -131,6 +116,8 @@ def inverse_se3(A: ArrayLike) -> Array:
 def pose_from_coordinates(x: ArrayLike) -> Array:
     """Return the pose with the coordinates (σ, d): rotation exp_so3(σ), position d.
 
+    Source: BK 2.5.
+
     Parameters
     ----------
     x : array_like, shape (..., 6)
@@ -139,15 +126,6 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4, 4)
-
-    See Also
-    --------
-    coordinates_from_pose : The inverse.
-    exp_se3 : Other coordinates, whose straight lines are screw motions.
-
-    References
-    ----------
-    BK 2.5.
 
     Examples
     --------
@@ -163,6 +141,8 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
 def coordinates_from_pose(A: ArrayLike) -> Array:
     """Return the coordinates (σ, d) of a pose: σ = log_so3(R), and its position d.
 
+    Source: BK 2.5.
+
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
@@ -177,10 +157,6 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     -----
     Singular set: half-turns, as for `log_so3`.
 
-    References
-    ----------
-    BK 2.5.
-
     Examples
     --------
     >>> coordinates_from_pose(pose_from_coordinates([0.1, 0, 0.3, 1, 2, 3])).round(12)
@@ -193,6 +169,8 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
 def hat_se3(S: ArrayLike) -> Array:
     """Return the matrix of a twist: [[hat_so3(ω), v], [0, 0]].
 
+    Source: BK 2.1, BK (1), BK (3).
+
     Parameters
     ----------
     S : array_like, shape (..., 6)
@@ -201,14 +179,6 @@ def hat_se3(S: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4, 4)
-
-    See Also
-    --------
-    vee_se3 : The inverse.
-
-    References
-    ----------
-    BK 2.1, BK (1), BK (3).
 
     Examples
     --------
@@ -227,6 +197,8 @@ def hat_se3(S: ArrayLike) -> Array:
 def vee_se3(matrix: ArrayLike) -> Array:
     """Return the twist (ω, v) of a matrix [[ω̂, v], [0, 0]]: the inverse of `hat_se3`.
 
+    Source: BK 2.1, BK (1).
+
     Parameters
     ----------
     matrix : array_like, shape (..., 4, 4)
@@ -235,10 +207,6 @@ def vee_se3(matrix: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 6)
-
-    References
-    ----------
-    BK 2.1, BK (1).
 
     Examples
     --------
@@ -257,6 +225,8 @@ BASIS_SE3.flags.writeable = False
 def exp_se3(S: ArrayLike) -> Array:
     """Return the pose that the constant twist S reaches from I in unit time.
 
+    Source: BK 2.6.
+
     Parameters
     ----------
     S : array_like, shape (..., 6)
@@ -268,18 +238,9 @@ def exp_se3(S: ArrayLike) -> Array:
         [[exp_so3(ω), J v], [0, 1]] with J the left Jacobian of SO(3), the transpose of
         ``right_jacobian_so3(ω)``; accurate to a few eps (1 + ‖ω‖) (1 + ‖v‖).
 
-    See Also
-    --------
-    log_se3 : The inverse.
-    screw_se3 : The motion.
-
     Notes
     -----
     No singular set; ω = 0 gives the translation by v exactly.
-
-    References
-    ----------
-    BK 2.6.
 
     Examples
     --------
@@ -298,6 +259,8 @@ def exp_se3(S: ArrayLike) -> Array:
 def log_se3(A: ArrayLike) -> Array:
     """Return the twist that reaches A from I in unit time, turning by π at most.
 
+    Source: BK 2.6.
+
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
@@ -308,17 +271,9 @@ def log_se3(A: ArrayLike) -> Array:
     ndarray, shape (..., 6)
         (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π; accurate to a few eps (1 + ‖d‖).
 
-    See Also
-    --------
-    screw_from_pose : The axis and the pitch of that motion.
-
     Notes
     -----
     Singular set: at a half-turn two twists reach A; ω is the one that `log_so3` returns.
-
-    References
-    ----------
-    BK 2.6.
 
     Examples
     --------
@@ -334,6 +289,8 @@ def log_se3(A: ArrayLike) -> Array:
 def adjoint_se3(A: ArrayLike) -> Array:
     """Return the matrix that carries twists from the body frame of A to the fixed frame.
 
+    Source: BK 2.1.
+
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
@@ -343,10 +300,6 @@ def adjoint_se3(A: ArrayLike) -> Array:
     -------
     ndarray, shape (..., 6, 6)
         [[R, 0], [d̂ R, R]]: hat_se3(adjoint_se3(A) @ S) = A hat_se3(S) A⁻¹.
-
-    References
-    ----------
-    BK 2.1.
 
     Examples
     --------

@@ -37,6 +37,8 @@ def vee(W: Array) -> Array:
 def hat_so3(w: ArrayLike) -> Array:
     """Return the skew-symmetric matrix of a vector: hat_so3(w) @ x = w × x.
 
+    Source: BK 2.1, BK (2).
+
     Parameters
     ----------
     w : array_like, shape (..., 3)
@@ -44,14 +46,6 @@ def hat_so3(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-
-    See Also
-    --------
-    vee_so3 : The inverse.
-
-    References
-    ----------
-    BK 2.1, BK (2).
 
     Examples
     --------
@@ -66,6 +60,8 @@ def hat_so3(w: ArrayLike) -> Array:
 def vee_so3(W: ArrayLike) -> Array:
     """Return the vector of the skew-symmetric part (W − Wᵀ)/2: the inverse of `hat_so3`.
 
+    Source: BK 2.1.
+
     Parameters
     ----------
     W : array_like, shape (..., 3, 3)
@@ -73,10 +69,6 @@ def vee_so3(W: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-
-    References
-    ----------
-    BK 2.1.
 
     Examples
     --------
@@ -88,6 +80,8 @@ def vee_so3(W: ArrayLike) -> Array:
 
 def exp_so3(w: ArrayLike) -> Array:
     """Return the rotation by ‖w‖ about w: Rodrigues' formula.
+
+    Source: BK 2.5.
 
     Parameters
     ----------
@@ -101,18 +95,10 @@ def exp_so3(w: ArrayLike) -> Array:
         a rotation however large a is, but beyond 1/eps ≈ 4.5e15 rad, where neighbouring
         floating-point numbers are turns apart, no digit is significant.
 
-    See Also
-    --------
-    log_so3 : The inverse.
-
     Notes
     -----
     No singular set; w = 0 gives I exactly. Vectors along one axis whose lengths differ by 2π give
     the same rotation.
-
-    References
-    ----------
-    BK 2.5.
 
     Examples
     --------
@@ -127,6 +113,8 @@ def exp_so3(w: ArrayLike) -> Array:
 
 def log_so3(R: ArrayLike) -> Array:
     """Return the rotation vector of R, the shortest one: exp_so3(log_so3(R)) = R.
+
+    Source: BK 2.5.
 
     Parameters
     ----------
@@ -145,10 +133,6 @@ def log_so3(R: ArrayLike) -> Array:
     magnitude is positive is returned, as `canonical_quaternion` chooses it. What differs from a
     half-turn by rounding only, less than 8 eps in the angle, counts as one.
 
-    References
-    ----------
-    BK 2.5.
-
     Examples
     --------
     >>> log_so3([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
@@ -160,6 +144,8 @@ def log_so3(R: ArrayLike) -> Array:
 def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     """Return the angle of the rotation from R to S: the geodesic distance ‖log_so3(Rᵀ S)‖.
 
+    Source: BK 6.1.
+
     Parameters
     ----------
     R, S : array_like, shape (..., 3, 3)
@@ -169,14 +155,6 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     -------
     ndarray, shape (...)
         Angles in [0, π], in rad; accurate to a few eps.
-
-    See Also
-    --------
-    geodesic_so3 : The curve of that length.
-
-    References
-    ----------
-    BK 6.1.
 
     Examples
     --------
@@ -191,6 +169,8 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
 def right_jacobian_so3(w: ArrayLike) -> Array:
     """Return J with body angular velocity = J w' along the curve exp_so3(w(t)).
 
+    Source: BK 2.5.
+
     Parameters
     ----------
     w : array_like, shape (..., 3)
@@ -203,17 +183,9 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
         however large a is. Its transpose is the left Jacobian, which gives the velocity in the
         fixed frame.
 
-    See Also
-    --------
-    right_jacobian_inverse_so3 : From angular velocity to w'.
-
     Notes
     -----
     Singular set: J itself is smooth; it has rank 1 where ‖w‖ = 2π, 4π, …
-
-    References
-    ----------
-    BK 2.5.
 
     Examples
     --------
@@ -226,6 +198,8 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
 
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`: w' = J⁻¹ times the body angular velocity.
+
+    Source: BK 2.5.
 
     Parameters
     ----------
@@ -241,10 +215,6 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     -----
     Singular set: ‖w‖ = 2π, 4π, …, where there is no inverse. Near it the entries grow like 1 over
     the distance, and at the floating-point numbers nearest to it they are finite and huge.
-
-    References
-    ----------
-    BK 2.5.
 
     Examples
     --------

@@ -51,9 +51,7 @@ def show(function: Callable[..., Any]) -> None:
 def project_so(M: Array) -> Array:
     """Return the rotations nearest to M, shape (..., n, n): U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
-    References
-    ----------
-    BK Prop. 2, with the determinant's sign.
+    Source: BK Prop. 2, with the determinant's sign.
 
     Examples
     --------
@@ -69,9 +67,7 @@ def project_so(M: Array) -> Array:
 def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
     """Return R0 exp(σ̂ t), shape (N, 3, 3), at the times t, shape (N,), with σ = log(R0ᵀ R1).
 
-    References
-    ----------
-    BK 6.1.
+    Source: BK 6.1.
 
     Examples
     --------
@@ -92,9 +88,7 @@ def projected_cubic_so3(
     With S = RᵀM, A = RᵀM' and G = tr(S) I − S the condition that S is symmetric, differentiated
     once and twice, says G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
 
-    References
-    ----------
-    BK 6.2.
+    Source: BK 6.2.
 
     Examples
     --------
@@ -121,6 +115,8 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     It is the minimum-acceleration curve: of all curves with these ends it has the least
     ∫ ‖x''‖² dt.
 
+    Source: BK 6.2.
+
     Parameters
     ----------
     x0, x1, v0, v1 : ndarray
@@ -130,10 +126,6 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     -------
     ndarray, shape (4, ...)
         The coefficients of 1, t, t², t³.
-
-    References
-    ----------
-    BK 6.2.
 
     Examples
     --------
@@ -186,9 +178,7 @@ def minimum_torque_so3(
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
     with p = G (τ' + w × τ) − G w × τ, for an unknown c. On the way ‖σ‖ has to stay below 2π.
 
-    References
-    ----------
-    beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
+    Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
 
     Examples
     --------
@@ -233,9 +223,7 @@ def _spin(S: Array) -> Array:
 def sample_rotation(n: int, rng: np.random.Generator) -> Array:
     """Return n uniformly random rotations, each Arvo's of three uniform numbers.
 
-    References
-    ----------
-    RR 2.1, RR (9), RR (10), RR (11).
+    Source: RR 2.1, RR (9), RR (10), RR (11).
 
     Examples
     --------
@@ -248,9 +236,7 @@ def sample_rotation(n: int, rng: np.random.Generator) -> Array:
 def sample_quaternion(n: int, rng: np.random.Generator) -> Array:
     """Return n uniformly random unit quaternions, each Shoemake's of three uniform numbers.
 
-    References
-    ----------
-    RR 2.2, RR (13).
+    Source: RR 2.2, RR (13).
 
     Examples
     --------
@@ -270,9 +256,7 @@ def minimum_acceleration_so3(
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. On the way ‖σ‖ has to
     stay below 2π.
 
-    References
-    ----------
-    BK (19).
+    Source: BK (19).
 
     Examples
     --------

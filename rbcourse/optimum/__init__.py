@@ -38,6 +38,9 @@ def minimum_acceleration_so3(
 ) -> Optimum:
     """Return the minimum-acceleration curve with these ends, of a ball or of any body.
 
+    Source: BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see
+    `rbcourse.optimum.functionals.Effort`).
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
@@ -96,10 +99,6 @@ def minimum_acceleration_so3(
     of a body these curves are stationary, too. Where the free motion of a body meets the ends, it
     costs nothing.
 
-    References
-    ----------
-    BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see `rbcourse.optimum.functionals.Effort`).
-
     Examples
     --------
     >>> from rbcourse import exp_so3
@@ -131,6 +130,8 @@ def minimum_torque_so3(
     duration: ArrayLike = 1.0,
 ) -> Optimum:
     """Return the curve with these ends that takes a body there with the least squared torque.
+
+    Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`).
 
     Parameters
     ----------
@@ -175,10 +176,6 @@ def minimum_torque_so3(
     In the fixed frame, with J = R G Rᵀ and H = R G w, so that H' is the torque, the equation is
     J H'' + H' × H = c.
 
-    References
-    ----------
-    beyond BK 4 (see `rbcourse.optimum.functionals.Effort`).
-
     Examples
     --------
     >>> from rbcourse import exp_so3, torque_cost
@@ -202,6 +199,8 @@ def minimum_jerk_so3(
     duration: ArrayLike = 1.0,
 ) -> Optimum:
     """Return the minimum-jerk curve with these ends.
+
+    Source: beyond BK 5 (see `rbcourse.optimum.functionals.Jerk`).
 
     Parameters
     ----------
@@ -243,10 +242,6 @@ def minimum_jerk_so3(
     From rest to rest without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
     costs 1440 ‖σ‖².
 
-    References
-    ----------
-    beyond BK 5 (see `rbcourse.optimum.functionals.Jerk`).
-
     Examples
     --------
     >>> from rbcourse import exp_so3
@@ -262,6 +257,8 @@ def minimum_jerk_so3(
 
 def stationary_so3(guess: Curve) -> Optimum:
     """Return the stationary curve that Newton's method finds from a curve with the same ends.
+
+    Source: BK (19).
 
     Parameters
     ----------
@@ -279,14 +276,6 @@ def stationary_so3(guess: Curve) -> Optimum:
     ------
     ValueError
         If `guess` is no such curve, or is NaN at a time.
-
-    See Also
-    --------
-    minimum_acceleration_so3 : The cheapest curve that is known.
-
-    References
-    ----------
-    BK (19).
 
     Examples
     --------
@@ -336,6 +325,8 @@ class ConvergenceError(RuntimeError):
 class Optimum(Curve):
     """A `Curve` on SO(3), or a stack of them, along which R p is constant; as Chebyshev series.
 
+    Source: beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
+
     Attributes
     ----------
     functional : Functional
@@ -353,10 +344,6 @@ class Optimum(Curve):
         time from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
         How many steps the solver took, and how many nodes carry the curve.
-
-    References
-    ----------
-    beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
     """
 
     functional: Functional

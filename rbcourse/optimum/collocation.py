@@ -256,16 +256,14 @@ def costs(functional: Functional, ends: Array, k: Array) -> Array:
 class Stationary:
     """R p = c for any functional; the unknowns are R, k = w⁽ᵐ⁾ at the nodes, and c.
 
+    Source: beyond BK 2.
+
     Parameters
     ----------
     functional : Functional
     R0, R1 : ndarray, shape (N, 3, 3)
     ends : ndarray, shape (N, m, 3)
         w0 and w1; for the jerk a0 and a1 too.
-
-    References
-    ----------
-    beyond BK 2.
     """
 
     together = 24
@@ -354,6 +352,8 @@ def _integrals(R: Array, K: Array) -> Array:
 class BallStationary:
     """R w'' = c; the unknowns are R at the nodes, and c: w'' = Rᵀc gives w by integration.
 
+    Source: BK (19).
+
     Parameters
     ----------
     R0, R1 : ndarray, shape (N, 3, 3)
@@ -361,10 +361,6 @@ class BallStationary:
         w0 and w1.
     coarse : int, optional
         On how many nodes the linear systems are solved: those of the first rotations.
-
-    References
-    ----------
-    BK (19).
     """
 
     together = 128

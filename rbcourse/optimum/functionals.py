@@ -76,9 +76,7 @@ class BallAcceleration:
 
     u = w' and p = w''. The optimum has R w'' = c.
 
-    References
-    ----------
-    BK (18), BK (19).
+    Source: BK (18), BK (19).
     """
 
     name, ends, scale, unit = "MinimumAcceleration", 2, 2.0, 1.0
@@ -116,6 +114,9 @@ class Effort:
 
         p = G (v' + w × v) − h × v.
 
+    Source: beyond BK 1, beyond BK 2; BK 3 leaves these metrics to a later publication. With M = G⁻¹
+    the equation is that of Noakes, Heinzinger and Paden 1989 and of Crouch and Silva Leite 1995.
+
     Parameters
     ----------
     G : ndarray, shape (N, 3, 3)
@@ -123,11 +124,6 @@ class Effort:
         the unit of inertia does not matter.
     of_torque : bool
         Whether M is I, and not G⁻¹.
-
-    References
-    ----------
-    beyond BK 1, beyond BK 2; BK 3 leaves these metrics to a later publication. With M = G⁻¹ the
-    equation is that of Noakes, Heinzinger and Paden 1989 and of Crouch and Silva Leite 1995.
     """
 
     ends = 2
@@ -189,9 +185,8 @@ class Jerk:
     p = j'' + ½ w × j' + w' × j. Of all j = w'' + κ w × w' only this one gives a motion and the
     motion seen from the body, Rᵀ(t), the same cost.
 
-    References
-    ----------
-    beyond BK 2, beyond BK 5; Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and Crouch 1995.
+    Source: beyond BK 2, beyond BK 5; Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and
+    Crouch 1995.
     """
 
     name, ends, scale, unit = "MinimumJerk", 4, 2.0, 1.0

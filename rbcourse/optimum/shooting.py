@@ -35,6 +35,8 @@ def shoot_minimum_acceleration_so3(
     Equation (20), w'' + w × w' = b, is integrated from t = 0; the unknown w'(0) and b are improved
     by Newton's method until R(1) and w(1) are the wanted ones.
 
+    Source: BK (20), BK 6.2.
+
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
@@ -59,17 +61,9 @@ def shoot_minimum_acceleration_so3(
     RuntimeWarning
         For a stack, if that happens to some: there the curve is NaN and ``converged`` False.
 
-    See Also
-    --------
-    minimum_acceleration_so3 : The faster and more robust way.
-
     Notes
     -----
     Singular set: as for `minimum_acceleration_so3`.
-
-    References
-    ----------
-    BK (20), BK 6.2.
 
     Examples
     --------

@@ -58,8 +58,8 @@ class Entry:
 def collect(root: Path) -> dict[str, Entry]:
     """Return where each entry and each misprint is to be found.
 
-    Functions come from the References of their docstrings, constants from what stands below them,
-    tests from their marks ``source``, lessons from the keys in small type below their headings.
+    Functions come from "Source: …" in their docstrings, constants from the text below them, tests
+    from their marks ``source``, lessons from the keys in small type below their headings.
     """
     found = {key: Entry() for key in [*WHAT, *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
@@ -81,17 +81,16 @@ def _functions(root: Path) -> Iterator[tuple[str, str]]:
         body = ast.parse(path.read_text(encoding="utf-8")).body
         for node, below in zip(body, [*body[1:], None], strict=True):
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_":
-                yield f"{module}.{node.name}", _references(ast.get_docstring(node) or "")
+                yield f"{module}.{node.name}", _sources(ast.get_docstring(node) or "")
             elif isinstance(node, ast.Assign) and isinstance(below, ast.Expr):
                 yield f"{module}.{ast.unparse(node.targets[0])}", ast.unparse(below)
 
 
-def _references(docstring: str) -> str:
-    """Return the References section; of a docstring without sections, the text."""
-    text, _, references = docstring.partition("References\n----------\n")
-    if not references:
-        return " ".join(re.split(r"\n\n\w+( \w+)?\n-+\n", text)[0].split())
-    return references.partition("\n\n")[0]
+def _sources(docstring: str) -> str:
+    """Return the paragraph "Source: …"; of a docstring without one, the text before sections."""
+    if source := re.search(r"^Source: (.*?)(?=\n\n|\Z)", docstring, re.MULTILINE | re.DOTALL):
+        return source[1]
+    return " ".join(re.split(r"\n\n\w+( \w+)?\n-+\n", docstring)[0].split())
 
 
 def _tests(root: Path) -> Iterator[tuple[str, str]]:

@@ -51,6 +51,8 @@ def survey(
 ) -> dict[str, Array]:
     """Return what the optimum and closed forms cost, for each of many problems.
 
+    Source: BK 1, BK 7, BK (18); for bodies beyond BK 1.
+
     Parameters
     ----------
     problems : Ends
@@ -91,10 +93,6 @@ def survey(
     Ways that are sent to other processes, or stored with chunks, have to be functions of a module,
     or partials of these; functions of a notebook are not. A script has to call this function below
     ``if __name__ == "__main__":``, as each new process imports the script.
-
-    References
-    ----------
-    BK 1, BK 7, BK (18); for bodies beyond BK 1.
 
     Examples
     --------

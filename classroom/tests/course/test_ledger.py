@@ -89,7 +89,7 @@ def course(tmp_path):
     """A course with one function, one test and one lesson."""
     for folder in ("rbcourse", "tests", "notebooks"):
         (tmp_path / folder).mkdir()
-    docstring = "References\n    ----------\n    BK (2), RR 2.\n\n    Notes\n    BK (3)\n"
+    docstring = "Turn.\n\n    Source: BK (2),\n    RR 2.\n\n    Notes\n    -----\n    BK (3)\n"
     code = f'def turn():\n    """{docstring}"""\n\nBASIS = 1\n"""Three turns (BK (2))."""\n'
     (tmp_path / "rbcourse/so3.py").write_text(code, "utf-8")
     mark = '@pytest.mark.source("BK (2)", "errata 1")'
