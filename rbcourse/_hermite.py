@@ -13,30 +13,10 @@ from rbcourse._numerics import Array
 def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
     """Return the polynomial of least degree with these ends, or a derivative, at the times t.
 
-    Written from the nearer end, it meets both exactly, however they differ in size. Of all curves
-    with its ends the line has the least ∫ ‖x'‖² dt, the cubic the least ∫ ‖x''‖² dt, and the
-    quintic the least ∫ ‖x'''‖² dt.
-
+    Ends: x0, x1, for a cubic also v0, v1, for a quintic also a0, a1, at t = 0 and 1; t broadcasts
+    with them. It meets both ends exactly. The line has the least ∫ ‖x'‖² dt, the cubic the least
+    ∫ ‖x''‖² dt, the quintic the least ∫ ‖x'''‖² dt.
     Source: BK 6, BK 6.2.
-
-    Parameters
-    ----------
-    ends : sequence of array_like
-        x0, x1 of a line; x0, x1, v0, v1 of a cubic; x0, x1, v0, v1, a0, a1 of a quintic: values and
-        derivatives at t = 0 and 1.
-    t : ndarray
-        The times; they broadcast with the ends.
-    order : {0, 1, 2, 3}, optional
-        Which derivative.
-
-    Returns
-    -------
-    ndarray
-
-    Examples
-    --------
-    >>> hermite([0, 1, 0, 0], np.array([0.0, 0.5, 1.0]))
-    array([0. , 0.5, 1. ])
     """
     return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
 
@@ -44,17 +24,8 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
 def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
     """Return `hermite` of a stack with these `stack_terms`, components first.
 
-    Parameters
-    ----------
-    terms : ndarray, shape (n + 1, ..., count)
-    t : ndarray, shape (T, count) or (T, 1); if `by_curve`, shape (count, T) or (1, T)
-    order : int
-    by_curve : bool, optional
-        Whether the axis of the curves is before that of the times.
-
-    Returns
-    -------
-    ndarray, shape (..., T, count); if `by_curve`, shape (..., count, T)
+    Terms (n + 1, ..., count) and t (T, count) or (T, 1) give the shape (..., T, count); `by_curve`,
+    t (count, T) or (1, T) give (..., count, T).
     """
     weights = _weights(len(terms) - 1, t, order)
     if not by_curve:
@@ -96,10 +67,7 @@ def _weights(count: int, t: Array, order: int) -> list[Array]:
 
 
 def _start_weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of x0, v0 and a0.
-
-    By symmetry x1, v1 and a1 have the same at 1 − t; the sign changes for each derivative.
-    """
+    """Return the weights of x0, v0, a0; those of x1, v1, a1 are the same at 1 − t, up to signs."""
     s = 1 - t
     match count, order:
         case 2, 0:

@@ -1,8 +1,7 @@
-"""Quaternions as functions of time: products, exp and slerp with their derivatives.
+"""Quaternions (w, x, y, z) as functions of time: products, exp and slerp with their derivatives.
 
-A jet is the list [x, x', x'', x'''] of a function of time and its first derivatives, or the first
-few of these. Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
-Quaternions are (w, x, y, z).
+A jet is the list of a function of time and its first derivatives: [x, x', x'', x'''] or fewer.
+Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
 """
 
 import math
@@ -24,23 +23,7 @@ _SINC_THIRD, _ANGLE_THIRD = np.polyder(_SINC_BEND), -np.polyder(_ANGLE_BEND) / 2
 
 
 def product(p: Jet, q: Jet) -> Jet:
-    """Return the jet of Hamilton's product p q, by Leibniz's rule.
-
-    Parameters
-    ----------
-    p, q : list of ndarray, shape (4, ...)
-        As many derivatives of each.
-
-    Returns
-    -------
-    list of ndarray, shape (4, ...)
-
-    Examples
-    --------
-    >>> i, j = np.eye(4)[1:3]
-    >>> product([i], [j])  # i j = k
-    [array([0., 0., 0., 1.])]
-    """
+    """Return the jet of Hamilton's product p q of two jets of one length, by Leibniz's rule."""
     return _leibniz(multiply, p, q)
 
 
@@ -58,22 +41,7 @@ def multiply(p: Array, q: Array) -> Array:
 
 
 def exp(u: Jet) -> Jet:
-    """Return the jet of the unit quaternion exp(u) = (cos ‖u‖, sin(‖u‖)/‖u‖ u).
-
-    Parameters
-    ----------
-    u : list of ndarray, shape (3, ...)
-        Half the rotation vector.
-
-    Returns
-    -------
-    list of ndarray, shape (4, ...)
-
-    Examples
-    --------
-    >>> exp([np.array([0, 0, np.pi / 2])])[0].round(12)  # a half-turn about z
-    array([0., 0., 0., 1.])
-    """
+    """Return the jet of exp(u) = (cos ‖u‖, sin(‖u‖)/‖u‖ u), u half the rotation vector."""
     s = dot(u, u)
     cosine, sinc = _cosine_and_sinc(s[0], len(u) - 1)
     real, share = _chain(cosine, s), _chain(sinc, s)
@@ -81,29 +49,10 @@ def exp(u: Jet) -> Jet:
 
 
 def slerp(a: Jet, b: Jet, share: Jet) -> Jet:
-    """Return the jet of (sin((1 − t) φ) a + sin(t φ) b)/sin φ, φ the angle between a and b.
+    """Return the jet of (sin((1 − t) φ) a + sin(t φ) b)/sin φ, φ < π the angle between a and b.
 
-    Parameters
-    ----------
-    a, b : list of ndarray, shape (4, ...)
-        Unit quaternions, φ < π.
-    share : list of ndarray
-        t.
-
-    Returns
-    -------
-    list of ndarray, shape (4, ...)
-
-    Notes
-    -----
-    sin(t φ)/sin φ = t sinc(t φ)/sinc φ. With s = φ² it is a smooth function of t and s, as s is of
-    cos φ = a·b.
-
-    Examples
-    --------
-    >>> one, about_z = np.eye(4)[[0, 3]]
-    >>> slerp([one], [about_z], [np.array(0.5)])[0].round(4)
-    array([0.7071, 0.    , 0.    , 0.7071])
+    Here t is `share`, and a and b are unit quaternions. sin(t φ)/sin φ = t sinc(t φ)/sinc φ is a
+    smooth function of t and s = φ², as s is of cos φ = a·b.
     """
     order = len(share) - 1
     cosine = dot(a, b)
@@ -154,24 +103,8 @@ def rotation(q: Array) -> Array:
 def angular_velocity(q: Jet) -> Array:
     """Return the last derivative that a jet gives: w of [q, q'], w' of [q, q', q''], then w''.
 
-    A unit quaternion has q' = q (0, w)/2. One of any norm, n = ‖q‖², has n w = 2 im(q̄ q'), and,
-    differentiated, n w' + n' w = 2 im(q̄ q''), n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
-
-    Parameters
-    ----------
-    q : list of ndarray, shape (4, ...)
-        A quaternion of any norm but 0.
-
-    Returns
-    -------
-    ndarray, shape (3, ...)
-        Angular velocity, acceleration or jerk, body frame.
-
-    Examples
-    --------
-    >>> still, about_x = np.eye(4)[:2]
-    >>> angular_velocity([still, about_x / 2])
-    array([1., 0., 0.])
+    q is of any norm but 0, the result in the body frame. With n = ‖q‖², n w = 2 im(q̄ q'), so
+    n w' + n' w = 2 im(q̄ q'') and n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
     """
     n = _dot(q[0], q[0])
     w = 2 * _imaginary(q[0], q[1]) / n
@@ -239,11 +172,9 @@ def _over(x: Jet, y: Jet) -> Jet:
 
 
 def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
-    """Return c = cos √s, k = sin(√s)/√s, and their derivatives by s.
+    """Return c = cos √s, k = sin(√s)/√s, and their derivatives by s; for small s by power series.
 
-    Where s is small the second and third derivatives of k are power series. The first follows, as
-    c' = −k/2 and 4 s k'' + 6 k' + k = 0; where s is not small the third does too, as
-    4 s k''' + 10 k'' + k' = 0.
+    c' = −k/2, 4 s k'' + 6 k' + k = 0 and 4 s k''' + 10 k'' + k' = 0 give the others.
     """
     root = np.sqrt(s)
     tangent = np.tan(root / 2)  # NumPy's fastest way

@@ -26,12 +26,12 @@ LINKS = (2.0, 1.5)
 
 
 class Posture(NamedTuple):
-    """Where the parts of an arm are.
+    """Positions of the parts of an arm with n links, in the world frame.
 
     Parameters
     ----------
     joints : ndarray, shape (..., n + 1, 2)
-        The joints in order, the first one at the origin; then the tip. In m, world frame.
+        The joints in order, the first one at the origin; then the tip.
     frames : ndarray, shape (..., n, 3)
         The frames of the links: poses (x, y, theta) at their centres, x along the link.
     """
@@ -41,23 +41,20 @@ class Posture(NamedTuple):
 
 
 def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
-    """Return where the joints, the tip and the frames of the links are.
+    """Return the positions of the joints and the tip, and the frames of the links.
 
     Source: RR 4.
 
     Parameters
     ----------
     q : array_like, shape (..., n)
-        Joint angles, in rad: the first measured from the world's x axis, the others each from the
-        link before. The heading of a link is the sum of the angles up to its own.
+        Joint angles: the first from the world's x axis, each other one from the link before.
     lengths : array_like, shape (n,), optional
-        Lengths of the links, in m, above 0.
+        Lengths of the links, above 0.
 
     Returns
     -------
     Posture
-        ``joints``, shape (..., n + 1, 2), the tip last, and ``frames``, shape (..., n, 3), the
-        planar poses of the links at their centres.
 
     Examples
     --------
@@ -77,27 +74,20 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
 
 
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
-    """Return the matrix that takes joint velocities to the velocity of the tip.
+    """Return the matrix that takes joint velocities to the velocity of the tip in the world frame.
 
+    Singular set: all links lie on one line, stretched or folded; the rank is 1.
     Source: RR 4.
 
     Parameters
     ----------
-    q : array_like, shape (..., n)
-        Joint angles, in rad, as for `arm_forward_kinematics`.
-    lengths : array_like, shape (n,), optional
-        Lengths of the links, in m, above 0.
+    q, lengths
+        As for `arm_forward_kinematics`.
 
     Returns
     -------
     ndarray, shape (..., 2, n)
-        In m/rad, world frame. Column k is the vector from joint k to the tip, turned by a quarter
-        to the left.
-
-    Notes
-    -----
-    Singular set: where all links lie on one line, stretched or folded, the tip cannot move along
-    it, and the rank is 1.
+        In m/rad. Column k is the vector from joint k to the tip, turned by a quarter to the left.
 
     Examples
     --------
@@ -113,30 +103,21 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the two sets of joint angles that bring the tip of a two-link arm to a place.
 
+    Singular set: the links lie on one line, where both solutions are the same up to full turns.
+    Where equal links fold up, any first angle puts the tip at the base; one is taken.
     Source: RR 4.
 
     Parameters
     ----------
     tip : array_like, shape (..., 2)
-        Where the tip is to be, in m, world frame.
+        Position of the tip, world frame. One out of reach raises ValueError.
     lengths : array_like, shape (2,), optional
-        Lengths of the links, in m, above 0.
+        Lengths of the links, above 0.
 
     Returns
     -------
     ndarray, shape (..., 2, 2)
-        The two solutions, and for each its joint angles in [−π, π], in rad: the first has its
-        elbow angle in [0, π], the second is its mirror image, with the opposite one.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, the lengths are not two above 0, or the tip is out of reach.
-
-    Notes
-    -----
-    Singular set: where the links lie on one line both solutions are the same, up to full turns.
-    Where equal links fold up, the tip is at the base whatever the first angle is; one is taken.
+        Angles in [−π, π], a row for each solution: elbow angle in [0, π], then its mirror image.
 
     Examples
     --------
@@ -163,21 +144,20 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
 
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
-    """Return the path that takes each joint angle evenly from its start to its goal.
+    """Return the path (1 − t) start + t goal of joint angles at even times t; full turns count.
 
     Source: RR 4.1, RR (20), RR (21), with errata 19.
 
     Parameters
     ----------
     start, goal : array_like, shape (..., n)
-        Joint angles, in rad. Turns count: a joint goes as far as the two numbers say.
     steps : int, optional
-        How many equal steps, from 1 up.
+        Number of equal steps, at least 1.
 
     Returns
     -------
     ndarray, shape (steps + 1, ..., n)
-        The first state is the start, the last one the goal, exactly.
+        The ends are exact.
 
     Examples
     --------
@@ -191,22 +171,19 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
 
 
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
-    """Return the path that a plan makes an arm go, one state more than commands.
+    """Return the joint angles after each command of a plan, the start first; turns add up.
 
     Source: RR 4.2, RR (22), RR (23), with errata 20.
 
     Parameters
     ----------
     start : array_like, shape (..., n)
-        Joint angles, in rad.
     plan : iterable of (velocity, duration)
-        Velocities of the n joints, in rad/s; durations from 0 up, in s. The empty plan leaves the
-        start alone, and a command of no duration repeats the state.
+        Velocities of the n joints in rad/s; durations from 0 up, in s. It may be empty.
 
     Returns
     -------
     ndarray, shape (commands + 1, ..., n)
-        The first state is the start, exactly. Turns add up.
 
     Examples
     --------

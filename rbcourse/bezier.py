@@ -37,45 +37,26 @@ def bezier_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at both ends. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time; ‖w‖ times the duration < 3π.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`; ‖w0‖ and ‖w1‖ times the duration must be below 3π.
 
     Returns
     -------
     Bezier
-        A `Curve` that meets all four ends, with the control points R0, R0 exp(ŵ0/3),
-        R1 exp(−ŵ1/3), R1.
-
-    Raises
-    ------
-    ValueError
-        If a velocity times the duration is 3π or more: its leg would be no shortest geodesic.
-
-    See Also
-    --------
-    cumulative_bezier_so3 : From the same control points, faster to evaluate.
-    corrected_bezier_so3 : Nearer to the optimum.
+        Its control points are R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1; it meets all four ends.
 
     Notes
     -----
-    Singular set: the two inner control points a half-turn apart; the geodesic between them is that
-    of `log_so3`. No other leg can become a half-turn: those of the next level are, by the triangle
-    inequality, never longer than the longest two before.
-
-    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+    Singular set: the two inner control points a half-turn apart; `log_so3` chooses the geodesic
+    between them. By the triangle inequality no other leg can become a half-turn. Moved ends give
+    the moved curve, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> c = bezier_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     return _bezier(*_slow_ends(R0, R1, w0, w1, duration))
 
@@ -85,27 +66,20 @@ def bezier_long_so3(
 ) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
+    Where the end velocities are large, it may cost less than `bezier_so3`. Moved and reversed ends,
+    singular set: as there; also singular where the two inner control points are equal, where it is
+    that curve.
     Source: beyond BK 10.
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like
+    R0, R1, w0, w1, duration
         As for `bezier_so3`.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
     Bezier
-        A `Curve` that meets all four ends, with the control points of `bezier_so3`. Where the end
-        velocities are large, it may cost less than that.
-
-    Notes
-    -----
-    Singular set: that of `bezier_so3`; and the two inner control points equal, where no axis is the
-    other one, and the curve is that of `bezier_so3`.
-
-    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+        With the control points of `bezier_so3`; it meets all four ends.
 
     Examples
     --------
@@ -123,37 +97,32 @@ def cumulative_bezier_so3(
 ) -> CumulativeBezier:
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
+    It is faster to evaluate than `bezier_so3`.
     Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
     quaternion curves with simple high order derivatives, SIGGRAPH 1995.
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    duration : array_like, shape (...), optional
-        How long it takes.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
 
     Returns
     -------
     CumulativeBezier
-        A `Curve` that meets all four ends: v₁ = w0/3, v₃ = w1/3, v₂ the shortest turn between, and
-        β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³.
+        v₁ = w0/3, v₃ = w1/3, v₂ is the shortest turn between, and β₁ = 1 − (1 − t)³,
+        β₂ = 3t² − 2t³, β₃ = t³. It meets all four ends.
 
     Notes
     -----
-    Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where v₂ is what `log_so3`
-    chooses. The curve itself is smooth everywhere.
-
-    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+    Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where `log_so3` chooses v₂. The
+    curve itself is smooth everywhere. Moved ends give the moved curve; reversed ends another.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = cumulative_bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> c = cumulative_bezier_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     halves = np.stack(bezier_legs(ends), axis=-2) / 2
@@ -169,39 +138,31 @@ def corrected_bezier_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at both ends. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time; ‖w‖ times the duration < 3π.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, duration
+        As for `bezier_so3`.
 
     Returns
     -------
     CorrectedBezier
-        A `Curve` that meets all four ends: R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B Bézier's
-        curve, R_m = R0 exp(σ̂/2) the rotation half-way, and δ(t) of `bezier_deviation`.
+        R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B the curve of `bezier_so3` and δ(t) of
+        `bezier_deviation`. It meets all four ends.
 
     Notes
     -----
-    Near-optimal for small excursions: data s times as large have a relative excess over the
-    optimum about s⁸ times as large, that of the other closed forms s⁴ or s² times. δ is of third
-    order in the data: where the ends are fast it is large, and makes the curve cost more than
-    Bézier's (see docs/near_optimal.md).
-
-    σ is the logarithm of R0ᵀ R1, of any length, that is nearest to the sum of Bézier's three legs.
-    Singular set: that of `bezier_so3`, and where two logarithms are equally near.
-
-    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+    R_m = R0 exp(σ̂/2) is the rotation half-way; σ is the logarithm of R0ᵀ R1, of any length, that is
+    nearest to the sum of Bézier's three legs.
+    Near-optimal for small excursions: data s times as large have a relative excess over the optimum
+    about s⁸ times as large (s⁴ or s² for the other closed forms). δ is of third order in the data:
+    fast ends make it large, and the curve cost more than Bézier's (see docs/near_optimal.md).
+    Singular set, moved and reversed ends: as for `bezier_so3`; also singular where two logarithms
+    are equally near.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = corrected_bezier_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> c = corrected_bezier_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     ends, T, legs = _slow_ends(R0, R1, w0, w1, duration)
     curve = _bezier(ends, T, legs)
@@ -239,22 +200,10 @@ def _slow_ends(
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
-    """Return e, the mean of two end velocities less σ, and d, their difference.
+    """Return e, the mean of two end velocities less σ = log(R0ᵀ R1), and d, their difference.
 
-    The velocities are carried to the rotation half-way, R0 exp(σ̂/2), parallel in a bi-invariant
-    metric: the body axes turn by σ/2 on each half of the way, and what is parallel by half of that.
-
-    Parameters
-    ----------
-    sigma : ndarray, shape (..., 3)
-        A logarithm of R0ᵀ R1.
-    w0, w1 : ndarray, shape (..., 3)
-        Angular velocities at the ends, body frame.
-
-    Returns
-    -------
-    e, d : ndarray, shape (..., 3)
-        0 for the geodesic at constant speed.
+    Both are carried to the rotation half-way, R0 exp(σ̂/2), parallel in a bi-invariant metric: on
+    each half the body axes turn by σ/2, parallel vectors by σ/4. 0 for the geodesic.
     """
     quarter = exp_so3(sigma / 4)
     u0, u1 = matvec(quarter.mT, w0), matvec(quarter, w1)
@@ -262,21 +211,11 @@ def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Arr
 
 
 def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
-    """Return what Bézier's curve is away from the optimum, to third order, as a polynomial.
+    """Return the coefficients c₀, …, c₄ of Bézier's deviation from the optimum, to third order.
 
-    The deviation, a rotation vector, is δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴), u = 2t − 1.
-
+    The deviation, a rotation vector, is δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴), u = 2t − 1; e
+    and d are those of `seen_from_the_middle`. In the code ``sed`` is σ × (e × d).
     Source: beyond BK 10.
-
-    Parameters
-    ----------
-    sigma, e, d : ndarray, shape (..., 3)
-        The displacement, and the velocities of `seen_from_the_middle`.
-
-    Returns
-    -------
-    list of ndarray, shape (..., 3)
-        c₀, …, c₄: sums of triple products a × (b × c); in the code ``sed`` is σ × (e × d).
     """
     first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
     second = np.stack([sigma, sigma, e, sigma, sigma, e, sigma, e])
@@ -343,7 +282,7 @@ def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
 class CorrectedBezier(Bezier):
     """The `Curve` of de Casteljau's construction, less its leading deviation from the optimum.
 
-    It is seen from the rotation half-way: there moving by −δ is exp(−δ̂/2) on both sides.
+    Seen from the rotation half-way, moving by −δ is exp(−δ̂/2) on both sides.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:

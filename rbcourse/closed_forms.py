@@ -46,33 +46,26 @@ def exponential_cubic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    duration : array_like, shape (...), optional
-        How long it takes.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
 
     Returns
     -------
     ExponentialCubic
-        A `Curve` that meets all four ends: σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1)
-        by `right_jacobian_inverse_so3`.
+        σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) by `right_jacobian_inverse_so3`.
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
-    `log_so3` chooses. The curve itself is smooth everywhere. Velocities along the geodesic give the
-    optimum among all curves that turn by this vector.
-
-    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses σ(1). The curve itself is
+    smooth everywhere. Velocities along the geodesic give the optimum among all curves that turn by
+    σ(1). Moved ends give the moved curve; the reversed ends give another curve.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = exponential_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> c = exponential_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     return _exponential_cubic(ends, T, log_so3(ends.turn))
@@ -83,24 +76,18 @@ def exponential_cubic_long_so3(
 ) -> ExponentialCubic:
     """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
 
+    Singular set: that of `exponential_cubic_so3`; and R0 = R1, where it is that curve.
     Source: beyond BK 10.
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like
-        As for `exponential_cubic_so3`.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
 
     Returns
     -------
     ExponentialCubic
-        A `Curve` that meets all four ends, with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1).
-
-    Notes
-    -----
-    Singular set: that of `exponential_cubic_so3`; and R0 = R1, where no axis is the other one, and
-    the curve is that of `exponential_cubic_so3`.
+        It meets all four ends, with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1).
 
     Examples
     --------
@@ -123,42 +110,29 @@ def quaternion_cubic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    duration : array_like, shape (...), optional
-        How long it takes.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
 
     Returns
     -------
     QuaternionCubic
-        A `Curve` that meets all four ends; with ``margin``. The cubic has q' = q (0, w)/2 at its
-        ends; of q1 and −q1 the one nearer to q0 is its goal.
-
-    Raises
-    ------
-    ValueError
-        From the curve, when called at a time when the cubic is zero, to rounding.
+        It meets all four ends; with ``margin``. The cubic has q' = q (0, w)/2 at its ends; of q1
+        and −q1 it ends at the one nearer to q0.
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart, where q1 and −q1 are equally near: the one that
-    `canonical_quaternion` chooses for R0ᵀ R1 is taken. And where the cubic is zero at some time;
-    near it, where ``margin`` is small, the body turns by up to a full turn in a moment, and the
-    curve is accurate to eps over ``margin`` at that time, its derivatives to that over its square
-    and its cube.
-
-    Moved ends give the moved curve, and R1, R0, −w1, −w0 give the curve run backwards.
+    Singular set: R0 and R1 a half-turn apart, where `canonical_quaternion` of R0ᵀ R1 is taken; and
+    times when the cubic is zero, when calling the curve raises ValueError. Near a small ``margin``
+    the body turns by up to a full turn in a moment, and the curve is accurate to eps over
+    ``margin`` at that time, its derivatives to that over its square and its cube. Moved ends give
+    the moved curve, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = quaternion_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
-    >>> float(c.margin.round(3))
-    0.933
+    >>> c = quaternion_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c(1, 1).round(12) + 0.0, float(c.margin.round(3))
+    (array([0., 1., 0.]), 0.933)
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
@@ -174,41 +148,27 @@ def cayley_cubic_so3(
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices at both ends, no half-turn apart. Validity is not checked; see
-        `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`; R0 and R1 must not be a half-turn apart.
 
     Returns
     -------
     CayleyCubic
-        A `Curve` that meets all four ends. Cayley's parameters of a turn by a about the unit
-        vector n are g = tan(a/2) n; its quaternion is (1, g) over its norm, and along a curve
-        2 g' = w + g × w + (g·w) g.
-
-    Raises
-    ------
-    ValueError
-        If R0 and R1 are a half-turn apart, to rounding.
+        Its quaternion is (1, g) over its norm. Cayley's parameters of a turn by a about the unit
+        vector n are g = tan(a/2) n; along a curve 2 g' = w + g × w + (g·w) g.
 
     Notes
     -----
-    Singular set: half-turns, which have no such parameters. No curve ever turns by 180° from R0,
-    so near them it is a long way round: the cost grows without bound.
-
-    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+    Singular set: half-turns, which have no such parameters. No curve ever turns by 180° from R0, so
+    near them it is a long way round, and the cost grows without bound. Moved ends give the moved
+    curve; the reversed ends give another curve.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = cayley_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> c = cayley_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     turn = quaternion_from_matrix(ends.turn)
@@ -236,59 +196,34 @@ def normal_cubic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    inertia : array_like, shape (..., 3, 3)
-        G, body frame: symmetric and positive definite.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, inertia, duration
+        As for `minimum_acceleration_so3`; `inertia` is not optional.
 
     Returns
     -------
     NormalCubic
-        A `Curve` that meets all four ends: R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with x(t) the cubic
-        with x(0) = 0, x'(0) = w0 and the x(1) and x'(1) that give R1 and w1.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, `inertia` is not symmetric and positive
-        definite, the batches do not broadcast, or no x(1), or no x'(1), is found.
-
-    See Also
-    --------
-    minimum_acceleration_so3 : The optimum.
-    weighted_cubic_so3 : The projection in the metric of a body.
-    exponential_cubic_so3 : With G a multiple of I it is that curve.
+        R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with x(t) the cubic with x(0) = 0, x'(0) = w0 and the
+        x(1) and x'(1) that give R1 and w1.
 
     Notes
     -----
-    A geodesic of the metric G, the motion of a free body, starts from R0 with the velocity x as
-    R0 exp(ŷ) with y = x t − ½ G⁻¹(x × G x) t² + …: Euler's equation is G w' = −w × G w. So x is
-    its initial velocity, the Riemannian normal coordinate of R0 exp(ŷ), to second order. Cubics in
-    normal coordinates are Hermite interpolation as Zimmermann 2020 has it; with the map cut off
-    after its second term, a retraction of second order, we know no source. It is no Riemannian
-    cubic: that is the name of the optimum.
+    x is the Riemannian normal coordinate of R0 exp(ŷ), the initial velocity of the geodesic from
+    R0, to second order. Zimmermann interpolates in normal coordinates; for the second-order map we
+    know no source. It is not a Riemannian cubic, which is the optimum, but near-optimal for small
+    excursions: data s times as large have a relative excess over the optimum about s⁴ times as
+    large. With G a multiple of I it is `exponential_cubic_so3`.
 
-    Near-optimal for small excursions: data s times as large have a relative excess over the
-    optimum about s⁴ times as large.
-
-    Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector y(1)
-    which `log_so3` chooses; and where x ↦ y is singular at x(1). Every y is reached, as
-    yᵀ G x = xᵀ G x bounds all x with this y. With y(1) up to π the moments 1, 2, 2.9 have no such
-    place; flat strips, thin bodies with three different moments, do, beyond about 2 rad about their
-    middle axis. Near it the curve is long.
-
-    Moved ends give the moved curve; but run backwards, from R1 to R0, it is another one.
+    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses y(1); and where x ↦ y is
+    singular at x(1): ValueError, as when no x(1) is found. With y(1) up to π the moments 1, 2, 2.9
+    have no such place; thin bodies with three different moments do, beyond about 2 rad about their
+    middle axis. Near it the curve is long. Moved ends give the moved curve; reversed ends another.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
     >>> R1, book = exp_so3([0, 0, 1.5]), np.diag([1.0, 2.22, 3.18])
-    >>> c = normal_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0], book)
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> normal_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0], book)(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
     ends, T = ends.over(duration)
@@ -321,42 +256,25 @@ def exponential_quintic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    a0, a1 : array_like, shape (..., 3)
-        Angular accelerations w' there, body frame, in rad per unit time squared.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, a0, a1, duration
+        As for `projected_quintic_so3`.
 
     Returns
     -------
     ExponentialQuintic
-        A `Curve` that meets all six ends: σ(0) = 0, σ(1) = log_so3(R0ᵀ R1), and the derivatives of
-        σ that give w and w' there.
-
-    See Also
-    --------
-    minimum_jerk_so3 : The optimum with the same ends.
-    projected_quintic_so3 : In the space of matrices, far from the optimum where turns are large.
-    jerk_cost : What they cost.
+        σ(0) = 0, σ(1) = log_so3(R0ᵀ R1), and the derivatives of σ give w and w' at both ends.
 
     Notes
     -----
-    Near-optimal for small excursions (see docs/near_optimal.md). From rest to rest it is the
-    optimum.
-
-    Singular set: R0 and R1 a half-turn apart, where the curve is that of the rotation vector which
-    `log_so3` chooses. The curve itself is smooth everywhere. Moved ends give the moved curve; but
-    run backwards, from R1 to R0, it is another one.
+    Near-optimal for small excursions (see docs/near_optimal.md), and from rest to rest it is the
+    optimum (`minimum_jerk_so3`). Singular set and invariance: as for `exponential_cubic_so3`.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> rest = [0, 0, 0]
-    >>> c = exponential_quintic_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, [0, 0, 2])
-    >>> c([0, 1], 2).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 0., 2.]])
+    >>> R1, rest = exp_so3([0, 0, 1.5]), [0, 0, 0]
+    >>> exponential_quintic_so3(np.eye(3), R1, rest, rest, rest, [0, 0, 2])(1, 2).round(12) + 0.0
+    array([0., 0., 2.])
     """
     ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
     curve = _exponential_cubic(ends, T, log_so3(ends.turn))
@@ -418,10 +336,7 @@ class NormalCubic(QuaternionCurve):
 
 
 def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Array]:
-    """Return x with x − ½ G⁻¹(x × G x) = y, and the derivative of the left side by x.
-
-    Newton's method, for a quarter of y, two quarters, and so on.
-    """
+    """Return x with x − ½ G⁻¹(x × G x) = y, and ∂y/∂x, by Newton's method for y/4, y/2, 3y/4, y."""
     x = np.zeros_like(y)
     for share in (0.25, 0.5, 0.75, 1):
         goal = share * y
@@ -448,8 +363,7 @@ def _check_normal(lost: Array, why: str) -> None:
 class NormalizedCubic(QuaternionCurve):
     """The `Curve` of a cubic of quaternions, of norm 1 at its start and of another at its end.
 
-    Its components are those seen from the goal: there Q(1) is real, and does not round w1 away,
-    however large it is.
+    Its components are seen from the goal: Q(1) is real there and does not round w1 away.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
@@ -471,12 +385,8 @@ def _cubic_from_the_goal(
 class QuaternionCubic(NormalizedCubic):
     """The `Curve` of the unit quaternions nearest to a cubic between unit quaternions.
 
-    Attributes
-    ----------
-    margin : ndarray, shape (...)
-        The least norm of the cubic. At 0 the nearest unit quaternion is not unique.
-    margin_time : ndarray, shape (...)
-        When that is.
+    Its ``margin`` is the least norm of the cubic, ``margin_time`` the time of it, both of shape
+    (...). Where the margin is 0 the nearest unit quaternion is not unique.
     """
 
     def _check(self, Q: Array, t: Array, by_curve: bool) -> None:

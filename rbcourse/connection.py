@@ -1,6 +1,6 @@
 """The connection of a left-invariant metric, in components, and its geodesics (BK section 2).
 
-Components are those of `rbcourse.metrics`: of angular velocities or twists, body frame.
+Components are those of `rbcourse.metrics`: of angular velocities or twists.
 """
 
 from __future__ import annotations
@@ -28,23 +28,17 @@ def structure_constants(basis: ArrayLike) -> Array:
     Parameters
     ----------
     basis : array_like, shape (m, n, n)
-        The matrices L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``.
+        L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``: linearly independent, to one part in a
+        million, with commutators that are, to rounding, combinations of the basis.
 
     Returns
     -------
     ndarray, shape (m, m, m)
-        Antisymmetric in i and j. For ``BASIS_SO3`` the cross product: C[k, i, j] = ε_ijk.
-
-    Raises
-    ------
-    ValueError
-        If `basis` is not finite or not of that shape, its matrices are linearly dependent, to one
-        part in a million, or a commutator of two of them is, to rounding, no combination of them.
+        Antisymmetric in i and j; for ``BASIS_SO3`` C[k, i, j] = ε_ijk.
 
     Examples
     --------
-    >>> C = structure_constants(BASIS_SO3)
-    >>> C[:, 0, 1]  # turning about x and then y, or y and then x, differs by turning about z
+    >>> structure_constants(BASIS_SO3)[:, 0, 1]  # [L_1, L_2] = L_3
     array([0., 0., 1.])
     """
     L = as_finite("basis", basis, "n", "n")
@@ -69,44 +63,28 @@ def structure_constants(basis: ArrayLike) -> Array:
 
 
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
-    """Return the Christoffel symbols of a left-invariant metric in a left-invariant frame.
+    """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
+    ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i, at all points. To a few eps times the condition
+    number of G the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and Γ, lowered by G, is
+    antisymmetric in i and k. Γ is *not* symmetric in j and k. It follows from Koszul's formula,
+    2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
     Source: BK 2.4, BK (8).
 
     Parameters
     ----------
     G : array_like, shape (..., m, m)
-        The metric in that frame: symmetric and not singular, definite or not.
+        The metric in the frame: symmetric and not singular to rounding, definite or not.
     basis : array_like, shape (m, n, n)
-        The frame at the identity, such as ``BASIS_SO3`` or ``BASIS_SE3``.
+        The frame L_1 … L_m at the identity, as for `structure_constants`.
 
     Returns
     -------
     ndarray, shape (..., m, m, m)
-        Γ[i, j, k] with ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. They are the same at all
-        points of the group. The connection is the only one without torsion, Γ[i, j, k] −
-        Γ[i, k, j] = C[i, j, k], that is compatible with the metric: lowered by `G`, Γ is
-        antisymmetric in i and k. Both hold to a few eps times the condition number of `G`.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite or not of that shape, `G` is not symmetric or is singular to
-        rounding, or `basis` is not one of a Lie algebra.
-
-    Notes
-    -----
-    Koszul's formula, in which the products of the metric are constant and their derivatives
-    vanish: 2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
-
-    In a left-invariant frame the symbols are *not* symmetric in j and k, as those of coordinates
-    are.
 
     Examples
     --------
-    >>> from rbcourse import METRIC_SO3
-    >>> gamma = christoffel(METRIC_SO3, BASIS_SO3)  # half of the cross product
-    >>> gamma[:, 0, 1] + 0.0
+    >>> christoffel(np.eye(3), BASIS_SO3)[:, 0, 1] + 0.0  # half of the cross product
     array([0. , 0. , 0.5])
     """
     C = structure_constants(basis)
@@ -124,30 +102,26 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
 
 
 def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
-    """Return the covariant derivative of a field x along a curve with the velocity v.
+    """Return the covariant derivative x_dot[i] + gamma[i, j, k] v[j] x[k] of a field along a curve.
 
+    The sum is over j and k. With x = v it is the acceleration (9), which vanishes along geodesics,
+    (8); with x_dot = 0 it is ∇_v x of left-invariant fields.
     Source: BK 2.4, BK (8), BK (9).
 
     Parameters
     ----------
     gamma : array_like, shape (..., m, m, m)
-        Christoffel symbols, as `christoffel` returns them.
-    v : array_like, shape (..., m)
-        The velocity, in components of the left-invariant frame: an angular velocity or a twist.
-    x, x_dot : array_like, shape (..., m)
-        The field along the curve, in such components, and their derivatives with respect to time.
+        As `christoffel` returns them.
+    v, x, x_dot : array_like, shape (..., m)
+        Velocity of the curve, field and its derivative by time, in left-invariant components.
 
     Returns
     -------
     ndarray, shape (..., m)
-        x_dot[i] + gamma[i, j, k] v[j] x[k], summed over j and k. With x = v it is the acceleration
-        (9), which vanishes along geodesics: (8), for the components of the velocity. With
-        x_dot = 0 it is ∇_v x of left-invariant fields.
 
     Examples
     --------
-    >>> from rbcourse import METRIC_SE3
-    >>> gamma = christoffel(METRIC_SE3, BASIS_SE3)
+    >>> gamma = christoffel(np.diag([2, 2, 2, 1, 1, 1]), BASIS_SE3)
     >>> S = [0, 0, 2, 3, 0, 0]  # a constant twist: the origin runs on a circle
     >>> covariant_derivative(gamma, S, S, np.zeros(6)) + 0.0  # ω × v, to its centre
     array([0., 0., 0., 0., 6., 0.])
@@ -161,54 +135,39 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
 
 
 def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
-    """Return where the geodesics that start at A0 with the velocity v0 are at the times t.
+    """Return A, v at the times t of the geodesics that start at A0 with the velocity v0.
 
-    Source: BK 2.4, BK (8); where the paper prints the equation with the second derivatives of
-    coordinates, which would need the symbols of these, not those of the left-invariant frame.
+    Source: BK 2.4, BK (8); where the paper prints second derivatives of coordinates, which need
+    other symbols than those of the left-invariant frame.
 
     Parameters
     ----------
     G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
-        The matrix of a left-invariant metric: symmetric and not singular, definite or not. Of a
-        body that turns freely, its inertia.
-    A0 : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses at t = 0. Validity is not checked; see `project_so`, `project_se`.
-    v0 : array_like, shape (..., 3) or (..., 6)
-        Angular velocities there, or twists (ω, v), body frame.
+        The matrix of a left-invariant metric, such as the inertia of a body that turns freely:
+        symmetric and not singular, definite or not.
+    A0, v0 : array_like, shapes (..., 3, 3) and (..., 3), or (..., 4, 4) and (..., 6)
+        Rotations and angular velocities, or poses and twists, at t = 0.
     t : array_like, any shape
         Times, in any order, negative ones too.
 
     Returns
     -------
-    A : ndarray, shape t.shape + (..., 3, 3) or (..., 4, 4)
-        Rotations or poses.
-    v : ndarray, shape t.shape + (..., 3) or (..., 6)
-        Their velocities, in the body frame: vᵀ G v is constant.
-
-    Raises
-    ------
-    FloatingPointError
-        If the integration fails.
-
-    See Also
-    --------
-    geodesic_so3, geodesic_se3 : In closed form, from end to end, for the metrics (12) and (14).
-    screw_se3 : For the metric (10).
+    A, v : ndarray, shapes t.shape + A0.shape and t.shape + v0.shape
+        After broadcasting of the batches of G, A0 and v0; vᵀ G v is constant.
 
     Notes
     -----
-    Singular set: none. The momentum in the fixed frame is constant, so that no velocity reaches
-    infinity in finite time. On SE(3), of an indefinite metric, it may grow exponentially; where it
-    leaves the range of the floating-point numbers the integration fails.
-
-    Solves A' = A hat(v) and (8) in the form v'_i = −Γ_ijk v_j v_k, on SO(3) Euler's equations, by
-    an eighth-order Runge–Kutta method at a relative tolerance of 3e-14. The members of a batch of
-    N share its steps, a tenth of a rad where all moments are alike and shorter otherwise, and its
-    tolerance: that of a single one may be up to √N times larger.
+    Singular set: none. For an indefinite metric on SE(3) the velocity may grow exponentially,
+    beyond the range of the floating-point numbers; if the integration fails, FloatingPointError is
+    raised.
+    Solves A' = A hat(v), v'_i = −Γ_ijk v_j v_k, on SO(3) Euler's equations, by an eighth-order
+    Runge–Kutta method at a relative tolerance of 3e-14, which the N members of a batch share: that
+    of a single one may be up to √N times larger. Closed forms: `screw_se3` for the metric (10),
+    `geodesic_so3` and `geodesic_se3`, from end to end, for (12) and (14).
 
     Examples
     --------
-    >>> G, spin = np.diag([1.0, 2, 3]), [0.01, 3, 0]  # about the middle axis, not quite
+    >>> G, spin = np.diag([1.0, 2, 3]), [0.01, 3, 0]  # nearly about the middle axis
     >>> R, w = geodesic_flow(G, np.eye(3), spin, [0, 6])
     >>> w[:, 1].round(1)  # it flips
     array([ 3., -3.])

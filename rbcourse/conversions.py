@@ -24,7 +24,6 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Its columns are the images of the three axes.
 
     Examples
     --------
@@ -37,26 +36,19 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
 
 
 def quaternion_from_matrix(R: ArrayLike) -> Array:
-    """Return the unit quaternion of a rotation matrix, with w ≥ 0.
+    """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
-    The ten products of two components of q are linear in R. They form the matrix 4 q qᵀ; its row
-    with the largest diagonal entry is a multiple of q that never vanishes.
-
+    It is the normalized row of 4 q qᵀ (linear in R) with the largest diagonal entry, accurate to a
+    few eps. Singular set: half-turns, where `canonical_quaternion` chooses between q and −q.
     Source: BK Remark 7.
 
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
     ndarray, shape (..., 4)
-        Unit quaternions (w, x, y, z), accurate to a few eps.
-
-    Notes
-    -----
-    Singular set: half-turns, where `canonical_quaternion` says which of q and −q is returned.
 
     Examples
     --------
@@ -77,12 +69,11 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
-        Rotation vectors, in rad. One full turn gives (−1, 0, 0, 0), two give (1, 0, 0, 0).
 
     Returns
     -------
     ndarray, shape (..., 4)
-        Unit quaternions.
+        (−1, 0, 0, 0) for one full turn, (1, 0, 0, 0) for two.
 
     Examples
     --------
@@ -97,10 +88,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
 def axis_and_angle(w: Array) -> tuple[Array, Array]:
     """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1); 0 where w is.
 
-    Raises
-    ------
-    ValueError
-        If a norm overflows.
+    A norm that overflows raises ValueError.
     """
     with np.errstate(over="ignore"):
         angle = np.linalg.norm(w, axis=-1, keepdims=True)
@@ -114,21 +102,17 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same.
 
+    Angle in [0, π] to rounding; accurate to a few eps. Singular set: half-turns, where
+    `canonical_quaternion` chooses the axis.
     Source: BK 2.5, RR 2.2.
 
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions.
 
     Returns
     -------
     ndarray, shape (..., 3)
-        Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps.
-
-    Notes
-    -----
-    Singular set: half-turns, where `canonical_quaternion` chooses the axis.
 
     Examples
     --------
@@ -143,22 +127,19 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
 
 
 def matrix_from_zyx(angles: ArrayLike) -> Array:
-    """Return R_z(α) R_y(β) R_x(γ): yaw, pitch and roll.
+    """Return R_z(α) R_y(β) R_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
-    Read from the left, each turn is about an axis of the *body*: first z, then the new y, then
-    the newest x. Read from the right, each is about a *fixed* axis: first x, then y, then z.
-
+    The turns are about axes of the *body*: first z, then the new y, then the newest x; or about
+    *fixed* axes: first x, then y, then z.
     Source: RR 2.1, RR (7), RR (8).
 
     Parameters
     ----------
     angles : array_like, shape (..., 3)
-        (α, β, γ), in rad, of any size.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Rotation matrices.
 
     Examples
     --------
@@ -172,20 +153,18 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
 
 
 def zyx_from_matrix(R: ArrayLike) -> Array:
-    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ).
+    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), as `zyx_from_quaternion`.
 
     Source: RR 2.1, RR (7), RR (8).
 
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
     ndarray, shape (..., 3)
-        Angles in rad, as `zyx_from_quaternion` returns them. They give R back to a few eps, in
-        gimbal lock to 40 eps.
+        The angles give R back to a few eps, in gimbal lock to 40 eps.
 
     Examples
     --------
@@ -196,14 +175,13 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
 
 
 def quaternion_from_zyx(angles: ArrayLike) -> Array:
-    """Return the quaternion q_z(α) q_y(β) q_x(γ): yaw, pitch and roll.
+    """Return q_z(α) q_y(β) q_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
     Source: RR 2.2, where α turns about x and γ about z.
 
     Parameters
     ----------
     angles : array_like, shape (..., 3)
-        (α, β, γ), in rad, of any size.
 
     Returns
     -------
@@ -225,9 +203,8 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
-    Of the half angles only two combinations enter: w + y and z − x are multiples of the cosine and
-    the sine of (α − γ)/2, w − y and z + x of those of (α + γ)/2, and β weighs the two.
-
+    Singular set: gimbal lock, β = ±π/2 to 16 eps. Only α − γ (β = −π/2: α + γ) is determined, and
+    γ = 0 is returned. Near it α and γ are accurate to eps over the distance, α ∓ γ to eps.
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
 
@@ -239,14 +216,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Angles in rad: α and γ in (−π, π], β in [−π/2, π/2]. They give q back to a few
-        eps, in gimbal lock to 20 eps.
-
-    Notes
-    -----
-    Singular set: gimbal lock, β = ±π/2. The axes of α and γ coincide, and only α − γ, or α + γ for
-    β = −π/2, is determined. There γ = 0 is returned; what is nearer than 16 eps to it counts as
-    locked. Close to it α and γ are accurate to eps over the distance, their combination to eps.
+        α, γ in (−π, π], β in [−π/2, π/2]; they give q back to a few eps, in gimbal lock 20 eps.
 
     Examples
     --------

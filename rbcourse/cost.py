@@ -41,59 +41,39 @@ def acceleration_cost(
     curve : Curve
         On SO(3) or SE(3), or a stack of them.
     inertia : array_like, shape (..., 3, 3), optional
-        G, the inertia of the body about its centre of mass, body axes: symmetric and positive
-        definite; one, or one for each curve. By default 2 I, that of the ball of metric (12).
-    mass : float, optional
-        Of the body, more than 0; on SE(3) only.
-    centre : array_like, shape (3,), optional
-        Its centre of mass, in the body frame, in m; on SE(3) only.
+        As for `minimum_acceleration_so3`, about the centre of mass; one, or one for each curve.
+    mass, centre : float above 0; array_like, shape (3,); optional
+        Mass of the body, and its centre of mass in the body frame; on SE(3) only.
     rtol : float, optional
-        The relative error that is wanted, from 1e-12 to 0.1. From 1e-8 on the quadrature starts
-        from two panels instead of 16 and more: 3 to 40 times as fast, but it may miss a peak that
-        is narrower than a hundredth of the interval.
+        The relative error, from 1e-12 to 0.1. From 1e-8 on the quadrature starts from two panels
+        instead of 16 and more: 3 to 40 times as fast, but it may miss a peak narrower than a
+        hundredth of the interval.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        ∫ τᵀ G⁻¹ τ dt, where τ = G w' + w × G w is the torque, and on SE(3) that and
-        ∫ m ‖d_c''‖² dt, where d_c is the place of the centre of mass. By default this is
-        ∫ 2 ‖w'‖² dt, and on SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. To `rtol` relative, or 1e-20 absolute,
-        unless acceleration falls within a hundredth of the interval, as with an abrupt ``f`` of a
-        `projected_line_so3`, or with narrow ripples of it. With an inertia the absolute bound is
-        1e-20 times a third of its trace.
+        ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w; on SE(3) plus ∫ m ‖d_c''‖² dt, where d_c
+        is the position of the centre of mass. By default ∫ 2 ‖w'‖² dt, and on SE(3)
+        ∫ (2 ‖w'‖² + ‖d''‖²) dt. To `rtol`, or absolutely to 1e-20 times a third of the trace of G
+        (1e-20 by default), unless acceleration has peaks or ripples within a hundredth of the
+        interval, as with an abrupt ``f`` of a `projected_line_so3`.
 
     Raises
     ------
-    ValueError
-        If `curve` is no `Curve`, an argument is not finite or not of its shape, `inertia` is not
-        symmetric and positive definite or does not fit the stack, `mass` is not positive, or `mass`
-        or `centre` is given on SO(3).
     RuntimeError
-        If the integral does not settle to that, if the curve almost jumps: ``margin`` below 1e-6,
-        or if the velocity of a `chain` jumps.
-
-    See Also
-    --------
-    acceleration_cost_parts : Rotation and translation apart.
-    torque_cost : ∫ ‖τ‖² dt.
-    jerk_cost : The integral of the squared jerk.
+        If the integral does not settle, ``margin`` is below 1e-6, the curve is NaN or the velocity
+        of a `chain` jumps.
 
     Notes
     -----
-    G⁻¹τ is the covariant acceleration of the rotation in the metric G, the metric of the kinetic
-    energy ½ wᵀ G w, and τᵀ G⁻¹ τ its square in that metric. A body that turns freely has τ = 0 and
-    costs nothing.
-
-    On SE(3) the two parts have different units; their sum, and any ratio of sums, depends on the
-    unit of length, unless inertia and mass are those of a body.
+    G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ its square; free motions cost
+    nothing. On SE(3) the sum, and any ratio of sums, depends on the unit of length unless inertia
+    and mass are those of a body; see `acceleration_cost_parts`.
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, geodesic_so3, projected_line_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> float(acceleration_cost(geodesic_so3(np.eye(3), R1)))
-    0.0
-    >>> line = projected_line_so3(np.eye(3), R1)
+    >>> from rbcourse import exp_so3, projected_line_so3
+    >>> line = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]))
     >>> float(acceleration_cost(line).round(4))
     6.7627
     >>> float(acceleration_cost(line, np.diag([1.0, 2, 2.5])).round(4))  # 2.5 in place of 2
@@ -117,30 +97,20 @@ def acceleration_cost_parts(
 
     Parameters
     ----------
-    curve : Curve
-        On SO(3) or SE(3), or a stack of them.
-    inertia, mass, centre, rtol : optional
-        As for `acceleration_cost`.
+    curve, inertia, mass, centre, rtol
+        As for `acceleration_cost`; so are errors.
 
     Returns
     -------
-    rotation : ndarray, shape curve.batch_shape
-        ∫ τᵀ G⁻¹ τ dt; by default ∫ 2 ‖w'‖² dt.
-    translation : ndarray, shape curve.batch_shape
-        ∫ m ‖d_c''‖² dt; by default ∫ ‖d''‖² dt; 0 on SO(3).
-
-    Raises
-    ------
-    ValueError, RuntimeError
-        As `acceleration_cost`.
+    rotation, translation : ndarray, shape curve.batch_shape
+        ∫ τᵀ G⁻¹ τ dt, by default ∫ 2 ‖w'‖² dt; and ∫ m ‖d_c''‖² dt, 0 on SO(3).
 
     Examples
     --------
     >>> from rbcourse import pose_from_coordinates, projected_cubic_se3
     >>> A1, rest = pose_from_coordinates([0, 0, 0, 1, 0, 0]), [0, 0, 0]
-    >>> rotation, translation = acceleration_cost_parts(
-    ...     projected_cubic_se3(np.eye(4), A1, rest, rest, rest, rest)
-    ... )
+    >>> c = projected_cubic_se3(np.eye(4), A1, rest, rest, rest, rest)
+    >>> rotation, translation = acceleration_cost_parts(c)
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
@@ -161,30 +131,18 @@ def acceleration_cost_parts(
 
 
 def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Array:
-    """Return the integral of the squared torque on a body that turns so.
+    """Return ∫ ‖τ‖² dt, with the torque τ = G w' + w × G w on a body that turns so.
 
     Source: beyond BK 4.
 
     Parameters
     ----------
-    curve : Curve
-        On SO(3), or a stack of them.
-    inertia : array_like, shape (..., 3, 3)
-        G, in body axes: symmetric and positive definite; one, or one for each curve.
-    rtol : float, optional
-        As for `acceleration_cost`.
+    curve, inertia, rtol
+        As for `acceleration_cost`, on SO(3) only; so are errors and accuracy.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        ∫ ‖τ‖² dt with the torque τ = G w' + w × G w; to `rtol`, as `acceleration_cost`.
-
-    Raises
-    ------
-    ValueError
-        If `curve` is on SE(3), or as `acceleration_cost`.
-    RuntimeError
-        As `acceleration_cost`.
 
     Examples
     --------
@@ -201,33 +159,20 @@ def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Arr
 
 
 def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
-    """Return the integral of the squared covariant jerk in metric (12).
+    """Return ∫ 2 ‖w'' + ½ w × w'‖² dt, the integral of the squared covariant jerk in metric (12).
 
+    It does not change if the motion is seen from the body, as Rᵀ(t); ∫ 2 ‖w''‖² dt would.
     Source: beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
 
     Parameters
     ----------
-    curve : Curve
-        On SO(3), or a stack of them.
-    rtol : float, optional
-        As for `acceleration_cost`.
+    curve, rtol
+        As for `acceleration_cost`, on SO(3) only; so are errors (also if the acceleration of a
+        `chain` jumps) and accuracy.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        ∫ 2 ‖w'' + ½ w × w'‖² dt, to `rtol`, as `acceleration_cost`.
-
-    Raises
-    ------
-    ValueError
-        If `curve` is on SE(3).
-    RuntimeError
-        As `acceleration_cost`, or if the acceleration of a `chain` jumps.
-
-    Notes
-    -----
-    w'' + ½ w × w' is the covariant derivative of the acceleration. With ∫ 2 ‖w''‖² dt a motion and
-    the motion seen from the body, Rᵀ(t), would cost different amounts.
 
     Examples
     --------
@@ -295,30 +240,9 @@ def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Arr
 def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
     """Return the integral for each curve of a stack, as if they took from 0 to 1: halving panels.
 
-    A panel is halved while the rules of Clenshaw and Curtis with 9 and 17 nodes differ there by
-    more than `rtol` times the integral; each curve has panels of its own.
-
-    Parameters
-    ----------
-    name : str
-        What it is called in messages.
-    curve : Curve
-    density : callable
-        ``density(some, t, index)``: what is integrated, at the times t, shape (T, K), on some of
-        the curves, which have these numbers.
-    rtol : float, optional
-        From 1e-8 on there are two panels at the start, below that many where the curve turns fast.
-
-    Returns
-    -------
-    ndarray, shape (count,)
-
-    Raises
-    ------
-    ValueError
-        If `rtol` is not from 1e-12 to 0.1.
-    RuntimeError
-        If the integral does not settle.
+    Each curve has panels of its own, halved while the rules of Clenshaw and Curtis with 9 and 17
+    nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` is what is
+    integrated at the times t, shape (T, K), on K curves, with their numbers. Messages name `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")

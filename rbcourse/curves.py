@@ -38,24 +38,20 @@ class _Ends(NamedTuple):
 class Ends(_Ends):
     """Boundary conditions at both ends, all of one batch shape: rotations and body velocities.
 
-    It is a tuple, so that the makers of curves take it as ``make(*ends)``.
-
+    A tuple, which makers of curves take as ``make(*ends)``.
     Source: BK 6.2.
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities, body frame, in rad per unit time.
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        Rotation matrices and angular velocities.
 
     Examples
     --------
-    >>> from rbcourse import acceleration_cost, bezier_so3, exp_so3, projected_cubic_so3
+    >>> from rbcourse import exp_so3
     >>> ends = Ends(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]), [0, 0, 0], [0, 1, 0])
     >>> ends.w1.shape
     (2, 3)
-    >>> costs = [acceleration_cost(make(*ends)) for make in (projected_cubic_so3, bezier_so3)]
     """
 
     __slots__ = ()
@@ -140,7 +136,8 @@ class Curve:
     batch_shape : tuple of int
         The shape of the stack; ``()`` for a single curve.
     domain : tuple of float
-        The first and the last time; of a stack, the times that all curves have; of none, all.
+        The first and the last time; for a stack, of the interval that all curves have in common;
+        for an empty one (0, inf).
     """
 
     duration: Array
@@ -152,7 +149,7 @@ class Curve:
 
     @property
     def size(self) -> int:
-        """Of its matrices: 3 on SO(3), 4 on SE(3)."""
+        """The size of its matrices: 3 on SO(3), 4 on SE(3)."""
         return 3
 
     @property
@@ -167,15 +164,10 @@ class Curve:
 
     @property
     def breakpoints(self) -> Array:
-        """Ends of panels for a quadrature, as shares of the duration: ndarray, shape (n,).
+        """Ends of panels for a quadrature, as shares of the duration, shape (n,).
 
-        Sixteenths, and ever smaller panels to where a curve of the stack may turn fast: its start
-        and its end, as its angular velocity and acceleration there tell, and times of small margin.
-
-        Raises
-        ------
-        RuntimeError
-            If a margin is below 1e-6: there the curve almost jumps.
+        Sixteenths, and finer panels where a curve may turn fast: at its ends, by its velocity and
+        acceleration there, and at times of small margin. RuntimeError if a margin is below 1e-6.
         """
         ends = np.array([[0.0], [1.0]])
         w, a = (np.linalg.norm(self.flat.values(ends, k)[..., :3], axis=-1) for k in (1, 2))
@@ -183,24 +175,9 @@ class Curve:
         return graded(np.arange(17) / 16, [0.0, 1.0], 1 / (1 + fastest))
 
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
-        """Return the curve, or a derivative, at the times t.
+        """Return the curve, or a derivative, at times of any shape in the domain.
 
-        Parameters
-        ----------
-        t : array_like
-            Times in the domain, of any shape.
-        order : {0, 1, 2, 3}, optional
-            The curve, its velocity, its acceleration or, on SO(3) only, its jerk.
-
-        Returns
-        -------
-        ndarray, shape t.shape + (..., 3, 3) or t.shape + (..., 3); or with 4 and 6
-
-        Raises
-        ------
-        ValueError
-            If a time is not finite or outside the domain, by more than 8 eps of the larger end, or
-            `order` is another.
+        `order` is 0 to 3, on SE(3) 0 to 2. Times may exceed the domain by 8 eps of its larger end.
 
         Examples
         --------
@@ -214,23 +191,10 @@ class Curve:
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
-        """Return each curve of the stack, or a derivative, at times of its own.
+        """Return each curve of the stack, or a derivative, at times of its own, up to its duration.
 
-        Parameters
-        ----------
-        t : array_like, shape (...) + batch_shape
-            Times from 0 to the duration of each curve.
-        order : {0, 1, 2, 3}, optional
-            As for a call.
-
-        Returns
-        -------
-        ndarray, shape t.shape + (3, 3) or t.shape + (3,); or with 4 and 6
-
-        Raises
-        ------
-        ValueError
-            As a call, or if `t` does not have that shape.
+        `t` has the shape (...) + batch_shape, the result t.shape + (3, 3) or t.shape + (3,), on
+        SE(3) with 4 and 6.
         """
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
@@ -243,15 +207,7 @@ class Curve:
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
-        """Return a curve of the stack, or some as a stack; the index is one for NumPy's arrays.
-
-        Examples
-        --------
-        >>> from rbcourse import exp_so3
-        >>> c = geodesic_so3(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]))
-        >>> c[1](0, 1).round(12), c[:1].batch_shape
-        (array([0. , 0. , 1.5]), (1,))
-        """
+        """Return a curve of the stack, or some as a stack; the index is one for NumPy's arrays."""
         if not self.batch_shape:
             raise TypeError("a single curve is no stack, and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
@@ -282,23 +238,10 @@ class Curve:
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return all curves of a stack with one axis, as if they took from 0 to 1.
+        """Return all curves of a stack with one axis, as if they took from 0 to 1; by subclasses.
 
-        Each subclass defines this method.
-
-        Parameters
-        ----------
-        t : ndarray, shape (T, count), or (T, 1) for the same times on all
-        order : {0, 1, 2, 3}
-
-        Returns
-        -------
-        ndarray, shape (T, count, 3, 3) or (T, count, 3); or with 4 and 6
-
-        Raises
-        ------
-        SingularTime
-            If a curve is not defined at one of the times.
+        `t` has the shape (T, count) or (T, 1), the result (T, count, 3, 3) or (T, count, 3), on
+        SE(3) with 4 and 6. SingularTime if a curve is not defined at one of the times.
         """
         raise NotImplementedError
 
@@ -339,10 +282,8 @@ class AlongGeodesic(Curve):
 
     Attributes
     ----------
-    R0 : ndarray, shape (..., 3, 3)
-        The start.
-    rotation_vector : ndarray, shape (..., 3)
-        σ, which turns R0 into the goal; body frame, in rad.
+    R0, rotation_vector : ndarray, shapes (..., 3, 3) and (..., 3)
+        The start, and σ, which turns it into the goal; body frame.
     """
 
     rotation_vector: Array
@@ -388,16 +329,7 @@ def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: 
 def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
     """Return for each curve of a stack the sums of its terms, each times its weight.
 
-    Parameters
-    ----------
-    weights : ndarray, shape (T, count, n) or (T, 1, n)
-    terms : ndarray, shape (count, n, m)
-    core : int
-        The shape of a sum, of m entries.
-
-    Returns
-    -------
-    ndarray, shape (T, count, ...)
+    Shapes: `weights` (T, count, n) or (T, 1, n), `terms` (count, n, m), the sums (T, count) + core.
     """
     sums = np.empty((len(weights), len(terms), terms.shape[-1]))
     np.matmul(np.swapaxes(weights, 0, 1), terms, out=np.swapaxes(sums, 0, 1))
@@ -412,7 +344,7 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     Parameters
     ----------
     R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
+        Rotation matrices.
     duration : array_like, shape (...), optional
         How long it takes.
 
@@ -421,26 +353,16 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     AlongGeodesic
         A `Curve`: R0 exp(σ̂ t) with ``rotation_vector`` σ = log_so3(R0ᵀ R1), of length ‖σ‖ ≤ π.
 
-    See Also
-    --------
-    rbcourse.textbook.geodesic_so3 : The same in two lines.
-    projected_line_so3 : The same path by projection, at another speed.
-    slerp : The same curve in quaternions.
-
     Notes
     -----
-    Singular set: between rotations a half-turn apart two geodesics are shortest. The one about the
-    axis whose component of largest magnitude (the first of equals, body frame) is positive is
-    returned; read it in ``rotation_vector``. R0 = R1 gives the constant curve.
+    Singular set: rotations a half-turn apart. Of the two shortest geodesics the one whose
+    ``rotation_vector`` has its component of largest magnitude (the first of equals) positive is
+    returned.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
     >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]), duration=3)
-    >>> log_so3(c([0, 1.5, 3])).round(12)
-    array([[0.  , 0.  , 0.  ],
-           [0.  , 0.  , 0.75],
-           [0.  , 0.  , 1.5 ]])
     >>> c(0.3, 1).round(12)  # the velocity
     array([0. , 0. , 0.5])
     """
@@ -468,20 +390,14 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     curve : Curve
         Or a stack of them.
     duration : array_like, shape (...)
-        The new duration, in s or any other unit of time; one, or one for each curve.
+        The new duration, from 1e-100 up; one, or one for each curve. It must not vanish in rounding
+        beside the first time of a `chain`.
 
     Returns
     -------
     Curve
-        Of the same kind. Velocities and accelerations are per unit of the new time: k times the
-        duration divides them by k and k², and `acceleration_cost` by k³. A `chain` that takes k
-        times as long is at its poses at a + k (t − a), a its first time.
-
-    Raises
-    ------
-    ValueError
-        If `curve` is no `Curve`, `duration` is not from 1e-100 up or does not broadcast with the
-        stack, or vanishes beside the first time.
+        Of the same kind. k times the duration divides velocities and accelerations by k and k², and
+        `acceleration_cost` by k³. A `chain` that starts at a is then at its poses at a + k (t − a).
 
     Examples
     --------
@@ -515,10 +431,7 @@ def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
 def check_defined(
     t: Array, lost: NDArray[np.bool_], reason: str, *, by_curve: bool = False
 ) -> None:
-    """Raise a `SingularTime` for the first time t, shape (T, count), at which a curve is lost.
-
-    If `by_curve`, the shape is (count, T).
-    """
+    """Raise `SingularTime` for the first lost t, shape (T, count) or, `by_curve`, (count, T)."""
     if lost.any():
         place = tuple(np.argwhere(lost)[0])
         curve = place[0] if by_curve else place[1]
@@ -526,13 +439,7 @@ def check_defined(
 
 
 def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
-    """Return `graded` breakpoints with those near times of small margin, where curves turn fast.
-
-    Raises
-    ------
-    RuntimeError
-        If a margin is below 1e-6.
-    """
+    """Return `graded` breakpoints, finer near small margins; RuntimeError if one is below 1e-6."""
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
         raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
@@ -553,10 +460,7 @@ def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
 def least_over_time(
     value: Callable[[Array], Array], batch_shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Return when a function of time is least, and its value: on 129 times, then refined.
-
-    Times and values have the shape (N,) + batch_shape.
-    """
+    """Return when a function of time is least, and its value; both of shape (N,) + batch_shape."""
     centre, reach, count = np.full(batch_shape, 0.5), 0.5, 129
     while reach > 1e-15:
         steps = np.linspace(-reach, reach, count).reshape(-1, *(1 for _ in batch_shape))

@@ -34,9 +34,9 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     Parameters
     ----------
     name : str
-        One of `CLOSED_FORMS` whose leading term is tabulated: not "corrected_bezier_so3".
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
+        One of `CLOSED_FORMS`, but not "corrected_bezier_so3".
+    R0, R1, w0, w1
+        As for `projected_cubic_so3`.
 
     Returns
     -------
@@ -44,32 +44,22 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
         E/(12 ‖e‖² + ‖d‖²), which cost over optimum, minus 1, approaches for small data. With
         σ = log_so3(R0ᵀ R1), e and d are the mean less σ, and the difference, of the two end
         velocities, carried parallel to the rotation half-way. E is a polynomial of degree six in
-        σ, e and d; for "cumulative_bezier_so3" of degree four. NaN where e and d are 0: there
-        the optimum costs nothing.
-
-    Raises
-    ------
-    ValueError
-        If `name` is not one of these.
+        σ, e and d, of degree four for "cumulative_bezier_so3". NaN where e and d are 0: there the
+        optimum costs nothing.
 
     Notes
     -----
     Domain: small excursions. The relative error falls with the square of their size, for
-    "cumulative" with the size. With ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ < 1 it was at most 10 % in 300 random
-    problems for each closed form but "Cayley", 14 %, and "cumulative"; with twice that up to 40 %,
-    for "Cayley" 66 %. Where E is much
-    smaller than is usual for such data, as for velocities along σ, it can be larger.
-
+    "cumulative" with the size. With ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ < 1 it was at most 14 % on random
+    problems, except for "cumulative". It can be larger where E is much smaller than is usual for
+    such data, as for velocities along σ.
     Singular set: R0 and R1 a half-turn apart, where σ is what `log_so3` chooses.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> a, rest = 0.2, [0, 0, 0]
-    >>> R1 = exp_so3([0, 0, a])
+    >>> R1, rest = exp_so3([0, 0, 0.2]), [0, 0, 0]
     >>> float(leading_excess("projected_cubic_so3", np.eye(3), R1, rest, rest).round(9))
-    5.6841e-05
-    >>> round(6401 / 180180 * a**4, 9)
     5.6841e-05
     """
     forms = _forms()
@@ -89,10 +79,7 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
 
 @lru_cache
 def _forms() -> dict[str, tuple[Array, Array]]:
-    """Return the polynomials E: the powers of the six inner products in each term, and its factor.
-
-    They are stored as whole numbers over one denominator.
-    """
+    """Return the polynomials E: in each term the powers of the six inner products, and a factor."""
     text = Path(__file__).with_name("leading_excess.csv").read_text(encoding="utf-8")
     head, over, *rows = csv.reader(text.splitlines())
     powers = np.array([row[:6] for row in rows], dtype=int)
@@ -117,46 +104,26 @@ def excess_estimate(curve: Curve) -> Array:
     Returns
     -------
     ndarray, shape curve.batch_shape
-        About cost over optimum, minus 1. A `chain` is compared with the best legs that have the
-        same velocities at its poses; the best motion through the poses is cheaper still. NaN where
-        there is no estimate: where a curve turns at `SPEED_LIMIT` or faster at some time, costs
-        more than about twice the optimum, is not smooth enough for 33 nodes, costs nothing, or is
-        NaN itself.
-
-    Raises
-    ------
-    ValueError
-        If `curve` is no `Curve` on SO(3).
-    RuntimeError
-        If the velocity of a `chain` jumps.
-
-    See Also
-    --------
-    leading_excess : From the ends alone, by a formula.
-    acceleration_cost, minimum_acceleration_so3 : For the excess itself.
+        About cost over optimum, minus 1. A `chain`, whose velocity must not jump (RuntimeError), is
+        compared with the best legs that have the same velocities at its poses. NaN where a curve
+        turns at `SPEED_LIMIT` or faster at some time, costs more than about twice the optimum, is
+        not smooth enough for 33 nodes, costs nothing, or is NaN itself.
 
     Notes
     -----
-    Domain: ‖w‖ < 2.5 rad over the whole time, and an excess of at most 1. There it was 14 % below
-    to 1 % above the excess for all closed forms, in 190,000 estimates for random problems, and
-    within 16 % for quintics with random end accelerations. The relative error is of second order in
-    ‖w‖, and was at most 2.1 % up to ‖w‖ = 1. An excess below 1e-13 is lost in rounding. For faster
-    curves the estimate would belong to the stationary curve nearby, which need not be the optimum.
+    Domain: ‖w‖ < 2.5 rad over the whole time, and an excess of at most 1. The relative error is of
+    second order in ‖w‖; on random problems it was at most 16 %, up to ‖w‖ = 1 at most 2.1 %. An
+    excess below 1e-13 is lost in rounding.
 
-    The optimum has w''' + w × w'' = 0. What a curve has instead, r = w''' + w × w'', is to leading
-    order the fourth derivative of its deviation δ from the optimum, with δ = δ' = 0 at both ends.
-    So δ'' is the second integral of r without its linear part, and ∫ ‖δ''‖² what it costs too much,
-    all vectors carried parallel to the rotation half-way.
+    The residual r = w''' + w × w'', 0 for the optimum, is to leading order the fourth derivative of
+    the deviation δ from it, with δ = δ' = 0 at both ends. So δ'' is the second integral of r less
+    its linear part, and ∫ ‖δ''‖² the excess cost, all carried parallel to the rotation half-way.
 
     Examples
     --------
-    >>> from rbcourse import acceleration_cost, exp_so3, minimum_acceleration_so3
-    >>> from rbcourse import projected_cubic_so3
+    >>> from rbcourse import exp_so3, minimum_acceleration_so3, projected_cubic_so3
     >>> ends = np.eye(3), exp_so3([0, 0, 0.9]), [0, 0, 0], [0, 1, 0]
-    >>> c = projected_cubic_so3(*ends)
-    >>> float(excess_estimate(c).round(4))
-    0.0197
-    >>> float((acceleration_cost(c) / minimum_acceleration_so3(*ends).cost - 1).round(4))
+    >>> float(excess_estimate(projected_cubic_so3(*ends)).round(4))
     0.0197
     """
     check_curve(curve)

@@ -54,29 +54,21 @@ def write_path(
 ) -> None:
     """Write a path of poses or rotations as CSV or as a TUM trajectory, by the file extension.
 
+    A line for each time, after a line of names (CSV: with units) or a comment (TUM): time,
+    position, quaternion, ω, v. Quaternions are (w, x, y, z) in CSV, (x, y, z, w) in TUM; the first
+    has w ≥ 0, each other the sign that is nearer to the one before. Numbers have all their digits.
+    An existing file is replaced; if an argument is malformed, nothing is written.
+
     Parameters
     ----------
     file : str or Path
-        ``….csv``; or ``….tum`` or ``….txt`` for TUM. A file that is there is replaced.
+        ``….csv``; or ``….tum`` or ``….txt`` for TUM, poses without velocities.
     times : array_like, shape (N,)
         In s, increasing.
     poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses, or rotation matrices, to 1e-9: these as CSV only.
+        Poses or rotation matrices, valid to 1e-9.
     velocities : array_like, shape (N, 6) or (N, 3), optional
-        Twists (ω, v), or angular velocities ω: body frame, as curves give them, in rad/s and m/s.
-        As CSV only.
-
-    Raises
-    ------
-    ValueError
-        If an argument is malformed, or the format cannot hold it; nothing is written.
-
-    Notes
-    -----
-    CSV: a line of names with their units and, for velocities, the frame; then a line for each time:
-    time, position, quaternion (w, x, y, z), ω, v. TUM: a comment, then a line for each time: time,
-    position, quaternion (x, y, z, w), with blanks between them. Numbers have all their digits. The
-    first quaternion has w ≥ 0, each other the sign that is nearer to the one before.
+        Twists (ω, v), or angular velocities ω, body frame, in rad/s and m/s.
 
     Examples
     --------
@@ -110,32 +102,27 @@ def write_path(
 def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
     """Read a path that `write_path` wrote, or a TUM trajectory; all of it, or nothing.
 
+    Each quaternion is replaced by the nearest unit quaternion. CSV is in UTF-8.
+
     Parameters
     ----------
     file : str or Path
-        ``….csv``, in UTF-8; or ``….tum`` or ``….txt`` for TUM, where blank lines and lines that
-        begin with # are passed over.
+        As for `write_path`. In TUM, blank lines and lines that begin with # are skipped.
 
     Returns
     -------
     times : ndarray, shape (N,)
         In s.
     poses : ndarray, shape (N, 4, 4) or (N, 3, 3)
-        Poses; rotation matrices where the file has no positions.
+        Poses; rotation matrices if the file has no positions.
     velocities : ndarray, shape (N, 6) or (N, 3), or None
-        Twists (ω, v), or ω, body frame; None where the file has none.
+        Twists (ω, v), or ω, body frame, if the file has them.
 
     Raises
     ------
     ValueError
-        If the file has anything else in it, or no pose; if times do not increase; if the norm of
-        a quaternion differs from 1 by more than 1e-3. The message gives the line and the reason.
-    OSError
-        If it cannot be read.
-
-    Notes
-    -----
-    Quaternions in files of other programs have few digits: the nearest unit quaternion is used.
+        If the file has other content or no pose, if times do not increase, or if the norm of a
+        quaternion differs from 1 by more than 1e-3. The message gives the line and the reason.
     """
     moves, rows = _tum_rows(file) if _is_tum(file) else _csv_rows(file)
     at, table, last = (4 if moves else 1), [], -math.inf
@@ -158,23 +145,16 @@ def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
 def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     """Write a plan as CSV: a line of names with their units, then a line for each command.
 
+    An existing file is replaced; if an argument is malformed, nothing is written.
     Source: RR 3.2, RR 4.2.
 
     Parameters
     ----------
     file : str or Path
-        Where to write; a file that is there is replaced.
     plan : iterable of (velocity, duration)
-        Velocities of three numbers in the plane, and of any number for joints; durations from
-        0 up, in s. There may be none.
+        Velocities: three numbers in the plane, any for joints; durations from 0 up, in s.
     kind : {"world", "body", "joints"}
-        What the velocities are: of the plane, in the frame of the world or of the body, or of
-        joints. The names of the columns tell it.
-
-    Raises
-    ------
-    ValueError
-        If the plan or a command is malformed, or the kind is unknown; nothing is written.
+        Planar velocities in the world or the body frame, or joint velocities: the column names.
     """
     commands = as_plan(plan, "n")  # how many joints there are, the first of them tells
     names = _velocities(kind, commands[0][0].size if commands else 0)
@@ -185,6 +165,7 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
 def load_plan(file: str | Path, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote; all of it, or nothing.
 
+    Other content or another kind raises ValueError, with the line and the reason.
     Source: RR 3.2, RR 4.2.
 
     Parameters
@@ -192,19 +173,12 @@ def load_plan(file: str | Path, kind: str) -> Commands:
     file : str or Path
         Comma-separated values, UTF-8; the first line has the names of the columns.
     kind : {"world", "body", "joints"}
-        As for `save_plan`. A file of another kind is refused: what is meant in one frame is not
-        obeyed in the other.
+        As for `save_plan`.
 
     Returns
     -------
     list of (ndarray, float)
-
-    Raises
-    ------
-    ValueError
-        If there is anything else in the file; the message gives the line and the reason.
-    OSError
-        If it cannot be read.
+        Commands (velocity, duration).
     """
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))

@@ -1,7 +1,7 @@
 """Metrics on matrices and on the groups: trace metrics, invariance, inertia and weight.
 
 Tangent vectors at A are matrices X = A hat(x); x are the components of X in the left-invariant
-frame: an angular velocity on SO(3), a twist (ω, v) on SE(3), both in the body frame.
+frame: an angular velocity on SO(3), a twist (ω, v) on SE(3).
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ METRIC_SO3.flags.writeable = METRIC_SE3.flags.writeable = False
 
 
 def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
-    """Return tr(XᵀY) of tangent vectors of GL(n) at one point: the sum of the products of entries.
+    """Return tr(XᵀY) of tangent vectors X, Y of GL(n) at one point.
 
+    It is invariant under rotations and reflections on either side, but not under other matrices.
     Source: BK 3.1, BK (11), BK Prop. 1.
 
     Parameters
@@ -49,11 +50,6 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (...)
-
-    Notes
-    -----
-    Invariant under rotations and reflections on either side: ``inner_gl(L @ X @ R, L @ Y @ R)`` is
-    the same. Not under other matrices.
 
     Examples
     --------
@@ -66,14 +62,17 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors R hat_so3(x), R hat_so3(y): 2 x · y.
 
-    Arguments, result and errors are those of `inner_gl`, for n = 3.
-
+    It is invariant under rotations on both sides, and twice the kinetic energy of a ball with the
+    moment of inertia 2.
     Source: BK 3.1, BK (12), BK Prop. 1, BK Remark 1, BK Remark 2.
 
-    Notes
-    -----
-    Invariant under rotations on both sides. It is twice the kinetic energy of a ball with the
-    moment of inertia 2.
+    Parameters
+    ----------
+    X, Y : array_like, shape (..., 3, 3)
+
+    Returns
+    -------
+    ndarray, shape (...)
 
     Examples
     --------
@@ -84,15 +83,21 @@ def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
 
 
 def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
-    """Return tr(XᵀY) of tangent vectors of GA(n), the affine maps; their last rows are 0.
-
-    Arguments, result and errors are those of `inner_gl`, for matrices of size n + 1.
+    """Return tr(XᵀY) of tangent vectors of GA(n), the affine maps.
 
     Source: BK 3.2, BK (13).
 
+    Parameters
+    ----------
+    X, Y : array_like, shape (..., n + 1, n + 1)
+
+    Returns
+    -------
+    ndarray, shape (...)
+
     Examples
     --------
-    >>> float(inner_ga([[1, 2], [0, 0]], [[3, 4], [0, 0]]))
+    >>> float(inner_ga([[1, 2], [0, 0]], [[3, 4], [0, 0]]))  # the last rows are 0
     11.0
     """
     return _trace(X, Y, "n+1")
@@ -101,14 +106,17 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors A hat_se3(x), A hat_se3(y): 2 ω_x · ω_y + v_x · v_y.
 
-    Arguments, result and errors are those of `inner_gl`, for n = 4.
-
+    It is invariant under poses on the left, under rotations only on the right, and twice the
+    kinetic energy of a ball of mass 1 and moment of inertia 2 whose centre is the body's origin.
     Source: BK 3.2, BK (14), BK Remark 3, BK Remark 4, BK Remark 5.
 
-    Notes
-    -----
-    Invariant under poses on the left; on the right under rotations only. It is twice the kinetic
-    energy of a ball of mass 1 and moment of inertia 2 whose centre is the body's origin.
+    Parameters
+    ----------
+    X, Y : array_like, shape (..., 4, 4)
+
+    Returns
+    -------
+    ndarray, shape (...)
 
     Examples
     --------
@@ -120,7 +128,7 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
 
 
 def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike) -> Array:
-    """Return ⟨X, Y⟩ at A of the left-invariant metric with the matrix G: xᵀ G y.
+    """Return ⟨X, Y⟩ = xᵀ G y at A: the left-invariant metric with the matrix G.
 
     Source: BK 2.3, BK (6), BK (7).
 
@@ -128,10 +136,8 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     ----------
     G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
         The metric at the identity, in the basis of angular velocities or twists: symmetric.
-    A : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses.
-    X, Y : array_like, of the same core shape as `A`
-        Tangent vectors at `A`; x and y are their components.
+    A, X, Y : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotations or poses, and tangent vectors there; x and y are their components.
 
     Returns
     -------
@@ -154,19 +160,19 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     """Return [[alpha I, beta I], [beta I, 0]]: invariant on both sides, and indefinite.
 
+    Three eigenvalues are positive and three negative: the "length" of a motion can be 0 or
+    imaginary. The geodesics are screws.
     Source: BK 2.6, BK (10).
 
     Parameters
     ----------
     alpha, beta : float
-        Positive: alpha weighs rotation, in m² for an energy per mass; beta couples it to
-        translation, in m.
+        Positive. alpha, in m² for an energy per mass, weighs rotation, and beta, in m, couples it
+        to translation.
 
     Returns
     -------
     ndarray, shape (6, 6)
-        With three positive and three negative eigenvalues: the "length" of a motion can be 0 or
-        imaginary, and its geodesics are screws.
 
     Examples
     --------
@@ -182,16 +188,14 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
 
 
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
-    """Return the tangent vector X = A hat(x): the left-invariant field of x, at A.
+    """Return the tangent vector X = A hat(x) at A: the left-invariant field of x.
 
     Source: BK 2.2, BK (4), BK (5).
 
     Parameters
     ----------
-    A : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses.
-    x : array_like, shape (..., 3) or (..., 6)
-        Components: angular velocities, or twists (ω, v), body frame.
+    A, x : array_like, shapes (..., 3, 3) and (..., 3), or (..., 4, 4) and (..., 6)
+        Rotations and angular velocities, or poses and twists.
 
     Returns
     -------
@@ -200,7 +204,7 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     Examples
     --------
     >>> A = [[0, -1, 0, 5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-    >>> tangent_from_components(A, [0, 0, 0, 1, 0, 0])[:3, 3] + 0.0  # ahead is the body's x axis
+    >>> tangent_from_components(A, [0, 0, 0, 1, 0, 0])[:3, 3] + 0.0  # the body's x axis
     array([0., 1., 0.])
     """
     A, size = as_rotation_or_pose("A", A)
@@ -210,21 +214,20 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
 
 
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
-    """Return the components x of a tangent vector X at A: vee(A⁻¹ X), with Rᵀ for R⁻¹.
+    """Return the components x of tangent vectors X at A: vee(A⁻¹ X), with Rᵀ for R⁻¹.
 
+    The part of X normal to the tangent space is dropped.
     Source: BK 2.2, BK (1), BK (5).
 
     Parameters
     ----------
-    A : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses. Validity is not checked.
-    X : array_like, of the same core shape
-        Tangent vectors. Components normal to the tangent space are dropped.
+    A, X : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotations or poses, and tangent vectors there.
 
     Returns
     -------
     ndarray, shape (..., 3) or (..., 6)
-        Angular velocities, or twists (ω, v), body frame. Those of A' are the velocity of BK (1).
+        Angular velocities or twists; the components of A' are the velocity of BK (1).
 
     Examples
     --------
@@ -239,19 +242,19 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
 
 
 def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
-    """Return the inertia of a solid box about its centre.
+    """Return the inertia of a solid box about its centre: diag(b² + c², c² + a², a² + b²) m/12.
 
     Parameters
     ----------
     sides : array_like, shape (..., 3)
-        Its lengths along the axes of the body, in m, not negative.
+        The lengths a, b, c along the axes, not negative.
     mass : float, optional
-        In kg.
+        Positive, in kg.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        diag(b² + c², c² + a², a² + b²) m/12, in kg m², in body axes.
+        In kg m², in body axes.
 
     Examples
     --------
@@ -271,19 +274,19 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
 
 
 def inertia_from_weight(W: ArrayLike) -> Array:
-    """Return tr(W) I − W: the metric that tr(XᵀY W) induces on SO(3).
+    """Return tr(W) I − W: the matrix of the metric that tr(XᵀY W) induces on SO(3).
 
     Source: BK 3, for the metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
     W : array_like, shape (..., 3, 3)
-        Symmetric. Of a body, ∫ p pᵀ dm over its points p, in kg m², body frame.
+        Symmetric; of a body ∫ p pᵀ dm over its points p, in kg m², body frame.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        The matrix G of the metric; of a body, its inertia about the origin.
+        Of a body its inertia about the origin.
 
     Examples
     --------
@@ -299,6 +302,9 @@ def inertia_from_weight(W: ArrayLike) -> Array:
 def weight_from_inertia(G: ArrayLike) -> Array:
     """Return the weight W with tr(W) I − W = G: tr(G)/2 I − G.
 
+    The inertia of every body satisfies the condition on G, and no other G has a W without negative
+    eigenvalues, which are ∫ x² dm along the axes. W has rank 2 for a flat body, whose largest
+    moment is the sum of the other two, and rank 1 for a rod without thickness.
     Source: BK 3, for the metrics that the paper leaves to a later publication.
 
     Parameters
@@ -309,27 +315,9 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Symmetric, without negative eigenvalues, to a few eps of the largest.
-
-    Raises
-    ------
-    ValueError
-        If `G` is not finite, not of that shape, not symmetric, or its eigenvalues, the principal
-        moments of inertia, do not satisfy the triangle inequality.
-
-    Notes
-    -----
-    Every body satisfies the inequality, because each eigenvalue of W is ∫ x² dm along an axis. A
-    flat body reaches equality: the eigenvalue across it is 0, and W has rank 2. A rod without
-    thickness has the moments 0, I, I, and a W of rank 1. A G that violates the inequality belongs
-    to no body, and no W without negative eigenvalues induces it.
 
     Examples
     --------
-    >>> weight_from_inertia(np.diag([2.0, 3, 4]))
-    array([[2.5, 0. , 0. ],
-           [0. , 1.5, 0. ],
-           [0. , 0. , 0.5]])
     >>> weight_from_inertia(np.diag([1.0, 2, 3])).diagonal()  # a flat body
     array([2., 1., 0.])
     """

@@ -34,13 +34,12 @@ class RigidMotion(Curve):
 
     Attributes
     ----------
-    rotation : Curve
-        R(t), on SO(3).
+    rotation : Curve on SO(3)
     path : ndarray, shape (..., n, 3)
-        d(0), d(1), and for a cubic d'(0), d'(1), for a quintic d''(0), d''(1) too, for the time
-        from 0 to 1: in m, fixed frame; of the point `centre`.
+        d(0), d(1), for a cubic also d'(0), d'(1), for a quintic also d''(0), d''(1), for the time
+        from 0 to 1: in m, fixed frame.
     centre : ndarray, shape (..., 3)
-        The point of the body that the path is of, body frame, in m; 0 is the origin.
+        The point of the body that follows the path, body frame, in m; 0 is the origin.
     """
 
     rotation: Curve
@@ -128,37 +127,27 @@ def rigid_motion(
 def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> RigidMotion:
     """Return the shortest curve from A0 to A1 in metric (14): turn and straight line at once.
 
+    Singular set: half-turns, as for `geodesic_so3`. `screw_se3` is a geodesic of another metric.
     Source: BK 2.6, BK (14).
 
     Parameters
     ----------
-    A0, A1 : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
-    duration : array_like, shape (...), optional
-        How long it takes.
+    A0, A1, duration
+        As for `projected_cubic_se3`.
 
     Returns
     -------
     RigidMotion
-        A `Curve`: its ``rotation`` is `geodesic_so3`, the origin moves on a straight line at
-        constant speed. The angular velocity is constant, and so is d', but not v = Rᵀ d'.
-
-    See Also
-    --------
-    screw_se3 : The other natural motion, a geodesic of another metric.
-
-    Notes
-    -----
-    Singular set: half-turns, as for `geodesic_so3`.
+        Its ``rotation`` is `geodesic_so3`; the origin moves on a straight line at constant speed.
+        The angular velocity is constant, and so is d', but not v = Rᵀ d'.
 
     Examples
     --------
     >>> from rbcourse import pose_from_coordinates
     >>> A1 = pose_from_coordinates([0, 0, np.pi / 2, 2, 4, 0])
-    >>> geodesic_se3(np.eye(4), A1)(0.5).round(3)[:3] + 0.0
+    >>> geodesic_se3(np.eye(4), A1)(0.5).round(3)[:2] + 0.0
     array([[ 0.707, -0.707,  0.   ,  1.   ],
-           [ 0.707,  0.707,  0.   ,  2.   ],
-           [ 0.   ,  0.   ,  1.   ,  0.   ]])
+           [ 0.707,  0.707,  0.   ,  2.   ]])
     """
     A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     check_broadcast(A0=(A0, 2), A1=(A1, 2))
@@ -183,39 +172,25 @@ def projected_cubic_se3(
     Parameters
     ----------
     A0, A1 : array_like, shape (..., 4, 4)
-        Poses at both ends. Validity is not checked (see `project_se`); the last row is not
-        read.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
-    d0_dot, d1_dot : array_like, shape (..., 3)
-        Velocities of the origin there, *fixed* frame, in m per unit time.
+        Poses at the start and at the end.
+    w0, w1, d0_dot, d1_dot : array_like, shape (..., 3)
+        Angular velocities there, body frame, and velocities of the origin there, *fixed* frame.
     duration : array_like, shape (...), optional
         How long it takes; velocities are per unit of that time.
 
     Returns
     -------
     ProjectedMotion
-        A `Curve`: its ``rotation`` is `projected_cubic_so3`, with its ``margin``; the path of the
-        origin is the optimum.
-
-    Warns
-    -----
-    RuntimeWarning
-        If ``margin`` is below 1e-6.
-
-    Notes
-    -----
-    Singular set: as for `projected_cubic_so3`.
+        Its ``rotation`` is `projected_cubic_so3`, with the same ``margin``, warning and singular
+        set; the path of the origin is the optimum.
 
     Examples
     --------
     >>> from rbcourse import pose_from_coordinates
     >>> A1, rest = pose_from_coordinates([0, 0, 1, 2, 0, 0]), [0, 0, 0]
     >>> c = projected_cubic_se3(np.eye(4), A1, rest, rest, rest, rest)  # from rest to rest
-    >>> c([0, 0.5, 1], 1).round(3)[:, [2, 3, 4]] + 0.0  # turn, forward, to the left
-    array([[ 0.   ,  0.   ,  0.   ],
-           [ 1.639,  2.633, -1.438],
-           [ 0.   ,  0.   ,  0.   ]])
+    >>> c(0.5, 1).round(3)[[2, 3, 4]]  # turn, forward, to the left
+    array([ 1.639,  2.633, -1.438])
     """
     ends, path = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
     rotation = watched(projected_cubic(*ends.over(duration)))
@@ -237,62 +212,39 @@ def minimum_acceleration_se3(
 ) -> RigidMotion:
     """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic.
 
+    Of all motions with these ends it has the least `acceleration_cost` with the same `inertia`,
+    `mass` and `centre`, as far as the rotation has.
     Source: BK 6.3; for bodies beyond BK 9.
 
     Parameters
     ----------
-    A0, A1 : array_like, shape (..., 4, 4)
-        Poses at both ends. Validity is not checked (see `project_se`); the last row is not
-        read.
-    w0, w1 : array_like, shape (..., 3)
-        Angular velocities there, body frame, in rad per unit time.
-    d0_dot, d1_dot : array_like, shape (..., 3)
-        Velocities of the origin there, *fixed* frame, in m per unit time.
+    A0, A1, w0, w1, d0_dot, d1_dot, duration
+        As for `projected_cubic_se3`.
     inertia : array_like, shape (..., 3, 3), optional
-        G, the inertia of the body about its centre of mass, body axes: symmetric and positive
-        definite. By default 2 I, that of metric (14).
+        As for `minimum_acceleration_so3`, about the centre of mass. By default 2 I, metric (14).
     mass : float, optional
-        Of the body, more than 0. It changes what the motion costs, but not the motion.
+        Of the body, more than 0. It changes the cost of the motion, but not the motion.
     centre : array_like, shape (3,), optional
         The centre of mass, in the body frame, in m; by default its origin.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
     RigidMotion
-        A `Curve`: its ``rotation`` is `minimum_acceleration_so3`, and its ``path``, that of the
-        centre of mass, a cubic. Of all motions with these ends it has the least
-        `acceleration_cost` with the same `inertia`, `mass` and `centre`, as far as the rotation
-        has.
-
-    Raises
-    ------
-    ConvergenceError
-        As `minimum_acceleration_so3`.
-
-    Warns
-    -----
-    RuntimeWarning
-        As `minimum_acceleration_so3`.
-
-    See Also
-    --------
-    projected_cubic_se3 : Its near-optimal stand-in, in closed form.
+        Its ``rotation`` is `minimum_acceleration_so3`, with the same error and warning; its
+        ``path``, of the centre of mass, is a cubic.
 
     Notes
     -----
-    In metric (14) rotation and translation are independent, so each has its own optimum. In the
-    metric of the kinetic energy of a body they are too, when its place is that of its centre of
-    mass r, d_c = d + R r. So the ends become those of the centre, d_c' = d' + R (w × r), and its
-    path is a cubic; the origin runs round it.
+    Rotation and translation are independent in metric (14), and in the metric of the kinetic energy
+    for the position d + R r of the centre of mass r; so each has its own optimum. The end
+    velocities of the centre are d_c' = d' + R (w × r). `projected_cubic_se3` is near-optimal, in
+    closed form.
 
     Examples
     --------
     >>> from rbcourse import pose_from_coordinates
     >>> A1, rest = pose_from_coordinates([0, 0, 1, 2, 0, 0]), [0, 0, 0]
-    >>> c = minimum_acceleration_se3(np.eye(4), A1, rest, rest, rest, rest)
-    >>> c(0.5)[:3, 3].round(9)
+    >>> minimum_acceleration_se3(np.eye(4), A1, rest, rest, rest, rest)(0.5)[:3, 3].round(9)
     array([1., 0., 0.])
     """
     ends, (d0, d1, v0, v1) = _cubic_ends(A0, A1, w0, w1, d0_dot, d1_dot)
@@ -309,34 +261,21 @@ def minimum_acceleration_se3(
 def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
     """Return the screw motion from A0 to A1: about one axis, at constant twist.
 
+    Its covariant acceleration is (0, ω × v): every point of the body runs on a helix about the
+    axis (see `screw_from_pose`). It is a geodesic of the indefinite metric (10), not of metric (14)
+    (see `geodesic_se3`). Singular set: poses a half-turn apart, where `log_so3` chooses one of two
+    ω. More full turns give more screws, with other twists.
     Source: BK 2.6.
 
     Parameters
     ----------
-    A0, A1 : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
-    duration : array_like, shape (...), optional
-        How long it takes.
+    A0, A1, duration
+        As for `projected_cubic_se3`.
 
     Returns
     -------
     ScrewMotion
-        A `Curve`: A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1), which turns by π at most.
-        Its covariant acceleration is (0, ω × v): the origin runs on a helix.
-
-    See Also
-    --------
-    geodesic_se3 : The same turn, while the origin runs straight.
-    screw_from_pose : The axis and the pitch.
-
-    Notes
-    -----
-    Singular set: between poses a half-turn apart there are two such motions; ω is the one that
-    `log_so3` returns. Full turns more give more screws, all with other twists.
-
-    It is a geodesic of the indefinite metric (10), not of the metric (14), for which the motion of
-    the origin does not depend on how the body turns. And it depends on which point of the body is
-    called the origin only as its displacement does: every point runs on a helix about the axis.
+        A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1), which turns by π at most.
 
     Examples
     --------
@@ -359,16 +298,9 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
 class ScrewMotion(Curve):
     """The `Curve` A0 exp_se3(S t), of constant twist S.
 
+    ``A0`` is the start; ``twist`` is S = (ω, v), body frame, shape (..., 6); ``displacement`` is S
+    times the duration.
     Source: BK 2.6.
-
-    Attributes
-    ----------
-    A0 : ndarray, shape (..., 4, 4)
-        The start.
-    displacement : ndarray, shape (..., 6)
-        S times the duration.
-    twist : ndarray, shape (..., 6)
-        S = (ω, v), body frame.
     """
 
     A0: Array
@@ -402,26 +334,23 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read. For
-        the screw from a pose A0 to A1, in the fixed frame, take A1 @ inverse_se3(A0).
+        Poses. For the screw from a pose A0 to A1, in the fixed frame, take A1 @ inverse_se3(A0).
 
     Returns
     -------
     Screw
-        ``axis``, ``point``, ``angle`` and ``slide``, and their ``pitch``.
+        Also with ``pitch``, the slide for each rad of the turn.
 
     Notes
     -----
-    Singular set: a half-turn has two screws, the axis of `log_so3` is taken. Where nothing turns
-    no axis is distinguished; what turns by rounding only, less than 8 eps, counts as a slide alone.
-    Near there axis, slide and pitch are uncertain by a few eps over the angle, relatively, and the
-    point, far away, by a few eps ‖d‖ over its square.
+    Singular set: half-turns, which have two screws (`log_so3` chooses the axis), and no turn, where
+    no axis is distinguished; a turn by less than 8 eps counts as a slide alone. Near there axis,
+    slide and pitch have a relative error of a few eps over the angle, and the point, far away, one
+    of a few eps ‖d‖ over its square.
 
     Examples
     --------
-    >>> from rbcourse import exp_se3
-    >>> A = exp_se3([0, 0, 2, 0, -2, 1])  # about the vertical line through x = 1
-    >>> screw = screw_from_pose(A)
+    >>> screw = screw_from_pose(exp_se3([0, 0, 2, 0, -2, 1]))  # about the vertical through x = 1
     >>> screw.axis.round(12), screw.point.round(12) + 0.0, float(screw.pitch.round(12))
     (array([0., 0., 1.]), array([1., 0., 0.]), 0.5)
     """
@@ -443,14 +372,11 @@ class Screw(NamedTuple):
     Attributes
     ----------
     axis : ndarray, shape (..., 3)
-        The direction of the axis, of unit length; of the slide alone where nothing turns, and 0
-        where nothing moves.
+        The unit direction of the axis; of the slide where nothing turns, 0 where nothing moves.
     point : ndarray, shape (..., 3)
         The point of the axis nearest to the origin, in m; 0 where nothing turns.
-    angle : ndarray, shape (...)
-        How far it turns, in [0, π] rad.
-    slide : ndarray, shape (...)
-        How far it moves along the axis, in m.
+    angle, slide : ndarray, shape (...)
+        The turn, in [0, π] rad, and the displacement along the axis, in m.
     """
 
     axis: Array

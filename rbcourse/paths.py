@@ -40,73 +40,42 @@ def chain(
 
     Parameters
     ----------
-    times : array_like, shape (N,)
-        Increasing; two or more.
-    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses, or rotation matrices, to 1e-9, one for each time.
+    times, poses
+        As for `bessel_velocities`.
     velocities : array_like, shape (N, 6) or (N, 3), optional
-        Twists (ω, v), or angular velocities ω, body frame, per unit of the times: what the curve
-        has at each pose. By default it starts and ends at rest, stops wherever two successive poses
-        are equal to rounding, and has the `bessel_velocities` elsewhere.
+        Twists or angular velocities at the poses. By default 0 at both ends and where two
+        successive poses are equal to rounding, and the `bessel_velocities` elsewhere.
     leg : callable, optional
-        What joins two poses: a function of this package that returns two-point curves, or one of
-        your own that returns a stack of them. It is called once for all legs, with keyword
-        arguments: ``duration``, how long each leg takes, and its other parameters, which must be
-        among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1; d0_dot and d1_dot are in the fixed
-        frame. A function for rotations also joins poses: the origin then moves on the
-        polynomial with as many boundary conditions. By default `projected_cubic_so3`, or
-        `projected_cubic_se3`.
+        What joins two poses: a function of this package, or one of your own, that returns a stack
+        of two-point curves. It is called once for all legs, with the keyword argument ``duration``
+        and its other parameters, which must be among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1
+        (d0_dot and d1_dot in the fixed frame). A function for rotations also joins poses: the
+        origin then moves on the polynomial with as many boundary conditions. By default
+        `projected_cubic_so3`, or `projected_cubic_se3`.
 
     Returns
     -------
     Chain
-        A `Curve` on [times[0], times[-1]], with the attributes ``legs`` and ``velocities`` and the
-        method ``jumps(order)``.
+        A `Curve` on [times[0], times[-1]], at its poses to a few eps, with the attributes ``legs``
+        and ``velocities`` and the method ``jumps(order)``.
 
     Raises
     ------
     ValueError
-        If times do not increase; if a matrix is no pose or no rotation; if neighbours are a
-        half-turn apart, to 1e-6; if the numbers do not agree; if `velocities` are given to legs
-        that ask for none; if `leg` asks for other arguments, refuses these, or does not lead to
-        the next pose, to 1e-6. The message names the first place.
-    ConvergenceError
-        If `leg` does.
-
-    Warns
-    -----
-    RuntimeWarning
-        Where `leg` does.
-
-    See Also
-    --------
-    bessel_velocities : The velocities that are chosen, those of the ends among them.
-    read_path : Times, poses and velocities from a file.
+        As `bessel_velocities`; if `velocities` are given to legs that ask for none; if `leg` asks
+        for other arguments, refuses these, or does not lead to the next pose, to 1e-6. The message
+        names the first place. Other errors, and warnings, are those of `leg`.
 
     Notes
     -----
-    It is at its poses to a few eps, however uneven the steps are. Between them a leg is as accurate
-    as alone, at a time that is rounded to eps of its duration. What the joints have; where legs are
-    projected, to a few eps of the largest ‖w‖ and of ‖w‖² + ‖w'‖:
-
-    ==========================================================  ==================================
-    `geodesic_so3`, `geodesic_se3`, `screw_se3`,                C⁰: the velocity jumps
-    `projected_line_so3`
-    all that ask for velocities: projected and other cubics,    C¹: the acceleration jumps
-    Bézier's curves, minimum acceleration
-    `projected_quintic_so3`, `exponential_quintic_so3`,         C²
-    `minimum_jerk_so3`
-    ==========================================================  ==================================
-
-    The accelerations that these ask for are those of the parabolas of `bessel_velocities`,
-    also where velocities are given; 0 at both ends and where it rests.
-
-    A million times take about as long as on one leg: up to three times as long with geodesics,
-    projected lines and quaternion cubics of rotations alone, which are quick, and up to twice as
-    long where the times are in no order.
-
-    Singular set: that of the legs; half-turns between neighbours are refused, as they leave open
-    which way to turn. Where a leg is to turn by more than that, put a pose between.
+    At the joints a chain is C⁰ (the velocity jumps) with `geodesic_so3`, `geodesic_se3`,
+    `screw_se3` and `projected_line_so3`; C² with `projected_quintic_so3`, `exponential_quintic_so3`
+    and `minimum_jerk_so3`; C¹ (the acceleration jumps) with all others, which ask for velocities.
+    Projected legs meet this to a few eps of the largest ‖w‖ and of ‖w‖² + ‖w'‖. The accelerations
+    a0, a1 are those of the parabolas of `bessel_velocities`, also where velocities are given, and 0
+    at both ends and where the curve rests.
+    Singular set: that of the legs, and half-turns between neighbours, which are refused. To turn by
+    more, put a pose between.
 
     Examples
     --------
@@ -150,16 +119,14 @@ def chain(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Chain(Curve):
-    """A `Curve` of legs, each from one pose to the next.
-
-    At an inner time the later leg counts.
+    """A `Curve` of legs, each from one pose to the next. At an inner time the later leg counts.
 
     Attributes
     ----------
     times : ndarray, shape (N,)
         When it is at each pose.
     velocities : ndarray, shape (N, 3) or (N, 6), or None
-        What it was told to have there, body frame; None where the legs ask for none.
+        Its velocities at the poses; None where the legs ask for none.
     legs : Curve
         The stack of the N − 1 legs.
     """
@@ -170,7 +137,7 @@ class Chain(Curve):
 
     @property
     def size(self) -> int:
-        """Of its matrices."""
+        """The size of its matrices: 3 on SO(3), 4 on SE(3)."""
         return self.legs.size
 
     @property
@@ -207,23 +174,9 @@ class Chain(Curve):
         )
 
     def jumps(self, order: int) -> Array:
-        """Return what the inner poses change in the curve or a derivative: after, minus before.
+        """Return the jumps at the inner poses of the curve or a derivative, shape (N − 2, ...).
 
-        Parameters
-        ----------
-        order : {0, 1, 2, 3}
-            Of poses 2 is the last.
-
-        Returns
-        -------
-        ndarray, shape (N − 2, …)
-
-        Examples
-        --------
-        >>> from rbcourse import exp_so3, geodesic_so3
-        >>> R = exp_so3([[0, 0, 0], [0, 0, 1], [0, 0, 3]])
-        >>> chain([0, 1, 2], R, leg=geodesic_so3).jumps(1).round(12)
-        array([[0., 0., 1.]])
+        They are the values after minus those before; `order` is 0 to 3, on SE(3) 0 to 2.
         """
         starts, ends = _at_ends(self.legs, self.legs._check_order(order))
         return starts[1:] - ends[:-1]
@@ -258,10 +211,7 @@ class Chain(Curve):
         return values
 
     def check_smooth(self, name: str, order: int) -> None:
-        """Raise a RuntimeError if a derivative jumps at a joint, up to an order.
-
-        `name` is the cost that does not exist then.
-        """
+        """Raise a RuntimeError about the cost `name` if a derivative up to an order jumps."""
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
         for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
@@ -276,12 +226,7 @@ class Chain(Curve):
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Divide runs of these lengths, one after the other, into parts of one length.
 
-    Returns
-    -------
-    run : ndarray of int, shape (parts,)
-        To which run each part belongs.
-    rows : ndarray of int, shape (parts, length)
-        Where it is. The last row of a run is repeated to fill its last part.
+    Return run and rows of each part, shapes (parts,) and (parts, length); last rows are repeated.
     """
     mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
     length, ends = max(1, min(int(counts.max()), 2 * mean)), np.cumsum(counts)
@@ -293,10 +238,7 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
 
 
 def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
-    """Return a curve, or of a chain its legs, unless a derivative jumps, up to an order.
-
-    `name` is the cost that does not exist then.
-    """
+    """Return the curve, or the legs of a chain; RuntimeError as `Chain.check_smooth`."""
     if isinstance(curve, Chain):
         curve.check_smooth(name, order)
         return curve.legs
@@ -313,31 +255,21 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
     Parameters
     ----------
-    times : array_like, shape (N,)
-        Increasing; two or more.
-    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses, or rotation matrices, one for each time.
+    times, poses : array_like, shapes (N,) and (N, 4, 4) or (N, 3, 3)
+        Two or more times, increasing, with a pose or a rotation matrix, valid to 1e-9, for each.
 
     Returns
     -------
     ndarray, shape (N, 6) or (N, 3)
-        Twists (ω, v), or angular velocities ω, body frame, per unit of the times.
-
-    Raises
-    ------
-    ValueError
-        If times do not increase, a matrix is no pose or no rotation, or neighbours are a half-turn
-        apart, to 1e-6.
+        Twists (ω, v), or angular velocities ω, per unit of the times.
 
     Notes
     -----
-    Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV); for even times, that of
-    Catmull and Rom. The parabola of the origin is one in R³; that of the rotation is one in the
-    exponential coordinates about the pose in the middle, so that moved poses have moved velocities.
-    The first and the last pose have what the parabolas of their neighbours have there; two poses
-    alone have the constant velocity between them.
-
-    Singular set: half-turns between neighbours.
+    Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). The parabola of the origin
+    is one in R³, that of the rotation one in the exponential coordinates about the pose in the
+    middle, so that moved poses have moved velocities. The first and the last velocity are those of
+    the neighbours' parabolas; two poses alone have the constant velocity between them.
+    Singular set: neighbours a half-turn apart, to 1e-6, raise ValueError.
 
     Examples
     --------
@@ -458,10 +390,7 @@ def _parabolas_and_rests(times: Array, poses: Array) -> tuple[Array, Array, Arra
 
 
 def _parabola(h: Array, slopes: Array) -> tuple[Array, Array]:
-    """Return the first and the second derivatives of the parabolas, from chords and their slopes.
-
-    At the ends they are those of the neighbours' parabolas; of one chord, a line.
-    """
+    """Return first and second derivatives of the parabolas, from chords and their slopes."""
     bend = np.zeros((len(h) + 1, slopes.shape[1]))
     if len(h) > 1:
         bend[1:-1] = 2 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])

@@ -1,8 +1,9 @@
 """Rigid bodies in the plane: poses (x, y, theta), the group SE(2), plans and paths.
 
-A pose (x, y, theta) counts full turns: theta and theta + 2π are the same orientation, reached after
-another turn. A twist is (vx, vy, omega), in the order of the poses. A plan is a list of commands
-(velocity, duration); a path is an array of states, one row each.
+Poses are in m, m and rad, in the frame of the world unless a docstring says otherwise. They count
+full turns: theta and theta + 2π are the same orientation, reached after another turn. A twist is
+(vx, vy, omega), in the body frame. A plan is a list of commands (velocity, duration); a path is an
+array of states, one row each.
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     Parameters
     ----------
     pose : array_like, shape (..., 3)
-        Poses (x, y, theta): m, m, rad, in the frame of the world.
+        Poses (x, y, theta).
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Elements of SE(2); they carry coordinates of the body to those of the world.
+        They carry coordinates of the body to those of the world.
 
     Examples
     --------
@@ -64,25 +65,20 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
 
 
 def planar_from_matrix(A: ArrayLike) -> Array:
-    """Return the planar poses (x, y, theta) of matrices.
+    """Return the planar poses (x, y, theta) of matrices, −π ≤ theta ≤ π.
 
+    The rotation nearest to the upper left block is used. Singular set: blocks [[a, b], [b, −a]], to
+    which no rotation is nearest; theta is 0. At θ = ±π rounding decides the sign.
     Source: RR 3.1.
 
     Parameters
     ----------
     A : array_like, shape (..., 3, 3)
-        Elements of SE(2). The rotation nearest to the upper left block is used; the last row is
-        not read.
+        Elements of SE(2).
 
     Returns
     -------
     ndarray, shape (..., 3)
-        Poses (x, y, theta): m, m, rad, −π ≤ theta ≤ π.
-
-    Notes
-    -----
-    Singular set: blocks [[a, b], [b, −a]], reflections and zero among them, to which no rotation
-    is nearest; theta is 0 there. At θ = ±π the sign is that of the rounding.
 
     Examples
     --------
@@ -97,21 +93,19 @@ def planar_from_matrix(A: ArrayLike) -> Array:
 
 
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
-    """Return the pose that is `step`, seen from `pose`: the product of the two, turns kept.
+    """Return the pose `step`, given in the body frame of `pose`, in the frame of the world.
 
     Source: RR 3.2.
 
     Parameters
     ----------
-    pose : array_like, shape (..., 3)
-        Poses (x, y, theta): m, m, rad, in the frame of the world.
-    step : array_like, shape (..., 3)
-        Poses in the frame of the body.
+    pose, step : array_like, shape (..., 3)
+        Poses (x, y, theta).
 
     Returns
     -------
     ndarray, shape (..., 3)
-        In the frame of the world. Its matrix is the product of theirs, and the angles add up.
+        Its matrix is the product of the two matrices, and the angles add up.
 
     Examples
     --------
@@ -125,19 +119,18 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
 
 
 def inverse_planar(pose: ArrayLike) -> Array:
-    """Return the pose of the world, seen from the body.
+    """Return the pose of the world in the body frame: `compose_planar` of the two is (0, 0, 0).
 
     Source: RR 3.2.
 
     Parameters
     ----------
     pose : array_like, shape (..., 3)
-        Poses (x, y, theta): m, m, rad, in the frame of the world.
+        Poses (x, y, theta).
 
     Returns
     -------
     ndarray, shape (..., 3)
-        In the frame of the body: `compose_planar` of the two is (0, 0, 0).
 
     Examples
     --------
@@ -152,24 +145,20 @@ def inverse_planar(pose: ArrayLike) -> Array:
 def exp_planar(S: ArrayLike) -> Array:
     """Return the pose that the constant body twist S reaches from (0, 0, 0) in unit time.
 
+    Its matrix is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]]. No singular set;
+    omega = 0 gives the translation exactly.
     Source: RR 3.2.
 
     Parameters
     ----------
     S : array_like, shape (..., 3)
-        Twists (vx, vy, omega) in the frame of the body, in m, m and rad for unit time; omega may
-        be more than a full turn.
+        Twists (vx, vy, omega), in m, m and rad for unit time; omega of any size.
 
     Returns
     -------
     ndarray, shape (..., 3)
-        (x, y, omega): an arc of the angle omega was run through. (x, y) is its chord, that is
-        (vx, vy), turned by omega/2, times sin(omega/2) / (omega/2).
-
-    Notes
-    -----
-    No singular set; omega = 0 gives the translation exactly. `matrix_from_planar` of it is the
-    exponential of the matrix [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]].
+        Poses (x, y, omega). (x, y), the chord of an arc of the angle omega, is (vx, vy) turned by
+        omega/2, times sin(omega/2) / (omega/2).
 
     Examples
     --------
@@ -183,24 +172,21 @@ def exp_planar(S: ArrayLike) -> Array:
 
 
 def log_planar(pose: ArrayLike) -> Array:
-    """Return the body twist that reaches a pose from (0, 0, 0) in unit time, by the short way.
+    """Return the body twist that reaches a pose from (0, 0, 0) in unit time, −π ≤ omega ≤ π.
 
+    Singular set: half-turns, which two twists reach. theta = π gives omega = π and −π gives −π;
+    with full turns added rounding decides.
     Source: RR 3.1.
 
     Parameters
     ----------
     pose : array_like, shape (..., 3)
-        Poses (x, y, theta): m, m, rad; full turns in theta do not count.
+        Poses (x, y, theta).
 
     Returns
     -------
     ndarray, shape (..., 3)
-        (vx, vy, omega), −π ≤ omega ≤ π; `exp_planar` of it is the pose, up to full turns.
-
-    Notes
-    -----
-    Singular set: half-turns, which two twists reach. π itself is to the left, −π to the right;
-    beyond, rounding decides.
+        Twists (vx, vy, omega); `exp_planar` of them is the pose, up to full turns.
 
     Examples
     --------
@@ -216,33 +202,26 @@ def log_planar(pose: ArrayLike) -> Array:
 def interpolate_planar(
     start: ArrayLike, goal: ArrayLike, steps: int = 10, *, shortest: bool = False
 ) -> Array:
-    """Return the path from one pose to another that blends x, y and theta evenly.
+    """Return the path (1 − t) start + t goal of poses (x, y, theta) at even times t in [0, 1].
 
+    The path depends on which point of the body is its place.
+    Singular set of `shortest`: angles that differ by half a turn. If they differ by π or −π as
+    given, the turn is that; otherwise rounding decides.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Parameters
     ----------
     start, goal : array_like, shape (..., 3)
-        Poses (x, y, theta): m, m, rad, in the frame of the world.
     steps : int, optional
-        How many equal steps, from 1 up.
+        Number of equal steps, at least 1.
     shortest : bool, optional
-        Whether to turn the short way, by π at most (to rounding), whatever full turns the
-        two angles differ by. By default theta goes from its start to its goal as given.
+        Whether to turn by π at most (to rounding): the last theta may then differ from the goal's
+        by full turns. By default theta goes from its start to its goal as given.
 
     Returns
     -------
     ndarray, shape (steps + 1, ..., 3)
-        The first pose is the start, the last one the goal, exactly; with `shortest` its theta may
-        differ from the goal's by full turns.
-
-    Notes
-    -----
-    The place goes straight at constant speed and the body turns at a constant rate. Which point
-    of the body is called its place makes a difference.
-
-    Singular set of `shortest`: angles that differ by half a turn, where either way is as short.
-    From 0, π is to the left and −π to the right; beyond, rounding decides.
+        The ends are exact.
 
     Examples
     --------
@@ -261,37 +240,23 @@ def interpolate_planar(
 
 
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
-    """Return the path that a plan makes a planar body go, one state more than commands.
+    """Return the poses (x, y, theta) after each command of a plan, the start first; turns add up.
 
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Parameters
     ----------
     start : array_like, shape (..., 3)
-        Pose (x, y, theta): m, m, rad, in the frame of the world.
     plan : iterable of (velocity, duration)
-        Velocities (vx, vy, vtheta) in m/s, m/s and rad/s; durations from 0 up, in s. The empty
-        plan leaves the start alone, and a command of no duration repeats the state.
+        Velocities (vx, vy, vtheta) in m/s, m/s and rad/s; durations from 0 up, in s.
     frame : {"world", "body"}, optional
-        Whose x and y axes vx and vy are meant along: those of the world, or those of the body,
-        which turn with it while the command lasts.
+        The frame of vx and vy. In "world" a command adds velocity times duration; in "body" it is
+        a constant twist, which moves the body along an arc or a line (`exp_planar`).
 
     Returns
     -------
     ndarray, shape (commands + 1, ..., 3)
-        Poses in the frame of the world; the first is the start, exactly. Turns add up.
-
-    Raises
-    ------
-    ValueError
-        If the start is not finite or not of that shape, `frame` is neither of the two, or a
-        command is malformed; the message says which and why.
-
-    Notes
-    -----
-    In the world's frame a command adds velocity times duration. In the body's it is a constant
-    twist, and the body runs through an arc, or a line: `exp_planar`, no small steps. The path has
-    the ends of the commands only; cut a command into shorter ones to see what is between them.
+        Only the ends of the commands are in the path: divide a command to see between them.
 
     Examples
     --------
@@ -321,14 +286,9 @@ def _short(angle: Array) -> Array:
 
 
 def as_plan(plan: Plan, size: int | str) -> Commands:
-    """Return a plan as a list of commands, all of them checked.
+    """Return a plan as a list of checked commands whose velocities have `size` numbers ("n": any).
 
-    `size` is how many numbers a velocity has; "n" takes any.
-
-    Raises
-    ------
-    ValueError
-        If the plan or a command is malformed; the message says which and why.
+    A ValueError names the malformed command and the reason.
     """
     try:
         commands = iter(plan)
@@ -350,21 +310,12 @@ def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> 
 
 
 def as_states(path: ArrayLike) -> Array:
-    """Return a path as an array of shape (states, k), at least one state.
-
-    Raises
-    ------
-    ValueError
-        If it has another shape, or an entry is not finite; the message names the first.
-    """
+    """Return a path as an array of shape (states, k), at least one state, or raise ValueError."""
     return as_single("path", path, "states", "k")
 
 
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
-    """Return (1 − t) start + t goal at steps + 1 even times t in [0, 1], time first.
-
-    Entries that are equal at both ends stay exactly equal.
-    """
+    """Return (1 − t) start + t goal at steps + 1 even times; entries that are equal stay exact."""
     t = np.linspace(0, 1, as_count("steps", steps) + 1)
     batch = check_broadcast(start=(start, 1), goal=(goal, 1))
     t = t.reshape(-1, *[1] * (len(batch) + 1))
@@ -372,10 +323,7 @@ def interpolate(start: Array, goal: Array, steps: int) -> Array:
 
 
 def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = np.add) -> Array:
-    """Return the states from a start on, one more than commands, time first.
-
-    Each is ``move(state, velocity * duration)`` of the one before it.
-    """
+    """Return the states from a start on, time first, by ``move(state, velocity * duration)``."""
     path = [start]
     for i, (velocity, duration) in enumerate(as_plan(plan, start.shape[-1])):
         try:

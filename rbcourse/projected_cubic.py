@@ -35,12 +35,10 @@ class ProjectedPolynomial(Curve):
     ends : ndarray, shape (..., n, 3, 3)
         M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1), for the time from 0 to 1. With a
         weight, all times W.
-    margin : ndarray, shape (...)
-        The least sum, over t, of the two smallest eigenvalues of RᵀM, R the projection of M: how
-        far the curve stays from where the nearest rotation is not unique. A small margin is a sign
-        of a poor cubic, a large one certifies nothing (see docs/near_optimal.md).
-    margin_time : ndarray, shape (...)
-        When that is.
+    margin, margin_time : ndarray, shape (...)
+        The least sum over t of the two smallest eigenvalues of RᵀM, R the projection of M, and its
+        time. At 0 the nearest rotation is not unique. A small margin is a sign of a poor cubic, a
+        large one does not guarantee a good one (see docs/near_optimal.md).
     """
 
     ends: Array
@@ -104,54 +102,36 @@ def projected_cubic_so3(
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
+        Rotation matrices at the start and at the end, and angular velocities there, body frame.
     duration : array_like, shape (...), optional
-        How long it takes.
+        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`: the nearest rotations to the cubic M(t) with M = R0 and M' = R0 hat_so3(w0) at
-        its start, M = R1 and M' = R1 hat_so3(w1) at its end. It meets all four exactly; with
-        ``margin``.
-
-    Raises
-    ------
-    ValueError
-        From the curve, when called at a time whose nearest rotation is not unique, to rounding.
-
-    Warns
-    -----
-    RuntimeWarning
-        If ``margin`` is below 1e-6; the message names the time.
+        A `Curve`, with ``margin``: the nearest rotations to the cubic M(t) with the values R and
+        first derivatives R ŵ at both ends. It meets all four ends exactly.
 
     See Also
     --------
     rbcourse.textbook.projected_cubic_so3 : The same, matrix by matrix.
-    minimum_acceleration_so3 : The optimum with the same ends.
-    weighted_cubic_so3 : For the inertia of another body than a ball.
-    acceleration_cost : What both cost.
 
     Notes
     -----
-    Singular set: where the two smallest eigenvalues of RᵀM sum to 0, at some time. A curve past
-    such a time is returned, and is right on both sides; in between it jumps. Near it, where
-    ``margin`` is small, the curve turns by up to π in a time of about ``margin`` over the speed of
-    M, and is accurate to a few eps ‖M‖ over the sum at that time, its derivatives to that over its
-    square and its cube.
-
-    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1.
+    Singular set: times when the two smallest eigenvalues of RᵀM sum to 0. There the curve jumps,
+    and raises ValueError when called; it is right on both sides. A ``margin`` below 1e-6 gives a
+    RuntimeWarning that names the time. Near a small ``margin`` the curve turns by up to π in a time
+    of about ``margin`` over the speed of M; it is accurate to a few eps ‖M‖ over the sum at that
+    time, its derivatives to that over its square and its cube.
+    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1. The optimum is
+    `minimum_acceleration_so3`; for the inertia of a body see `weighted_cubic_so3`.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = projected_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])  # from rest
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
-    >>> float(c.margin.round(3))
-    1.464
+    >>> c = projected_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])  # from rest
+    >>> c(1, 1).round(12) + 0.0, float(c.margin.round(3))
+    (array([0., 1., 0.]), 1.464)
     """
     return watched(projected_cubic(*Ends(R0, R1, w0, w1).over(duration)))
 
@@ -171,56 +151,30 @@ def weighted_cubic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
     inertia : array_like, shape (..., 3, 3)
-        G, body frame: symmetric and positive definite, and of a body: each principal moment is at
-        most the sum of the other two.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        As for `minimum_acceleration_so3`; each principal moment is at most the sum of the others.
 
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`: `project_so_weighted` of the cubic of `projected_cubic_so3`, with the weight W
-        that belongs to G, `weight_from_inertia`. It meets all four ends; with ``margin``, of M W
-        with W of trace 3.
-
-    Raises
-    ------
-    ValueError
-        As `projected_cubic_so3`; if `inertia` is not symmetric and positive definite; or if it
-        belongs to no body, so that there is no W.
-
-    Warns
-    -----
-    RuntimeWarning
-        If ``margin`` is below 1e-6; the message names the time.
-
-    See Also
-    --------
-    minimum_acceleration_so3 : The optimum, for any inertia.
-    normal_cubic_so3 : Another closed form, which needs no W.
-    acceleration_cost : What they cost.
+        `project_so_weighted` of the cubic of `projected_cubic_so3`, with the weight W of
+        `weight_from_inertia`. It meets all four ends. ``margin`` is that of M W with W of trace 3.
 
     Notes
     -----
-    Near-optimal for small excursions: data s times as large have a relative excess over the
-    optimum about s⁴ times as large, where that of `projected_cubic_so3` is s² times as large. For
-    large ones it may be far from it, as `projected_cubic_so3` is.
-
-    Singular set: as for `projected_cubic_so3`, of M W. With G a multiple of I it is that curve.
-
-    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 and Qᵀ G Q.
+    Near-optimal for small excursions: data s times as large have a relative excess over the optimum
+    about s⁴ times as large (s² times for `projected_cubic_so3`). For large ones it may be far from
+    it; `normal_cubic_so3` is a closed form for any inertia. With G a multiple of I the curve is
+    `projected_cubic_so3`. Singular set, warning, moved ends (Qᵀ G Q): as there, of M W.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
     >>> R1, rest, book = exp_so3([0.5, 0.3, 0]), [0, 0, 0], np.diag([1.0, 2.22, 3.18])
-    >>> c = weighted_cubic_so3(np.eye(3), R1, rest, [0, 1, 0], book)
-    >>> c([0, 1], 1).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 1., 0.]])
+    >>> weighted_cubic_so3(np.eye(3), R1, rest, [0, 1, 0], book)(1, 1).round(12) + 0.0
+    array([0., 1., 0.])
     """
     ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
     curve = projected_cubic(*ends.over(duration))
@@ -246,46 +200,29 @@ def projected_quintic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
     a0, a1 : array_like, shape (..., 3)
         Angular accelerations w' there, body frame, in rad per unit time squared.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`: the nearest rotations to the quintic M(t) with the values R, first derivatives
-        R ŵ and second derivatives R (ŵ² + â) at both ends. It meets all six exactly; with
-        ``margin``.
-
-    Warns
-    -----
-    RuntimeWarning
-        If ``margin`` is below 1e-6; the message names the time.
-
-    See Also
-    --------
-    projected_cubic_so3 : The projection of a cubic, for given velocities only.
-    exponential_quintic_so3 : What is near the curve of least jerk.
-    minimum_jerk_so3 : That curve.
+        With ``margin``: the nearest rotations to the quintic M(t) with R, R ŵ and R (ŵ² + â) as
+        values, first and second derivatives at both ends. It meets all six ends exactly.
 
     Notes
     -----
-    The curve is in general not near the one of least jerk: from rest to rest it costs 1.17 times
-    the optimum for a turn by 60°, and 11.6 times for 120°.
-
-    Singular set and invariance: as for `projected_cubic_so3`.
+    In general it is not near the curve of least jerk, `minimum_jerk_so3`: from rest to rest it
+    costs 1.17 times the optimum for a turn by 60°, and 11.6 times for 120°;
+    `exponential_quintic_so3` is near it. Singular set, invariance: as for `projected_cubic_so3`.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> rest = [0, 0, 0]
-    >>> c = projected_quintic_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, [0, 0, 2])
-    >>> c([0, 1], 2).round(12) + 0.0
-    array([[0., 0., 0.],
-           [0., 0., 2.]])
+    >>> R1, rest = exp_so3([0, 0, 1.5]), [0, 0, 0]
+    >>> projected_quintic_so3(np.eye(3), R1, rest, rest, rest, [0, 0, 2])(1, 2).round(12) + 0.0
+    array([0., 0., 2.])
     """
     ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
     (R0, R1, w0, w1), W0, W1 = ends, hat(ends.w0), hat(ends.w1)
@@ -328,13 +265,9 @@ def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
 def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
     """Return w, w', w'', as many as there are of M', M'', M'''; R nearest to M; components first.
 
-    S = RᵀM is symmetric. With A = RᵀM', differentiated, that says (tr(S) I − S) w = vee(A − Aᵀ),
-    and differentiated again, by Leibniz's rule for its left side,
-
-        (tr(S) I − S) w' = vee(A' − A'ᵀ) − (tr(S') I − S') w
-        (tr(S) I − S) w'' = vee(A'' − A''ᵀ) − 2 (tr(S') I − S') w' − (tr(S'') I − S'') w.
-
-    The derivative of RᵀX is RᵀX' − ŵ RᵀX.
+    S = RᵀM is symmetric. With A = RᵀM' and K(S) = tr(S) I − S, differentiation gives
+    K(S) w = vee(A − Aᵀ), K(S) w' = vee(A' − A'ᵀ) − K(S') w and
+    K(S) w'' = vee(A'' − A''ᵀ) − 2 K(S') w' − K(S'') w. The derivative of RᵀX is RᵀX' − ŵ RᵀX.
     """
     S, *turned = (_transposed_times(R, X) for X in (M, *rates))
     A = turned[0]

@@ -44,8 +44,8 @@ class ProjectedLine(AlongGeodesic):
     Attributes
     ----------
     margin : ndarray, shape (...)
-        The least sum, over the line, of the two smallest eigenvalues of RᵀM, M on the line and R
-        its projection: 2 cos(‖σ‖/2). At 0 the projection of the middle is not unique.
+        2 cos(‖σ‖/2): the least sum, over the line, of the two smallest eigenvalues of RᵀM, M on the
+        line and R its projection. At 0 the projection of the middle is not unique.
     """
 
     timing: Progress
@@ -113,58 +113,40 @@ class ProjectedLine(AlongGeodesic):
 def projected_line_so3(
     R0: ArrayLike, R1: ArrayLike, f: Progress | None = None, *, duration: ArrayLike = 1.0
 ) -> ProjectedLine:
-    """Return the projection on SO(3) of the line R0 + (R1 − R0) f(t), in closed form.
+    """Return the curve R0 exp(σ̂ θ(f(t))): the projection of the line R0 + (R1 − R0) f(t) on SO(3).
 
     Source: BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
 
     Parameters
     ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
+    R0, R1, duration
+        As for `projected_cubic_so3`.
     f : callable, optional
         ``f(t, order)``, order 0, 1 or 2: how the line is run through, f(0) = 0 and f(1) = 1 to
         1e-12, and the derivatives of that; for the jerk ``c(t, 3)`` order 3 too. The times come
         with an axis of length 1 for each batch axis, and from 0 to 1. By default f(t) = t.
-    duration : array_like, shape (...), optional
-        How long it takes.
 
     Returns
     -------
     ProjectedLine
-        A `Curve`: R0 exp(σ̂ θ(f(t))), the nearest rotations to the line; with ``margin``.
-
-    Raises
-    ------
-    ValueError
-        If `f` is not callable or has other ends. The curve, when called: if `f` returns non-finite
-        values or another shape, or at a time whose nearest rotation is not unique.
-
-    Warns
-    -----
-    RuntimeWarning
-        If ``margin`` is below 1e-6.
-
-    See Also
-    --------
-    geodesic_so3 : The same path at constant speed.
-    rbcourse.projected_line.f : The timing for constant speed (see the example).
-    project_so : The projection, for any matrix.
+        A `Curve` with ``margin``.
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart. The line then runs through a matrix of rank 1, at
-    f(t) = 1/2, and its projection jumps there from R0 to R1. ``margin`` is 0 to a few eps, and the
-    curve raises at that time. Near it the projection is accurate to eps over the sum of the two
-    smallest eigenvalues of RᵀM, which ``margin`` bounds from below.
+    Singular set: R0 and R1 a half-turn apart. At f(t) = 1/2 the projection jumps from R0 to R1, the
+    curve raises ValueError, and ``margin`` is 0 to a few eps; `RuntimeWarning` if it is below 1e-6.
+    The projection is accurate to eps over the sum of the two smallest eigenvalues of RᵀM, which
+    ``margin`` bounds from below. The curve also raises ValueError when called if `f` returns
+    non-finite values or another shape.
 
     Examples
     --------
     >>> from rbcourse import exp_so3, log_so3
-    >>> c = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]))
-    >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # slow, fast, slow
-    array([0.314, 0.75 , 1.186])
     >>> from rbcourse.projected_line import f
-    >>> c = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]), lambda t, order: f(t, 1.5, order))
+    >>> R0, R1 = np.eye(3), exp_so3([0, 0, 1.5])
+    >>> log_so3(projected_line_so3(R0, R1)([0.25, 0.5, 0.75]))[:, 2].round(3)  # slow, fast, slow
+    array([0.314, 0.75 , 1.186])
+    >>> c = projected_line_so3(R0, R1, lambda t, order: f(t, 1.5, order))
     >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # uniform
     array([0.375, 0.75 , 1.125])
     """
@@ -192,24 +174,18 @@ def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     """Return s(t): the line (1 − t) I + t R2 has the singular values 1, s(t), s(t).
 
+    s vanishes only at the angle π and t = 1/2, where the nearest rotation is not unique.
     Source: BK (17).
 
     Parameters
     ----------
-    t : array_like
-        Where on the line, any real numbers; broadcasts with `angle`.
-    angle : array_like
-        The angle ‖ω₀‖ of the rotation R2, in [0, π] rad.
+    t, angle : array_like, shape (...)
+        Where on the line, any real numbers, and the angle ‖ω₀‖ of R2, in [0, π].
 
     Returns
     -------
-    ndarray
+    ndarray, shape (...)
         √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)), accurate to a few eps relative.
-
-    Notes
-    -----
-    It vanishes at t = 1/2, angle π only: the middle of the line between rotations a half-turn
-    apart has no unique nearest rotation.
 
     Examples
     --------
@@ -220,33 +196,25 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
 
 
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return how far along the geodesic the projection of the straight line is.
+    """Return θ: the nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)); or a derivative.
 
-    The nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)). For a line that is run
-    through as f(t), θ is ``theta(f(t), angle)``.
-
+    Angle 0: the limit, θ(t) = t. Angle π is singular: θ is 0 before t = 1/2, 1/2 there and 1 after
+    it. `numpy.pi` is less than π by 1.2e-16, so there the jump has the finite slope 1e16.
     Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², where the paper
     prints s, with s from BK (17).
 
     Parameters
     ----------
-    t : array_like
-        Where on the line, any real numbers; broadcasts with `angle`.
-    angle : array_like
-        The angle ‖ω₀‖, in [0, π] rad.
+    t, angle : array_like, shape (...)
+        Where on the line, any real numbers, and the angle ‖ω₀‖, in [0, π].
     order : {0, 1, 2, 3}, optional
         Which derivative with respect to t.
 
     Returns
     -------
-    ndarray
-        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)); or a
-        derivative, accurate to a few eps relative.
-
-    Notes
-    -----
-    Angle 0: the limit, θ(t) = t. Angle π is singular: θ is 0 before t = 1/2, 1/2 there and 1 after
-    it. `numpy.pi` is less than π by 1.2e-16, so there the jump has the finite slope 1e16.
+    ndarray, shape (...)
+        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)); a
+        derivative to a few eps relative.
 
     Examples
     --------
@@ -263,32 +231,26 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
 
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return where on the straight line to be at time t, for a projection of constant speed.
+    """Return where on the line to be at time t for a projection of constant speed, or a derivative.
 
     It is the inverse of `theta`: theta(f(t)) = t. Rounding f disturbs that by up to
     eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, the greatest slope of θ.
 
+    Angle 0: the limit, f(t) = t. Angle π is singular: f is 0 at t = 0, 1 at t = 1, and 1/2 at all
+    times between. `numpy.pi` is less than π by 1.2e-16, so there f' is about 1e16 at the ends.
     Source: BK Cor. 2.
 
     Parameters
     ----------
-    t : array_like
-        Times in [0, 1]; broadcasts with `angle`.
-    angle : array_like
-        The angle ‖ω₀‖, in [0, π] rad.
-    order : {0, 1, 2, 3}, optional
-        Which derivative with respect to t.
+    t : array_like, shape (...)
+        In [0, 1].
+    angle, order
+        As for `theta`.
 
     Returns
     -------
-    ndarray
-        f = sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)), or a derivative; accurate to a few eps
-        relative.
-
-    Notes
-    -----
-    Angle 0: the limit, f(t) = t. Angle π is singular: f is 0 at t = 0, 1 at t = 1, and 1/2 at all
-    times between. `numpy.pi` is less than π by 1.2e-16, so there f' is about 1e16 at the ends.
+    ndarray, shape (...)
+        sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)) or a derivative, to a few eps relative.
 
     Examples
     --------

@@ -30,7 +30,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Candidates. Non-finite entries do not raise; the result is False.
+        Non-finite entries do not raise; the result is False.
     atol : float, optional
         The largest defect that passes, in any entry of MᵀM − I and in det M − 1.
 
@@ -58,9 +58,9 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     A : array_like, shape (..., n + 1, n + 1)
-        Candidates. Non-finite entries do not raise; the result is False.
+        Non-finite entries do not raise; the result is False.
     atol : float, optional
-        The largest defect of the rotation (see `is_so`) and of the last row that passes.
+        As for `is_so`, with R for M; also the largest defect of the last row that passes.
 
     Returns
     -------
@@ -79,37 +79,31 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 
 
 def project_so(M: ArrayLike) -> Array:
-    """Return the rotation nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
+    """Return the rotation R nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
-    Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1. Many 3 × 3 matrices are
-    projected by FOAM (see `rbcourse._foam`); few, those near the singular set, and those of other
-    sizes by the SVD.
+    RᵀM is symmetric, and its two smallest eigenvalues sum to 0 or more. L M projects to L R, and
+    M L to R L, for every rotation L. The paper prints U Vᵀ, which is a reflection where det M < 0.
+    Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Any matrices, singular and reflected ones too.
 
     Returns
     -------
     ndarray, shape (..., n, n)
-        Rotations R. S = RᵀM is symmetric and its two smallest eigenvalues sum to 0 or more, which
-        only a nearest rotation does. L M projects to L R, and M L to R L, for every rotation L.
 
     See Also
     --------
-    rbcourse.textbook.project_so : The same in three lines, by the singular value decomposition.
-    project_se : The same for poses.
-    project_so_weighted : The same for a body, by mass.
-    distance_to_so : How far it is.
+    rbcourse.textbook.project_so : The same in three lines, by the SVD.
+    distance_to_so : How far M is from R.
 
     Notes
     -----
-    Singular set: where the two smallest eigenvalues of RᵀM sum to 0 several rotations are equally
-    near (rank n − 2 or less; or det M < 0 with its smallest singular value repeated), and one of
-    them is returned. Near that set R is accurate to a few eps ‖M‖ over that sum.
-
-    The paper prints U Vᵀ, which is a reflection where det M < 0.
+    Singular set: where the two smallest eigenvalues of RᵀM sum to 0 (rank n − 2 or less; or the
+    smallest singular value of M repeated and det M < 0) several rotations are equally near; one is
+    returned. Near that set R is accurate to a few eps ‖M‖ over that sum. Many 3 × 3 matrices are
+    projected by FOAM (see `rbcourse._foam`), except near the singular set; others by the SVD.
 
     Examples
     --------
@@ -123,46 +117,31 @@ def project_so(M: ArrayLike) -> Array:
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     """Return the rotation R with the least √tr(XᵀX W), X = M − R: `project_so` of M W.
 
+    For a body tr(XᵀX W) is the sum of the squared distances, by mass, from where M puts its points
+    to where R does. `rbcourse.metrics.weight_from_inertia` returns the W of a given metric.
     Source: BK 4, for metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
-    M : array_like, shape (..., n, n)
-        Any matrices, singular and reflected ones too.
-    W : array_like, shape (..., n, n)
-        Weights: symmetric, to 1e-12 of the largest entry, and without negative eigenvalues, to a
-        few eps of the largest. Those of a body are ∫ p pᵀ dm over its points p, body frame; of a
-        flat body they are singular.
+    M, W : array_like, shape (..., n, n)
+        W is symmetric, to 1e-12 of the largest entry, and without negative eigenvalues, to a few
+        eps of the largest; of a body ∫ p pᵀ dm over its points p, body frame. Its factor does not
+        matter.
 
     Returns
     -------
     ndarray, shape (..., n, n)
-        Rotations R, for which tr((M − R)ᵀ(M − R) W) is least: the sum of the squared distances,
-        by mass, from where M puts the points of the body to where R does. L M projects to L R for
-        every rotation L; M L does *not* project to R L, unless L turns W into itself. The factor
-        of `W` does not matter; W = I gives `project_so`.
-
-    Raises
-    ------
-    ValueError
-        If an argument is not finite, not of that shape, the two do not fit, or `W` is not
-        symmetric or has a negative eigenvalue.
-
-    See Also
-    --------
-    weight_from_inertia : Which W induces a given metric on SO(3), and when there is one.
 
     Notes
     -----
-    On SO(3), tr(XᵀY W) induces the left-invariant metric G = tr(W) I − W: the inertia of the body.
-
-    Singular set: that of `project_so`, for the matrix M W. A W of rank n − 1, as of a flat body,
-    determines the rotation wherever M keeps that rank. One of rank n − 2 or less never does: a rod
-    without thickness may be turned about itself, and one of the nearest rotations is returned.
+    L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L.
+    On SO(3) W induces the left-invariant metric tr(W) I − W: the inertia of the body.
+    Singular set: that of `project_so`, for M W. A W of rank n − 1, as of a flat body, determines R
+    wherever M keeps that rank; one of rank n − 2 or less, as of a thin rod, never does.
 
     Examples
     --------
-    >>> M = [[1, -0.2], [0, 1]]  # which axis has turned? the one of less weight
+    >>> M = [[1, -0.2], [0, 1]]  # the axis of less weight turns
     >>> project_so_weighted(M, np.diag([100, 1])).round(3)
     array([[ 1.   , -0.002],
            [ 0.002,  1.   ]])
@@ -181,25 +160,19 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     """Return the columns of M made orthonormal, from left to right, as Gram and Schmidt do.
 
+    The result Q has QᵀQ = I, and QᵀM is upper triangular with a positive diagonal: Q is a
+    reflection where det M < 0. Q is not the rotation nearest to M: the first column keeps its
+    direction. L M gives L Q for every rotation L; M L does *not* give Q L.
     Source: BK 4, BK Remark 6, BK Prop. 3.
 
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Matrices of full rank.
+        No column depends on those before it, to rounding.
 
     Returns
     -------
     ndarray, shape (..., n, n)
-        Q with QᵀQ = I, and QᵀM upper triangular with a positive diagonal: rotations where
-        det M > 0, reflections where it is negative. Q is not the rotation nearest to M: the first
-        column keeps its direction, and the others take all of the correction. L M gives L Q for
-        every rotation L; M L does *not* give Q L.
-
-    Raises
-    ------
-    ValueError
-        If a column depends on those before it, to rounding.
 
     Examples
     --------
@@ -225,23 +198,22 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 
 
 def distance_to_so(M: ArrayLike) -> Array:
-    """Return ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)², the last σ signed as det M.
+    """Return ‖M − R‖, in the Frobenius norm, for the nearest rotation R: √Σ (σ_i − 1)².
 
+    Of the singular values σ of M the smallest is signed as det M.
     Source: BK 4, BK Remark 6; where the paper prints the square, and no sign.
 
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Any matrices.
 
     Returns
     -------
     ndarray, shape (...)
-        In the Frobenius norm; σ are the singular values, the last one the smallest.
 
     Examples
     --------
-    >>> float(distance_to_so([[1, 0], [0, -1]]))  # from a mirror every turn is as far
+    >>> float(distance_to_so([[1, 0], [0, -1]]))  # a reflection: all rotations are equally far
     2.0
     """
     d = _signed_singular_values(as_finite("M", M, "n", "n"))
@@ -249,10 +221,7 @@ def distance_to_so(M: ArrayLike) -> Array:
 
 
 def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return `project_so` of M, and where it is unique: by FOAM, or by the SVD where it has to be.
-
-    The rotations lie in the memory as the matrices do: component by component is the fastest.
-    """
+    """Return `project_so` of M, in the memory layout of M, and where it is unique."""
     flat = M.reshape(-1, *M.shape[-2:])
     R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
     if M.shape[-1] == 3 and len(flat) >= MANY:
@@ -286,10 +255,9 @@ def _signed_singular_values(M: Array) -> Array:
 
 
 def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
-    """Return the small turn Ω, skew, that makes Uᵀ M V symmetric: Ω d + d Ω = K − Kᵀ, K = Uᵀ M V.
+    """Return the small skew Ω that makes Uᵀ M V symmetric: Ω d + d Ω = K − Kᵀ, K = Uᵀ M V.
 
-    An SVD in floating point leaves K − Kᵀ of some ten eps ‖M‖. Where d_i + d_j nearly vanishes
-    nothing is turned.
+    An SVD leaves K − Kᵀ of some ten eps ‖M‖. Where d_i + d_j nearly vanishes, Ω_ij is 0.
     """
     K = np.swapaxes(U, -1, -2) @ M @ np.swapaxes(Vt, -1, -2)
     sums = d[..., :, None] + d[..., None, :]
@@ -299,19 +267,18 @@ def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
 
 
 def project_se(B: ArrayLike) -> Array:
-    """Return the pose nearest to B: its rotation block projected, its translation kept.
+    """Return [[project_so(B1), B2], [0, 1]]: the pose nearest to B = [[B1, B2], [0, 1]].
 
     Source: BK 5, BK Prop. 4, BK Prop. 5; RR 1.6.
 
     Parameters
     ----------
     B : array_like, shape (..., n + 1, n + 1)
-        Affine matrices [[B1, B2], [0, 1]]; any other last row is replaced.
+        Any other last row is replaced.
 
     Returns
     -------
     ndarray, shape (..., n + 1, n + 1)
-        Poses [[project_so(B1), B2], [0, 1]].
 
     Examples
     --------

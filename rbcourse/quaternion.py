@@ -34,7 +34,7 @@ _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
-    """Tell which quaternions have norm 1.
+    """Return whether quaternions have norm 1.
 
     Source: RR 1.2, RR (3).
 
@@ -61,19 +61,17 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 
 
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
-    """Return Hamilton's product p q: turn by q first, then by p.
+    """Return Hamilton's product p q of quaternions (w, x, y, z): the rotation by q, then by p.
 
     Source: RR 2.2.
 
     Parameters
     ----------
     p, q : array_like, shape (..., 4)
-        Quaternions (w, x, y, z), of any norm.
 
     Returns
     -------
     ndarray, shape (..., 4)
-        Its norm is the product of the norms.
 
     Examples
     --------
@@ -86,7 +84,7 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
 
 
 def quaternion_conjugate(q: ArrayLike) -> Array:
-    """Return (w, −x, −y, −z): for a unit quaternion its inverse, the turn back.
+    """Return (w, −x, −y, −z), the inverse of a unit quaternion.
 
     Source: RR 2.2.
 
@@ -107,7 +105,7 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
 
 
 def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
-    """Rotate points: the vector part of q p q⁻¹.
+    """Return rotated points: the vector part of q p q⁻¹.
 
     Source: RR 2.2.
 
@@ -116,7 +114,6 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     q : array_like, shape (..., 4)
         Unit quaternions; any other norm scales the points by its square.
     p : array_like, shape (..., 3)
-        Points.
 
     Returns
     -------
@@ -136,21 +133,16 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
 def project_quaternion(q: ArrayLike) -> Array:
     """Return the unit quaternion nearest to q: q over its norm.
 
+    Singular set: q = 0, to which all are equally near; it raises ValueError.
     Source: RR 1.5, RR (6), RR Fig. 2.
 
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Quaternions of any norm but 0.
 
     Returns
     -------
     ndarray, shape (..., 4)
-
-    Raises
-    ------
-    ValueError
-        If zero, the singular set: all unit quaternions are equally near to zero.
 
     Examples
     --------
@@ -161,24 +153,19 @@ def project_quaternion(q: ArrayLike) -> Array:
 
 
 def canonical_quaternion(q: ArrayLike) -> Array:
-    """Return the one of q and −q with w ≥ 0: one quaternion for each rotation.
+    """Return the one of the unit quaternions q and −q with w ≥ 0: one for each rotation.
 
+    Singular set: half-turns, w = 0 to 4 eps. The one whose component of largest magnitude is
+    positive is returned, with w = 0; of components that are equal to 1e-8 the first decides.
     Source: BK Remark 7.
 
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions.
 
     Returns
     -------
     ndarray, shape (..., 4)
-
-    Notes
-    -----
-    Singular set: at a half-turn w = 0, and q and −q are equally good. The one whose component of
-    largest magnitude is positive is returned, with w = 0; of components that are equal to 1e-8 the
-    first. What differs from a half-turn by rounding only, w below 4 eps, counts as one.
 
     Examples
     --------
@@ -198,25 +185,18 @@ def canonical_quaternion(q: ArrayLike) -> Array:
 def continuous_quaternions(q: ArrayLike) -> Array:
     """Return quaternions along a path, each with the sign that is nearer to the one before.
 
+    Unlike those of `quaternion_from_matrix` they do not jump where w passes through 0. Singular
+    set: successive rotations a half-turn apart; the sign changes if that before was changed.
+
     Parameters
     ----------
     q : array_like, shape (N, ..., 4) or (4,)
-        Quaternions; the first axis is time. A single one is returned as it is.
+        The first axis is time. A single quaternion is returned as it is.
 
     Returns
     -------
     ndarray, shape (N, ..., 4) or (4,)
-        ± q, the first ones with the sign that they have: no component jumps where w passes
-        through 0.
-
-    See Also
-    --------
-    quaternion_from_matrix : Its quaternions have w ≥ 0, and so jump there.
-
-    Notes
-    -----
-    Singular set: successive quaternions with the scalar product 0, rotations that differ by a
-    half-turn: there the sign changes where that of the one before was changed.
+        ± q; the first quaternion keeps its sign.
 
     Examples
     --------
@@ -235,24 +215,20 @@ def continuous_quaternions(q: ArrayLike) -> Array:
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
+    Constant angular speed. Singular set: q0 · q1 = 0, to 4 eps, a half-turn. Of the two shortest
+    arcs the one to q1 as given is taken.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Parameters
     ----------
     q0, q1 : array_like, shape (..., 4)
-        Unit quaternions. q1 and −q1 are one rotation: the nearer of the two is the goal.
+        Unit quaternions. The arc ends at q1 or −q1, whichever is nearer to q0.
     t : array_like
         Times in [0, 1], of any shape.
 
     Returns
     -------
     ndarray, shape t.shape + (..., 4)
-        Unit quaternions, at constant angular speed.
-
-    Notes
-    -----
-    Singular set: where q0 · q1 = 0, to 4 eps, the rotations are a half-turn apart and both arcs
-    are shortest; the one to q1 as given is taken. Equal quaternions need no care.
 
     Examples
     --------
@@ -276,28 +252,19 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
 def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
 
-    The other way round on the great circle of `slerp`: where that one turns by the angle a about
-    an axis, this one turns by 2π − a about the opposite axis. It ends at the other of q1 and −q1.
-
+    Where `slerp` turns by the angle a about an axis, this turns by 2π − a about the opposite axis
+    and ends at the other of q1 and −q1. Singular set: q0 and q1 are the same rotation, to 4 eps; it
+    raises ValueError. Near it the axis is accurate to eps over ‖q1 − q0‖.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Parameters
     ----------
-    q0, q1 : array_like, shape (..., 4)
-        Unit quaternions of two different rotations.
-    t : array_like
-        Times in [0, 1], of any shape.
+    q0, q1, t
+        As for `slerp`.
 
     Returns
     -------
     ndarray, shape t.shape + (..., 4)
-        Unit quaternions, at constant angular speed.
-
-    Raises
-    ------
-    ValueError
-        As for `slerp`; and if q0 and q1 are the same rotation to 4 eps, the singular set: the long
-        way is then a full turn about any axis. Near it the axis is accurate to eps over ‖q1 − q0‖.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """The functions of the report RR, under its own names and with its signatures.
 
-Each hands its work to the package. Arguments that the report does not have are keyword-only.
-Inputs of a wrong shape, or not finite, fail a check and are refused by a correction.
+Arguments that the report does not have are keyword-only. Inputs of a wrong shape, or not finite,
+fail a check and are refused by a correction.
 """
 
 from __future__ import annotations
@@ -57,10 +57,7 @@ _V1 = np.array([0.0, 0.2, 0.0]) + _V0
 
 
 def check_SOn(m: ArrayLike, epsilon: float = 0.01) -> bool:
-    """Tell whether m is a rotation matrix: mᵀm = I and det m = 1, each entry within epsilon.
-
-    Only one square matrix of finite real numbers can pass; [[1]] is in SO(1). A negative or NaN
-    epsilon is a ValueError.
+    """Return whether m is a rotation matrix: mᵀm = I and det m = 1, each entry within epsilon ≥ 0.
 
     Source: RR 1.1, RR (1), RR (2).
 
@@ -73,7 +70,7 @@ def check_SOn(m: ArrayLike, epsilon: float = 0.01) -> bool:
 
 
 def check_quaternion(v: ArrayLike, epsilon: float = 0.01) -> bool:
-    """Tell whether v is a unit quaternion (w, x, y, z): its norm is 1 within epsilon.
+    """Return whether v is a unit quaternion (w, x, y, z): its norm is 1 within epsilon.
 
     Source: RR 1.2, RR (3).
 
@@ -86,10 +83,7 @@ def check_quaternion(v: ArrayLike, epsilon: float = 0.01) -> bool:
 
 
 def check_SEn(m: ArrayLike, epsilon: float = 0.01) -> bool:
-    """Tell whether m is a pose: a rotation, any translation, and the last row 0, …, 0, 1.
-
-    Only one matrix of 2 × 2 or larger can pass; the rotation and the last row are taken within
-    epsilon, as `check_SOn` takes them.
+    """Return whether m is a pose: a rotation and the last row 0, …, 0, 1, each within epsilon.
 
     Source: RR 1.3.
 
@@ -104,8 +98,7 @@ def check_SEn(m: ArrayLike, epsilon: float = 0.01) -> bool:
 def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     """Return a copy of m if it passes `check_SOn`, else the rotation matrix nearest to it.
 
-    m is any square matrix, singular or reflected too; anything else is a ValueError.
-
+    m is any square matrix, also a singular or reflected one.
     Source: RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Examples
@@ -119,9 +112,7 @@ def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
-    """Return a copy of v if it passes `check_quaternion`, else v over its norm.
-
-    v has four finite real numbers (w, x, y, z), not all zero; anything else is a ValueError.
+    """Return a copy of v ≠ 0, (w, x, y, z), if it passes `check_quaternion`, else v over its norm.
 
     Source: RR 1.5, RR (6), RR Fig. 2.
 
@@ -136,9 +127,7 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     """Return a copy of m if it passes `check_SEn`, else the pose nearest to it.
 
-    m is any matrix (n + 1, n + 1), n ≥ 1: its rotation is corrected, its translation kept, and the
-    last row replaced by 0, …, 0, 1. Anything else is a ValueError.
-
+    m has the shape (n + 1, n + 1), n ≥ 1. Its translation is kept, its last row made 0, …, 0, 1.
     Source: RR 1.6, RR Fig. 3.
 
     Examples
@@ -152,11 +141,9 @@ def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random rotation matrix, shape (3, 3).
+    """Return a random rotation matrix, shape (3, 3): uniform, by Arvo's method, if not naive.
 
-    With ``naive=True`` three angles are uniform, and the rotation is not; with False it is, by
-    Arvo's method. `rng` is a Generator, a seed or None.
-
+    If naive, three angles are uniform, not the rotation. `rng` is a Generator, a seed or None.
     Source: RR 2.1.
 
     Examples
@@ -183,21 +170,10 @@ def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
 def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure, Animation]:
     """Show how a rotation carries v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) over the sphere.
 
+    `rotation` is a rotation matrix (3, 3) or a unit quaternion (4,), within 0.01; the nearest one
+    is shown, reached in `steps` equal steps about one axis. Return the figure with all images, and
+    an animation of them. A notebook shows a player; ``animation.save(path)`` writes a GIF.
     Source: RR 2.2.
-
-    Parameters
-    ----------
-    rotation : array_like, shape (3, 3) or (4,)
-        A rotation matrix or a unit quaternion, within 0.01; the nearest one is shown.
-    steps : int, optional
-        In how many equal steps about one axis it is reached.
-
-    Returns
-    -------
-    figure : Figure
-        The sphere with all images.
-    animation : Animation
-        They appear one by one. A notebook shows a player; ``animation.save(path)`` writes a GIF.
 
     Examples
     --------
@@ -215,25 +191,11 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
 def visualize(
     quaternion: bool, *, naive: bool = False, rng: Rng = None, steps: int = 100
 ) -> tuple[Figure, Animation]:
-    """Show where 100 random rotations carry v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0).
+    """Show where random rotations, `steps` of them, carry v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0).
 
+    They are from `random_quaternion`, with v ↦ q v q⁻¹, if `quaternion` is True, else from
+    `random_rotation_matrix`. Return figure and animation as `visualize_rotation`.
     Source: RR 2.2, RR Fig. 4, RR Fig. 5.
-
-    Parameters
-    ----------
-    quaternion : bool
-        True for `random_quaternion`, with v ↦ q v q⁻¹; False for `random_rotation_matrix`.
-    naive : bool, optional
-        Whether the angles are uniform; the rotations are not then.
-    rng : Generator, int or None, optional
-        Where the random numbers come from.
-    steps : int, optional
-        How many rotations.
-
-    Returns
-    -------
-    figure, animation
-        As for `visualize_rotation`.
 
     Examples
     --------
@@ -256,9 +218,8 @@ def interpolate_rigid_body(
 ) -> Array:
     """Return the path from one planar pose to another that blends x, y and theta evenly.
 
-    Poses are (x, y, theta) in m, m and rad, shape (3,); the path has the shape (steps + 1, 3).
-    With `shortest` the body turns the short way. See `rbcourse.planar.interpolate_planar`.
-
+    Poses are (x, y, theta); the path has the shape (steps + 1, 3). With `shortest` the body turns
+    the short way.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Examples
@@ -273,12 +234,10 @@ def interpolate_rigid_body(
 def forward_propagate_rigid_body(
     start_pose: ArrayLike, plan: Plan, *, frame: str = "world"
 ) -> Array:
-    """Return the path that a plan makes a planar body go, shape (commands + 1, 3).
+    """Return the path of a planar body that follows a plan, shape (commands + 1, 3).
 
-    The plan is a list of (velocity, duration): velocities (vx, vy, vtheta) in m/s, m/s and rad/s,
-    durations from 0 up, in s. `frame`, "world" as in the report or "body", says along whose axes
-    vx and vy are. See `rbcourse.planar.propagate_planar`.
-
+    The plan is a list of (velocity, duration): (vx, vy, vtheta) in m/s, m/s and rad/s, and s ≥ 0.
+    vx and vy are along the axes of `frame`, "world" as in the report, or "body".
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
@@ -294,35 +253,15 @@ def forward_propagate_rigid_body(
 def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Figure, Animation]:
     """Show a path of planar poses: a rectangle that turns with its pose, and its way.
 
+    The path has poses (x, y, theta), shape (states, 3). The rectangle has a `length`, by default a
+    fifth of the larger extent of the path, or 1 if the body does not move. Lines join the states:
+    to show the arc of a command in the frame of the body, divide it first. Return a figure of the
+    whole way, and an animation of at most 40 frames, as `visualize_rotation`.
     Source: RR 3.3, RR Fig. 6, RR Fig. 7.
-
-    Parameters
-    ----------
-    path : array_like, shape (states, 3)
-        Poses (x, y, theta): m, m, rad; one state is enough.
-    length : float, optional
-        How long the rectangle is, in m; by default a fifth of the larger extent of the path, and
-        1 for a path that stays where it is, to 1e-12 of a metre or of its distance from the origin.
-
-    Returns
-    -------
-    figure : Figure
-        The whole way, and the rectangle at its end; pale at its start and on its way.
-    animation : Animation
-        A frame for each state, or for 40 of them. A notebook shows a player;
-        ``animation.save(path)`` writes a GIF.
-
-    Notes
-    -----
-    Lines join the states. To see the arc of a command in the frame of the body, cut it into shorter
-    ones first.
 
     Examples
     --------
     >>> figure, animation = visualize_path([[0, 0, 0], [4, 2, 1]])
-    >>> animation
-    path: A rectangle goes from (0, 0) m, heading 0 degrees, to (4, 2) m, heading 57 degrees. From
-    state to state its centre covers 4.47 m, and it turns by 57 degrees to the left.
     >>> plt.close(figure)
     """
     states = as_single("path", path, "states", 3)
@@ -339,9 +278,7 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
 def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Array:
     """Return the path that takes each joint angle evenly from its start to its goal.
 
-    Angles are in rad, shape (n,), n = 2 for the arm of the report; the path has the shape
-    (steps + 1, n). See `rbcourse.arm.interpolate_joints`.
-
+    Angles have the shape (n,), with n = 2 for the arm of the report; the path has (steps + 1, n).
     Source: RR 4.1, RR (20), RR (21).
 
     Examples
@@ -354,12 +291,10 @@ def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Ar
 
 
 def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
-    """Return the path that a plan makes an arm go, shape (commands + 1, n).
+    """Return the path of an arm that follows a plan, shape (commands + 1, n).
 
-    `start_pose` (the report's name) are joint angles in rad, shape (n,); the plan is a list of
-    (velocity, duration), with the velocities of the joints in rad/s and durations from 0 up, in s.
-    See `rbcourse.arm.propagate_joints`.
-
+    `start_pose` (the report's name) are joint angles, shape (n,); the plan is a list of
+    (velocity, duration), with velocities of the joints in rad/s and durations from 0 up, in s.
     Source: RR 4.2, RR (22), RR (23).
 
     Examples
@@ -375,29 +310,13 @@ def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
 def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[Figure, Animation]:
     """Show a path of an arm: its links in blue, and the way of its tip, a red curve that grows.
 
+    The path has joint angles, shape (states, n); `lengths` are those of the n links, above 0.
+    Return figure and animation as `visualize_path`.
     Source: RR 4.3, RR Fig. 8, RR Fig. 9.
-
-    Parameters
-    ----------
-    path : array_like, shape (states, n)
-        Joint angles, in rad; one state is enough.
-    lengths : array_like, shape (n,), optional
-        Lengths of the links, in m, above 0.
-
-    Returns
-    -------
-    figure : Figure
-        The whole way of the tip, and the arm at its end; pale at its start and on its way.
-    animation : Animation
-        As for `visualize_path`.
 
     Examples
     --------
     >>> figure, animation = visualize_arm_path([[0, 0], [0, 1.57]])
-    >>> animation
-    arm_path: An arm with links of 2 and 1.5 m turns its joints from 0 and 0 to 0 and 90 degrees,
-    by 0 and 90 degrees in all. From state to state its tip covers 2.12 m, from (3.5, 0) to
-    (2, 1.5) m; its way is drawn in red.
     >>> plt.close(figure)
     """
     states = as_states(path)

@@ -1,7 +1,7 @@
 """Random rotations: uniform ones, naive ones that are not, and tests of uniformity.
 
 Uniform means Haar's measure: a set of rotations is as likely as the same set turned by any other
-rotation, from the left or from the right. Three uniform numbers are enough for one rotation.
+rotation, from the left or from the right.
 """
 
 from __future__ import annotations
@@ -35,32 +35,25 @@ _BLOCK = 6136  # draws whose arrays fit into the cache together; with 6144 they 
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
-    """Return Arvo's rotation of three numbers; of three uniform ones it is uniform.
+    """Return Arvo's rotation −M B of three numbers; uniform if they are.
 
-    A random turn about z, then a half-turn about a random axis V: −M B with M = I − 2 V Vᵀ, the
-    reflection across V, and B = R_z(θ).
-
+    B turns by 2π x₁ about the z axis, and −M is a half-turn about V = (√z cos 2π x₂, √z sin 2π x₂,
+    √(1 − z)): M = I − 2 V Vᵀ. M B, as printed, has the determinant −1.
     Source: RR 2.1, RR (9), RR (10), RR (11); J. Arvo, Fast random rotation matrices, Graphics Gems
     III, 1992.
 
     Parameters
     ----------
     x : array_like, shape (..., 3)
-        Numbers x₁, x₂, z in [0, 1]: θ = 2π x₁, and V = (√z cos 2π x₂, √z sin 2π x₂, √(1 − z)).
+        x₁, x₂, z in [0, 1].
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Rotation matrices.
-
-    Notes
-    -----
-    M B, as printed, has the determinant −1 always. Its first column negated is uniform too: it is
-    −M B diag(1, −1, −1), a uniform rotation times a fixed one.
 
     Examples
     --------
-    >>> arvo_rotation([0, 0, 0])  # V = z, no turn before
+    >>> arvo_rotation([0, 0, 0])  # V = z, B = I
     array([[-1.,  0.,  0.],
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
@@ -74,9 +67,7 @@ def arvo_rotation(x: ArrayLike) -> Array:
 
 
 def shoemake_quaternion(x: ArrayLike) -> Array:
-    """Return Shoemake's quaternion of three numbers; of three uniform ones it is uniform.
-
-    Two circles, in the planes (w, z) and (x, y), whose squared radii s and 1 − s add to 1.
+    """Return Shoemake's quaternion of three numbers; uniform if they are.
 
     Source: RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid
     body path planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
@@ -84,12 +75,12 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     Parameters
     ----------
     x : array_like, shape (..., 3)
-        Numbers s, x₁, x₂ in [0, 1]; the angles on the circles are θ₁ = 2π x₁ and θ₂ = 2π x₂.
+        s, x₁, x₂ in [0, 1].
 
     Returns
     -------
     ndarray, shape (..., 4)
-        Unit quaternions (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂).
+        (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂), with θ₁ = 2π x₁ and θ₂ = 2π x₂.
 
     Examples
     --------
@@ -113,18 +104,12 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     size : int or tuple of int, optional
         How many; by default one, without a batch axis.
     rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
-        `numpy.random.default_rng` takes.
+        A generator, a seed, or None for fresh numbers; or as for `numpy.random.default_rng`.
 
     Returns
     -------
     ndarray, shape size + (3, 3)
-        To a few eps ``arvo_rotation(rng.random(size + (3,)))``, on every processor.
-
-    See Also
-    --------
-    sample_rotation_naive : What not to do.
-    uniformity_tests : How to tell.
+        ``arvo_rotation(rng.random(size + (3,)))``, to a few eps, on every processor.
 
     Examples
     --------
@@ -136,23 +121,19 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
 
 
 def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return uniformly random unit quaternions.
+    """Return uniformly random unit quaternions; q and −q are equally likely.
 
     Source: RR 2.2, RR (13).
 
     Parameters
     ----------
-    size : int or tuple of int, optional
-        How many; by default one, without a batch axis.
-    rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
-        `numpy.random.default_rng` takes.
+    size, rng
+        As for `sample_rotation`.
 
     Returns
     -------
     ndarray, shape size + (4,)
-        Uniform on the whole sphere: q and −q are equally likely. To a few eps
-        ``shoemake_quaternion(rng.random(size + (3,)))``, on every processor.
+        ``shoemake_quaternion(rng.random(size + (3,)))``, to a few eps, on every processor.
 
     Examples
     --------
@@ -164,23 +145,19 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
 
 
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return rotation matrices of three uniform angles about z, y and x: not uniform.
+    """Return rotations R_z(α) R_y(β) R_x(γ) of angles uniform on [0, 2π): not uniform rotations.
 
+    E tr² is 7/8; for uniform rotations it is 1.
     Source: RR 2.1, RR (7), RR (8).
 
     Parameters
     ----------
-    size : int or tuple of int, optional
-        How many; by default one, without a batch axis.
-    rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
-        `numpy.random.default_rng` takes.
+    size, rng
+        As for `sample_rotation`.
 
     Returns
     -------
     ndarray, shape size + (3, 3)
-        R_z(α) R_y(β) R_x(γ), each angle uniform on [0, 2π). E tr² is 7/8; for uniform rotations
-        it is 1.
 
     Examples
     --------
@@ -191,23 +168,20 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
 
 
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return unit quaternions of three uniform angles about x, y and z: not uniform.
+    """Return quaternions q_z(γ) q_y(β) q_x(α) of angles uniform on [0, 2π): not uniform rotations.
 
+    The rotations have the law of `sample_rotation_naive`, but the first random angle turns about x,
+    not about z.
     Source: RR 2.2, RR (12).
 
     Parameters
     ----------
-    size : int or tuple of int, optional
-        How many; by default one, without a batch axis.
-    rng : Generator, int or None, optional
-        Where the random numbers come from: a generator, a seed, or fresh ones; and whatever else
-        `numpy.random.default_rng` takes.
+    size, rng
+        As for `sample_rotation`.
 
     Returns
     -------
     ndarray, shape size + (4,)
-        q_z(γ) q_y(β) q_x(α), each angle uniform on [0, 2π). The first angle turns about x; in
-        `sample_rotation_naive` it turns about z. The law of the rotations is the same.
 
     Examples
     --------
@@ -280,16 +254,11 @@ def _cos_sin(turns: Array) -> tuple[Array, Array]:
 
 
 class UniformityTest(NamedTuple):
-    """What a statistic says of a sample.
+    """Result of a test of uniformity: ``statistic``, ``p_value`` and ``null``.
 
-    Parameters
-    ----------
-    statistic : float
-        Its value.
-    p_value : float
-        How likely uniform rotations are to give a value at least as unusual.
-    null : str
-        Its law if the rotations are uniform and independent.
+    ``statistic`` is the value of the statistic; ``p_value`` is the probability that uniform
+    rotations give a value at least as unusual; ``null`` names the law of the statistic if the
+    rotations are uniform and independent.
     """
 
     statistic: float
@@ -300,19 +269,17 @@ class UniformityTest(NamedTuple):
 def angle_law(angle: ArrayLike) -> Array:
     """Return the probability (a − sin a)/π that a uniform rotation turns by at most a.
 
-    Its density is (1 − cos a)/π: large turns are common, small ones are rare.
-
+    The density is (1 − cos a)/π.
     Source: RR 2.
 
     Parameters
     ----------
-    angle : array_like
-        Angles a in [0, π], in rad.
+    angle : array_like, shape (...)
+        a, in [0, π].
 
     Returns
     -------
-    ndarray
-        Of the same shape.
+    ndarray, shape (...)
 
     Examples
     --------
@@ -331,24 +298,21 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     Parameters
     ----------
     R : array_like, shape (n, 3, 3)
-        At least 100 rotation matrices, in the order in which they were drawn. Validity is not
-        checked; see `project_so`.
+        At least 100 rotation matrices, in the order of the draws.
 
     Returns
     -------
     dict of str to UniformityTest
         E tr, E tr²
-            The mean of the trace and of its square; normal, with means 0 and 1 and the variances
-            1/n and 2/n (for large n).
+            Means of the trace and its square; for large n normal, means 0, 1, variances 1/n, 2/n.
         angle
-            The largest distance between the observed distribution of the angle and `angle_law`;
-            Kolmogorov's law.
+            The largest distance of the angle's distribution from `angle_law`; Kolmogorov's law.
         image of e₁, image of e₃
             χ² of the first and of the last column, on 20 cells of the sphere of equal area, 4 in
-            height by 5 in longitude; χ² with 19 degrees of freedom (for large n).
+            height by 5 in longitude; for large n χ² with 19 degrees of freedom.
         angle to next, angle to half
             As angle, of the turns from each even draw to the next, and from each draw of the first
-            half to its partner in the second: draws that depend on these partners show here.
+            half to its partner in the second: these show draws that depend on each other.
 
     Examples
     --------

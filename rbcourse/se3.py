@@ -29,9 +29,8 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
     d : array_like, shape (..., 3)
-        Positions, in m, fixed frame.
+        Positions, fixed frame.
 
     Returns
     -------
@@ -51,21 +50,18 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
 
 
 def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
-    """Return the rotation R and the position d of a pose [[R, d], [0, 1]].
+    """Return the rotation R and the position d, in the fixed frame, of a pose [[R, d], [0, 1]].
 
     Source: BK 2.1.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
     R : ndarray, shape (..., 3, 3)
-        Rotation matrices.
     d : ndarray, shape (..., 3)
-        Positions, in m, fixed frame.
 
     Examples
     --------
@@ -96,7 +92,6 @@ def inverse_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
@@ -114,14 +109,14 @@ def inverse_se3(A: ArrayLike) -> Array:
 
 
 def pose_from_coordinates(x: ArrayLike) -> Array:
-    """Return the pose with the coordinates (σ, d): rotation exp_so3(σ), position d.
+    """Return the pose with rotation exp_so3(σ) and position d, in the fixed frame.
 
     Source: BK 2.5.
 
     Parameters
     ----------
     x : array_like, shape (..., 6)
-        Exponential coordinates σ of the rotation, in rad, then the position d, in m, fixed frame.
+        Coordinates (σ, d).
 
     Returns
     -------
@@ -139,23 +134,18 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
 
 
 def coordinates_from_pose(A: ArrayLike) -> Array:
-    """Return the coordinates (σ, d) of a pose: σ = log_so3(R), and its position d.
+    """Return the coordinates (σ, d) of a pose: σ = log_so3(R), and d in the fixed frame.
 
+    Singular set: half-turns, as for `log_so3`.
     Source: BK 2.5.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
     ndarray, shape (..., 6)
-        σ in rad, ‖σ‖ ≤ π; d in m, fixed frame.
-
-    Notes
-    -----
-    Singular set: half-turns, as for `log_so3`.
 
     Examples
     --------
@@ -167,14 +157,13 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
 
 
 def hat_se3(S: ArrayLike) -> Array:
-    """Return the matrix of a twist: [[hat_so3(ω), v], [0, 0]].
+    """Return the matrix of a twist S = (ω, v): [[hat_so3(ω), v], [0, 0]].
 
     Source: BK 2.1, BK (1), BK (3).
 
     Parameters
     ----------
     S : array_like, shape (..., 6)
-        Twists (ω, v).
 
     Returns
     -------
@@ -202,7 +191,7 @@ def vee_se3(matrix: ArrayLike) -> Array:
     Parameters
     ----------
     matrix : array_like, shape (..., 4, 4)
-        Of the 3 × 3 block the skew-symmetric part counts; the last row is not read.
+        The skew-symmetric part of its 3 × 3 block is used; the last row is not read.
 
     Returns
     -------
@@ -223,24 +212,19 @@ BASIS_SE3.flags.writeable = False
 
 
 def exp_se3(S: ArrayLike) -> Array:
-    """Return the pose that the constant twist S reaches from I in unit time.
+    """Return the pose that the constant twist S = (ω, v) reaches from I in unit time.
 
+    It is [[exp_so3(ω), J v], [0, 1]] with J = ``right_jacobian_so3(ω).mT``, accurate to a few
+    eps (1 + ‖ω‖) (1 + ‖v‖). No singular set; ω = 0 gives the translation by v exactly.
     Source: BK 2.6.
 
     Parameters
     ----------
     S : array_like, shape (..., 6)
-        Twists (ω, v), ω in rad and v in m, each for unit time.
 
     Returns
     -------
     ndarray, shape (..., 4, 4)
-        [[exp_so3(ω), J v], [0, 1]] with J the left Jacobian of SO(3), the transpose of
-        ``right_jacobian_so3(ω)``; accurate to a few eps (1 + ‖ω‖) (1 + ‖v‖).
-
-    Notes
-    -----
-    No singular set; ω = 0 gives the translation by v exactly.
 
     Examples
     --------
@@ -257,23 +241,19 @@ def exp_se3(S: ArrayLike) -> Array:
 
 
 def log_se3(A: ArrayLike) -> Array:
-    """Return the twist that reaches A from I in unit time, turning by π at most.
+    """Return the twist (ω, v) that reaches A from I in unit time: exp_se3((ω, v)) = A, ‖ω‖ ≤ π.
 
+    Accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists reach A; ω is the
+    one that `log_so3` returns.
     Source: BK 2.6.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
     ndarray, shape (..., 6)
-        (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π; accurate to a few eps (1 + ‖d‖).
-
-    Notes
-    -----
-    Singular set: at a half-turn two twists reach A; ω is the one that `log_so3` returns.
 
     Examples
     --------
@@ -287,19 +267,18 @@ def log_se3(A: ArrayLike) -> Array:
 
 
 def adjoint_se3(A: ArrayLike) -> Array:
-    """Return the matrix that carries twists from the body frame of A to the fixed frame.
+    """Return [[R, 0], [d̂ R, R]], which carries twists from the body frame of A to the fixed frame.
 
+    ``hat_se3(adjoint_se3(A) @ S)`` is A hat_se3(S) A⁻¹.
     Source: BK 2.1.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. Validity is not checked (see `project_se`); the last row is not read.
 
     Returns
     -------
     ndarray, shape (..., 6, 6)
-        [[R, 0], [d̂ R, R]]: hat_se3(adjoint_se3(A) @ S) = A hat_se3(S) A⁻¹.
 
     Examples
     --------
@@ -319,11 +298,7 @@ def check_path(
 ) -> tuple[Array, Array, Array | None]:
     """Return times, poses or rotations, and velocities if there are any, as arrays.
 
-    Raises
-    ------
-    ValueError
-        If a shape is wrong, times do not increase, or a matrix is no pose or no rotation; the
-        message names the first.
+    A ValueError names the first wrong shape, time that does not increase, or invalid matrix.
     """
     if np.size(times) == 0:
         raise ValueError("times, poses: one or more wanted, got none")

@@ -79,26 +79,19 @@ def vee_so3(W: ArrayLike) -> Array:
 
 
 def exp_so3(w: ArrayLike) -> Array:
-    """Return the rotation by ‖w‖ about w: Rodrigues' formula.
+    """Return the rotation by ‖w‖ about w: I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a.
 
+    Rodrigues' formula, accurate to a few eps (1 + a): a rotation for every a, but no digit is
+    significant above a = 1/eps. No singular set; w = 0 gives I exactly.
     Source: BK 2.5.
 
     Parameters
     ----------
     w : array_like, shape (..., 3)
-        Rotation vectors (exponential coordinates), in rad.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps (1 + a). It is
-        a rotation however large a is, but beyond 1/eps ≈ 4.5e15 rad, where neighbouring
-        floating-point numbers are turns apart, no digit is significant.
-
-    Notes
-    -----
-    No singular set; w = 0 gives I exactly. Vectors along one axis whose lengths differ by 2π give
-    the same rotation.
 
     Examples
     --------
@@ -112,26 +105,19 @@ def exp_so3(w: ArrayLike) -> Array:
 
 
 def log_so3(R: ArrayLike) -> Array:
-    """Return the rotation vector of R, the shortest one: exp_so3(log_so3(R)) = R.
+    """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, to rounding.
 
+    Accurate to a few eps. Singular set: half-turns, to 8 eps in the angle; of w and −w the
+    one whose component of largest magnitude is positive is returned (see `canonical_quaternion`).
     Source: BK 2.5.
 
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
     ndarray, shape (..., 3)
-        Axis times angle, the angle in [0, π] rad to rounding; accurate to a few eps, at half-turns
-        too.
-
-    Notes
-    -----
-    Singular set: at a half-turn both w and −w are logarithms. The one whose component of largest
-    magnitude is positive is returned, as `canonical_quaternion` chooses it. What differs from a
-    half-turn by rounding only, less than 8 eps in the angle, counts as one.
 
     Examples
     --------
@@ -149,12 +135,11 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     Parameters
     ----------
     R, S : array_like, shape (..., 3, 3)
-        Rotation matrices. Validity is not checked; see `project_so`.
 
     Returns
     -------
     ndarray, shape (...)
-        Angles in [0, π], in rad; accurate to a few eps.
+        Angles in [0, π], accurate to a few eps.
 
     Examples
     --------
@@ -169,23 +154,18 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
 def right_jacobian_so3(w: ArrayLike) -> Array:
     """Return J with body angular velocity = J w' along the curve exp_so3(w(t)).
 
+    Its transpose is the left Jacobian, for the angular velocity in the fixed frame. Singular set: J
+    is smooth, but has rank 1 where ‖w‖ = 2π, 4π, …
     Source: BK 2.5.
 
     Parameters
     ----------
     w : array_like, shape (..., 3)
-        Rotation vectors, in rad.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps,
-        however large a is. Its transpose is the left Jacobian, which gives the velocity in the
-        fixed frame.
-
-    Notes
-    -----
-    Singular set: J itself is smooth; it has rank 1 where ‖w‖ = 2π, 4π, …
+        I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps.
 
     Examples
     --------
@@ -199,22 +179,18 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`: w' = J⁻¹ times the body angular velocity.
 
+    Singular set: ‖w‖ = 2π, 4π, …, where J has no inverse and the result is finite and huge. Near it
+    the entries grow like 1 over the distance.
     Source: BK 2.5.
 
     Parameters
     ----------
     w : array_like, shape (..., 3)
-        Rotation vectors, in rad, ‖w‖ < 2π.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
         I + ŵ/2 + (1 − (a/2) cot(a/2)) n̂² with a = ‖w‖ and n = w/a.
-
-    Notes
-    -----
-    Singular set: ‖w‖ = 2π, 4π, …, where there is no inverse. Near it the entries grow like 1 over
-    the distance, and at the floating-point numbers nearest to it they are finite and huge.
 
     Examples
     --------

@@ -1,9 +1,8 @@
 """Textbook versions of the fast functions, as on the board: short, slow, and to be read first.
 
-Each has the name of its fast twin and gives the same to rounding, the optimum to a tolerance. Units
-and frames are those of the twin, and so is the singular set. No argument is checked, and rotations
-R0, R1 and velocities w0, w1 are single ones, of shape (3, 3) and (3,). `show` prints a function
-without its docstring.
+Each has the name, units, frames and singular set of its fast twin and gives the same to rounding,
+the optimum to a tolerance. No argument is checked. R0, R1, w0, w1 are single ones, of shape (3, 3)
+and (3,); the times t have the shape (N,), R (N, 3, 3), w and w' (N, 3).
 """
 
 import ast
@@ -32,7 +31,7 @@ __all__ = [
 
 
 def show(function: Callable[..., Any]) -> None:
-    """Print the code of a function that has a docstring, without it.
+    """Print the code of a function that has a docstring, without it; ValueError if there is none.
 
     Examples
     --------
@@ -65,7 +64,7 @@ def project_so(M: Array) -> Array:
 
 
 def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
-    """Return R0 exp(σ̂ t), shape (N, 3, 3), at the times t, shape (N,), with σ = log(R0ᵀ R1).
+    """Return R0 exp(σ̂ t) at the times t, with σ = log(R0ᵀ R1).
 
     Source: BK 6.1.
 
@@ -82,19 +81,16 @@ def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
 def projected_cubic_so3(
     R0: Array, R1: Array, w0: Array, w1: Array, t: Array
 ) -> tuple[Array, Array, Array]:
-    """Return R, w and w' of the projected cubic at the times t, shape (N,).
+    """Return R, w and w' of the projected cubic at the times t.
 
-    Their shapes are (N, 3, 3), (N, 3) and (N, 3).
     With S = RᵀM, A = RᵀM' and G = tr(S) I − S the condition that S is symmetric, differentiated
     once and twice, says G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
-
     Source: BK 6.2.
 
     Examples
     --------
-    >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
-    >>> R, w, a = projected_cubic_so3(I, R1, rest, rest, np.array([0, 0.5, 1]))
-    >>> log_so3(R)[:, 2].round(12)
+    >>> R1, rest, t = exp_so3([0, 0, 1.5]), np.zeros(3), np.array([0, 0.5, 1])
+    >>> log_so3(projected_cubic_so3(np.eye(3), R1, rest, rest, t)[0])[:, 2].round(12)
     array([0.  , 0.75, 1.5 ])
     """
     coefficients = cubic_coefficients(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1))
@@ -112,20 +108,9 @@ def projected_cubic_so3(
 def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
 
-    It is the minimum-acceleration curve: of all curves with these ends it has the least
-    ∫ ‖x''‖² dt.
-
+    x0, x1, v0, v1 have one shape, and the result, the coefficients of 1, t, t², t³, shape (4, ...).
+    Of all curves with these ends the cubic has the least ∫ ‖x''‖² dt.
     Source: BK 6.2.
-
-    Parameters
-    ----------
-    x0, x1, v0, v1 : ndarray
-        Of one shape.
-
-    Returns
-    -------
-    ndarray, shape (4, ...)
-        The coefficients of 1, t, t², t³.
 
     Examples
     --------
@@ -137,20 +122,9 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
 
 
 def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
-    """Return a polynomial, or one of its derivatives, at the times t.
+    """Return a polynomial or, if order > 0, that derivative, at the times t.
 
-    Parameters
-    ----------
-    coefficients : ndarray, shape (degree + 1, ...)
-        Of 1, t, t², ….
-    t : ndarray
-        The times; they broadcast with one coefficient.
-    order : int, optional
-        Which derivative.
-
-    Returns
-    -------
-    ndarray
+    The coefficients, shape (degree + 1, ...), are those of 1, t, t², …; t broadcasts with one.
 
     Examples
     --------
@@ -170,20 +144,17 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
 def minimum_torque_so3(
     R0: Array, R1: Array, w0: Array, w1: Array, G: Array, t: Array, tol: float = 1e-9
 ) -> tuple[Array, Array]:
-    """Return R and w of a body's least torque at the times t, shape (N,), by SciPy's `solve_bvp`.
-
-    Their shapes are (N, 3, 3) and (N, 3). If it fails, a RuntimeError says why. It starts from the
-    geodesic, and may find another stationary curve than the cheapest.
+    """Return R and w of a body's least torque at the times t, by SciPy's `solve_bvp`.
 
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
-    with p = G (τ' + w × τ) − G w × τ, for an unknown c. On the way ‖σ‖ has to stay below 2π.
-
+    with p = G (τ' + w × τ) − G w × τ, for an unknown c. ‖σ‖ has to stay below 2π. If it
+    fails, a RuntimeError says why. It may find a stationary curve that is not the cheapest.
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
 
     Examples
     --------
-    >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
-    >>> R, w = minimum_torque_so3(I, R1, rest, rest, np.diag([1.0, 2, 2.5]), np.array([0.5]))
+    >>> R1, rest, G = exp_so3([0, 0, 1.5]), np.zeros(3), np.diag([1.0, 2, 2.5])
+    >>> R, w = minimum_torque_so3(np.eye(3), R1, rest, rest, G, np.array([0.5]))
     >>> log_so3(R)[:, 2].round(9) + 0.0
     array([0.75])
     """
@@ -249,19 +220,16 @@ def sample_quaternion(n: int, rng: np.random.Generator) -> Array:
 def minimum_acceleration_so3(
     R0: Array, R1: Array, w0: Array, w1: Array, t: Array, tol: float = 1e-9
 ) -> tuple[Array, Array, Array]:
-    """Return R, w and w' of the optimum at the times t, shape (N,), by SciPy's `solve_bvp`.
+    """Return R, w and w' of the optimum at the times t, by SciPy's `solve_bvp`.
 
-    Their shapes are (N, 3, 3), (N, 3) and (N, 3). If it fails, a RuntimeError says why.
-
-    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. On the way ‖σ‖ has to
-    stay below 2π.
-
+    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. ‖σ‖ has to stay below
+    2π. If it fails, a RuntimeError says why.
     Source: BK (19).
 
     Examples
     --------
-    >>> I, R1, rest = np.eye(3), exp_so3([0, 0, 1.5]), np.zeros(3)
-    >>> R, w, a = minimum_acceleration_so3(I, R1, rest, rest, np.array([0, 0.5, 1]))
+    >>> R1, rest, t = exp_so3([0, 0, 1.5]), np.zeros(3), np.array([0, 0.5, 1])
+    >>> R, w, a = minimum_acceleration_so3(np.eye(3), R1, rest, rest, t)
     >>> log_so3(R)[:, 2].round(9) + 0.0
     array([0.  , 0.75, 1.5 ])
     """

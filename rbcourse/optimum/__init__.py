@@ -43,21 +43,18 @@ def minimum_acceleration_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
     inertia : array_like, shape (..., 3, 3), optional
         G, the metric or the inertia of a body, body frame: symmetric and positive definite. By
         default 2 I, the metric (12).
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
 
     Returns
     -------
     Optimum
-        A `Curve`, or a stack of them, that meets all four ends, with the least ∫ 2 ‖w'‖² dt that
-        was found, and w''' + w × w'' = 0; with an inertia, the least ∫ τᵀ G⁻¹ τ dt with the torque
-        τ = G w' + w × G w. Its ``converged``, ``residual``, ``iterations`` and ``nodes`` tell how
-        it was found; ``c`` is the constant R w'', with an inertia the constant R p of `costate`.
+        A `Curve` that meets all four ends, with the least ∫ 2 ‖w'‖² dt that was found; ``c`` is the
+        constant R w''. With an inertia the least ∫ τᵀ G⁻¹ τ dt, with the torque τ = G w' + w × G w;
+        ``c`` is the constant R p of `Optimum.costate`. Its attributes tell how it was found.
 
     Raises
     ------
@@ -67,50 +64,35 @@ def minimum_acceleration_so3(
     Warns
     -----
     RuntimeWarning
-        For a stack, if that happens to some: there the curve is NaN and ``converged`` False. Also
-        if a start costs less than the curve that is returned: there ``converged`` is False, too.
+        For a stack, if that happens to some, which are NaN; or if a start costs less than the curve
+        that is returned. ``converged`` is False there.
 
     See Also
     --------
     rbcourse.textbook.minimum_acceleration_so3 : The equation, and SciPy's `solve_bvp`.
     shoot_minimum_acceleration_so3 : The same by shooting.
-    minimum_torque_so3, minimum_jerk_so3 : Least torque, and least jerk.
-    projected_cubic_so3, weighted_cubic_so3 : Near-optimal stand-ins, in closed form.
-    acceleration_cost : What they cost.
 
     Notes
     -----
     Singular set: none is known in closed form. (19) is necessary, not sufficient, and has several
-    solutions: a turn by σ and one by σ ± 2π reach the same rotation. Of curves whose costs differ
-    by less than 1e-9, as a share, the arguments decide which one is returned, not their rounding.
+    solutions. If costs differ by less than 1e-9, as a share, the arguments decide which curve is
+    returned, not their rounding.
 
-    There is a start for each way round, and more of them, with full turns more, where
-    ‖w0‖ + ‖w1‖ > 6π. A body is also started from the optimum of the ball and from two curves that
-    lead from a free motion into another, and full turns about its principal axes are added to
-    these. Steps of Gauss and Newton lower the cost of each. Newton's method for R p = c then goes
-    on from the cheapest and from those that cost up to a tenth more; if the result costs more than
-    a start, or ‖w0‖ + ‖w1‖ > 24, from all of them, on more nodes. The cheapest curve that it finds
-    is returned. It is stationary. That none costs less is not proven; docs/near_optimal.md tells on
-    which random problems it was tried: for balls with ‖w0‖, ‖w1‖ < 12 no cheaper curve was found,
-    for bodies one in 500 problems. Problems of very thin rods may not converge.
-
-    End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a cubic and σ a logarithm of
-    R0ᵀR1, the shortest or one with full turns more or the other way round; about a principal axis
-    of a body these curves are stationary, too. Where the free motion of a body meets the ends, it
-    costs nothing.
+    Starts go each way round, with full turns more where ‖w0‖ + ‖w1‖ > 6π; for a body also from the
+    optimum of the ball and from curves between free motions. Steps of Gauss and Newton lower their
+    costs, then Newton's method solves R p = c from the cheapest. The result is stationary; that
+    none costs less is not proven (tests on random problems: docs/near_optimal.md). Problems of very
+    thin rods may not converge. End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a
+    cubic and σ a logarithm of R0ᵀR1, not always the shortest.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1 = exp_so3([0, 0, 1.5])
-    >>> c = minimum_acceleration_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0])
-    >>> c([0, 1], 1).round(9) + 0.0
+    >>> ends = np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0]
+    >>> minimum_acceleration_so3(*ends)([0, 1], 1).round(9) + 0.0
     array([[0., 0., 0.],
            [0., 1., 0.]])
-    >>> c.residual < 1e-12
-    True
-    >>> book = np.diag([1.0, 2.22, 3.18])
-    >>> c = minimum_acceleration_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0], book)
+    >>> c = minimum_acceleration_so3(*ends, np.diag([1.0, 2.22, 3.18]))
     >>> (c(0.5) @ c.costate(0.5)).round(6) - c.c.round(6)
     array([0., 0., 0.])
     """
@@ -135,53 +117,31 @@ def minimum_torque_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    inertia : array_like, shape (..., 3, 3)
-        G, body frame: symmetric and positive definite.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
+    inertia
+        As for `minimum_acceleration_so3`.
 
     Returns
     -------
     Optimum
-        A `Curve`, or a stack of them, that meets all four ends, with the least ∫ ‖τ‖² dt that was
-        found, where τ = G w' + w × G w is the torque. Its ``c`` is the constant R p of `costate`.
-
-    Raises
-    ------
-    ConvergenceError
-        As `minimum_acceleration_so3`.
-
-    Warns
-    -----
-    RuntimeWarning
-        As `minimum_acceleration_so3`.
-
-    See Also
-    --------
-    rbcourse.textbook.minimum_torque_so3 : The equation, and SciPy's `solve_bvp`.
-    minimum_acceleration_so3 : The least of ∫ τᵀ G⁻¹ τ dt, the covariant acceleration.
-    torque_cost : What curves cost.
+        A `Curve` that meets all four ends, with the least ∫ ‖τ‖² dt that was found, where
+        τ = G w' + w × G w is the torque; ``c`` is the constant R p of `Optimum.costate`.
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary; problems of thin
-    rods often do not converge (see docs/near_optimal.md).
-
-    A turn about one axis is stationary about each principal axis; about that of the largest moment
-    it may be a saddle: a curve that leaves the axis can cost a fifth less. Curves bent aside are
-    tried where the solution turns about one axis, nearly.
-
-    In the fixed frame, with J = R G Rᵀ and H = R G w, so that H' is the torque, the equation is
-    J H'' + H' × H = c.
+    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`; problems of thin
+    rods often do not converge. A turn about a principal axis is stationary; about that of the
+    largest moment it may be a saddle, and a curve that leaves the axis costs less. Such curves are
+    tried, too. The equation, with J = R G Rᵀ and H = R G w, is J H'' + H' × H = c; see
+    `rbcourse.textbook.minimum_torque_so3`.
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, torque_cost
+    >>> from rbcourse import exp_so3
     >>> book, rest = np.diag([1.0, 2.22, 3.18]), [0, 0, 0]
     >>> c = minimum_torque_so3(np.eye(3), exp_so3([0, 1.5, 0]), rest, rest, book)
-    >>> float(torque_cost(c, book).round(9))  # about a principal axis 12 (2.22 · 1.5)²
+    >>> round(c.cost, 9)  # about a principal axis 12 (2.22 · 1.5)²
     133.0668
     """
     given, T = Ends(R0, R1, w0, w1).over(duration)
@@ -204,43 +164,20 @@ def minimum_jerk_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    a0, a1 : array_like, shape (..., 3)
-        Angular accelerations w' there, body frame, in rad per unit time squared.
-    duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+    R0, R1, w0, w1, a0, a1, duration
+        As for `projected_quintic_so3`.
 
     Returns
     -------
     Optimum
-        A `Curve`, or a stack of them, that meets all six ends, with the least
-        ∫ 2 ‖w'' + ½ w × w'‖² dt that was found: the squared covariant jerk in the metric (12). Its
-        ``c`` is the constant R p of `costate`.
-
-    Raises
-    ------
-    ConvergenceError
-        As `minimum_acceleration_so3`.
-
-    Warns
-    -----
-    RuntimeWarning
-        As `minimum_acceleration_so3`.
-
-    See Also
-    --------
-    exponential_quintic_so3 : Its near-optimal stand-in, in closed form.
-    jerk_cost : What curves cost.
+        A `Curve` that meets all six ends, with the least ∫ 2 ‖w'' + ½ w × w'‖² dt that was found,
+        the squared covariant jerk; ``c`` is the constant R p of `Optimum.costate`.
 
     Notes
     -----
-    The curve is found as that of `minimum_acceleration_so3`, and is stationary (see
-    docs/near_optimal.md). About one axis it is the cheapest of the quintics to σ with any number of
-    full turns.
-
-    From rest to rest without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
-    costs 1440 ‖σ‖².
+    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. From rest to rest
+    without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and costs 1440 ‖σ‖².
+    `exponential_quintic_so3` is near-optimal, in closed form.
 
     Examples
     --------
@@ -263,19 +200,13 @@ def stationary_so3(guess: Curve) -> Optimum:
     Parameters
     ----------
     guess : Curve
-        On SO(3), or a stack of them.
+        On SO(3), or a stack of them; not NaN.
 
     Returns
     -------
     Optimum
-        A `Curve`, or a stack of them, with the rotations and the velocities of the guess at both
-        ends, and R w'' constant, as for the least ∫ 2 ‖w'‖² dt. It need not be the cheapest; NaN
-        where nothing is found (see ``converged``).
-
-    Raises
-    ------
-    ValueError
-        If `guess` is no such curve, or is NaN at a time.
+        A `Curve` with the rotations and velocities of the guess at both ends, and R w'' constant.
+        It need not be the cheapest; NaN where nothing is found (see ``converged``).
 
     Examples
     --------
@@ -298,15 +229,7 @@ def stationary_so3(guess: Curve) -> Optimum:
 
 
 class ConvergenceError(RuntimeError):
-    """No curve was found; the message says how far the iteration got.
-
-    Attributes
-    ----------
-    residual : float
-        What was left at the end.
-    iterations : int
-        How many steps were taken.
-    """
+    """No curve was found; `residual` is what was left after a number of `iterations`."""
 
     def __init__(self, residual: float, iterations: int) -> None:
         super().__init__(
@@ -330,20 +253,17 @@ class Optimum(Curve):
     Attributes
     ----------
     functional : Functional
-        What is least, and p.
+        Defines the cost, and p.
     converged : bool, or ndarray of bool, shape (...)
-        Where a solution was found, and no curve that was tried costs less. Where none was found
+        Whether a solution was found, and no curve that was tried costs less. If none was found
         the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
-        R p, which does not depend on t, in the fixed frame. Without an inertia p is w'': half of
-        what it is with ``inertia=2 * np.eye(3)``.
-    cost : float or ndarray, shape (...)
-        What is least: as `acceleration_cost`, `torque_cost` or `jerk_cost` of the curve.
-    residual : float or ndarray, shape (...)
-        The largest error of the equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for the
-        time from 0 to 1.
+        R p, constant, in the fixed frame. Without an inertia p is w'', half of that of 2 I.
+    cost, residual : float or ndarray, shape (...)
+        The `acceleration_cost`, `torque_cost` or `jerk_cost`, and the largest error of the
+        equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for the time from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
-        How many steps the solver took, and how many nodes carry the curve.
+        The number of steps of the solver, and of nodes that carry the curve.
     """
 
     functional: Functional
@@ -399,26 +319,7 @@ class Optimum(Curve):
         return orthogonal(weighted_sums(weights, terms, 3, 3))
 
     def costate(self, t: ArrayLike) -> Array:
-        """Return p at the times t, body frame: R p is `c`.
-
-        Parameters
-        ----------
-        t : array_like
-            Times in the domain, of any shape.
-
-        Returns
-        -------
-        ndarray, shape t.shape + (..., 3)
-
-        Examples
-        --------
-        >>> from rbcourse import exp_so3
-        >>> G, R1 = np.diag([1.0, 2, 2.5]), exp_so3([0.3, 0.5, 1.2])
-        >>> c = minimum_torque_so3(np.eye(3), R1, [0, 1, 0], [0, 0, 0], G)
-        >>> t = np.linspace(0, 1, 11)
-        >>> bool(np.abs((c(t) @ c.costate(t)[..., None])[..., 0] - c.c).max() < 1e-11)
-        True
-        """
+        """Return p at times of any shape, body frame, shape t.shape + (..., 3): R p is `c`."""
         times = as_time(t, 0, self.domain)
         orders = range(1, self.functional.ends + 2)
         rates = [self.evaluate(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
@@ -435,18 +336,7 @@ class Optimum(Curve):
 
 
 def solve(task: Task, duration: Array) -> Optimum:
-    """Return for each problem the cheapest curve that is found from its starts.
-
-    Raises
-    ------
-    ConvergenceError
-        If none is found, for a single problem.
-
-    Warns
-    -----
-    RuntimeWarning
-        If none is found, for some of a stack.
-    """
+    """Return for each problem the cheapest curve found; errors as `minimum_acceleration_so3`."""
     solutions = cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
@@ -501,8 +391,8 @@ def _warn_if_not_converged(curve: Optimum) -> None:
     _warn(curve, beaten, "may not have their optimum", "a curve that was tried costs less")
 
 
-def _warn(curve: Optimum, which: Array, what: str, why: str) -> None:
-    places = np.argwhere(which)
+def _warn(curve: Optimum, some: Array, what: str, why: str) -> None:
+    places = np.argwhere(some)
     if len(places):
         first = [int(i) for i in places[0]]
         warnings.warn(

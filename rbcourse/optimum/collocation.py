@@ -119,24 +119,24 @@ def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
 
 def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
     found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
-    which, steps = np.arange(len(R)), np.zeros(len(R), int)
+    number, steps = np.arange(len(R)), np.zeros(len(R), int)
     first, R = R.shape[1], _with_ends(equations, R)
     unknowns: Arrays = R, *equations.first(R)
     for n in equations.nodes(first):
-        if not len(which):
+        if not len(number):
             break
         if n > first:
             unknowns = _on_nodes(equations, n, unknowns)
         now = _newton(equations, unknowns, rough=n == first)
         steps += now.steps
         solved, finer = now.verdict == SOLVED, now.verdict == FINER
-        for i, left, taken in zip(which, now.left.tolist(), steps.tolist(), strict=True):
+        for i, left, taken in zip(number, now.left.tolist(), steps.tolist(), strict=True):
             found[i] = Failure(left, taken)
         good = tuple(x[solved] for x in now.unknowns)
         results = equations.take(solved).solution(good)
-        for i, R_i, k, c, cost in zip(which[solved], good[0], *results, strict=True):
+        for i, R_i, k, c, cost in zip(number[solved], good[0], *results, strict=True):
             found[i] = Solution(R_i, k, c, float(cost), *found[i])
-        equations, which, steps = equations.take(finer), which[finer], steps[finer]
+        equations, number, steps = equations.take(finer), number[finer], steps[finer]
         unknowns = tuple(x[finer] for x in now.unknowns)
     return found
 

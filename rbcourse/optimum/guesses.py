@@ -185,8 +185,8 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
     for _ in range(steps):
         before = cost[active]
         for part in blocks(len(active), _TOGETHER):
-            which = active[part]
-            R[which], cost[which] = _lower(functional.take(which), R[which], cost[which])
+            index = active[part]
+            R[index], cost[index] = _lower(functional.take(index), R[index], cost[index])
         active = active[cost[active] < (1 - worthwhile) * before]
         if not len(active):
             break

@@ -92,7 +92,7 @@ class Task(NamedTuple):
     equations : Equations
         When it is: R p = c, and the ends.
     starts : callable
-        ``starts(which, n)``: curves to start from at n nodes, for some of the problems; and the
+        ``starts(index, n)``: curves to start from at n nodes, for some of the problems; and the
         numbers, among these, of the problems that they are for.
     solver : callable
         ``solver(equations, R)``: what is found for some of the equations from these curves.
@@ -119,7 +119,7 @@ def ball(given: Ends) -> Task:
         given.w0.shape[:-1],
         BallAcceleration(),
         equations,
-        lambda which, n: starts(ends.take(which), n),
+        lambda index, n: starts(ends.take(index), n),
         relax_ball,
         known=_of_slow_ends(ends, equations),
     )
@@ -156,11 +156,11 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     curves = {i: one for i, one in of_ball.items() if isinstance(one, Solution)}
     round_ones = np.abs(functional.G - np.eye(3)).max(axis=(1, 2)) < 8 * EPS
 
-    def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.take(which), n)
-        number, free = between_free_motions(ends.take(which), functional.G[which], n)
-        more = [k for k, i in enumerate(which) if i in curves]
-        of_balls = [_on_nodes(curves[which[k]].R[None], n) for k in more]
+    def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
+        problem, R = starts(ends.take(index), n)
+        number, free = between_free_motions(ends.take(index), functional.G[index], n)
+        more = [k for k, i in enumerate(index) if i in curves]
+        of_balls = [_on_nodes(curves[index[k]].R[None], n) for k in more]
         return np.concatenate([problem, number, np.array(more, int)]), np.concatenate(
             [R, free, *of_balls]
         )
@@ -180,9 +180,9 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     # about one axis the cheapest of all turns is by (w0 + w1)/2 + (a0 − a1)/12
     bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
-    def start(which: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.take(which), n, bend[which])
-        return problem, with_ends(R, rates[which][problem])
+    def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
+        problem, R = starts(ends.take(index), n, bend[index])
+        return problem, with_ends(R, rates[index][problem])
 
     equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
     return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=LIMITS.nodes_for_jerk)
@@ -213,12 +213,12 @@ def cheapest(task: Task) -> list[Solution | Failure]:
 def _searched(task: Task) -> list[Solution | Failure]:
     ends = task.equations.ends
     found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
-    which = np.flatnonzero([one is NOTHING for one in found])
-    if not len(which):
+    index = np.flatnonzero([one is NOTHING for one in found])
+    if not len(index):
         return found
     share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in the turn of a quintic
     fast = np.linalg.norm(ends, axis=-1) @ share
-    problem, R = _started(task, which, task.nodes)
+    problem, R = _started(task, index, task.nodes)
     R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
     if isinstance(task.functional, Effort):
         problem, R, cost = _with_more_turns(task, task.functional, problem, R, cost)
@@ -234,7 +234,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
         if some[again].any():
             _follow_on(task, again[some[again]], problem, R, n, found)
     if isinstance(task.functional, Effort):
-        _leave_the_axis(task, task.functional, which, found)
+        _leave_the_axis(task, task.functional, index, found)
     return found
 
 
@@ -281,7 +281,7 @@ def _with_more_turns(
 
 
 def _leave_the_axis(
-    task: Task, effort: Effort, which: Numbers, found: list[Solution | Failure]
+    task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
 ) -> None:
     """Bend solutions that turn about one axis, nearly, to four sides of it; follow the cheaper.
 
@@ -290,7 +290,7 @@ def _leave_the_axis(
     """
     order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
     problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
-    for i in which:
+    for i in index:
         one = found[i]
         if isinstance(one, Solution):
             w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
@@ -320,16 +320,16 @@ def _across(w: Array, G: Array) -> Array:
 
 def _follow_on(
     task: Task,
-    which: Numbers,
+    index: Numbers,
     problem: Numbers,
     R: Array,
     n: int,
     found: list[Solution | Failure],
 ) -> None:
     """Follow more starts of some problems, on n nodes, where their costs are better known."""
-    mine = np.isin(problem, which)
+    mine = np.isin(problem, index)
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
-    more, as_they_are = _started(task, which, n)
+    more, as_they_are = _started(task, index, n)
     problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
     functional = task.functional.take(problem)
     bound = LIMITS.known_cost * _least(len(found), problem, cost_at_nodes(functional, R))
@@ -366,10 +366,10 @@ def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
     return repeated
 
 
-def _started(task: Task, which: Numbers, n: int) -> tuple[Numbers, Array]:
+def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
     """Return curves to start from, and the numbers of their problems."""
-    problem, R = task.starts(which, n)
-    return which[problem], R
+    problem, R = task.starts(index, n)
+    return index[problem], R
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:

@@ -32,38 +32,24 @@ def shoot_minimum_acceleration_so3(
 ) -> Optimum:
     """Return the minimum-acceleration curve with these ends, by shooting.
 
-    Equation (20), w'' + w × w' = b, is integrated from t = 0; the unknown w'(0) and b are improved
-    by Newton's method until R(1) and w(1) are the wanted ones.
-
+    Equation (20), w'' + w × w' = b, is integrated from t = 0; Newton's method improves the unknown
+    w'(0) and b until R(1) and w(1) are right.
     Source: BK (20), BK 6.2.
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        The boundary conditions, see `Ends`.
-    duration : array_like, shape (...), optional
-        How long it takes.
+    R0, R1, w0, w1, duration
+        As for `projected_cubic_so3`.
 
     Returns
     -------
     Optimum
-        As `minimum_acceleration_so3`, and for the same ends the same curve to about 1e-11, if both
-        find the same solution of (19). Of a stack the problems are solved one by one.
-
-    Raises
-    ------
-    ConvergenceError
-        For a single problem, if Newton's method converges from none of its starts: rare for ‖w0‖,
-        ‖w1‖ < 12. It takes seconds to say so for ‖w‖ of 30, and minutes for 1000.
-
-    Warns
-    -----
-    RuntimeWarning
-        For a stack, if that happens to some: there the curve is NaN and ``converged`` False.
+        As `minimum_acceleration_so3`, with the same errors, warnings and singular set: the same
+        curve to about 1e-11, if both find the same solution of (19).
 
     Notes
     -----
-    Singular set: as for `minimum_acceleration_so3`.
+    It seldom fails for ‖w0‖, ‖w1‖ < 12; to fail takes seconds for ‖w‖ = 30, minutes for 1000.
 
     Examples
     --------

@@ -1,0 +1,145 @@
+"""The contract of all functions of arrays: shapes as documented, stacks, and refused arguments."""
+
+import importlib
+import inspect
+import pkgutil
+import re
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+import rbcourse as rb
+
+ENTRY = re.compile(r"^(\w+(?:, \w+)*) : array_like, shape \(([^()]*)\)(, optional)?$", re.MULTILINE)
+RESULT = re.compile(r"^Returns\n-+\nndarray(?: of bool)?, shape \(([^()]*)\)$", re.MULTILINE)
+SIZES = {"n": 3, "m": 3, "n + 1": 4, "steps + 1": 11}
+TURNS = {"R", "R0", "R1", "S"}
+
+
+def exported():
+    """All functions in the lists of the package and its modules, by name."""
+    names = [part.name for part in pkgutil.iter_modules(rb.__path__)]
+    modules = [rb, *(importlib.import_module(f"rbcourse.{name}") for name in names)]
+    listed = {name: getattr(m, name) for m in modules for name in getattr(m, "__all__", ())}
+    return {
+        name: one
+        for name, one in listed.items()
+        if inspect.isfunction(one)
+        and not re.match(r"rbcourse\.(report|textbook|draw)", one.__module__)
+    }
+
+
+def arrays_of(function):
+    """The core shapes of the required arrays, as the docstring has them."""
+    found = {}
+    for names, shape, optional in ENTRY.findall(inspect.getdoc(function)):
+        if shape.startswith("...") and not optional:
+            found |= dict.fromkeys(names.split(", "), shape.split(", ")[1:])
+    return found
+
+
+def takes_arrays_alone(function):
+    parameters = inspect.signature(function).parameters.values()
+    needed = {one.name for one in parameters if one.default is one.empty}
+    found = arrays_of(function)
+    return bool(needed) and set(found) == needed and RESULT.search(inspect.getdoc(function))
+
+
+FUNCTIONS = {name: one for name, one in exported().items() if takes_arrays_alone(one)}
+every_function = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
+
+
+def sample(function, *batch):
+    """Valid arguments: rotations and poses, unit quaternions, inertias, or any numbers."""
+    rng, found = np.random.default_rng([96, *batch]), {}
+    for name, core in arrays_of(function).items():
+        sizes = tuple(int(SIZES.get(n, n)) for n in core)
+        R = rb.sample_rotation(batch, rng=rng)
+        if sizes == (4, 4):
+            found[name] = rb.pose_from_components(R, rng.normal(size=(*batch, 3)))
+        elif sizes == (4,):
+            found[name] = rb.quaternion_from_matrix(R)
+        elif name in ("G", "W") and function is not rb.vee_so3:
+            G = R @ (np.array([2.0, 3, 4])[:, None] * R.mT)
+            found[name] = (G + G.mT) / 2
+        elif sizes == (3, 3):
+            found[name] = R if name in TURNS else R + 0.1 * rng.normal(size=R.shape)
+        else:
+            found[name] = rng.uniform(0.5, 0.9, (*batch, *sizes))
+    return found
+
+
+@every_function
+def test_results_have_the_documented_shape_and_are_stacks_of_single_results(function):
+    (shape,) = RESULT.search(inspect.getdoc(function)).groups()
+    before, _, core = shape.rpartition("...")
+    leading = tuple(SIZES[n] for n in before.split(", ") if n)
+    for batch in ((), (2,), (2, 3), (0,), (2, 0)):
+        given = sample(function, *batch)
+        values = function(**given)
+        sizes = tuple(int(SIZES.get(n, n)) for n in core.split(", ") if n)
+        assert values.shape == (*leading, *batch, *sizes)
+        for i in np.ndindex(batch):
+            one = function(**{name: value[i] for name, value in given.items()})
+            some = values[(slice(None),) * len(leading) + i]
+            assert np.allclose(some, one, rtol=1e-12, atol=1e-12)
+
+
+@every_function
+def test_batches_of_arguments_broadcast_or_are_refused(function):
+    given = sample(function, 2, 3)
+    for name in given:
+        first = given | {name: given[name][0]}
+        both = given | {name: np.stack([given[name][0]] * 2)}
+        assert np.allclose(function(**first), function(**both), rtol=1e-12, atol=1e-12)
+        if len(given) > 1:
+            with pytest.raises(ValueError, match=rf"broadcast.*\b{name} \(5,\)|^{name}"):
+                function(**given | {name: sample(function, 5)[name]})
+
+
+@every_function
+def test_arguments_are_neither_changed_nor_returned(function):
+    given = sample(function, 2)
+    before = deepcopy(given)
+    values = function(**given)
+    assert all(np.array_equal(given[name], before[name]) for name in given)
+    kept = values.copy()
+    for value in given.values():
+        value.fill(0)
+    assert np.array_equal(values, kept)
+
+
+@every_function
+def test_bad_arguments_are_refused_by_name(function):
+    for name, core in arrays_of(function).items():
+        given = sample(function, 2)
+        shapes = [()] * len(core[:1]) + [(2, 5, 7)] * len(core[1:])
+        shapes += [(2, 7)] * (not {"n", "m"} & set(core) and len(core) > 0)
+        bad = [np.zeros(shape) for shape in shapes]
+        bad += [[[1.0, 0, 0], [0, 1]], np.ma.masked_greater(given[name], 0), given[name] + 1j]
+        bad += [given[name].astype(str)]
+        if not function.__name__.startswith("is_"):
+            bad += [
+                np.where(given[name] == given[name].flat[0], x, given[name])
+                for x in (np.nan, np.inf)
+            ]
+        for one in bad:
+            with pytest.raises(ValueError, match=rf"^{name}\b"):
+                function(**given | {name: one})
+
+
+@pytest.mark.parametrize("name", exported())
+def test_parameters_and_results_are_documented(name):
+    function = exported()[name]
+    sections = re.split(r"^(\w.*)\n-{3,}\n", inspect.getdoc(function), flags=re.MULTILINE)
+    text = dict(zip(sections[1::2], sections[2::2], strict=True))
+    documented = re.findall(r"^(\w+(?:, \w+)*)(?: :|$)", text.get("Parameters", ""), re.MULTILINE)
+    wanted = set(inspect.signature(function).parameters)
+    assert wanted == {one for names in documented for one in names.split(", ")}
+    assert "Returns" in text or inspect.signature(function).return_annotation == "None"
+    assert "Examples" in text or function.__module__ == "rbcourse.files"  # one for all four
+
+
+def test_most_exported_functions_are_tried_here():
+    assert len(FUNCTIONS) >= 55
