@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from operator import index
 from typing import Any, TypeAlias
@@ -31,7 +32,8 @@ def as_array(
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]
-    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+    ma = sys.modules.get("numpy.ma")  # without it there are no masked arrays
+    if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
         raise ValueError(f"{name}: a masked array, whose mask would be lost; fill or compress it")
     try:
         given = np.asarray(value)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 import re
 from collections.abc import Iterable, Iterator
-from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,7 @@ __all__ = [
 ]
 
 Rows = Iterator[tuple[str, list[float]]]
+File: TypeAlias = str | os.PathLike[str]
 TIME = ["time [s]"]
 POSITION = ["x [m]", "y [m]", "z [m]"]
 QUATERNION = ["qw [1]", "qx [1]", "qy [1]", "qz [1]"]
@@ -50,7 +52,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def write_path(
-    file: str | Path, times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
+    file: File, times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> None:
     """Write a path of poses or rotations as CSV or as a TUM trajectory, by the file extension.
 
@@ -99,7 +101,7 @@ def write_path(
         write_csv(file, HEADERS[d.size > 0, velocities is not None], table.tolist())
 
 
-def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
+def read_path(file: File) -> tuple[Array, Array, Array | None]:
     """Read a path that `write_path` wrote, or a TUM trajectory; all of it, or nothing.
 
     Each quaternion is replaced by the nearest unit quaternion. CSV is in UTF-8.
@@ -142,7 +144,7 @@ def read_path(file: str | Path) -> tuple[Array, Array, Array | None]:
     return times[:, 0], poses, velocities if velocities.size else None
 
 
-def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
+def save_plan(file: File, plan: Plan, kind: str) -> None:
     """Write a plan as CSV: a line of names with their units, then a line for each command.
 
     An existing file is replaced; if an argument is malformed, nothing is written.
@@ -162,7 +164,7 @@ def save_plan(file: str | Path, plan: Plan, kind: str) -> None:
     write_csv(file, [*names, DURATION], rows)
 
 
-def load_plan(file: str | Path, kind: str) -> Commands:
+def load_plan(file: File, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote; all of it, or nothing.
 
     Other content or another kind raises ValueError, with the line and the reason.
@@ -189,15 +191,15 @@ def load_plan(file: str | Path, kind: str) -> Commands:
     return [_command(place, row) for place, row in rows]
 
 
-def _is_tum(file: str | Path) -> bool:
+def _is_tum(file: File) -> bool:
     """Tell TUM from CSV."""
-    suffix = Path(file).suffix.lower()
+    suffix = os.path.splitext(file)[1].lower()
     if suffix not in (".csv", ".tum", ".txt"):
         raise ValueError(f"file: a name wanted that ends in .csv, .tum or .txt, got {file}")
     return suffix != ".csv"
 
 
-def _csv_rows(file: str | Path) -> tuple[bool, Rows]:
+def _csv_rows(file: File) -> tuple[bool, Rows]:
     """Return whether there are positions, and the rows of a CSV file."""
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
@@ -212,7 +214,7 @@ def _csv_rows(file: str | Path) -> tuple[bool, Rows]:
     return kind[0], (_row(place, header, cells) for place, cells in lines)
 
 
-def _tum_rows(file: str | Path) -> tuple[bool, Rows]:
+def _tum_rows(file: File) -> tuple[bool, Rows]:
     """Return that there are positions, and the rows of a TUM file in the order of the CSV."""
     lines = ((place, line.split()) for place, line in text_lines(file))
     rows = (
@@ -244,7 +246,7 @@ def _row(place: str, names: list[str], cells: list[str]) -> tuple[str, list[floa
     return place, [to_number(f"{place}, {name}", cell) for name, cell in numbers]
 
 
-def csv_lines(file: str | Path) -> Iterator[tuple[str, list[str]]]:
+def csv_lines(file: File) -> Iterator[tuple[str, list[str]]]:
     """Yield the place and the cells of each line of a CSV file."""
     for place, line in text_lines(file):
         try:
@@ -254,9 +256,10 @@ def csv_lines(file: str | Path) -> Iterator[tuple[str, list[str]]]:
         yield place, [cell.strip(" \t") for cell in row]
 
 
-def text_lines(file: str | Path) -> Iterator[tuple[str, str]]:
+def text_lines(file: File) -> Iterator[tuple[str, str]]:
     """Yield the place and the text of each line of a file; blank lines at its end are left out."""
-    content = Path(file).read_bytes()
+    with open(file, "rb") as stream:
+        content = stream.read()
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -266,7 +269,7 @@ def text_lines(file: str | Path) -> Iterator[tuple[str, str]]:
     yield from ((f"{file}, line {number}", line) for number, line in enumerate(lines, start=1))
 
 
-def write_csv(file: str | Path, names: list[str], rows: Iterable[Iterable[float]]) -> None:
+def write_csv(file: File, names: list[str], rows: Iterable[Iterable[float]]) -> None:
     """Write a line of names, then a line for each row, with all digits that numbers need."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -275,9 +278,10 @@ def write_csv(file: str | Path, names: list[str], rows: Iterable[Iterable[float]
     write_text(file, text.getvalue())
 
 
-def write_text(file: str | Path, text: str) -> None:
+def write_text(file: File, text: str) -> None:
     """Write a text file, the same on every system."""
-    Path(file).write_text(text, encoding="utf-8", newline="\n")
+    with open(file, "w", encoding="utf-8", newline="\n") as stream:
+        stream.write(text)
 
 
 def to_number(place: str, cell: str) -> float:

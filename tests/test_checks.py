@@ -14,17 +14,13 @@ EPS = np.finfo(float).eps
     ("value", "core", "message"),
     [
         ([1, 2], (3,), "x: shape (..., 3) wanted, got (2,)"),
-        (5, (3,), "x: shape (..., 3) wanted, got ()"),
         (np.zeros((2, 3)), ("n", "n"), "x: shape (..., n, n) wanted, got (2, 3)"),
         (np.zeros((4, 0, 0)), ("n", "n"), "x: shape (..., n, n) wanted, got (4, 0, 0)"),
         ([[1, 2], [3]], (2,), "x: an array of numbers wanted, got rows of unequal length"),
-        (["1", "2", "3"], (3,), "x: real numbers wanted, got dtype <U1"),
         ([1j, 0, 0], (3,), "x: real numbers wanted, got dtype complex128"),
         (None, (), "x: real numbers wanted, got dtype object"),
-        ([1, np.nan, np.inf], (3,), "x[1] is nan, a finite number is wanted"),
         ([[1, 2], [3, -np.inf]], (2,), "x[1, 1] is -inf, a finite number is wanted"),
         (np.nan, (), "x is nan, a finite number is wanted"),
-        (np.ma.array([1.0, 2, 3], mask=[0, 1, 0]), (3,), "x: a masked array"),
         ([np.ma.array([1.0, 2, 3], mask=[0, 1, 0])], (3,), "x: a masked array"),
     ],
 )
@@ -35,8 +31,7 @@ def test_bad_arguments_are_named(value, core, message):
 
 def test_good_arguments_become_floats_and_are_copied():
     given = np.arange(6.0).reshape(2, 3)
-    array = checks.as_finite("x", given, 3)
-    array[0, 0] = 9
+    checks.as_finite("x", given, 3)[0, 0] = 9
     assert given[0, 0] == 0
     assert checks.as_finite("x", [1, 2], 2).dtype == np.float64
     assert checks.as_finite("x", np.zeros((0, 3, 3)), "n", "n").shape == (0, 3, 3)
@@ -56,27 +51,17 @@ def test_symmetric_but_for_rounding():
     assert not checks.as_symmetric("G", np.zeros((2, 2)), 2).any()
 
 
-def test_times_outside_the_unit_interval_are_named():
+def test_times_and_angles_outside_by_rounding_become_the_end_and_others_are_named():
     assert checks.as_time([0, 1], 2).shape == (2, 1, 1)
-    for bad in (-2e-15, 1.000000000000002):
-        with pytest.raises(ValueError, match=re.escape(f"t[1] is {bad}, a time in [0, 1]")):
-            checks.as_time([0, bad], 0)
-
-
-def test_times_that_are_outside_by_rounding_become_the_end():
     accumulated = np.cumsum(np.full(100, 0.07))  # the last one is 7.000000000000009
     assert accumulated[-1] > 7
     assert np.array_equal(checks.as_time(accumulated, 0, (0.0, 7.0)), np.minimum(accumulated, 7))
     assert checks.as_time(-1e-15, 0, (0.0, 7.0)) == 0
-    with pytest.raises(ValueError, match=r"t is 7\.0000000000000\d+, a time in \[0, 7\] is wanted"):
-        checks.as_time(7 * (1 + 10 * EPS), 0, (0.0, 7.0))
-    with pytest.raises(ValueError, match="t is -1e-13"):
-        checks.as_time(-1e-13, 0, (0.0, 7.0))
-
-
-def test_angles_outside_0_to_pi_are_named():
-    assert np.array_equal(checks.as_angle([0, np.pi]), [0, np.pi])
-    assert checks.as_angle(np.nextafter(np.pi, 4)) == np.pi
+    assert np.array_equal(checks.as_angle([0, np.nextafter(np.pi, 4)]), [0, np.pi])
+    for bad, end in ((-2e-15, 1), (1.000000000000002, 1), (7 * (1 + 10 * EPS), 7), (-1e-13, 7)):
+        message = f"t[1] is {bad}, a time in [0, {end}] is wanted"
+        with pytest.raises(ValueError, match=re.escape(message)):
+            checks.as_time([0, bad], 0, (0.0, end))
     for bad in (-1e-300, 3.2):
         with pytest.raises(ValueError, match=re.escape(f"angle is {bad}, an angle in [0, π]")):
             checks.as_angle(bad)
@@ -89,6 +74,10 @@ def test_batches_that_do_not_broadcast_are_listed():
     assert checks.check_broadcast(a=(a, 2), b=(np.zeros((5, 2, 3)), 1)) == (5, 2)
 
 
+TINY, SMALL = [1e-300, 1e-160, 1e-9, 9.99e-5, 1e-4, 1.01e-4], [5e-4, 1e-3, 9e-3, 0.01]
+
+
+@pytest.mark.parametrize("x", [*TINY, *SMALL, 0.9, 1.0, 2.0, 3.1])
 @pytest.mark.parametrize(
     ("function", "exact", "limit", "power"),
     [
@@ -96,25 +85,10 @@ def test_batches_that_do_not_broadcast_are_listed():
         (numerics.sine_gap_ratio, lambda x: (x - mp.sin(x)) / x**3, 1 / 6, 2),
     ],
 )
-def test_ratios_near_zero(function, exact, limit, power):
-    """What multiplies a square later has to be right to eps after that."""
+def test_ratios_near_zero_are_right_to_eps_once_multiplied_by_a_power(
+    function, exact, limit, power, x
+):
     assert function(np.array(0.0)) == limit
-    for x in [
-        1e-300,
-        1e-160,
-        1e-9,
-        9.99e-5,
-        1e-4,
-        1.01e-4,
-        5e-4,
-        1e-3,
-        9e-3,
-        0.01,
-        0.9,
-        1.0,
-        2.0,
-        3.1,
-    ]:
-        with mp.workdps(700 if x < 1e-9 else 60):
-            want = exact(mp.mpf(x))
-            assert abs(function(np.array(x)) - want) * x**power < 3 * EPS * (want * x**power + 1)
+    with mp.workdps(700 if x < 1e-9 else 60):
+        want = exact(mp.mpf(x))
+        assert abs(function(np.array(x)) - want) * x**power < 3 * EPS * (want * x**power + 1)

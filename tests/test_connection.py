@@ -1,3 +1,4 @@
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -6,27 +7,33 @@ import pytest
 import scipy.integrate
 
 import rbcourse as rb
+from rbcourse.connection import christoffel, covariant_derivative, structure_constants
 
 EPS = np.finfo(float).eps
 GROUPS = [(rb.BASIS_SO3, 3), (rb.BASIS_SE3, 6)]
 TIMES = np.linspace(0, 10, 21)
-INERTIA = np.diag([1.0, 2, 3])
+ONE, INERTIA = np.eye(3), np.diag([1.0, 2, 3])
 
 
 def random_metrics(m, count=100):
     X = np.random.default_rng(m).normal(size=(count, m, m))
-    return X @ np.swapaxes(X, -1, -2)
+    return X @ X.mT
 
 
 def indefinite_metrics(m, count=100):
     X = np.random.default_rng(m).normal(size=(count, m, m))
-    return X + np.swapaxes(X, -1, -2)
+    return X + X.mT
+
+
+def momentum(G, A, v):
+    """In the fixed frame, where it is conserved (Noether)."""
+    return np.linalg.solve(rb.adjoint_se3(A).mT, (v @ G)[..., None])[..., 0]
 
 
 @pytest.mark.source("BK (2)", "BK (3)", "BK 2.4")
 @pytest.mark.parametrize(("basis", "m"), GROUPS)
 def test_structure_constants_give_the_commutators(basis, m):
-    C = rb.connection.structure_constants(basis)
+    C = structure_constants(basis)
     for i, j in np.ndindex(m, m):
         bracket = basis[i] @ basis[j] - basis[j] @ basis[i]
         assert np.array_equal(np.einsum("k,kab->ab", C[:, i, j], basis), bracket)
@@ -37,22 +44,16 @@ def test_structure_constants_in_another_basis(condition):
     rng = np.random.default_rng(0)
     Q, P = np.linalg.qr(rng.normal(size=(2, 6, 6)))[0]
     change = (Q * np.geomspace(1, 1 / condition, 6)) @ P
-    C = rb.connection.structure_constants(np.einsum("ij,jab->iab", change, rb.BASIS_SE3))
-    standard = rb.connection.structure_constants(rb.BASIS_SE3)
+    C = structure_constants(np.einsum("ij,jab->iab", change, rb.BASIS_SE3))
+    standard = structure_constants(rb.BASIS_SE3)
     wanted = np.einsum("kc,kij,ai,bj->cab", np.linalg.inv(change), standard, change, change)
     assert np.abs(C - wanted).max() < 1e-13 * condition
 
 
-def test_a_bracket_that_sticks_out_a_little_is_seen():
-    L = [rb.BASIS_SO3[0] + 1e-7 * np.eye(3), rb.BASIS_SO3[1], rb.BASIS_SO3[2] + 1e-10]
-    with pytest.raises(ValueError, match="a commutator of two"):
-        rb.connection.structure_constants(L)
-
-
 def test_structure_constants_of_bases_of_any_size():
     sizes = np.array([1e-150, 1.0, 1e120])
-    C = rb.connection.structure_constants(sizes[:, None, None] * rb.BASIS_SO3)
-    wanted = rb.connection.structure_constants(rb.BASIS_SO3)
+    C = structure_constants(sizes[:, None, None] * rb.BASIS_SO3)
+    wanted = structure_constants(rb.BASIS_SO3)
     wanted = wanted * sizes[:, None] * sizes / sizes[:, None, None]
     assert np.allclose(C, wanted, rtol=4 * EPS, atol=0)
 
@@ -62,61 +63,50 @@ def test_structure_constants_of_bases_of_any_size():
 @pytest.mark.parametrize("metrics", [random_metrics, indefinite_metrics])
 def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(basis, m, metrics):
     G = metrics(m)
-    gamma, C = rb.connection.christoffel(G, basis), rb.connection.structure_constants(basis)
-    condition, size = np.linalg.cond(G), np.abs(G).max(axis=(-2, -1))
-    torsion = gamma - np.swapaxes(gamma, -1, -2) - C
-    assert np.all(np.abs(torsion).max(axis=(-3, -2, -1)) < 1e-14 * condition)
+    gamma, C = christoffel(G, basis), structure_constants(basis)
+    bound = 1e-14 * np.linalg.cond(G)[:, None, None, None]
+    assert np.all(np.abs(gamma - gamma.mT - C) < bound)
     lowered = np.einsum("bil,bljk->bijk", G, gamma)
     change = lowered + lowered.transpose(0, 3, 2, 1)  # of ⟨L_i, L_k⟩ along L_j, must be 0
-    assert np.all(np.abs(change).max(axis=(-3, -2, -1)) < 1e-14 * condition * size)
+    assert np.all(np.abs(change) < bound * np.abs(G).max(axis=(-2, -1))[:, None, None, None])
 
 
 @pytest.mark.source("BK (9)", "BK 2.4")
 def test_a_bi_invariant_metric_has_half_the_commutator():
-    C = rb.connection.structure_constants(rb.BASIS_SO3)
-    assert np.array_equal(rb.connection.christoffel(rb.METRIC_SO3, rb.BASIS_SO3), C / 2)
-    C = rb.connection.structure_constants(rb.BASIS_SE3)
-    gamma = rb.connection.christoffel(rb.metrics.semi_riemannian_metric_se3(2, 3), rb.BASIS_SE3)
+    C = structure_constants(rb.BASIS_SO3)
+    assert np.array_equal(christoffel(rb.METRIC_SO3, rb.BASIS_SO3), C / 2)
+    C = structure_constants(rb.BASIS_SE3)
+    gamma = christoffel(rb.metrics.semi_riemannian_metric_se3(2, 3), rb.BASIS_SE3)
     assert np.abs(gamma - C / 2).max() < 4 * EPS
 
 
-@pytest.mark.source("BK (9)", "BK (14)")
-def test_the_acceleration_is_the_one_that_the_curves_give():
-    rng = np.random.default_rng(1)
-    A0, A1 = rb.exp_se3(rng.normal(size=(2, 6)))
-    c = rb.projected_cubic_se3(A0, A1, *rng.normal(size=(4, 3)))
-    gamma = rb.connection.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
-    t, h = np.linspace(0.1, 0.9, 9), 1e-4
-    v, v_dot = c(t, 1), (c(t + h, 1) - c(t - h, 1)) / (2 * h)
-    assert np.abs(rb.connection.covariant_derivative(gamma, v, v, v_dot) - c(t, 2)).max() < 1e-5
-
-
-@pytest.mark.source("BK (9)", "BK 2.4")
-def test_the_acceleration_is_the_ambient_one_projected_on_the_tangent_space():
-    """Of (12) and (14), which are induced by a flat metric; R'' by differences, not by Γ."""
-    rng = np.random.default_rng(2)
-    R0, w, a = rb.sample_rotation(rng=3), *rng.normal(size=(2, 3))
-    h = 1e-4
-    before, at, after = (R0 @ rb.exp_so3(w * t + a * t**2 / 2) for t in (-h, 0, h))
-    projected = rb.metrics.components_from_tangent(R0, (before - 2 * at + after) / h**2)
-    gamma = rb.connection.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
-    assert np.abs(rb.connection.covariant_derivative(gamma, w, w, a) - projected).max() < 1e-6
+@pytest.mark.source("BK (9)", "BK (14)", "BK 2.4")
+@pytest.mark.parametrize(
+    ("G", "basis", "exp"),
+    [(rb.METRIC_SO3, rb.BASIS_SO3, rb.exp_so3), (rb.METRIC_SE3, rb.BASIS_SE3, rb.exp_se3)],
+)
+def test_the_acceleration_is_the_ambient_one_projected_on_the_tangent_space(G, basis, exp):
+    """Of (12) and (14), which are induced by a flat metric; A'' by differences, not by Γ."""
+    start, v, a = np.random.default_rng(2).normal(size=(3, len(G)))
+    h, A0 = 1e-4, exp(start)
+    before, at, after = (A0 @ exp(v * t + a * t**2 / 2) for t in (-h, 0, h))
+    projected = rb.metrics.components_from_tangent(A0, (before - 2 * at + after) / h**2)
+    gamma = christoffel(G, basis)
+    assert np.abs(covariant_derivative(gamma, v, v, a) - projected).max() < 1e-6
 
 
 @pytest.mark.source("BK 2.4", "errata 22")
 def test_the_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
     """A is no tangent vector at A: it has no components there, so nothing would turn along."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
-    gamma = rb.connection.christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
+    gamma = christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
     corrected = rb.metrics.components_from_tangent(A, rb.metrics.tangent_from_components(A, S))
     assert np.abs(printed[:3]).max() < 8 * EPS
-    wanted = [0, 0, 0, 0, 6, 0]  # of the origin that runs on a circle, ω × v
-    at = [
-        rb.connection.covariant_derivative(gamma, x, S, np.zeros(6)) for x in (printed, corrected)
-    ]
-    assert np.abs(at[1] - wanted).max() < 1e-13
-    assert np.abs(at[0] - wanted).max() > 1
+    at = (covariant_derivative(gamma, x, S, 0 * S) for x in (corrected, printed))
+    off = [np.abs(x - [0, 0, 0, 0, 6, 0]).max() for x in at]  # the origin on a circle: ω × v
+    assert off[0] < 1e-13
+    assert off[1] > 1
 
 
 @pytest.mark.source("BK 2.4")
@@ -125,11 +115,9 @@ def test_products_change_as_the_metric_says(basis, m):
     """d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩, for any metric."""
     v, x, y, dx, dy = np.random.default_rng(4).normal(size=(5, 100, m))
     G = random_metrics(m)
-    gamma = rb.connection.christoffel(G, basis)
-    Dx, Dy = (
-        rb.connection.covariant_derivative(gamma, v, x, dx),
-        rb.connection.covariant_derivative(gamma, v, y, dy),
-    )
+    gamma = christoffel(G, basis)
+    Dx = covariant_derivative(gamma, v, x, dx)
+    Dy = covariant_derivative(gamma, v, y, dy)
     by_connection = np.einsum("bij,bi,bj->b", G, Dx, y) + np.einsum("bij,bi,bj->b", G, x, Dy)
     by_components = np.einsum("bij,bi,bj->b", G, dx, y) + np.einsum("bij,bi,bj->b", G, x, dy)
     bound = 1e-13 * np.linalg.cond(G) * np.linalg.norm(G, axis=(-2, -1))
@@ -148,8 +136,7 @@ def test_the_energy_is_constant_over_ten_units_of_time(m, start):
 
 
 @pytest.mark.source("BK (8)")
-def test_the_velocity_is_the_velocity_and_the_momentum_stays():
-    """Against central differences, and the conserved momentum in the fixed frame (Noether)."""
+def test_the_velocity_is_the_slope_and_the_momentum_stays():
     rng = np.random.default_rng(6)
     G, v0 = random_metrics(6, 1)[0] + np.eye(6), rng.normal(size=6)
     A0, t, h = rb.exp_se3(rng.normal(size=6)), np.linspace(-3, 3, 13), 1e-4
@@ -157,8 +144,7 @@ def test_the_velocity_is_the_velocity_and_the_momentum_stays():
     ahead, behind = (rb.geodesic_flow(G, A0, v0, t + step)[0] for step in (h, -h))
     by_differences = rb.metrics.components_from_tangent(A, (ahead - behind) / (2 * h))
     assert np.abs(by_differences - v).max() < 1e-5
-    momentum = np.linalg.solve(np.swapaxes(rb.adjoint_se3(A), -1, -2), (v @ G)[..., None])[..., 0]
-    assert np.abs(momentum - momentum[0]).max() < 1e-10
+    assert np.abs(momentum(G, A, v) - momentum(G, A, v)[0]).max() < 1e-10
     assert rb.is_se(A, 1e-13).all()
 
 
@@ -174,22 +160,20 @@ def test_the_free_body_is_eulers(a, c):
 def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
     """It has Γ^i_ik for Γ^i_jk, and with the frame's symbols ä of coordinates for ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
-    inertia, w = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3])
-    gamma = rb.connection.christoffel(inertia, rb.BASIS_SO3)
+    inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
+    gamma = christoffel(inertia, rb.BASIS_SO3)
     euler = np.linalg.solve(inertia, np.cross(inertia @ w, w))
-    corrected = -np.einsum("ijk,j,k->i", gamma, w, w)
-    assert np.abs(corrected - euler).max() < 40 * EPS
+    assert np.abs(-np.einsum("ijk,j,k->i", gamma, w, w) - euler).max() < 40 * EPS
     for reading in ("iik,j,k->i", "iik,i,k->i"):  # j is summed over, or stands for i
         printed = -np.einsum(reading, gamma, w, w)
         assert np.abs(printed).max() > 0.1
         assert np.abs(printed - euler).max() > 1
-    _, after = rb.geodesic_flow(inertia, np.eye(3), w, 1e-4)
-    assert np.abs((after - w) / 1e-4 - euler).max() < 1e-2
-    sigma, h = np.array([0.4, -0.3, 0.5]), 1e-4  # coordinates along the geodesic, and their ä
-    ways = rb.geodesic_flow(rb.METRIC_SO3, rb.exp_so3(sigma), w, [-h, 0, h])[0]
-    before, at, ahead = rb.log_so3(ways)
+    _, after = rb.geodesic_flow(inertia, np.eye(3), w, h)
+    assert np.abs((after - w) / h - euler).max() < 1e-2
+    ways, _ = rb.geodesic_flow(rb.METRIC_SO3, turn, w, [-h, 0, h])
+    before, at, ahead = rb.log_so3(ways)  # coordinates along the geodesic, and their ä
     velocity, acceleration = (ahead - before) / (2 * h), (before - 2 * at + ahead) / h**2
-    frame = rb.connection.christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
+    frame = christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
     assert np.abs(acceleration + np.einsum("ijk,j,k->i", frame, velocity, velocity)).max() > 0.1
 
 
@@ -198,31 +182,24 @@ def test_geodesics_of_14_turn_steadily_and_run_straight():
     v0 = np.random.default_rng(7).normal(size=(5, 6))
     A, v = rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, TIMES)
     assert np.abs(v[..., :3] - v0[:, :3]).max() < 1e-12
-    straight = TIMES[:, None, None] * v0[:, 3:]
-    assert np.abs(A[..., :3, 3] - straight).max() < 1e-10
-    ends = rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, 0.5)[0]
-    assert (
-        np.abs(
-            rb.geodesic_se3(np.eye(4), ends)(0.5)
-            - rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, 0.25)[0]
-        ).max()
-        < 1e-12
-    )
+    assert np.abs(A[..., :3, 3] - TIMES[:, None, None] * v0[:, 3:]).max() < 1e-10
+    (half, end), _ = rb.geodesic_flow(rb.METRIC_SE3, np.eye(4), v0, [0.25, 0.5])
+    assert np.abs(rb.geodesic_se3(np.eye(4), end)(0.5) - half).max() < 1e-12
 
 
-@pytest.mark.source("BK (10)", "BK 2.6")
-def test_geodesics_of_10_are_screws():
-    v0 = np.random.default_rng(8).normal(size=(5, 6))
-    A, v = rb.geodesic_flow(rb.metrics.semi_riemannian_metric_se3(2, 3), np.eye(4), v0, TIMES)
+@pytest.mark.source("BK (10)", "BK 2.5", "BK 2.6")
+@pytest.mark.parametrize(
+    ("G", "start", "exp", "tolerance"),
+    [
+        (rb.METRIC_SO3, np.eye(3), rb.exp_so3, 1e-12),
+        (rb.metrics.semi_riemannian_metric_se3(2, 3), np.eye(4), rb.exp_se3, 1e-10),
+    ],
+)
+def test_geodesics_of_bi_invariant_metrics_are_one_parameter_subgroups(G, start, exp, tolerance):
+    v0 = np.random.default_rng(8).normal(size=(5, len(G)))
+    A, v = rb.geodesic_flow(G, start, v0, TIMES)
     assert np.abs(v - v0).max() < 1e-11
-    assert np.abs(A - rb.exp_se3(TIMES[:, None, None] * v0)).max() < 1e-10
-
-
-@pytest.mark.source("BK 2.5", "BK 2.6")
-def test_geodesics_of_the_induced_metric_are_one_parameter_subgroups():
-    w = np.array([0.3, -1.2, 2])
-    R, _ = rb.geodesic_flow(rb.METRIC_SO3, np.eye(3), w, TIMES)
-    assert np.abs(R - rb.exp_so3(TIMES[:, None] * w)).max() < 1e-12
+    assert np.abs(A - exp(TIMES[:, None, None] * v0)).max() < tolerance
 
 
 def test_times_in_any_order_forwards_and_back():
@@ -233,10 +210,9 @@ def test_times_in_any_order_forwards_and_back():
     assert np.array_equal(w[0, 2], spin)
     assert np.array_equal(w[0, 0], w[1, 0])
     for i in np.ndindex(2, 3):
-        alone = rb.geodesic_flow(INERTIA, start, spin, t[i])
-        assert np.abs(R[i] - alone[0]).max() < 1e-11
-    back = rb.geodesic_flow(INERTIA, R[0, 0], w[0, 0], -2)
-    assert np.abs(back[0] - start).max() < 1e-11
+        assert np.abs(R[i] - rb.geodesic_flow(INERTIA, start, spin, t[i])[0]).max() < 1e-11
+    back, _ = rb.geodesic_flow(INERTIA, R[0, 0], w[0, 0], -2)
+    assert np.abs(back - start).max() < 1e-11
     assert rb.geodesic_flow(INERTIA, start, spin, [])[0].shape == (0, 3, 3)
     assert rb.geodesic_flow(np.ones((0, 3, 3)), start, spin, 1)[0].shape == (0, 3, 3)
 
@@ -245,13 +221,12 @@ def test_slow_and_fast_bodies_run_through_the_same_attitudes():
     """γ_sv(t) = γ_v(st), alone and in one batch."""
     w0 = np.array([0.3, 2, -1])
     slow = rb.geodesic_flow(INERTIA, np.eye(3), w0, 3)
-    for s in (1, 1e-8, 1e8):
+    for s in (1e-8, 1e8):
         R, w = rb.geodesic_flow(INERTIA, np.eye(3), s * w0, 3 / s)
         assert np.abs(R - slow[0]).max() < 1e-11
         assert np.abs(w / s - slow[1]).max() < 1e-11
-    batch = rb.geodesic_flow(INERTIA, np.eye(3), np.array([[1], [1e-8], [0]]) * w0, 3)
-    assert np.abs(batch[0][0] - slow[0]).max() < 1e-11
-    assert np.abs(batch[0][1] - rb.exp_so3(3e-8 * w0)).max() < 1e-11
+    R, _ = rb.geodesic_flow(INERTIA, np.eye(3), np.array([[1], [1e-8], [0]]) * w0, 3)
+    assert np.abs(R[:2] - [slow[0], rb.exp_so3(3e-8 * w0)]).max() < 1e-11
 
 
 @pytest.mark.parametrize(("speed", "t"), [(1e-320, 1), (1e-310, 1), (1e200, 1e-200)])
@@ -269,53 +244,47 @@ def test_a_large_batch_loses_no_more_than_the_root_of_its_size():
 
 
 def test_of_an_indefinite_metric_velocities_may_grow_and_the_momentum_stays():
-    B = np.diag([2, 0.5, 1])
-    G = np.linalg.inv(np.block([[np.zeros((3, 3)), B], [B, np.zeros((3, 3))]]))
+    G = np.linalg.inv(np.kron([[0, 1], [1, 0]], np.diag([2, 0.5, 1])))
     v0 = np.linalg.solve(G, [1, 1, 0, 0, 0, 1])
     A, v = rb.geodesic_flow(G, np.eye(4), v0, [0, 10, 20])
     speeds = np.linalg.norm(v, axis=-1)
     assert np.all(speeds[1:] > 10 * speeds[:-1])
-    momentum = np.linalg.solve(np.swapaxes(rb.adjoint_se3(A), -1, -2), (v @ G)[..., None])[..., 0]
-    scale = speeds * np.linalg.norm(rb.adjoint_se3(A), axis=(-2, -1))
-    assert np.all(np.abs(momentum - momentum[0]).max(axis=-1) < 1e-10 * scale)
+    off = np.abs(momentum(G, A, v) - momentum(G, A, v)[0]).max(axis=-1)
+    assert np.all(off < 1e-10 * speeds * np.linalg.norm(rb.adjoint_se3(A), axis=(-2, -1)))
 
 
-def test_what_starts_beside_the_group_is_put_on_it():
+def test_a_start_beside_the_group_is_put_on_it():
     start = rb.exp_so3([1, 2, 3]) + 1e-3
     R, _ = rb.geodesic_flow(INERTIA, start, [0.3, 2, -1], TIMES)
     assert np.abs(R[0] - rb.project_so(start)).max() < 4 * EPS
-    assert np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max() < 10 * EPS
-    pose = np.eye(4)
-    pose[:3, :3] *= 2  # it does not run at twice the speed
+    assert np.abs(R.mT @ R - np.eye(3)).max() < 10 * EPS
+    pose = np.diag([2, 2, 2, 1])  # it does not run at twice the speed
     A, _ = rb.geodesic_flow(np.eye(6), pose, [0, 0, 0, 1, 0, 0], 3)
     assert np.abs(A[:3, 3] - [3, 0, 0]).max() < 1e-12
 
 
-def test_a_fast_flight_does_not_disturb_the_turning():
+def test_a_fast_flight_does_not_disturb_the_turning_and_a_body_at_rest_stays():
     """Whatever the unit of length: 1e8 of them go by while the body turns."""
     G = np.diag([1.0, 2, 3, 1, 1, 1])
     _, w = rb.geodesic_flow(INERTIA, np.eye(3), [1, 2, 3], TIMES)
     A, v = rb.geodesic_flow(G, np.eye(4), [1, 2, 3, 1e8, 0, 0], TIMES)
     assert np.abs(v[:, :3] - w).max() < 1e-11
     assert np.abs(A[:, :3, 3] - TIMES[:, None] * [1e8, 0, 0]).max() < 1e-11 * 1e9
+    A, v = rb.geodesic_flow(G, np.eye(4), np.zeros(6), TIMES)
+    assert not (A - np.eye(4)).any()
+    assert not v.any()
 
 
 @pytest.mark.parametrize("size", [1e-320, 1e-310, 1e-200, 1e200, 1e308])
 def test_the_size_of_a_metric_does_not_matter(size):
-    gamma = rb.connection.christoffel(size * np.eye(3), rb.BASIS_SO3)
-    assert np.array_equal(gamma, rb.connection.structure_constants(rb.BASIS_SO3) / 2)
+    gamma = christoffel(size * np.eye(3), rb.BASIS_SO3)
+    assert np.array_equal(gamma, structure_constants(rb.BASIS_SO3) / 2)
     metric = np.array([1, 2, 3]) * min(size, 1e307)
     ways = [rb.geodesic_flow(G, np.eye(3), [1, 2, 3], 1) for G in (np.diag(metric), INERTIA)]
     assert np.abs(ways[0][1] - ways[1][1]).max() < (1e-11 if size > 1e-300 else 1e-2)
 
 
-def test_a_body_at_rest_stays():
-    A, v = rb.geodesic_flow(np.eye(6), np.eye(4), np.zeros(6), TIMES)
-    assert np.array_equal(A, np.broadcast_to(np.eye(4), (21, 4, 4)))
-    assert not v.any()
-
-
-def test_an_integration_that_fails_is_no_curve(monkeypatch):
+def test_an_integration_that_fails_is_an_error(monkeypatch):
     failed = SimpleNamespace(success=False, message="the step is too small")
     monkeypatch.setattr(scipy.integrate, "solve_ivp", lambda *_, **__: failed)
     with pytest.raises(FloatingPointError, match="followed to its end: the step is too small"):
@@ -323,46 +292,34 @@ def test_an_integration_that_fails_is_no_curve(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("basis", "message"),
     [
-        (lambda: rb.connection.structure_constants(np.eye(3)), r"basis: shape \(m, n, n\) wanted"),
-        (
-            lambda: rb.connection.structure_constants([np.eye(2), 2 * np.eye(2)]),
-            "linearly dependent",
-        ),
-        (lambda: rb.connection.structure_constants(rb.BASIS_SO3[:2]), "a commutator of two"),
-        (
-            lambda: rb.connection.structure_constants([1e6 * np.eye(3), *rb.BASIS_SO3[:2]]),
-            "a commutator of two",
-        ),
-        (
-            lambda: rb.connection.structure_constants(np.ones((0, 3, 3))),
-            r"basis: shape \(m, n, n\) wanted",
-        ),
-        (
-            lambda: rb.connection.christoffel(np.eye(6), rb.BASIS_SO3),
-            r"G: shape \(\.\.\., 3, 3\) wanted",
-        ),
-        (lambda: rb.connection.christoffel(np.eye(3, k=1), rb.BASIS_SO3), "G is not symmetric"),
-        (lambda: rb.connection.christoffel(np.ones((3, 3)), rb.BASIS_SO3), "G is singular"),
-        (
-            lambda: rb.connection.covariant_derivative(np.zeros((3, 3, 3)), [1, 2], [1, 2], [1, 2]),
-            r"gamma: shape \(\.\.\., 2, 2, 2\) wanted",
-        ),
-        (
-            lambda: rb.connection.covariant_derivative(np.zeros((2, 1, 1, 1)), [[1]] * 3, [1], [1]),
-            r"broadcast: gamma \(2,\), v \(3,\), x \(\), x_dot \(\)",
-        ),
-        (
-            lambda: rb.geodesic_flow(np.eye(3), [np.eye(3)] * 2, np.ones((3, 3)), 1),
-            r"broadcast: G \(\), A0 \(2,\), v0 \(3,\)",
-        ),
-        (lambda: rb.geodesic_flow(np.eye(6), np.eye(3), [1, 2, 3], 1), r"G: shape \(\.\.\., 3, 3"),
-        (lambda: rb.geodesic_flow(np.eye(3), np.eye(3), np.ones(6), 1), r"v0: shape \(\.\.\., 3\)"),
-        (lambda: rb.geodesic_flow(np.eye(3), np.eye(2), [1], 1), r"A0: shape \(\.\.\., 3, 3\) or"),
-        (lambda: rb.geodesic_flow(np.eye(3), np.eye(3), [1, 2, 3], [0, np.nan]), r"t\[1\] is nan"),
+        (ONE, r"basis: shape \(m, n, n\) wanted"),
+        (np.ones((0, 3, 3)), r"basis: shape \(m, n, n\) wanted"),
+        ([np.eye(2), 2 * np.eye(2)], "linearly dependent"),
+        (rb.BASIS_SO3[:2], "a commutator of two"),
+        ([1e6 * ONE, *rb.BASIS_SO3[:2]], "a commutator of two"),
+        ([rb.BASIS_SO3[0] + 1e-7 * ONE, rb.BASIS_SO3[1], rb.BASIS_SO3[2] + 1e-10], "a commutator"),
     ],
 )
-def test_bad_arguments_are_named(call, message):
+def test_a_basis_that_spans_no_lie_algebra_is_refused(basis, message):
     with pytest.raises(ValueError, match=message):
-        call()
+        structure_constants(basis)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        ("christoffel", (np.eye(6), rb.BASIS_SO3), "G: shape (..., 3, 3) wanted"),
+        ("christoffel", (np.eye(3, k=1), rb.BASIS_SO3), "G is not symmetric"),
+        ("christoffel", (np.ones((3, 3)), rb.BASIS_SO3), "G is singular"),
+        ("geodesic_flow", (ONE, [ONE] * 2, ONE, 1), "broadcast: G (), A0 (2,), v0 (3,)"),
+        ("geodesic_flow", (np.eye(6), ONE, [1, 2, 3], 1), "G: shape (..., 3, 3"),
+        ("geodesic_flow", (ONE, ONE, np.ones(6), 1), "v0: shape (..., 3)"),
+        ("geodesic_flow", (ONE, np.eye(2), [1], 1), "A0: shape (..., 3, 3) or"),
+        ("geodesic_flow", (ONE, ONE, [1, 2, 3], [0, np.nan]), "t[1] is nan"),
+    ],
+)
+def test_bad_arguments_are_named(function, arguments, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        getattr(rb.connection, function)(*arguments)

@@ -15,15 +15,10 @@ EPS = np.finfo(float).eps
 RNG = np.random.default_rng(111)
 N = 40
 TIMES = 1305031098.6659 + np.cumsum(10.0 ** RNG.uniform(-6, 3, N))
-ROTATIONS = np.concatenate(
-    [
-        Rotation.random(N - 6, rng=RNG).as_matrix(),
-        [np.eye(3), *(oracles.exp_so3(np.pi * e) for e in np.eye(3)), *[np.eye(3)] * 2],
-    ]
-)
-POSES = rb.pose_from_components(
-    ROTATIONS, RNG.normal(size=(N, 3)) * 10.0 ** RNG.uniform(-9, 9, (N, 1))
-)
+HALF_TURNS = [oracles.exp_so3(np.pi * e) for e in np.eye(3)]
+ROTATIONS = np.stack([*Rotation.random(N - 6, rng=RNG).as_matrix(), *HALF_TURNS, *[np.eye(3)] * 3])
+D = RNG.normal(size=(N, 3)) * 10.0 ** RNG.uniform(-9, 9, (N, 1))
+POSES = rb.pose_from_components(ROTATIONS, D)
 TWISTS = RNG.normal(size=(N, 6)) * 10.0 ** RNG.uniform(-9, 9, (N, 1))
 KINDS = {
     "poses and twists": (POSES, TWISTS),
@@ -35,58 +30,44 @@ FULL = ",".join(HEADERS[True, True])
 PLAIN = ",".join(HEADERS[True, False])
 
 
-def tum_lines(file):
-    """The format as its authors' tools read it: # begins a comment, blanks part eight numbers."""
-    lines = file.read_text("ascii").replace(",", " ").replace("\t", " ").split("\n")
-    kept = [line.split() for line in lines if line and line[0] != "#"]
-    return np.array([[float(x) for x in line] for line in kept])
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_path_comes_back(tmp_path, kind):
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("a.csv", kind) for kind in KINDS] + [(f"a.{end}", "poses") for end in ("tum", "txt", "TUM")],
+)
+def test_a_path_comes_back(tmp_path, name, kind):
     poses, velocities = KINDS[kind]
-    rb.write_path(tmp_path / "path.csv", TIMES, poses, velocities)
-    times, again, twists = rb.read_path(str(tmp_path / "path.csv"))
+    rb.write_path(tmp_path / name, TIMES, poses, velocities)
+    times, again, twists = rb.read_path(str(tmp_path / name))
     assert np.array_equal(times, TIMES)
     assert np.abs(again[:, :3, :3] - poses[:, :3, :3]).max() < 8 * EPS
     assert np.array_equal(again[:, :3, 3:], poses[:, :3, 3:])
     assert (twists is None) if velocities is None else np.array_equal(twists, velocities)
 
 
-@pytest.mark.parametrize("name", ["path.tum", "path.txt", "PATH.TUM"])
-def test_a_tum_trajectory_comes_back(tmp_path, name):
-    rb.write_path(tmp_path / name, TIMES, POSES)
-    times, poses, velocities = rb.read_path(tmp_path / name)
-    assert np.array_equal(times, TIMES)
-    assert np.abs(poses[:, :3, :3] - ROTATIONS).max() < 8 * EPS
-    assert np.array_equal(poses[:, :, 3], POSES[:, :, 3])
-    assert velocities is None
-
-
 def test_other_programs_read_a_tum_trajectory(tmp_path):
     """SciPy's quaternions end with the scalar, as those of TUM do."""
     rb.write_path(tmp_path / "path.tum", TIMES, POSES)
-    for table in (tum_lines(tmp_path / "path.tum"), np.loadtxt(tmp_path / "path.tum")):
-        assert np.array_equal(table[:, 0], TIMES)
-        rotations = Rotation.from_quat(table[:, 4:])
-        got = RigidTransform.from_components(table[:, 1:4], rotations).as_matrix()
-        assert np.array_equal(got[:, :3, 3], POSES[:, :3, 3])
-        assert np.abs(got[:, :3, :3] - ROTATIONS).max() < 8 * EPS
+    table = np.loadtxt(tmp_path / "path.tum")
+    assert np.array_equal(table[:, 0], TIMES)
+    got = RigidTransform.from_components(table[:, 1:4], Rotation.from_quat(table[:, 4:]))
+    assert np.array_equal(got.translation, POSES[:, :3, 3])
+    assert np.abs(got.rotation.as_matrix() - ROTATIONS).max() < 8 * EPS
 
 
 def test_other_programs_read_the_csv(tmp_path):
     rb.write_path(tmp_path / "path.csv", TIMES, POSES, TWISTS)
     with open(tmp_path / "path.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["time [s]"]) for row in rows] == TIMES.tolist()
-    q = np.array([[float(row[f"q{x} [1]"]) for x in "wxyz"] for row in rows])
-    got = Rotation.from_quat(q, scalar_first=True).as_matrix()
+
+    def columns(name, letters="xyz"):
+        return np.array([[float(row[name.replace("*", x)]) for x in letters] for row in rows])
+
+    assert np.array_equal(columns("time [s]", "-")[:, 0], TIMES)
+    got = Rotation.from_quat(columns("q* [1]", "wxyz"), scalar_first=True).as_matrix()
     assert np.abs(got - ROTATIONS).max() < 8 * EPS
-    w = np.array([[float(row[f"w{x} body [rad/s]"]) for x in "xyz"] for row in rows])
-    v = np.array([[float(row[f"v{x} body [m/s]"]) for x in "xyz"] for row in rows])
-    assert np.array_equal(np.hstack([w, v]), TWISTS)
-    d = np.array([[float(row[f"{x} [m]"]) for x in "xyz"] for row in rows])
-    assert np.array_equal(d, POSES[:, :3, 3])
+    assert np.array_equal(columns("* [m]"), POSES[:, :3, 3])
+    twists = np.hstack([columns("w* body [rad/s]"), columns("v* body [m/s]")])
+    assert np.array_equal(twists, TWISTS)
 
 
 def test_files_are_plain(tmp_path):
@@ -108,22 +89,18 @@ def test_files_are_plain(tmp_path):
     )
 
 
-def test_quaternions_go_on_without_a_change_of_sign(tmp_path):
+def test_quaternions_go_on_without_a_change_of_sign_and_zeros_have_no_minus(tmp_path):
     """Three turns about an axis: w passes zero, and no component jumps."""
     t = np.linspace(0, 6 * np.pi, 200)
     rb.write_path(tmp_path / "path.csv", t, rb.exp_so3(t[:, None] * [0.6, 0, 0.8]))
     q = np.loadtxt(tmp_path / "path.csv", delimiter=",", skiprows=1)[:, 1:]
     assert q[0, 0] == 1
     assert np.abs(np.diff(q, axis=0)).max() < 0.05
-
-
-def test_no_zero_of_a_quaternion_has_a_minus(tmp_path):
-    R = rb.exp_so3([[0, 0, 0], [0, 0, 4], [0, 0, 2]])
-    rb.write_path(tmp_path / "path.csv", [0, 1, 2], R)
+    rb.write_path(tmp_path / "path.csv", [0, 1, 2], rb.exp_so3([[0, 0, 0], [0, 0, 4], [0, 0, 2]]))
     assert "-0.0," not in (tmp_path / "path.csv").read_text("utf-8")
 
 
-def test_what_others_write_is_read(tmp_path):
+def test_files_of_other_programs_are_read(tmp_path):
     """Comments, blank lines, tabs, four digits; a mark of the byte order, CRLF, blanks, quotes."""
     text = "# ground truth\n# timestamp tx ty tz qx qy qz qw\n\n1305031098.6659\t1 2 3 "
     (tmp_path / "a.txt").write_text(text + "0.6574 0.6126 -0.2949 -0.3248 \n\n", "utf-8")
@@ -135,12 +112,14 @@ def test_what_others_write_is_read(tmp_path):
     assert np.array_equal(rb.read_path(tmp_path / "b.tum")[1][0], np.eye(4))
     text = "\ufeff" + PLAIN.replace(",", " , ") + '\r\n"0",1, 2 ,3,1,0,0,0\r\n\r\n'
     (tmp_path / "a.csv").write_bytes(text.encode())
-    times, poses, _ = rb.read_path(tmp_path / "a.csv")
-    assert np.array_equal(poses[0], rb.pose_from_components(np.eye(3), [1, 2, 3]))
+    pose = rb.read_path(tmp_path / "a.csv")[1][0]
+    assert np.array_equal(pose, rb.pose_from_components(np.eye(3), [1, 2, 3]))
 
 
 GOOD = "0 0 0 0 0 0 0 1\n"
 NUMBER = "a finite number wanted, got"
+UNIT = "a quaternion of norm 1 wanted, got one of"
+COLUMNS = ", line 1: the columns must be time [s], "
 
 
 @pytest.mark.parametrize(
@@ -152,37 +131,18 @@ NUMBER = "a finite number wanted, got"
         ("a.tum", "# x\n\n" + GOOD + "1 0 0 0 0 0 0 1 9\n", ", line 4: numbers wanted: 8, got: 9"),
         ("a.tum", GOOD.replace(" ", ","), ", line 1: numbers wanted: 8, got: 1"),
         ("a.tum", GOOD + GOOD, ", line 2: a time after 0.0 wanted, got 0.0"),
-        ("a.tum", "1" + GOOD[1:] + GOOD, ", line 2: a time after 1.0 wanted, got 0.0"),
         ("a.tum", "0 0 x 0 0 0 0 1\n", f", line 1, ty: {NUMBER} 'x'"),
-        ("a.tum", "0 0 0 0 0 nan 0 1\n", f", line 1, qy: {NUMBER} 'nan'"),
-        ("a.tum", "0 0 0 1e999 0 0 0 1\n", f", line 1, tz: {NUMBER} '1e999'"),
-        (
-            "a.tum",
-            GOOD + "1 0 0 0 0 0 0 0\n",
-            ", line 2: a quaternion of norm 1 wanted, got one of 0",
-        ),
-        (
-            "a.tum",
-            "0 0 0 0 1 0 0 1\n",
-            ", line 1: a quaternion of norm 1 wanted, got one of 1.41421",
-        ),
-        (
-            "a.tum",
-            "0 0 0 0 0 0 0 1.0011\n",
-            ", line 1: a quaternion of norm 1 wanted, got one of 1.0011",
-        ),
+        ("a.tum", GOOD + "1 0 0 0 0 0 0 0\n", f", line 2: {UNIT} 0"),
+        ("a.tum", "0 0 0 0 0 0 0 1.0011\n", f", line 1: {UNIT} 1.0011"),
         ("a.tum", GOOD + "\udcff\n", ", line 2: no text in UTF-8"),
-        ("a.csv", "", ", line 1: the columns must be time [s], "),
-        ("a.csv", "0,0,0,0,1,0,0,0\n", ", line 1: the columns must be time [s], "),
-        ("a.csv", FULL.replace("body", "world") + "\n", ", line 1: the columns must be time [s], "),
-        ("a.csv", FULL.replace("qw", "qx") + "\n", ", line 1: the columns must be time [s], "),
-        ("a.csv", FULL.replace("[m]", "[mm]") + "\n", ", line 1: the columns must be time [s], "),
+        ("a.csv", "", COLUMNS),
+        ("a.csv", "0,0,0,0,1,0,0,0\n", COLUMNS),
+        ("a.csv", FULL.replace("body", "world") + "\n", COLUMNS),
+        ("a.csv", FULL.replace("qw", "qx") + "\n", COLUMNS),
         ("a.csv", PLAIN + "\n", ": a pose wanted, the file ends"),
-        ("a.csv", PLAIN + "\n0,0,0,0,1,0,0\n", ", line 2: numbers wanted: 8, got: 7"),
         ("a.csv", PLAIN + "\n0,0,0,0,1,0,0,0\n\n1,0,0,0,1,0,0,0\n", ", line 3: numbers wanted: 8"),
-        ("a.csv", PLAIN + "\n0,0,0,0,1,0,,0\n", f", line 2, qy [1]: {NUMBER} ''"),
         ("a.csv", PLAIN + "\n0,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n", ", line 3: a time after 0.0"),
-        ("a.csv", PLAIN + "\n0,0,0,0,0,0,0,0\n", ", line 2: a quaternion of norm 1 wanted"),
+        ("a.csv", PLAIN + "\n0,0,0,0,0,0,0,0\n", f", line 2: {UNIT} 0"),
     ],
 )
 def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, name, text, reason):
@@ -192,32 +152,45 @@ def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, name, text, reason):
         rb.read_path(file)
 
 
-def test_what_has_no_place_in_a_format_is_not_written(tmp_path):
-    good = [0, 1], POSES[:2]
-    for name, arguments, message in (
-        ("a.tum", (*good, TWISTS[:2]), r"^velocities: TUM has no columns for them; .*\.csv$"),
-        ("a.txt", ([0, 1], ROTATIONS[:2]), r"^poses: TUM has no rotations alone; .*\.csv$"),
-        ("a.dat", good, r"^file: a name wanted that ends in \.csv, \.tum or \.txt, got .*a\.dat"),
-        ("a", good, r"^file: a name wanted that ends in"),
-        ("a.csv", ([1, 0], POSES[:2]), r"^times\[1\] is 0.0, a time after 1.0 is wanted"),
-        ("a.csv", ([0], POSES[:2]), r"^times, poses: as many of each wanted, got 1 and 2"),
-        ("a.csv", ([0, 1], 2 * POSES[:2]), r"^poses\[0\] is no pose \(project_se gives"),
-        ("a.csv", ([0, 1], POSES[:2, :2]), r"^poses: shape"),
-        ("a.csv", (*good, TWISTS[:2, :3]), r"^velocities: shape"),
-        ("a.csv", (*good, TWISTS[:2] * np.nan), r"^velocities\[0, 0\] is nan"),
-        ("a.csv", ([], np.zeros((0, 4, 4))), r"^times, poses: one or more wanted, got none"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            rb.write_path(tmp_path / name, *arguments)
-        assert list(tmp_path.iterdir()) == []
+TWO = [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "times", "poses", "velocities", "message"),
+    [
+        ("a.tum", TWO, POSES[:2], TWISTS[:2], r"velocities: TUM has no columns .*\.csv$"),
+        ("a.txt", TWO, ROTATIONS[:2], None, r"poses: TUM has no rotations alone; .*\.csv$"),
+        (
+            "a.dat",
+            TWO,
+            POSES[:2],
+            None,
+            r"file: a name .* in \.csv, \.tum or \.txt, got .*dat",
+        ),
+        ("a", TWO, POSES[:2], None, r"file: a name wanted that ends in"),
+        ("a.csv", [1, 0], POSES[:2], None, r"times\[1\] is 0.0, a time after 1.0 is wanted"),
+        ("a.csv", [0], POSES[:2], None, r"times, poses: as many of each wanted, got 1 and 2"),
+        ("a.csv", TWO, 2 * POSES[:2], None, r"poses\[0\] is no pose \(project_se gives"),
+        ("a.csv", TWO, POSES[:2, :2], None, r"poses: shape"),
+        ("a.csv", TWO, POSES[:2], TWISTS[:2, :3], r"velocities: shape"),
+        ("a.csv", TWO, POSES[:2], TWISTS[:2] * np.nan, r"velocities\[0, 0\] is nan"),
+        ("a.csv", [], np.zeros((0, 4, 4)), None, r"times, poses: one or more wanted, got none"),
+    ],
+)
+def test_malformed_paths_are_not_written(tmp_path, name, times, poses, velocities, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        rb.write_path(tmp_path / name, times, poses, velocities)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_of_another_kind_or_none_are_not_read(tmp_path):
     with pytest.raises(ValueError, match=r"^file: a name wanted"):
         rb.read_path(tmp_path / "a.bag")
     with pytest.raises(FileNotFoundError):
         rb.read_path(tmp_path / "a.csv")
 
 
-def test_what_was_read_is_chained(tmp_path):
-    """Of a curve written at its joints, with its velocities, the same curve comes back."""
+def test_of_a_curve_written_at_its_joints_with_velocities_the_same_curve_is_chained(tmp_path):
     t, A = [0, 0.5, 2], rb.pose_from_coordinates(RNG.normal(size=(3, 6)))
     c = rb.chain(t, A)
     rb.write_path(tmp_path / "a.csv", t, c(t), c(t, 1))

@@ -40,46 +40,40 @@ def test_files_are_plain(tmp_path):
     assert (tmp_path / "plan.csv").read_text("utf-8") == text
 
 
-def test_what_a_spreadsheet_writes_is_read(tmp_path):
-    text = (
-        "\ufeff"
-        + PLAN.replace(",", " , ").replace("\n", "\r\n")
-        + '"1", 2 ,3e0,+.5\r\n-1,0,0,0\r\n\r\n'
-    )
+def test_files_of_a_spreadsheet_are_read(tmp_path):
+    header = PLAN.replace(",", " , ").replace("\n", "\r\n")
+    text = "\ufeff" + header + '"1", 2 ,3e0,+.5\r\n-1,0,0,0\r\n\r\n'
     (tmp_path / "plan.csv").write_bytes(text.encode())
     plan = rb.files.load_plan(tmp_path / "plan.csv", "world")
     assert same(plan, [([1, 2, 3], 0.5), ([-1, 0, 0], 0)])
+
+
+NUMBER = "a finite number wanted, got"
+COLUMNS = "line 1: vx world [m/s], "
 
 
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
         ("", f"line 1: {PLAN.strip().replace(',', ', ')} wanted, got "),
-        ("1,0,0,2\n", "line 1: vx world [m/s], "),
-        (PLAN.replace("world", "body"), "line 1: vx world [m/s], "),
-        (PLAN.replace(",vtheta [rad/s]", ""), "line 1: vx world [m/s], "),
-        (PLAN.replace("[rad/s]", "[deg/s]"), "line 1: vx world [m/s], "),
+        ("1,0,0,2\n", COLUMNS),
+        (PLAN.replace("world", "body"), COLUMNS),
+        (PLAN.replace(",vtheta [rad/s]", ""), COLUMNS),
+        ("\n" + PLAN, COLUMNS),
         (PLAN + "1,0,0,2\n1,0,0\n", "line 3: numbers wanted: 4, got: 3"),
         (PLAN + "1,0,0,2,\n", "line 2: numbers wanted: 4, got: 5"),
         (PLAN + "1,0,0,2\n\n1,0,0,2\n", "line 3: numbers wanted: 4, got: 0"),
         (PLAN.replace("\n", "\r") + "1,0,0,2\r1;0;0;2\r", "line 3: numbers wanted: 4, got: 1"),
-        ("\n" + PLAN, "line 1: vx world [m/s], "),
-        (PLAN + "1,0,0,\n", "line 2, duration [s]: a finite number wanted, got ''"),
-        (PLAN + "1,x,0,2\n", "line 2, vy world [m/s]: a finite number wanted, got 'x'"),
-        (
-            PLAN + "1,0,0,2\n1,0,nan,2\n",
-            "line 3, vtheta [rad/s]: a finite number wanted, got 'nan'",
-        ),
-        (PLAN + "1e999,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '1e999'"),
-        (PLAN + "1_0,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '1_0'"),
+        (PLAN + "1,0,0,\n", f"line 2, duration [s]: {NUMBER} ''"),
+        (PLAN + "1,x,0,2\n", f"line 2, vy world [m/s]: {NUMBER} 'x'"),
+        (PLAN + "1,0,0,2\n1,0,nan,2\n", f"line 3, vtheta [rad/s]: {NUMBER} 'nan'"),
+        (PLAN + "1e999,0,0,2\n", f"line 2, vx world [m/s]: {NUMBER} '1e999'"),
+        (PLAN + "1_0,0,0,2\n", f"line 2, vx world [m/s]: {NUMBER} '1_0'"),
         (PLAN + "1,0,0,2\n1,0,0,-2\n", "line 3: duration is -2.0, a duration from 0 up is wanted"),
-        (PLAN + "1,0,0,2\n1,0,0,١\n", "line 3, duration [s]: a finite number wanted, got '١'"),
-        (PLAN + "1\xa0,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '1\\xa0'"),
-        (PLAN + "0x1,0,0,2\n", "line 2, vx world [m/s]: a finite number wanted, got '0x1'"),
-        (
-            PLAN + "x" * 90 + ",0,0,2",
-            f"line 2, vx world [m/s]: a finite number wanted, got '{'x' * 40}'",
-        ),
+        (PLAN + "1,0,0,2\n1,0,0,١\n", f"line 3, duration [s]: {NUMBER} '١'"),
+        (PLAN + "1\xa0,0,0,2\n", f"line 2, vx world [m/s]: {NUMBER} '1\\xa0'"),
+        (PLAN + "0x1,0,0,2\n", f"line 2, vx world [m/s]: {NUMBER} '0x1'"),
+        (PLAN + "x" * 90 + ",0,0,2", f"line 2, vx world [m/s]: {NUMBER} '{'x' * 40}'"),
         (PLAN + '1,0,0,2\n"1,0,0,2\n1,0,0,2\n', "line 3: unexpected end of data"),
         (PLAN + "1,0,0,2\n\udcff,0,0,2\n", "line 3: no text in UTF-8"),
         (PLAN.replace("\n", "\r") + "1,0,0,2\r\udcff,0,0,2\r", "line 3: no text in UTF-8"),
@@ -92,50 +86,37 @@ def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, text, reason):
         rb.files.load_plan(file, "world")
 
 
-def test_what_is_none_is_not_written(tmp_path):
-    file = tmp_path / "file.csv"
-    for call, message in (
-        (lambda: rb.files.save_plan(file, [([1, 0], 2)], "world"), r"^plan\[0\] velocity: shape"),
-        (
-            lambda: rb.files.save_plan(file, [([1, 0], 2), ([1], 2)], "joints"),
-            r"^plan\[1\] velocity: ",
-        ),
-        (lambda: rb.files.save_plan(file, [([1, 0, 0], -2)], "body"), r"^plan\[0\] duration is -2"),
-        (lambda: rb.files.save_plan(file, 3, "joints"), r"^plan: a list of"),
-        (
-            lambda: rb.files.save_plan(file, [], "planar"),
-            r"^kind: one of 'world', 'body', 'joints'",
-        ),
-        (
-            lambda: rb.files.save_plan(file, [], ["world"]),
-            r"^kind: one of .* wanted, got \['world'\]",
-        ),
-    ):
-        with pytest.raises(ValueError, match=message):
-            call()
-        assert not file.exists()
+@pytest.mark.parametrize(
+    ("plan", "kind", "message"),
+    [
+        ([([1, 0], 2)], "world", r"plan\[0\] velocity: shape"),
+        ([([1, 0], 2), ([1], 2)], "joints", r"plan\[1\] velocity: "),
+        ([([1, 0, 0], -2)], "body", r"plan\[0\] duration is -2"),
+        ([([1, 2, 3], 1), ([1, 2, 3], np.nan)], "body", r"plan\[1\]"),
+        (3, "joints", "plan: a list of"),
+        ([], "planar", "kind: one of 'world', 'body', 'joints' wanted, got 'planar'"),
+        ([], ["world"], r"kind: one of .* wanted, got \['world'\]"),
+    ],
+)
+def test_malformed_plans_are_not_written_and_no_file_is_changed(tmp_path, plan, kind, message):
+    for content in (None, "there"):
+        file = tmp_path / f"{content}.csv"
+        if content:
+            file.write_text(content, "utf-8")
+        with pytest.raises(ValueError, match=f"^{message}"):
+            rb.files.save_plan(file, plan, kind)
+        assert (file.read_text("utf-8") if file.exists() else None) == content
 
 
-def test_joints_need_columns(tmp_path):
-    file = tmp_path / "file.csv"
-    file.write_text("duration [s]\n1\n", "utf-8")
-    with pytest.raises(ValueError, match="line 2: a velocity wanted, there is no column for it"):
-        rb.files.load_plan(file, "joints")
-    file.write_text("", "utf-8")
-    with pytest.raises(ValueError, match=r"line 1: duration \[s\] wanted, got ''$"):
-        rb.files.load_plan(file, "joints")
-
-
-def test_an_unknown_kind_is_refused_by_readers_too(tmp_path):
-    rb.files.save_plan(tmp_path / "plan.csv", PLANS["world"], "world")
-    with pytest.raises(ValueError, match=r"^kind: one of 'world', .* wanted, got 'arm'"):
-        rb.files.load_plan(tmp_path / "plan.csv", "arm")
-
-
-def test_a_file_that_is_there_survives_a_bad_plan(tmp_path):
-    file = tmp_path / "plan.csv"
-    rb.files.save_plan(file, PLANS["body"], "body")
-    before = file.read_bytes()
-    with pytest.raises(ValueError, match=r"^plan\[1\]"):
-        rb.files.save_plan(file, [([1, 2, 3], 1), ([1, 2, 3], np.nan)], "body")
-    assert file.read_bytes() == before
+@pytest.mark.parametrize(
+    ("text", "kind", "message"),
+    [
+        ("duration [s]\n1\n", "joints", "line 2: a velocity wanted, there is no column for it"),
+        ("", "joints", r"line 1: duration \[s\] wanted, got ''$"),
+        (PLAN, "arm", "^kind: one of 'world', .* wanted, got 'arm'"),
+    ],
+)
+def test_joints_need_columns_and_kinds_are_known(tmp_path, text, kind, message):
+    (tmp_path / "plan.csv").write_text(text, "utf-8")
+    with pytest.raises(ValueError, match=message):
+        rb.files.load_plan(tmp_path / "plan.csv", kind)

@@ -1,6 +1,7 @@
 """The functionals against their definitions: variations of the integral, and derivatives."""
 
 import numpy as np
+import oracles
 import pytest
 from numpy.polynomial import Polynomial
 
@@ -30,18 +31,15 @@ def test_the_costate_is_the_derivative_of_the_integral(name):
     functional, rng = FUNCTIONALS[name], np.random.default_rng(1)
     x, weights = np.polynomial.legendre.leggauss(40)
     t, order = (x + 1) / 2, functional.ends // 2
-    bump = Polynomial([0, 1, -1]) ** order
     w = [Polynomial(rng.normal(size=5)) for _ in range(3)]
-    dw = [Polynomial(rng.normal(size=4)) * bump for _ in range(3)]
+    dw = [Polynomial(rng.normal(size=4)) * Polynomial([0, 1, -1]) ** order for _ in range(3)]
 
     def cost(s):
-        u = functional.deviation(
-            *jets([p + s * q for p, q in zip(w, dw, strict=True)], t, order + 1)
-        )
+        moved = [p + s * q for p, q in zip(w, dw, strict=True)]
+        u = functional.deviation(*jets(moved, t, order + 1))
         return np.sum(u[0] ** 2, axis=-1) @ weights / 2
 
-    s = 1e-3  # of a polynomial of degree four in s: the formula has no error but rounding
-    slope = (8 * (cost(s) - cost(-s)) - (cost(2 * s) - cost(-2 * s))) / (12 * s)
+    slope = oracles.derivative_by_differences(cost, 0.0, 1e-3)
     p = functional.p(*jets(w, t, functional.ends + 1))
     work = np.sum(p[0] * jets(dw, t, 1)[0][0], axis=-1) @ weights / 2
     sign = -1 if functional.ends == 2 else 1
@@ -53,21 +51,18 @@ def test_the_costate_is_the_derivative_of_the_integral(name):
 def test_the_derivatives_are_derivatives(name, what):
     functional, rng = FUNCTIONALS[name], np.random.default_rng(2)
     count = functional.ends + 1 if what == "p" else functional.ends // 2 + 1
-    rates = list(rng.normal(size=(count, 1, 4, 3)))
-    function = getattr(functional, what)
+    rates = rng.normal(size=(count, 1, 4, 3))
     by = getattr(functional, f"{what}_by")(*rates)
     assert len(by) == count
-    for k in range(count):
-        for i in range(3):
-            step = np.zeros(3)
-            step[i] = 2.0**-7
+    for k, i in np.ndindex(count, 3):
+        step = np.zeros_like(rates)
+        step[k, ..., i] = 1
 
-            def moved(n, k=k, step=step):
-                return function(*rates[:k], rates[k] + n * step, *rates[k + 1 :])
+        def moved(s, step=step):
+            return getattr(functional, what)(*(rates + s * step))
 
-            slope = 45 * (moved(1) - moved(-1)) - 9 * (moved(2) - moved(-2)) + moved(3) - moved(-3)
-            slope /= 60 * step[i]
-            assert np.abs(by[k][..., i] - slope).max() < 1e-11
+        slope = oracles.derivative_by_differences(moved, 0.0, 2.0**-7)
+        assert np.abs(by[k][..., i] - slope).max() < 1e-11
 
 
 @pytest.mark.source("beyond BK 1", "beyond BK 5")
@@ -89,14 +84,11 @@ def test_the_deviations_are_the_torque_and_the_covariant_jerk():
 
 
 @pytest.mark.source("beyond BK 5")
-def test_the_covariant_jerk_is_the_same_seen_from_the_body():
+@pytest.mark.parametrize(("kappa", "same"), [(0, False), (0.5, True), (1, False)])
+def test_the_covariant_jerk_is_the_same_seen_from_the_body(kappa, same):
     """Rᵀ(t) has the body velocity −R w; only with κ = ½ has its jerk the same size."""
-    rng = np.random.default_rng(4)
-    w, a, b = rng.normal(size=(3, 3))
-    for kappa, same in ((0, False), (0.5, True), (1, False)):
-        here = b + kappa * np.cross(w, a)
-        # the derivatives of −R w, turned back by R
-        w_back, a_back = -w, -a
-        b_back = -(b + np.cross(w, a))
-        there = b_back + kappa * np.cross(w_back, a_back)
-        assert (abs(here @ here - there @ there) < 1e-12) == same
+    w, a, b = np.random.default_rng(4).normal(size=(3, 3))
+    here = b + kappa * np.cross(w, a)
+    # by the derivatives of −R w, turned back by R: −w, −a and −(b + w × a)
+    there = -(b + np.cross(w, a)) + kappa * np.cross(-w, -a)
+    assert (abs(here @ here - there @ there) < 1e-12) == same

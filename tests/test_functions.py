@@ -19,15 +19,11 @@ TURNS = {"R", "R0", "R1", "S"}
 
 def exported():
     """All functions in the lists of the package and its modules, by name."""
-    names = [part.name for part in pkgutil.iter_modules(rb.__path__)]
-    modules = [rb, *(importlib.import_module(f"rbcourse.{name}") for name in names)]
+    others = {"draw", "report", "textbook"}
+    names = {part.name for part in pkgutil.iter_modules(rb.__path__)} - others
+    modules = [rb, *(importlib.import_module(f"rbcourse.{name}") for name in sorted(names))]
     listed = {name: getattr(m, name) for m in modules for name in getattr(m, "__all__", ())}
-    return {
-        name: one
-        for name, one in listed.items()
-        if inspect.isfunction(one)
-        and not re.match(r"rbcourse\.(report|textbook|draw)", one.__module__)
-    }
+    return {name: one for name, one in listed.items() if inspect.isfunction(one)}
 
 
 def arrays_of(function):

@@ -1,8 +1,9 @@
-"""Motions on SE(3): a rotation curve, and a path of the origin of its own."""
+"""Motions on SE(3): rotations with paths of their own, bodies off their centre, and screws."""
 
 import numpy as np
 import oracles
 import pytest
+from numpy.polynomial import Chebyshev, Polynomial
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
@@ -15,33 +16,42 @@ A0, A1 = (
     rb.pose_from_components(Rotation.random(N, rng=RNG).as_matrix(), 3 * RNG.normal(size=(N, 3)))
     for _ in range(2)
 )
-W0, W1, V0, V1 = RNG.normal(size=(4, N, 3))
-CUBICS = rb.projected_cubic_se3(A0, A1, W0, W1, V0, V1)
-GEODESICS = rb.geodesic_se3(A0, A1)
-OPTIMUM = rb.minimum_acceleration_se3(A0[0], A1[0], W0[0], W1[0], V0[0], V1[0])
+RATES = RNG.normal(size=(4, N, 3))
+GEODESICS, SCREWS = rb.geodesic_se3(A0, A1), rb.screw_se3(A0, A1)
 TIMES = np.linspace(0, 1, 11)
+BODY = {
+    "inertia": np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]]),
+    "mass": 2.0,
+    "centre": np.array([0.1, -0.2, 0.3]),
+}
+OFF_CENTRE = rb.minimum_acceleration_se3(A0, A1, *RATES, **BODY)
 
 
-@pytest.mark.source("BK 6.3")
-def test_rotation_and_origin_each_go_their_own_way():
-    path = CubicHermiteSpline([0, 1], [A0[:, :3, 3], A1[:, :3, 3]], [V0, V1])
-    rotation = rb.projected_cubic_so3(A0[:, :3, :3], A1[:, :3, :3], W0, W1)
-    A = CUBICS(TIMES)
+def on_so3(make, *more):
+    return make(A0[:, :3, :3], A1[:, :3, :3], *more)
+
+
+@pytest.mark.source("BK 6.3", "BK (1)", "BK (9)")
+@pytest.mark.parametrize("name", ["projected_cubic", "minimum_acceleration"])
+def test_rotation_and_origin_each_go_their_own_way(name):
+    motion = getattr(rb, f"{name}_se3")(A0, A1, *RATES)
+    rotation = on_so3(getattr(rb, f"{name}_so3"), *RATES[:2])
+    path = CubicHermiteSpline([0, 1], [A0[:, :3, 3], A1[:, :3, 3]], RATES[2:])
+    A = motion(TIMES)
     assert rb.is_se(A).all()
     assert np.array_equal(A[..., :3, :3], rotation(TIMES))
     assert np.abs(A[..., :3, 3] - path(TIMES)).max() < 40 * EPS
-    assert np.array_equal(CUBICS.margin, rotation.margin)
-    A = OPTIMUM(TIMES)
-    optimum = rb.minimum_acceleration_so3(A0[0, :3, :3], A1[0, :3, :3], W0[0], W1[0])
-    assert np.array_equal(A[..., :3, :3], optimum(TIMES))
-    assert np.abs(A[..., :3, 3] - path(TIMES)[:, 0]).max() < 40 * EPS
+    assert np.array_equal(getattr(motion, "margin", None), getattr(rotation, "margin", None))
+    for order in (1, 2):
+        assert np.array_equal(motion(TIMES, order)[..., :3], rotation(TIMES, order))
+        moved = (A[..., :3, :3] @ motion(TIMES, order)[..., 3:, None])[..., 0]
+        assert np.abs(moved - path(TIMES, order)).max() < 1e-13
 
 
 @pytest.mark.source("BK 2.6", "BK (14)")
 def test_the_geodesic_turns_as_on_so3_and_moves_straight():
     A = GEODESICS(TIMES)
-    turning = rb.geodesic_so3(A0[:, :3, :3], A1[:, :3, :3])
-    assert np.array_equal(A[..., :3, :3], turning(TIMES))
+    assert np.array_equal(A[..., :3, :3], on_so3(rb.geodesic_so3)(TIMES))
     straight = A0[:, :3, 3] + (A1 - A0)[:, :3, 3] * TIMES[:, None, None]
     assert np.abs(A[..., :3, 3] - straight).max() < 8 * EPS
     assert np.all(GEODESICS(TIMES, 2) == 0)
@@ -49,31 +59,185 @@ def test_the_geodesic_turns_as_on_so3_and_moves_straight():
     assert np.abs(speed - np.linalg.norm((A1 - A0)[:, :3, 3], axis=-1)).max() < 20 * EPS
 
 
-@pytest.mark.source("BK (1)", "BK (9)")
-@pytest.mark.parametrize(
-    "curve", [CUBICS, GEODESICS, OPTIMUM], ids=["cubic", "geodesic", "optimum"]
-)
-def test_twist_and_covariant_acceleration_are_what_the_protocol_says(curve):
-    for t in (0.2, 0.5, 0.9):
-        A, S, acceleration = curve(t), curve(t, 1), curve(t, 2)
-        rate = oracles.derivative_by_differences(curve, t, 2.0**-11)
-        assert np.abs(rate - A @ rb.hat_se3(S)).max() < 1e-9
-        w, v = S[..., :3], S[..., 3:]
-        twist_rate = oracles.derivative_by_differences(lambda u: curve(u, 1), t, 2.0**-11)
-        assert np.abs(acceleration[..., :3] - twist_rate[..., :3]).max() < 1e-7
-        assert np.abs(acceleration[..., 3:] - np.cross(w, v) - twist_rate[..., 3:]).max() < 1e-7
+@pytest.mark.source("beyond BK 9")
+def test_the_centre_of_mass_of_a_body_runs_along_a_cubic():
+    t, (w0, w1, *v) = np.linspace(0, 1, 21), RATES
+    centre = (OFF_CENTRE(t)[..., :3, :3] @ BODY["centre"] + OFF_CENTRE(t)[..., :3, 3]).reshape(
+        21, -1
+    )
+    fit = np.polynomial.polynomial.polyfit(t, centre, 3)
+    assert np.abs(np.polynomial.polynomial.polyval(t, fit).T - centre).max() < 1e-13
+    alone = on_so3(rb.minimum_acceleration_so3, w0, w1, BODY["inertia"])
+    assert np.abs(OFF_CENTRE(t)[..., :3, :3] - alone(t)).max() < 1e-13
+    assert np.abs(OFF_CENTRE([0, 1]) - [A0, A1]).max() < 1e-14
+    S = OFF_CENTRE([0, 1], 1)
+    assert np.abs(S[..., :3] - [w0, w1]).max() < 1e-13
+    moved = np.stack([A0, A1])[..., :3, :3] @ S[..., 3:, None]
+    assert np.abs(moved[..., 0] - v).max() < 1e-13
 
 
-@pytest.mark.source("BK Prop. 5")
-def test_moving_the_fixed_frame_moves_the_motion():
-    L = rb.exp_se3([1, -2, 0.5, 3, 1, -1])
-    moved = rb.projected_cubic_se3(L @ A0, L @ A1, W0, W1, V0 @ L[:3, :3].T, V1 @ L[:3, :3].T)
-    off = np.abs(moved(TIMES) - L @ CUBICS(TIMES)).max(axis=(0, -2, -1))
-    assert np.all(off < 1e-12 / np.minimum(CUBICS.margin, 1))
+def test_twist_and_acceleration_of_a_body_are_those_of_its_frame():
+    for t in (0.2, 0.6):
+        A, S, a = (OFF_CENTRE(t, order) for order in range(3))
+        rate = oracles.derivative_by_differences(OFF_CENTRE, t)
+        assert np.abs(rate - A @ rb.hat_se3(S)).max() < 1e-10
+        rate = oracles.derivative_by_differences(lambda u: OFF_CENTRE(u, 1), t)
+        rate[:, 3:] += np.cross(S[:, :3], S[:, 3:])
+        assert np.abs(rate - a).max() < 1e-10
 
 
-def test_the_ends_are_met():
-    for t, A, w, v in ((0, A0, W0, V0), (1, A1, W1, V1)):
-        assert np.abs(CUBICS(t) - A).max() < 80 * EPS
-        in_body = (np.swapaxes(A[:, :3, :3], -1, -2) @ v[..., None])[..., 0]
-        assert np.abs(CUBICS(t, 1) - np.concatenate([w, in_body], axis=-1)).max() < 400 * EPS
+def test_another_frame_of_the_same_body_gives_the_same_motion():
+    """The frame is moved to the centre of mass, and so are the ends."""
+    r, shift, (w0, w1, *v) = BODY["centre"], np.eye(4), RATES
+    shift[:3, 3] = r
+    v = [
+        v + (A[:, :3, :3] @ np.cross(w, r)[..., None])[..., 0]
+        for A, w, v in zip((A0, A1), (w0, w1), v, strict=True)
+    ]
+    central = rb.minimum_acceleration_se3(
+        A0 @ shift, A1 @ shift, w0, w1, *v, inertia=BODY["inertia"], mass=7
+    )
+    assert np.abs(OFF_CENTRE(TIMES) @ shift - central(TIMES)).max() < 1e-12
+    assert rb.acceleration_cost(OFF_CENTRE, **BODY) == pytest.approx(
+        rb.acceleration_cost(central, BODY["inertia"], BODY["mass"]), rel=1e-10
+    )
+
+
+@pytest.mark.source("beyond BK 9")
+def test_no_motion_nearby_costs_a_body_less():
+    """Perturbed by R exp(η̂) and d + ξ, η and ξ polynomials that vanish at the ends, twice."""
+    motion, G, m, r = OFF_CENTRE[0], *BODY.values()
+    x, weights = np.polynomial.legendre.leggauss(60)
+    t, rng, bump = (x + 1) / 2, np.random.default_rng(9), Polynomial([0, 0, 1, -2, 1])
+
+    def cost(size, eta, xi):
+        def entries(t):
+            R, d = motion(t)[..., :3, :3], motion(t)[..., :3, 3]
+            R = R @ rb.exp_so3(size * bump(t)[:, None] * eta)
+            centre = d + R @ r + size * bump(t)[:, None] * xi
+            return np.concatenate([R.reshape(-1, 9), centre], axis=1)
+
+        parts = [
+            Chebyshev.interpolate(lambda t, i=i: entries(t)[:, i], 50, [0, 1]) for i in range(12)
+        ]
+        jets = [np.stack([(p.deriv(k) if k else p)(t) for p in parts], axis=-1) for k in range(3)]
+        R, R1, R2 = (x[:, :9].reshape(-1, 3, 3) for x in jets)
+        w, a = (rb.vee_so3((R.mT @ X - X.mT @ R) / 2) for X in (R1, R2))
+        torque = a @ G + np.cross(w, w @ G)
+        squares = np.sum(torque * (torque @ np.linalg.inv(G)), axis=-1)
+        return (squares + m * np.sum(jets[2][:, 9:] ** 2, axis=-1)) @ weights / 2
+
+    for eta, xi in rng.normal(size=(3, 2, 3)):
+        less, same, more = (cost(size, eta, xi) for size in (-0.3, 0.0, 0.3))
+        assert same == pytest.approx(rb.acceleration_cost(motion, **BODY), rel=1e-8)
+        assert min(less, more) > same
+        slope = cost(1e-3, eta, xi) - cost(-1e-3, eta, xi)
+        assert abs(slope) < 1e-5 * (less + more - 2 * same)
+
+
+@pytest.mark.source("BK 2.6", "errata 15")
+def test_each_definition_holds_of_screws_and_not_of_geodesics():
+    """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, A' a left-invariant field."""
+
+    def defects(curve):
+        A, rate = curve(TIMES[1:-1]), rates(curve)
+        S, twist = rb.inverse_se3(A) @ rate, curve(TIMES, 1)
+        a, b, ab = rb.inverse_se3(A0) @ curve([0.2, 0.5, 0.7])
+        carried = A @ rb.inverse_se3(A[:1]) @ rate[:1]
+        found = S - S[0], twist - twist[0], a @ b - ab, carried - rate
+        return [np.abs(one).max() for one in found]
+
+    def rates(curve):
+        return np.array([oracles.derivative_by_differences(curve, t) for t in TIMES[1:-1]])
+
+    assert np.all(np.array(defects(SCREWS)) <= [1e-11, 0, 40 * EPS, 1e-11])
+    assert np.all(np.array(defects(GEODESICS)) > 0.1)
+    assert np.array_equal(SCREWS(0, 1), SCREWS.twist)
+    twist = rb.vee_se3(rb.inverse_se3(SCREWS(TIMES[1:-1])) @ rates(SCREWS))
+    assert np.abs(twist - SCREWS.twist).max() < 1e-11
+    a, b, ab = SCREWS([0.2, 0.5, 0.7])
+    assert np.abs(a @ b - ab).max() > 0.1  # A itself is no subgroup, unless A0 = I
+
+
+@pytest.mark.source("errata 15")
+@pytest.mark.parametrize("curve", [SCREWS, GEODESICS], ids=["screws", "geodesics"])
+def test_the_definitions_as_printed_without_the_dot_hold_of_every_curve(curve):
+    A = curve(TIMES)
+    assert np.abs(rb.inverse_se3(A) @ A - np.eye(4)).max() < 1e-13
+    assert np.abs(A @ rb.inverse_se3(A[:1]) @ A[:1] - A).max() < 1e-13
+
+
+@pytest.mark.source("errata 15")
+def test_the_subgroup_through_a_pose_is_not_unique():
+    S = np.array([0, 0, 1.0, 0.3, -0.2, 0.5])
+    w, v = S[:3], S[3:]
+    screw = rb.screw_from_pose(rb.exp_se3(S))
+    longer = w * (1 + 2 * np.pi)
+    along = screw.slide * screw.axis
+    other = np.concatenate([longer, along - np.cross(longer, screw.point)])
+    assert np.abs(rb.exp_se3(other) - rb.exp_se3(S)).max() < 40 * EPS
+    assert np.abs(rb.exp_se3(other / 2) - rb.exp_se3(S / 2)).max() > 0.1
+    assert np.abs(v - (along - np.cross(w, screw.point))).max() < 4 * EPS
+
+
+@pytest.mark.source("BK 2.6")
+def test_chasles_every_displacement_turns_about_an_axis_and_slides_along_it():
+    screw = rb.screw_from_pose(A1)
+    on_axis = screw.point + 3 * screw.axis
+    moved = (A1[:, :3, :3] @ on_axis[..., None])[..., 0] + A1[:, :3, 3]
+    assert np.abs(moved - on_axis - screw.slide[:, None] * screw.axis).max() < 100 * EPS
+    assert np.abs(np.vecdot(screw.point, screw.axis)).max() < 40 * EPS
+    assert np.abs(np.linalg.norm(screw.axis, axis=-1) - 1).max() < 4 * EPS
+    trace = np.trace(A1[:, :3, :3], axis1=1, axis2=2)
+    assert np.abs(np.cos(screw.angle) - (trace - 1) / 2).max() < 20 * EPS
+    assert np.array_equal(screw.pitch, screw.slide / screw.angle)
+
+
+def test_displacements_that_do_not_turn_or_by_rounding_only_slide():
+    still = rb.screw_from_pose(np.eye(4))
+    assert not np.any([*still.axis, *still.point, still.angle, still.slide])
+    assert np.isnan(still.pitch)
+    B, C = Rotation.random(400, rng=RNG).as_matrix().reshape(2, 200, 3, 3)
+    rounded = B @ (B.mT @ C) @ C.mT
+    assert np.abs(rb.log_so3(rounded)).max() > 0
+    exact = [(np.eye(3), size, 4 * EPS) for size in (1e-300, 1e-170, 1, 1e170, 1e300)]
+    for R, size, off in ((rounded, 5, 8 * EPS), *exact):
+        screw = rb.screw_from_pose(rb.pose_from_components(R, size * np.array([0, 0.6, 0.8])))
+        assert np.all(screw.angle == 0)
+        assert np.all(screw.point == 0)
+        assert np.abs(screw.axis - [0, 0.6, 0.8]).max() < off
+        assert screw.slide == pytest.approx(size, rel=off)
+        assert np.all(screw.pitch == np.inf)
+
+
+def test_a_small_turn_is_a_turn():
+    axis = np.array([0.6, 0, 0.8])
+    for angle in (1e-3, 1e-6, 1e-9):
+        screw = rb.screw_from_pose(rb.exp_se3(np.append(angle * axis, 2 * axis)))
+        assert np.abs(screw.axis - axis).max() < 8 * EPS / angle
+        assert screw.slide == pytest.approx(2, rel=8 * EPS / angle)
+        assert screw.angle == pytest.approx(angle, rel=8 * EPS / angle)
+
+
+def test_the_last_row_is_not_read():
+    wrong = np.eye(4)
+    wrong[3] = 7
+    assert np.array_equal(rb.screw_se3(wrong, A1)(0.3), rb.screw_se3(np.eye(4), A1)(0.3))
+
+
+@pytest.mark.source("BK (10)", "BK (14)")
+def test_every_point_of_the_body_runs_on_a_helix_of_one_axis():
+    """The distance to the axis does not change, the height grows evenly; so it is for no geodesic
+    of metric (14) that turns and moves across its axis."""
+    screw = rb.screw_from_pose(A1 @ rb.inverse_se3(A0))
+
+    def distance_and_height(curve):
+        x = curve(TIMES)[..., :3, :3] @ np.array([0.3, -1.0, 0.5]) + curve(TIMES)[..., :3, 3]
+        height = np.vecdot(x - screw.point, screw.axis)
+        across = x - screw.point - height[..., None] * screw.axis
+        return np.linalg.norm(across, axis=-1), height
+
+    distance, height = distance_and_height(SCREWS)
+    assert np.abs(distance - distance[0]).max() < 1e-13
+    assert np.abs(np.diff(height, 2, axis=0)).max() < 1e-13
+    assert np.ptp(distance_and_height(GEODESICS)[0], axis=0).min() > 1e-3

@@ -14,19 +14,35 @@ PATH, ARM_PATH = RNG.uniform(-3, 3, (12, 3)), RNG.uniform(-3, 3, (12, 2))
 PLAN = [([1, 0.5, -1], 2), ([0, 0, 3], 0.5)]
 
 
+@pytest.fixture(autouse=True)
+def figures_are_closed():
+    yield
+    plt.close("all")
+
+
+def is_saved_small(animation, folder):
+    animation.save(folder / "path.gif")
+    return (folder / "path.gif").stat().st_size < 500_000
+
+
+def edges_of(figure):
+    return np.linalg.norm(np.diff(figure.axes[0].patches[-1].get_xy(), axis=0), axis=1)[:4]
+
+
+def way_of(figure):
+    way = next(line for line in figure.axes[0].lines if line.get_color() == COLOURS["path"])
+    return np.transpose(way.get_data())
+
+
 @pytest.mark.source("RR 3.1", "RR (14)", "RR (15)", "RR (16)")
-def test_a_body_goes_in_ten_steps_unless_told_otherwise():
+@pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
+def test_a_body_goes_in_ten_steps_and_obeys_in_the_world_unless_told_otherwise():
     start, goal = PATH[:2]
     path = rr.interpolate_rigid_body(start, goal)
-    assert path.shape == (11, 3)
     assert np.abs(path - np.linspace(start, goal, 11)).max() < 1e-15
     assert rr.interpolate_rigid_body(start, goal, steps=3).shape == (4, 3)
     short = rr.interpolate_rigid_body([0, 0, 3], [0, 0, -3], shortest=True)
     assert short[-1, 2] == pytest.approx(2 * np.pi - 3)
-
-
-@pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
-def test_a_body_obeys_in_the_frame_of_the_world_unless_told_otherwise():
     path = rr.forward_propagate_rigid_body([0, 0, 0.5], PLAN)
     assert np.array_equal(path, [[0, 0, 0.5], [2, 1, -1.5], [2, 1, 0]])
     in_body = rr.forward_propagate_rigid_body([0, 0, 0.5], PLAN, frame="body")
@@ -47,16 +63,11 @@ def test_an_arm_goes_and_obeys():
 def test_a_path_is_shown(states, tmp_path):
     figure, animation = rr.visualize_path(PATH[:states])
     assert isinstance(figure, Figure)
-    assert len(animation.pictures) == states
+    assert len(animation.pictures) == len(animation.states) == states
     assert animation.alt.startswith("A rectangle goes from (")
-    (ax,) = figure.axes
-    way = next(line for line in ax.lines if line.get_color() == COLOURS["path"])
-    assert np.array_equal(np.transpose(way.get_data()), PATH[:states, :2])
-    animation.save(tmp_path / "path.gif")
-    assert (tmp_path / "path.gif").stat().st_size < 500_000
-    assert len(animation.states) == states
+    assert np.array_equal(way_of(figure), PATH[:states, :2])
+    assert is_saved_small(animation, tmp_path)
     assert "<script>" in animation._repr_html_()
-    plt.close(figure)
 
 
 @pytest.mark.source("RR 4.3", "RR Fig. 8", "RR Fig. 9")
@@ -70,12 +81,9 @@ def test_an_arm_path_is_shown(states, tmp_path):
     tip = rb.arm.arm_forward_kinematics(ARM_PATH[:states]).joints
     assert np.array_equal(np.transpose(way.get_data()), tip[:, -1])
     assert np.array_equal(np.transpose(links.get_data()), tip[-1])
-    blue, red = (plt.matplotlib.colors.to_rgb(line.get_color()) for line in (links, way))
-    assert np.argmax(blue) == 2
-    assert np.argmax(red) == 0
-    animation.save(tmp_path / "arm.gif")
-    assert (tmp_path / "arm.gif").stat().st_size < 500_000
-    plt.close(figure)
+    for line, channel in ((links, 2), (way, 0)):  # blue, and red
+        assert np.argmax(plt.matplotlib.colors.to_rgb(line.get_color())) == channel
+    assert is_saved_small(animation, tmp_path)
 
 
 def test_of_a_long_path_forty_states_are_frames_and_all_are_drawn(tmp_path):
@@ -85,37 +93,19 @@ def test_of_a_long_path_forty_states_are_frames_and_all_are_drawn(tmp_path):
     for path, length in ((noise, 1.5), (dense, 0.3), (dense, None)):
         figure, animation = rr.visualize_path(path, length=length)
         assert len(animation.pictures) == 40
-        way = next(line for line in figure.axes[0].lines if line.get_color() == COLOURS["path"])
-        assert len(way.get_xdata()) == len(path)
-        animation.save(tmp_path / "path.gif")
-        assert (tmp_path / "path.gif").stat().st_size < 500_000
-        plt.close(figure)
-
-
-def place_of(body):
-    """The centre of a rectangle, as drawn."""
-    return body.get_xy()[:4].mean(axis=0)
+        assert len(way_of(figure)) == len(path)
+        assert is_saved_small(animation, tmp_path)
 
 
 def test_six_states_are_pale_and_the_last_is_on_top():
     figure, _ = rr.visualize_path(PATH)
-    *pale, body = figure.axes[0].patches
-    shown = [0, 2, 4, 7, 9, 11]
-    for ghost, i in zip(pale, shown, strict=True):
-        assert np.abs(place_of(ghost) - PATH[i, :2]).max() < 1e-14
-    assert np.abs(place_of(body) - PATH[-1, :2]).max() < 1e-14
+    shown, body = [0, 2, 4, 7, 9, 11], figure.axes[0].patches[-1]
+    centres = [patch.get_xy()[:4].mean(axis=0) for patch in figure.axes[0].patches]
+    assert np.abs(centres - PATH[[*shown, -1], :2]).max() < 1e-14
     assert all(body.get_zorder() > other.get_zorder() for other in figure.axes[0].lines[:-1])
-    plt.close(figure)
     figure, _ = rr.visualize_arm_path(ARM_PATH)
-    for line, i in zip(figure.axes[0].lines[:-2], shown, strict=True):
-        wanted = rb.arm.arm_forward_kinematics(ARM_PATH[i]).joints
-        assert np.abs(np.transpose(line.get_data()) - wanted).max() < 1e-14
-    plt.close(figure)
-
-
-def length_of(figure):
-    corners = figure.axes[0].patches[-1].get_xy()
-    return np.linalg.norm(corners[1] - corners[0])
+    pale = [np.transpose(line.get_data()) for line in figure.axes[0].lines[:-2]]
+    assert np.abs(pale - rb.arm.arm_forward_kinematics(ARM_PATH[shown]).joints).max() < 1e-14
 
 
 @pytest.mark.parametrize("place", [[0, 0], [1.1, 0.7], [1e6, -2e6], [1e14, 0]])
@@ -126,10 +116,10 @@ def test_a_body_that_turns_on_the_spot_is_seen(place):
     driven = rr.forward_propagate_rigid_body([*place, 0], circle, frame="body")
     for path in (spin, driven):
         figure, animation = rr.visualize_path(path)
-        assert length_of(figure) == pytest.approx(max(1, 1e-12 * np.abs(place).max()), rel=1e-4)
+        length = max(1, 1e-12 * np.abs(place).max())
+        assert edges_of(figure)[0] == pytest.approx(length, rel=1e-4)
         assert len(set(np.asarray(animation.pictures[0]).ravel())) > 10
         assert "its centre covers 0 m" in animation.alt
-        plt.close(figure)
 
 
 @pytest.mark.parametrize(
@@ -140,53 +130,41 @@ def test_the_rectangle_is_a_fifth_of_the_extent_and_the_words_have_the_scale(siz
     path = np.array([[far, 0, 0], [far + 2 * size, size, 0]])
     figure, animation = rr.visualize_path(path)
     extent = path[1, 0] - far
-    assert length_of(figure) == pytest.approx(extent / 5, rel=1e-3)
+    assert edges_of(figure)[0] == pytest.approx(extent / 5, rel=1e-3)
     assert f"{float(f'{size:.3g}'):.10g}) m, heading" in animation.alt
     covered = np.hypot(extent, size)
     assert f"covers {float(f'{covered:.3g}'):.10g} m" in animation.alt
-    plt.close(figure)
 
 
-def test_more_links_need_their_lengths():
-    figure, animation = rr.visualize_arm_path(RNG.normal(size=(3, 4)), lengths=[1, 2, 3, 4])
+def test_lengths_of_the_rectangle_and_of_links_may_be_given():
+    for length in (0.3, 2):
+        figure, _ = rr.visualize_path([[0, 0, 0], [9, 1, 0.5]], length=length)
+        assert np.allclose(edges_of(figure), [length, length / 2] * 2)
+    _, animation = rr.visualize_arm_path(RNG.normal(size=(3, 4)), lengths=[1, 2, 3, 4])
     assert "links of 1, 2, 3 and 4 m" in animation.alt
-    plt.close(figure)
-    with pytest.raises(ValueError, match=r"^lengths: shape \(4\) wanted, got \(2,\)"):
-        rr.visualize_arm_path(RNG.normal(size=(3, 4)))
 
 
-@pytest.mark.parametrize("length", [0.3, 2])
-def test_the_rectangle_is_as_long_as_told(length):
-    figure, _ = rr.visualize_path([[0, 0, 0], [9, 1, 0.5]], length=length)
-    corners = figure.axes[0].patches[-1].get_xy()
-    edges = np.linalg.norm(np.diff(corners, axis=0), axis=1)[:4]
-    assert np.allclose(edges, [length, length / 2] * 2)
-    plt.close(figure)
-
-
-def test_bad_input_is_named_and_no_figure_stays_open():
-    for call, message in (
-        (lambda: rr.interpolate_rigid_body([0, 0], [1, 1, 1]), r"^start_pose: shape \(3\)"),
-        (lambda: rr.interpolate_rigid_body([0, 0, 0], [[1, 1, 1]]), r"^goal_pose: shape \(3\)"),
-        (lambda: rr.forward_propagate_rigid_body([0, 0, np.nan], []), r"^start_pose\[2\] is nan"),
-        (lambda: rr.forward_propagate_rigid_body([0, 0, 0], [([1, 0], 1)]), r"^plan\[0\] velocity"),
-        (lambda: rr.interpolate_arm([0, 0], [1, 1, 1]), r"^goal: shape \(2\) wanted"),
-        (lambda: rr.interpolate_arm([[0, 0]], [1, 1]), r"^start: shape \(n\) wanted"),
-        (lambda: rr.forward_propagate_arm([[0, 0]], []), r"^start_pose: shape \(n\) wanted"),
-        (lambda: rr.visualize_path(np.zeros((0, 3))), r"^path: shape"),
-        (lambda: rr.visualize_path([0, 0, 0]), r"^path: shape"),
-        (lambda: rr.visualize_path([[0, 0]]), r"^path: shape"),
-        (lambda: rr.visualize_path([[0, 0, np.inf]]), r"^path\[0, 2\] is inf"),
-        (
-            lambda: rr.visualize_path([[0, 0, 0]], length=0),
-            r"^length: above 0 wanted, and enough to",
-        ),
-        (lambda: rr.visualize_path([[1e17, 0, 0]], length=1), r"^length: above 0 wanted, and"),
-        (lambda: rr.visualize_path([[0, 0, 0]], length=np.nan), r"^length is nan"),
-        (lambda: rr.visualize_arm_path(np.zeros((0, 2))), r"^path: shape"),
-        (lambda: rr.visualize_arm_path([0, 0]), r"^path: shape"),
-        (lambda: rr.visualize_arm_path([[0, 0]], lengths=[1, -1]), r"^lengths\[1\] is -1"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            call()
+@pytest.mark.parametrize(
+    ("function", "arguments", "options", "message"),
+    [
+        (rr.interpolate_rigid_body, ([0, 0], [1, 1, 1]), {}, r"start_pose: shape \(3\)"),
+        (rr.interpolate_rigid_body, ([0, 0, 0], [[1, 1, 1]]), {}, r"goal_pose: shape \(3\)"),
+        (rr.forward_propagate_rigid_body, ([0, 0, np.nan], []), {}, r"start_pose\[2\] is nan"),
+        (rr.interpolate_arm, ([0, 0], [1, 1, 1]), {}, r"goal: shape \(2\) wanted"),
+        (rr.interpolate_arm, ([[0, 0]], [1, 1]), {}, r"start: shape \(n\) wanted"),
+        (rr.forward_propagate_arm, ([[0, 0]], []), {}, r"start_pose: shape \(n\) wanted"),
+        (rr.visualize_path, (np.zeros((0, 3)),), {}, "path: shape"),
+        (rr.visualize_path, ([[0, 0]],), {}, "path: shape"),
+        (rr.visualize_path, ([[0, 0, np.inf]],), {}, r"path\[0, 2\] is inf"),
+        (rr.visualize_path, ([[0, 0, 0]],), {"length": 0}, "length: above 0 wanted, and enough"),
+        (rr.visualize_path, ([[1e17, 0, 0]],), {"length": 1}, "length: above 0 wanted, and"),
+        (rr.visualize_path, ([[0, 0, 0]],), {"length": np.nan}, "length is nan"),
+        (rr.visualize_arm_path, (np.zeros((0, 2)),), {}, "path: shape"),
+        (rr.visualize_arm_path, (np.ones((3, 4)),), {}, r"lengths: shape \(4\) wanted, got \(2,\)"),
+        (rr.visualize_arm_path, ([[0, 0]],), {"lengths": [1, -1]}, r"lengths\[1\] is -1"),
+    ],
+)
+def test_bad_input_is_named_and_no_figure_stays_open(function, arguments, options, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        function(*arguments, **options)
     assert plt.get_fignums() == []

@@ -12,37 +12,33 @@ import rbcourse as rb
 from rbcourse import textbook
 
 EPS = np.finfo(float).eps
+TIMES = np.linspace(0, 1, 101)
 ALONG = np.pi / 6 * np.array([1, 2, 3])
-E1 = np.array([1.0, 0, 0])
 PAPER = {
-    "4b": (ALONG, ALONG, ALONG + E1),
-    "4c": (ALONG, ALONG, ALONG + 5 * E1),
+    "4b": (ALONG, ALONG, ALONG + np.eye(3)[0]),
+    "4c": (ALONG, ALONG, ALONG + 5 * np.eye(3)[0]),
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
 }
-
-
-def condition(M, R):
-    """‖M‖ over the sum of the two smallest eigenvalues of RᵀM: what rounding grows by."""
-    return np.linalg.norm(M, axis=(-2, -1)) / oracles.two_smallest_eigenvalues(R.mT @ M)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 @pytest.mark.source("BK Prop. 2")
 def test_the_projection_is_the_textbooks(n):
+    """To ‖M‖ over the sum of the two smallest eigenvalues of RᵀM, by which rounding grows."""
     M = np.random.default_rng(n).normal(size=(1000, n, n))
     R = textbook.project_so(M)
+    condition = np.linalg.norm(M, axis=(-2, -1)) / oracles.two_smallest_eigenvalues(R.mT @ M)
     off = np.abs(rb.project_so(M) - R).max(axis=(-2, -1))
-    assert np.all(off < 8 * n * EPS * (1 + condition(M, R)))
+    assert np.all(off < 8 * n * EPS * (1 + condition))
     assert np.linalg.det(R).min() > 0 > np.linalg.det(M).min()
 
 
 @pytest.mark.source("BK 6.1")
 def test_the_geodesic_is_the_textbooks():
-    t = np.linspace(0, 1, 101)
     for turn in (ALONG, [0, 0, 0], [1e-9, 0, 2e-9], [0, 3.14, 0], [0, 0, np.pi]):
         R0 = Rotation.random(rng=6).as_matrix()
         R1 = R0 @ rb.exp_so3(turn)
-        off = np.abs(rb.geodesic_so3(R0, R1)(t) - textbook.geodesic_so3(R0, R1, t))
+        off = np.abs(rb.geodesic_so3(R0, R1)(TIMES) - textbook.geodesic_so3(R0, R1, TIMES))
         assert off.max() < 8 * EPS
 
 
@@ -50,14 +46,12 @@ def test_the_geodesic_is_the_textbooks():
 def test_the_projected_cubic_is_the_textbooks():
     """To eps over the least gap, its derivatives to that over its square and its cube."""
     rng = np.random.default_rng(62)
-    t = np.linspace(0, 1, 101)
     for _ in range(40):
-        R0, R1 = Rotation.random(2, rng=rng).as_matrix()
-        w0, w1 = 3 * rng.normal(size=(2, 3))
-        curve = rb.projected_cubic_so3(R0, R1, w0, w1)
+        ends = *Rotation.random(2, rng=rng).as_matrix(), *3 * rng.normal(size=(2, 3))
+        curve = rb.projected_cubic_so3(*ends)
         size = np.linalg.norm(curve.ends, axis=(-2, -1)).sum() / min(curve.margin, 1)
-        for order, want in enumerate(textbook.projected_cubic_so3(R0, R1, w0, w1, t)):
-            assert np.abs(curve(t, order) - want).max() < 4 * EPS * size ** (1 + order)
+        for order, want in enumerate(textbook.projected_cubic_so3(*ends, TIMES)):
+            assert np.abs(curve(TIMES, order) - want).max() < 4 * EPS * size ** (1 + order)
 
 
 @pytest.mark.parametrize(
@@ -74,29 +68,24 @@ def test_samplers_draw_what_the_textbooks_draw(name, core, count):
     assert fast.random() == slow.random()
 
 
-@pytest.mark.parametrize("case", PAPER)
-@pytest.mark.source("BK (19)")
-def test_the_optimum_is_the_textbooks(case):
-    turn, w0, w1 = PAPER[case]
-    R0, t = Rotation.random(rng=19).as_matrix(), np.linspace(0, 1, 101)
-    ends = R0, R0 @ rb.exp_so3(turn), w0, w1
-    curve = rb.minimum_acceleration_so3(*ends)
-    for order, want in enumerate(textbook.minimum_acceleration_so3(*ends, t)):
-        assert np.abs(curve(t, order) - want).max() < 1e-9 * max(1, np.abs(want).max())
+BODY = np.diag([1, 2.2, 2.9])
 
 
-@pytest.mark.source("beyond BK 4")
-@pytest.mark.parametrize("case", PAPER)
-def test_the_least_torque_is_the_textbooks(case):
-    turn, w0, w1 = PAPER[case]
-    R0, t, G = Rotation.random(rng=19).as_matrix(), np.linspace(0, 1, 101), np.diag([1, 2.2, 2.9])
-    ends = R0, R0 @ rb.exp_so3(turn), w0, w1, G
-    curve = rb.minimum_torque_so3(*ends)
-    for order, want in enumerate(textbook.minimum_torque_so3(*ends, t)):
-        assert np.abs(curve(t, order) - want).max() < 1e-8 * max(1, np.abs(want).max())
+@pytest.mark.parametrize(("turn", "w0", "w1"), PAPER.values(), ids=PAPER)
+@pytest.mark.parametrize(
+    ("name", "inertia", "bound"),
+    [("minimum_acceleration_so3", (), 1e-9), ("minimum_torque_so3", (BODY,), 1e-8)],
+)
+@pytest.mark.source("BK (19)", "beyond BK 4")
+def test_the_optima_are_the_textbooks(name, inertia, bound, turn, w0, w1):
+    R0 = Rotation.random(rng=19).as_matrix()
+    given = R0, R0 @ rb.exp_so3(turn), w0, w1, *inertia
+    curve = getattr(rb, name)(*given)
+    for order, want in enumerate(getattr(textbook, name)(*given, TIMES)):
+        assert np.abs(curve(TIMES, order) - want).max() < bound * max(1, np.abs(want).max())
 
 
-def test_what_is_shown_is_the_code_without_its_docstring(capsys):
+def test_code_is_shown_without_its_docstring(capsys):
     textbook.show(textbook.geodesic_so3)
     shown = capsys.readouterr().out
     assert shown.startswith("def geodesic_so3(")
@@ -107,12 +96,12 @@ def test_what_is_shown_is_the_code_without_its_docstring(capsys):
 
 
 def test_an_optimum_that_is_not_found_is_no_result(monkeypatch):
-    def gives_up(*_, **__):
-        return SimpleNamespace(success=False, message="too many nodes")
-
-    monkeypatch.setattr(integrate, "solve_bvp", gives_up)
-    rest = np.zeros(3)
-    with pytest.raises(RuntimeError, match="too many nodes"):
-        textbook.minimum_acceleration_so3(np.eye(3), np.eye(3), rest, rest, np.zeros(1))
-    with pytest.raises(RuntimeError, match="too many nodes"):
-        textbook.minimum_torque_so3(np.eye(3), np.eye(3), rest, rest, np.eye(3), np.zeros(1))
+    failed = SimpleNamespace(success=False, message="too many nodes")
+    monkeypatch.setattr(integrate, "solve_bvp", lambda *_, **__: failed)
+    given = np.eye(3), np.eye(3), np.zeros(3), np.zeros(3)
+    for call in (
+        lambda: textbook.minimum_acceleration_so3(*given, np.zeros(1)),
+        lambda: textbook.minimum_torque_so3(*given, np.eye(3), np.zeros(1)),
+    ):
+        with pytest.raises(RuntimeError, match="too many nodes"):
+            call()

@@ -89,35 +89,29 @@ def test_a_marker_is_kept_once_and_drawn_at_each_point(ax):
 
 
 @pytest.mark.parametrize("width", [3, 15])
-def test_what_leaves_the_picture_keeps_its_slope(width):
-    fig = plt.figure(figsize=(width, 4), dpi=100, layout="none")
-    axes = fig.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, 1), ylim=(0, 1))
-    (line,) = axes.plot([0, 5], [0, 5])
-    ((_, _, places),) = recorded(axes, line)
+def test_what_leaves_the_picture_keeps_its_slope(ax, width):
+    ax.figure.set_size_inches(width, 4)
+    (line,) = ax.plot([0, 5], [0, 5])
+    ((_, _, places),) = recorded(ax, line)
     x, y = (places / [100 * width, 400]).T
     assert np.abs(y - (1 - x)).max() < 1 / (400 * PARTS)
     assert x.max() > 1
-    plt.close(fig)
 
 
-def test_figures_that_are_too_large_are_refused():
-    fig = plt.figure(figsize=(16, 4), dpi=100)
+def test_figures_that_are_too_large_are_refused(ax):
+    ax.figure.set_size_inches(16, 4)
     with pytest.raises(ValueError, match=r"at most 1500 pixels each way wanted, got \(1600, 400\)"):
-        Display(fig)
-    plt.close(fig)
+        Display(ax.figure)
 
 
-def test_a_face_that_has_no_area_in_whole_numbers_is_its_edge():
+def test_a_face_that_has_no_area_in_whole_numbers_is_its_edge(ax):
     """In the browser its plane would part nothing from nothing."""
-    fig = plt.figure(figsize=(3, 3), dpi=100)
-    space = fig.add_subplot(projection="space")
+    space = ax.figure.add_subplot(projection="space")
     space.fit(-np.ones(3), np.ones(3))
     bodies.draw_box(space, np.eye(4), np.array([1.0, 1.0, 1e-4]))
-    display = Display(fig)
-    found = polygons(display.record([]), list(display.styles))
+    ax.remove()
+    found = recorded(space)
     kinds = [style[9] for style, _, _ in found]
     assert kinds.count("line") == 4
     for (_, _, places), kind in zip(found, kinds, strict=True):
         assert kind == "line" or np.linalg.matrix_rank(places - places[0]) == 2
-    plt.close(fig)

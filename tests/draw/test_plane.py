@@ -18,43 +18,37 @@ def ax():
 
 
 def corners(pose, length):
-    """Of the rectangle and of its nose, by complex numbers."""
     x, y, theta = pose
     turn = length * np.exp(1j * theta)
-    outline = complex(x, y) + turn * np.array([-2 - 1j, 2 - 1j, 2 + 1j, -2 + 1j]) / 4
-    return outline, complex(x, y) + turn * 0.5
+    return complex(x, y) + turn * np.array([-2 - 1j, 2 - 1j, 2 + 1j, -2 + 1j]) / 4
 
 
 def assert_body(outline, nose, pose, length):
-    wanted, tip = corners(pose, length)
+    ahead = rb.planar.matrix_from_planar(pose) @ [length / 2, 0, 1]  # as the lesson says
+    assert np.abs(nose.get_xydata()[1] - ahead[:2]).max() < 1e-14
+    wanted = corners(pose, length)
     assert np.abs(outline.get_xy()[:4] @ [1, 1j] - wanted).max() < 1e-14
-    assert abs(nose.get_xydata()[1] @ [1, 1j] - tip) < 1e-14
 
 
 def assert_all_is_seen(ax, length):
-    low, high = np.transpose([ax.get_xlim(), ax.get_ylim()])
-    for pose in PATH:
-        for point in corners(pose, length)[0]:
-            assert low[0] < point.real < high[0]
-            assert low[1] < point.imag < high[1]
-    assert ax.get_aspect() == 1
-
-
-def test_a_table_holds_the_path():
-    table = plane.path_table(PATH)
-    assert list(table) == ["x [m]", "y [m]", "theta [rad]"]
-    assert np.array_equal(np.transpose(list(table.values())), PATH)
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    places = np.concatenate([corners(pose, length) for pose in PATH])
+    assert left < places.real.min() <= places.real.max() < right
+    assert low < places.imag.min() <= places.imag.max() < high
+    assert (ax.get_aspect(), ax.get_xlabel(), ax.get_ylabel()) == (1, "x (m)", "y (m)")
 
 
 @pytest.mark.source("RR 3.3")
-def test_rectangles_stand_at_the_poses_and_all_is_seen(ax):
+def test_rectangles_stand_at_the_poses_of_the_table_and_all_is_seen(ax):
     way, *bodies = plane.draw_route(ax, PATH, 1.5, shown=[0, 2, 3])
     assert {text.get_text(): text.xy[0] for text in ax.texts} == {"start": 0, "goal": 1}
+    table = plane.path_table(PATH)
+    assert list(table) == ["x [m]", "y [m]", "theta [rad]"]
+    assert np.array_equal(np.transpose(list(table.values())), PATH)
     assert np.array_equal(np.transpose(way.get_data()), PATH[:, :2])
     for i, outline, nose in zip([0, 2, 3], bodies[::2], bodies[1::2], strict=True):
         assert_body(outline, nose, PATH[i], 1.5)
     assert_all_is_seen(ax, 1.5)
-    assert ax.get_xlabel() == "x (m)"
 
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
@@ -80,8 +74,7 @@ def test_two_ways_are_compared(ax):
         wanted = path[:, :2] @ [1, 1j] + c * np.exp(1j * path[:, 2])
         assert np.abs(np.transpose(way.get_data()) @ [1, 1j] - wanted).max() < 1e-14
         assert_body(outline, nose, path[1], 1)
-    for one, other in zip(artists[:3], artists[3:], strict=True):
-        assert one.get_linestyle() != other.get_linestyle()
+    assert [one.get_linestyle() for one in artists] == 3 * ["-"] + 3 * ["--"]
     assert [artists[0].get_label(), artists[3].get_label()] == ["one", "other"]
     assert ax.get_ylim()[1] > 4.5
     way = plane.draw_compared(ax, pair, 1, shown=[1])[3]
@@ -104,11 +97,3 @@ def test_the_description_says_from_where_to_where_and_how_it_turns():
     both = plane.describe_routes({"one": PATH, "two": PATH})
     assert both.startswith("A rectangle on its way from start to goal: one; two. In turn, one: ")
     assert both.endswith(f"one: {said} two: {said}")
-
-
-def test_a_rectangle_of_a_drawing_is_that_of_its_matrix(ax):
-    """The nose is half a length ahead, as the lesson says."""
-    pose = [4, 2, 0.5]
-    _, nose = plane.draw_body(ax, np.array(pose), 1.2, "k")
-    ahead = rb.planar.matrix_from_planar(pose) @ [0.6, 0, 1]
-    assert np.abs(nose.get_xydata()[1] - ahead[:2]).max() < 1e-14

@@ -1,13 +1,15 @@
 """Figures as files: the same bytes each time, colours for all eyes."""
 
+import html
 import re
+from functools import partial
 from itertools import combinations
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from rbcourse.draw import save
+from rbcourse.draw import animate, save
 
 TABLE = {"t [1]": [0, 0.5, 1], "theta [1]": [0, 1 / 3, 1]}
 
@@ -19,19 +21,14 @@ def saved(folder, monkeypatch, alt="a line"):
     return save.save_figure(fig, "line", TABLE, alt)
 
 
-def test_a_figure_is_saved_as_picture_document_and_numbers(tmp_path, monkeypatch):
-    picture = saved(tmp_path, monkeypatch)
-    assert {file.name for file in tmp_path.iterdir()} == {"line.png", "line.pdf", "line.csv"}
-    assert picture.png == (tmp_path / "line.png").read_bytes()
-    assert (tmp_path / "line.csv").read_text() == "t [1],theta [1]\n0,0\n0.5,0.333333333333\n1,1\n"
+def test_a_figure_is_saved_as_picture_document_and_numbers_of_the_same_bytes(tmp_path, monkeypatch):
+    picture, _ = (saved(tmp_path / folder, monkeypatch) for folder in "ab")
+    files, again = ({f.name: f.read_bytes() for f in (tmp_path / x).iterdir()} for x in "ab")
+    assert set(files) == {"line.png", "line.pdf", "line.csv"}
+    assert files == again
+    assert picture.png == files["line.png"]
+    assert files["line.csv"] == b"t [1],theta [1]\n0,0\n0.5,0.333333333333\n1,1\n"
     assert plt.get_fignums() == []
-
-
-def test_the_same_input_gives_the_same_bytes(tmp_path, monkeypatch):
-    for folder in ("a", "b"):
-        saved(tmp_path / folder, monkeypatch)
-    for name in ("line.png", "line.pdf", "line.csv"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
 def seen(colour, matrix):
@@ -71,41 +68,42 @@ def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
     assert (tmp_path / "figures" / "empty.png").exists()
 
 
-def test_a_picture_says_what_is_to_be_seen(tmp_path, monkeypatch):
-    picture = saved(tmp_path, monkeypatch, alt='from "0" to <1>')
-    assert repr(picture) == 'line: from "0" to <1>'
-    assert 'alt="from &quot;0&quot; to &lt;1&gt;"' in picture._repr_html_()
-
-
 @pytest.mark.parametrize(
     ("alt", "sentence"),
     [
         ("One of two. The other.", "One of two."),
         ("By 0.5 to 1. Then more. And more.", "By 0.5 to 1."),
         ("A cubic, cf. Figure 5, of 2. order. No more.", "A cubic, cf. Figure 5, of 2. order."),
-        ("A < B: no end", "A &lt; B: no end"),
+        ('A < "B": no end', 'A &lt; "B": no end'),
     ],
 )
 def test_the_caption_is_the_first_sentence_and_the_files(tmp_path, monkeypatch, alt, sentence):
     picture = saved(tmp_path, monkeypatch, alt)
+    assert repr(picture) == f"line: {alt}"
+    assert f'alt="{html.escape(alt)}"' in picture._repr_html_()
     said = f"<figcaption>{sentence} <small>line.png, .pdf, .csv</small></figcaption></figure>"
     assert picture._repr_html_().endswith(said)
 
 
-def test_columns_of_different_shapes_are_refused_and_nothing_is_written(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "one shape wanted, got t [1] (2,), x [m] (3,)"),
+        *(
+            ({"body": ["a"], name: [1.0]}, f"data: {name!r} has to end with")
+            for name in ("pitch [deg]", "t", "angle (rad)", "x[m]")
+        ),
+    ],
+)
+@pytest.mark.parametrize(
+    "saved", [save.save_figure, partial(animate.save_animation, update=list, frames=2)]
+)
+def test_tables_that_are_ragged_or_lack_units_are_refused_and_nothing_is_written(
+    table, message, saved, tmp_path, monkeypatch
+):
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
     fig, _ = plt.subplots()
-    with pytest.raises(ValueError, match=r"one shape wanted, got t \[1\] \(2,\), x \[m\] \(3,\)"):
-        save.save_figure(fig, "bad", {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "")
+    with pytest.raises(ValueError, match=re.escape(message)):
+        saved(fig, "bad", table, alt="")
     assert list(tmp_path.iterdir()) == []
-    plt.close(fig)
-
-
-@pytest.mark.parametrize("name", ["pitch [deg]", "t", "angle (rad)", "x[m]"])
-def test_a_column_without_a_unit_of_the_course_is_refused(name, tmp_path, monkeypatch):
-    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
-    fig, _ = plt.subplots()
-    with pytest.raises(ValueError, match=re.escape(f"data: {name!r} has to end with")):
-        save.save_figure(fig, "pitch", {"body": ["a"], name: [1.0]}, "A pitch.")
-    assert not list(tmp_path.iterdir())
     plt.close(fig)

@@ -56,18 +56,17 @@ def test_it_is_seen_as_matplotlib_sees_it_without_perspective(ax):
     x, y, _ = proj_transform(*places.T, ax.get_proj())
     want = ax.transData.transform(np.stack([x, y], axis=-1))
     assert np.abs(sight.flat(sight.scale * (places - sight.middle)) - want).max() < 1e-9
-    axes = np.stack([sight.right, sight.up, sight.eye])
-    assert np.abs(axes @ axes.T - np.eye(3)).max() < 1e-12
     e, a = np.radians([33, -71])
     eye = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
     assert np.abs(sight.eye - eye).max() < 1e-12
 
 
-@pytest.mark.parametrize("limits", [lambda ax: ax.fit([0, 0, 0], [1, 5, 2]), lambda ax: None])
+@pytest.mark.parametrize("limits", [True, False])
 def test_units_are_equal_and_the_middle_stays(limits):
     fig, ax = plt.subplots(subplot_kw={"projection": "space"})
     ax.plot([0, 1], [0, 5], [0, 20])
-    limits(ax)
+    if limits:
+        ax.fit([0, 0, 0], [1, 5, 2])
     first = ax.sight().origin
     for side in SIDES:
         ax.view_init(*side)
@@ -260,9 +259,8 @@ def test_faces_without_area_part_nothing_and_faces_that_are_not_flat_are_drawn(a
 
 def test_many_faces_can_be_drawn(ax):
     """More than Python can call functions within one another."""
-    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]]) + np.linspace(-1, 1, 1200)[
-        :, None, None
-    ] * [0, 0, 1]
+    corners = np.tile([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]], (1200, 1, 1))
+    corners[..., 2] = np.linspace(-1, 1, 1200)[:, None]
     ax.add_artist(space.Faces(corners, 1200 * ["red"]))
     parts, _ = drawn(ax)
     depths = [part.places[:, 2].mean() for part in parts if part.kind == "face"]

@@ -68,12 +68,15 @@ def test_it_shows_something_before_it_is_touched(explorer):
     assert not explorer.play.playing
 
 
-def test_the_picture_follows_each_control(explorer):
+def test_the_picture_follows_each_control_with_its_figure_and_its_artist(explorer):
+    figure, dot = explorer._fig, explorer.artists["dot"]
     explorer.put(x=7.0)
     assert sent(explorer)[0][0] == [pytest.approx(at(7, 0), abs=0.07)]
     explorer.controls["kind"].value = "high"
     assert sent(explorer)[0][0] == [pytest.approx(at(7, 1), abs=0.07)]
     assert sent(explorer)[1][0][0] == [("place", "7.0\nhigh")]
+    assert explorer._fig is figure
+    assert list(figure.axes[0].lines) == [dot]
 
 
 def test_the_browser_is_sent_the_states_it_asks_for_one_after_the_other(explorer):
@@ -93,34 +96,28 @@ def test_the_browser_is_sent_the_states_it_asks_for_one_after_the_other(explorer
     assert explorer.picture.run["version"] > version
 
 
-def test_what_plays_asks_nothing_while_another_control_starts_anew(explorer):
+@pytest.mark.parametrize(
+    ("act", "count"),
+    [
+        (lambda explorer: setattr(explorer.controls["x"], "value", 5.0), 0),  # it plays
+        (lambda explorer: setattr(explorer.controls["kind"], "value", "high"), 1),
+        (lambda explorer: explorer.put(x=5.0, kind="high"), 1),
+        (lambda explorer: [tell(explorer, index=20) for _ in "ab"], 2),  # though it is the same
+    ],
+)
+def test_each_change_is_sent_once_and_what_plays_asks_nothing(explorer, act, count):
     runs = []
     explorer.picture.observe(lambda change: runs.append(change.new), "run")
-    explorer.controls["x"].value = 5.0
-    assert runs == []
-    explorer.controls["kind"].value = "high"
-    assert len(runs) == 1
-    assert runs[0]["index"] == 10
-
-
-def test_it_keeps_its_figure_and_its_artist(explorer):
-    figure, dot = explorer._fig, explorer.artists["dot"]
-    explorer.put(x=7.0)
-    assert explorer._fig is figure
-    assert list(figure.axes[0].lines) == [dot]
-
-
-def test_several_controls_are_set_with_one_picture(explorer):
-    pictures = []
-    explorer.picture.observe(lambda change: pictures.append(change.new), "run")
-    explorer.put(x=5.0, kind="high")
-    assert explorer.values == {"x": 5.0, "kind": "high"}
-    assert len(pictures) == 1
+    act(explorer)
+    assert len(runs) == count
+    if count == 1:
+        assert runs[0]["index"] == explorer.steps.index(explorer.values["x"])
 
 
 def test_reset_brings_everything_back_and_stops(explorer):
     dots, texts = sent(explorer)
     explorer.put(x=5.0, kind="high")
+    assert explorer.values == {"x": 5.0, "kind": "high"}
     explorer.play.playing = True
     explorer.reset.click()
     assert explorer.values == {"x": 2.0, "kind": "low"}
@@ -135,33 +132,20 @@ def test_play_has_the_steps_of_the_slider_and_its_seconds(explorer):
     assert explorer.steps == [x / 2 for x in range(21)]
 
 
-def test_what_cannot_be_served_is_said_and_nothing_that_moves_is_drawn(explorer):
+def test_what_cannot_be_served_and_a_warning_are_said(explorer):
     explorer.put(x=FAR)
     said = "Nothing to show here: x: too <far>"
     assert sent(explorer) == ([[]], [[[], said, f"A dot. {said}"]])
-    explorer.put(x=3.0)
-    assert notice(explorer) == ""
-    assert sent(explorer)[0][0] == [pytest.approx(at(3, 0), abs=0.07)]
-
-
-def test_a_warning_is_said_and_the_picture_drawn(explorer):
-    explorer.put(x=WARN)
-    (dots, (texts,)) = sent(explorer)
-    assert texts[1] == "nearly too far"
-    assert dots[0] == [pytest.approx(at(8, 0), abs=0.07)]
+    for x, warned in ((3.0, ""), (WARN, "nearly too far")):
+        explorer.put(x=x)
+        assert notice(explorer) == warned
+        assert sent(explorer)[0][0] == [pytest.approx(at(x, 0), abs=0.07)]
 
 
 def test_other_errors_are_not_hidden(explorer):
     explorer._show = lambda **values: 1 / 0
     with pytest.raises(ZeroDivisionError):
         explorer.controls["kind"].value = "high"
-
-
-def test_a_click_is_given_in_the_pixels_of_the_figure(explorer):
-    seen = []
-    explorer._point = lambda x, y: seen.append((x, y)) or {}
-    tell(explorer, place=[0.25, 0.1])
-    assert seen == [(0.25 * 560, 0.9 * 380)]
 
 
 def test_a_click_sets_controls_or_says_why_not(explorer):
@@ -176,6 +160,10 @@ def test_a_click_sets_controls_or_says_why_not(explorer):
     tell(explorer, place=[0.05, 0.5])  # the same place again
     assert notice(explorer) == "click more to the right"
     assert explorer.picture.run["version"] > version
+    seen = []
+    explorer._point = lambda x, y: seen.append((x, y)) or {}
+    tell(explorer, place=[0.25, 0.1])
+    assert seen == [(0.25 * 560, 0.9 * 380)]  # pixels of the figure
 
 
 def test_only_what_can_be_clicked_shows_it(explorer):
@@ -229,29 +217,19 @@ def test_the_state_can_be_sent(explorer):
     assert explorer.picture.made["background"].startswith(b"\x89PNG")
 
 
-def test_an_answer_is_sent_though_it_is_the_same_again(explorer):
-    runs = []
-    explorer.picture.observe(lambda change: runs.append(change.new), "run")
-    tell(explorer, index=20)
-    tell(explorer, index=20)
-    assert len(runs) == 2
-
-
 @pytest.mark.parametrize(
     ("step", "shown"), [(1.0, ".0f"), (0.25, ".2f"), (0.05, ".2f"), (5.0, ".0f")]
 )
-def test_readouts_have_the_digits_of_the_step(step, shown):
-    assert slider("x (m)", 0.0, 0.0, 10.0, step).readout_format == shown
+def test_readouts_have_the_digits_of_the_step_and_follow_while_dragged(step, shown):
+    control = slider("x (m)", 0.0, 0.0, 10.0, step)
+    assert control.readout_format == shown
+    assert control.continuous_update
 
 
-def test_sliders_follow_while_they_are_dragged(explorer):
-    assert slider("x (m)", 0.0, 0.0, 10.0, 1.0).continuous_update
-    assert explorer.controls["x"].continuous_update
-    assert isinstance(explorer.controls["x"], ipywidgets.SelectionSlider)
-
-
-def test_what_plays_has_its_steps_and_nothing_between(explorer):
+def test_what_plays_has_its_steps_and_nothing_between():
     control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)
     labels = ("−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3")
+    assert isinstance(control, ipywidgets.SelectionSlider)
+    assert control.continuous_update
     assert control._options_labels == labels
     assert [value for _, value in control.options] == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]
