@@ -37,6 +37,7 @@ from rbclassroom.assignments.restore import (
     read_notebook,
     title_of,
 )
+from rbclassroom.assignments.tables import update
 from rbclassroom.assignments.writing import write_csv
 
 WORKERS = 2  # so many students are graded at once
@@ -66,6 +67,7 @@ def grade(name: str, assignments: Path) -> Path:
     before = Path(course.root, "gradebook.db")
     if before.exists():
         shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
+    update(find_set(name, assignments))
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")

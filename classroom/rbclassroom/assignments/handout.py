@@ -20,6 +20,7 @@ from traitlets.config.loader import PyFileConfigLoader
 
 from rbclassroom.assignments.client import BoundedClient
 from rbclassroom.assignments.restore import is_answer
+from rbclassroom.assignments.tables import update
 from rbclassroom.assignments.writing import write_whole
 from rbclassroom.course.notebooks import KERNEL
 
@@ -56,6 +57,7 @@ def read_config(assignments: Path) -> Config:
 def release(name: str, assignments: Path) -> dict[str, bytes]:
     """Return what ``nbgrader generate_assignment`` makes, checked to give nothing away."""
     source, config = find_set(name, assignments), read_config(assignments)
+    update(source)
     given = nbformat.read(source / f"{name}.ipynb", as_version=4)
     notebook, about = copy.deepcopy(given), dict[str, Any]()
     try:

@@ -1,15 +1,14 @@
-"""Problems that give hints: a student's function compared with an answer and known mistakes.
+"""Problems that give hints: a student's function compared with answers and known mistakes.
 
-What is right is accepted; else `NotYet` is raised, whose text is one hint. What people get wrong is
-listed with each problem, as functions that get it wrong in the same way: a student's function that
-agrees with one of them everywhere gets its hint.
+What is right is accepted; else `NotYet` is raised, whose text is one hint. The data of a problem
+are numbers: inputs, right answers, and what functions return that make a known mistake. A student's
+function that agrees with one of these on all inputs gets its hint.
 """
 
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from inspect import signature
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -21,20 +20,20 @@ IN_RADIANS = (
 )
 
 
-class Mistake:
-    """What people get wrong, and what to tell them.
+class Mistake(NamedTuple):
+    """A common mistake.
 
-    Parameters
+    Attributes
     ----------
     hint : str
         For the student.
-    *answers : callable
-        Called as the student's function is; each returns what somebody who makes this mistake
-        returns.
+    results : sequence
+        What some functions that make this mistake return: for each a list, with a result for each
+        input of the problem.
     """
 
-    def __init__(self, hint: str, *answers: Callable[..., Any]) -> None:
-        self.hint, self.answers = hint, answers
+    hint: str
+    results: Sequence[Sequence[Any]]
 
 
 @dataclass(frozen=True)
@@ -43,26 +42,29 @@ class Problem:
 
     Parameters
     ----------
-    answer : callable
-        The right answer.
-    inputs : sequence of tuple
+    names : sequence of str
+        The names of its arguments.
+    inputs : sequence of sequence
         The arguments of each trial; so many, and so general, that no mistake agrees with the
         answer, or with another mistake, on all of them.
+    answers : sequence
+        The right result of each trial.
     mistakes : sequence of Mistake
-    read : callable
-        What counts of a result: angles up to full turns, say.
-    allowed : tuple of str
+    allowed : sequence of str
         Names of the package that the student may use.
     accuracy : float
         How far an entry may be off, in units of the largest entry, or of 1.
+    angles : sequence of int
+        Which entries of a result are angles that count up to full turns.
     """
 
-    answer: Callable[..., Any]
-    inputs: Sequence[tuple[Any, ...]]
-    mistakes: Sequence[Mistake]
-    read: Callable[[Array], Array] = np.array
-    allowed: tuple[str, ...] = ()
+    names: Sequence[str]
+    inputs: Sequence[Sequence[Any]]
+    answers: Sequence[Any]
+    mistakes: Sequence[Mistake] = ()
+    allowed: Sequence[str] = ()
     accuracy: float = 1e-9
+    angles: Sequence[int] = ()
 
     def accepts(self, function: Callable[..., Any]) -> bool:
         """Compare a function with the answer on all inputs."""
@@ -70,44 +72,52 @@ class Problem:
         print("As it should be, on these inputs. Others are tried when it is graded.")
         return True
 
-    def on(self, *inputs: tuple[Any, ...]) -> Self:
-        """Return the problem with other inputs, for hidden tests."""
-        return replace(self, inputs=inputs)
-
-    def results(self, answer: Callable[..., Any]) -> list[Any]:
-        """Return what an answer gives for each input."""
-        return [answer(*copy.deepcopy(trial)) for trial in self.inputs]
+    def on(self, inputs: Sequence[Sequence[Any]], answers: Sequence[Any]) -> Self:
+        """Return the problem with other inputs and their answers, for hidden tests."""
+        return replace(self, inputs=inputs, answers=answers, mistakes=())
 
     def same(self, got: Any, wanted: Any) -> bool:
         """Return whether two results are the same, to the accuracy of the problem."""
         one, other = as_numbers(got), as_numbers(wanted)
         if one is None or other is None or one.shape != other.shape:
             return False
-        one, other = self.read(one), self.read(other)
+        one, other = self._read(one), self._read(other)
         scale = max(1.0, float(np.abs(other).max(initial=0)))
         return bool(np.abs(one - other).max(initial=0) <= self.accuracy * scale)
 
+    def _read(self, numbers: Array) -> Array:
+        """Return numbers with the cosine and the sine of each angle in its place."""
+        if not self.angles:
+            return numbers
+        turned = numbers.ravel()[list(self.angles)]
+        rest = np.delete(numbers, self.angles)
+        return np.concatenate([rest, np.cos(turned), np.sin(turned)])
+
     def _examine(self, function: Callable[..., Any]) -> None:
         given = [self._run(function, trial) for trial in self.inputs]
-        wanted = self.results(self.answer)
-        right = [self.same(*pair) for pair in zip(given, wanted, strict=True)]
+        right = [self.same(*pair) for pair in zip(given, self.answers, strict=True)]
         if all(right):
             return
-        for mistake in self.mistakes:
-            if any(all(map(self.same, given, self.results(f))) for f in mistake.answers):
-                raise NotYet(mistake.hint)
-        given_degrees = [_in_radians(value) for value in given]
-        for mistake in self.mistakes:  # two at once
-            if any(all(map(self.same, given_degrees, self.results(f))) for f in mistake.answers):
-                raise NotYet(f"{IN_RADIANS} There is a second mistake: {mistake.hint}")
+        if mistake := self._made(given):
+            raise NotYet(mistake.hint)
+        if mistake := self._made([_in_radians(value) for value in given]):
+            raise NotYet(f"{IN_RADIANS} There is a second mistake: {mistake.hint}")
         first = right.index(False)
-        called = f"For {_named(self.answer, self.inputs[first])}"
-        raise NotYet(self._describe(called, given[first], wanted[first]))
+        arguments = zip(self.names, self.inputs[first], strict=False)
+        called = "For " + ", ".join(f"{name} = {show(value)}" for name, value in arguments)
+        raise NotYet(self._describe(called, given[first], self.answers[first]))
 
-    def _run(self, function: Callable[..., Any], trial: tuple[Any, ...]) -> Any:
-        arguments = copy.deepcopy(trial)
+    def _made(self, given: list[Any]) -> Mistake | None:
+        """Return the first mistake that gives these results."""
+        for mistake in self.mistakes:
+            if any(all(map(self.same, given, results)) for results in mistake.results):
+                return mistake
+        return None
+
+    def _run(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
+        arguments = tuple(copy.deepcopy(trial))
         (result,) = call_student(function, arguments, self.allowed)
-        if not _unchanged(trial, arguments):
+        if not _unchanged(tuple(trial), arguments):
             raise NotYet("Your function changes the arguments that it is given. Work on a copy.")
         return result
 
@@ -135,10 +145,9 @@ class Problem:
 class Drawing(Problem):
     """A function to be written, which draws: judged by the data of what it drew.
 
-    The student's function gets axes before the arguments of `inputs`. `answer` and the mistakes
-    get none, and return the curves that are wanted, each an array of points, shape (n, 2). Others
-    may be drawn besides. The bars of a histogram are a curve too: middle and height of each.
-    Both axes need a label.
+    The student's function gets axes before the arguments of `inputs`. A result is a list of
+    curves, each an array of points, shape (n, 2); others may be drawn besides. The bars of a
+    histogram are a curve too: middle and height of each. Both axes need a label.
     """
 
     accuracy: float = 1e-6
@@ -157,10 +166,10 @@ class Drawing(Problem):
         drawn = [*got, *(curve[::-1] for curve in got)]
         return all(any(super(Drawing, self).same(d, w) for d in drawn) for w in wanted)
 
-    def _run(self, function: Callable[..., Any], trial: tuple[Any, ...]) -> Any:
+    def _run(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
         return curves_of(self._draw(function, trial))
 
-    def _draw(self, function: Callable[..., Any], trial: tuple[Any, ...]) -> Any:
+    def _draw(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
         from matplotlib.figure import Figure
 
         axes = Figure().subplots()
@@ -241,11 +250,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, complex):
         return complex(round(value.real, 4), round(value.imag, 4))
     return round(value, 4) + 0 if isinstance(value, float) else value
-
-
-def _named(answer: Callable[..., Any], trial: tuple[Any, ...]) -> str:
-    names = list(signature(answer).parameters)
-    return ", ".join(f"{name} = {show(value)}" for name, value in zip(names, trial, strict=False))
 
 
 def _unchanged(before: Any, after: Any) -> bool:

@@ -80,14 +80,14 @@ def file_of(module: str) -> str:
 def has_page(module: str) -> bool:
     """Tell whether a module has a page besides its code.
 
-    Private modules, the figures of one lesson and the answers to problems have none.
+    Private modules and the figures of one lesson have none.
 
     Examples
     --------
-    >>> has_page("draw.save"), has_page("_foam"), has_page("assignments.problems.arm")
+    >>> has_page("draw.save"), has_page("_foam"), has_page("figures.lesson03")
     (True, False, False)
     """
-    return not re.search(r"\b(_|conf$|problems\b|figures\b)", module)
+    return not re.search(r"\b(_|conf$|figures\b)", module)
 
 
 def anchor(key: str) -> str:

@@ -95,9 +95,8 @@ def shown_code(root: Path) -> list[Path]:
     packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
-    hidden = [root / "classroom/rbclassroom/assignments/problems"]
     machinery = "assignments", "book", "browser", "hostile"
-    hidden += [root / "classroom/tests" / name for name in machinery]
+    hidden = [root / "classroom/tests" / name for name in machinery]
     return sorted(path for path in paths if not any(map(path.is_relative_to, hidden)))
 
 

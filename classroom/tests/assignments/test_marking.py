@@ -7,12 +7,14 @@ from test_student_code import student
 from rbclassroom.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem, curves_of
 from rbclassroom.assignments.student_code import NotYet
 
+X = [(np.array([1.0, -2.0]), 1), (np.array([0.5, 4.0]), 3)]
 DOUBLE = Problem(
-    answer=lambda x, k: 2 * k * x,
-    inputs=[(np.array([1.0, -2.0]), 1), (np.array([0.5, 4.0]), 3)],
+    names=["x", "k"],
+    inputs=X,
+    answers=[2 * k * x for x, k in X],
     mistakes=[
-        Mistake("half", lambda x, k: x * k / 2, lambda x, k: x / 2),
-        Mistake("sign", lambda x, k: -2 * k * x),
+        Mistake("half", [[x * k / 2 for x, k in X], [x / 2 for x, _ in X]]),
+        Mistake("sign", [[-2 * k * x for x, k in X]]),
     ],
 )
 
@@ -73,8 +75,11 @@ def test_a_mistake_made_in_degrees_gets_both_hints():
 
 
 def test_full_turns_do_not_count_where_the_problem_says_so():
-    problem = Problem(lambda x: x, [(np.array([1.0]),)], [], read=lambda a: np.exp(1j * a).real)
-    assert problem.accepts(student("import numpy as np\ndef answer(x): return x + 2 * np.pi"))
+    x = np.array([1.0, 2.0])
+    problem = Problem(["x"], [(x,)], [x], angles=[1])
+    turned = "import numpy as np\ndef answer(x): return x + 2 * np.pi * np.array([{}, {}])"
+    assert problem.accepts(student(turned.format(0, 1)))
+    assert "off by 6" in told(problem, turned.format(1, 0))
 
 
 def test_inputs_are_not_touched_from_trial_to_trial():
@@ -83,10 +88,13 @@ def test_inputs_are_not_touched_from_trial_to_trial():
     assert all(map(np.array_equal, before, [x for x, _ in DOUBLE.inputs]))
 
 
+T = [np.linspace(0, 1, 5), np.linspace(0, 2, 7)]
 LINE = Drawing(
-    answer=lambda t: [np.column_stack([t, t**2])],
-    inputs=[(np.linspace(0, 1, 5),), (np.linspace(0, 2, 7),)],
-    mistakes=[Mistake("swapped", lambda t: [np.column_stack([t**2, t])])],
+    names=["t"],
+    inputs=[(t,) for t in T],
+    answers=[[np.column_stack([t, t**2])] for t in T],
+    mistakes=[Mistake("swapped", [[[np.column_stack([t**2, t])] for t in T]])],
+    accuracy=1e-6,
 )
 LABELS = "ax.set(xlabel='x [m]', ylabel='y [m]')"
 

@@ -8,21 +8,17 @@ from scipy.spatial.transform import Rotation
 from test_student_code import student
 
 from rbclassroom.assignments.marking import Mistake
-from rbclassroom.assignments.marking_samplers import DELTA, Sampler
-from rbclassroom.assignments.problems.random import (
-    RANDOM_DIRECTION,
-    RANDOM_QUATERNION,
-    RANDOM_ROTATION,
-)
+from rbclassroom.assignments.marking_samplers import DELTA, LAWS, Sampler, quantiles
 from rbclassroom.assignments.student_code import NotYet
 
 COIN = Sampler(
     shape=(),
     fault=lambda x: "outside" if np.abs(x - 0.5).max() > 0.5 else "",
     uniforms=lambda x: {"the number": x},
-    mistakes=[Mistake("squared", lambda n, rng: rng.random(n) ** 2)],
+    mistakes=[Mistake("squared", [[quantiles(np.linspace(0, 1, 4001) ** 2)]])],
     draws=4000,
 )
+PROBLEMS = [Sampler(**law, mistakes=()) for law in LAWS.values()]
 GENERATORS = ("PCG64", "MT19937", "Philox", "SFC64")
 
 
@@ -35,7 +31,7 @@ def draws(problem, n, rng):
     return turns.as_matrix() if problem.shape == (3, 3) else turns.as_quat(scalar_first=True)
 
 
-@pytest.mark.parametrize("problem", [RANDOM_DIRECTION, RANDOM_QUATERNION, RANDOM_ROTATION])
+@pytest.mark.parametrize("problem", PROBLEMS)
 def test_the_chances_of_refusing_a_right_sampler_add_up_to_one_in_a_million(problem):
     """The law of each row is uniform, and Massart's bound holds for every number of draws."""
     rows = problem.uniforms(draws(problem, problem.draws, np.random.default_rng(3)))
@@ -44,7 +40,7 @@ def test_the_chances_of_refusing_a_right_sampler_add_up_to_one_in_a_million(prob
     assert DELTA <= 1e-6
 
 
-@pytest.mark.parametrize("problem", [RANDOM_DIRECTION, RANDOM_QUATERNION, RANDOM_ROTATION])
+@pytest.mark.parametrize("problem", PROBLEMS)
 def test_right_draws_stay_well_within_the_bounds(problem):
     """If rows had other laws than the uniform one, 20 times as many draws would show it."""
     drawn = draws(problem, 20 * problem.draws, np.random.default_rng(17))
@@ -123,8 +119,8 @@ def test_what_goes_wrong_late_is_told_too(late, said):
 
 @pytest.mark.parametrize("step", [1, -1])
 def test_of_two_mistakes_that_look_alike_the_nearer_gets_its_hint(step):
-    near = [Mistake("near", lambda n, rng: rng.random(n) ** 2.02), *COIN.mistakes]
-    alike = replace(COIN, mistakes=near[::step])
+    near = [Mistake("near", [[quantiles(np.linspace(0, 1, 4001) ** 2.02)]]), *COIN.mistakes]
+    alike = replace(COIN, mistakes=near[::step], draws=40_000)
     with pytest.raises(NotYet, match="squared"):
         alike.accepts(student("def answer(rng): return rng.random() ** 1.98"), 5)
 
@@ -141,4 +137,4 @@ def test_draws_that_are_used_twice_are_seen():
             return last[0]
     """
     with pytest.raises(NotYet, match="the angle from a draw to the next"):
-        RANDOM_QUATERNION.accepts(student(source))
+        PROBLEMS[-1].accepts(student(source))

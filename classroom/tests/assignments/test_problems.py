@@ -1,8 +1,9 @@
 """The problem sets: the reference passes, nothing passes, and each wrong answer gets its hint."""
 
 import ast
+import contextlib
 import re
-from importlib import import_module
+import tomllib
 from pathlib import Path
 from textwrap import dedent, indent
 
@@ -10,22 +11,102 @@ import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
 import pytest
-from wrong_answers import HELP, WRONG
+from nbformat.v4 import new_code_cell, new_notebook
 
-from rbclassroom.assignments.marking import Mistake, Problem
-from rbclassroom.assignments.marking_samplers import Sampler
+from rbclassroom.assignments.problems import problem
 from rbclassroom.assignments.student_code import NotYet
 
 SOURCE = Path(__file__).parents[3] / "notebooks" / "assignments" / "source"
 SETS = {path.stem: nbformat.read(path, as_version=4) for path in sorted(SOURCE.glob("*/*.ipynb"))}
-TOPICS = ("plane", "arm", "rotations", "random", "geodesics", "acceleration", "bodies")
+TABLES = {name: tomllib.loads((SOURCE / f"{name}.toml").read_text("utf-8")) for name in SETS}
 TESTS = [
     (name, cell.metadata.nbgrader.grade_id.removesuffix("-test"))
     for name, notebook in SETS.items()
     for cell in notebook.cells
     if cell.metadata.nbgrader.grade_id.endswith("-test")
 ]
-FAILING = [(key, hint, body) for key, pairs in WRONG.items() for hint, body in pairs]
+GENERIC = [  # faults that need no table
+    (
+        ("ps1", "plan"),
+        "Your function changes the arguments",
+        """
+        poses = [start.copy()]
+        for v, d in plan:
+            start += v * d
+            poses.append(start.copy())
+        return np.array(poses)
+        """,
+    ),
+    (
+        ("ps1", "tip"),
+        "The curves are right. The y axis needs a label",
+        """
+        q = start + np.linspace(0, 1, 41)[:, None] * (goal - start)
+        x = lengths[0] * np.cos(q[:, 0]) + lengths[1] * np.cos(q.sum(axis=1))
+        y = lengths[0] * np.sin(q[:, 0]) + lengths[1] * np.sin(q.sum(axis=1))
+        ax.plot(x, y)
+        ax.set_xlabel("x [m]")
+        """,
+    ),
+    (("ps1", "tip"), "Nothing was drawn on the axes", "plt.figure()"),
+    (("ps3", "direction"), "A direction has the length 1", "return rng.normal(size=3)"),
+    (
+        ("ps3", "direction"),
+        "Every call returns the same draw",
+        """
+        rng = np.random.default_rng(0)
+        p = rng.normal(size=3)
+        return p / np.linalg.norm(p)
+        """,
+    ),
+    (
+        ("ps3", "quaternion"),
+        "The length is between 0.71 and 1",
+        """
+        s, a, b = rng.random(), 2 * np.pi * rng.random(), 2 * np.pi * rng.random()
+        r = 1 - s
+        return np.array([s * np.cos(b), r * np.sin(a), r * np.cos(a), s * np.sin(b)])
+        """,
+    ),
+    (("ps3", "quaternion"), "A unit quaternion has the length 1", "return rng.normal(size=4)"),
+    (
+        ("ps3", "rotation"),
+        "A draw is no rotation. If you reflect",
+        """
+        a, b, z = 2 * np.pi * rng.random(), 2 * np.pi * rng.random(), rng.random()
+        V = np.array([np.cos(b) * z, np.sin(b) * z, np.sqrt(1 - z)])
+        return -(np.eye(3) - 2 * np.outer(V, V)) @ RZ(a)
+        """,
+    ),
+    (
+        ("ps3", "rotation"),
+        "The determinant is −1 for all",
+        """
+        a, b, z = 2 * np.pi * rng.random(), 2 * np.pi * rng.random(), rng.random()
+        V = np.array([np.cos(b) * np.sqrt(z), np.sin(b) * np.sqrt(z), np.sqrt(1 - z)])
+        return (np.eye(3) - 2 * np.outer(V, V)) @ RZ(a)
+        """,
+    ),
+    (
+        ("ps3", "rotation"),
+        "The determinant is −1 for ",
+        """
+        Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
+        return Q * np.sign(np.diag(R))
+        """,
+    ),
+    (
+        ("ps3", "rotation"),
+        "A draw is no rotation: its singular values",
+        "return rng.normal(size=(3, 3))",
+    ),
+]
+FAILING = [
+    ((name, slug), mistake["hint"], code)
+    for name, slug in TESTS
+    for mistake in TABLES[name][slug]["mistakes"]
+    for code in mistake["code"]
+] + GENERIC
 
 
 def cells(name):
@@ -42,13 +123,15 @@ def head(source):
     return re.split(r" *### BEGIN SOLUTION", source)[0]
 
 
-def try_answer(name, slug, answer, extra=""):
+def try_answer(name, slug, answer):
     """Run the test of a problem on an answer, after the reference answers of the others."""
     sources = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
     answers = [text for key, text in sources.items() if key.endswith("-answer")]
     space = {"__name__": "__main__"}
-    for text in (sources["setup"], extra, *answers, answer, sources[f"{slug}-test"]):
-        exec(compile(text, "<cell>", "exec"), space)
+    own = TABLES[name]["helpers"]
+    with contextlib.chdir(SOURCE / name):
+        for text in (sources["setup"], own, *answers, answer, sources[f"{slug}-test"]):
+            exec(compile(text, "<cell>", "exec"), space)
 
 
 @pytest.fixture(autouse=True)
@@ -124,20 +207,13 @@ def test_the_examples_in_the_questions_are_right():
     assert {key for key, text in asked.items() if given.search(text)} == set(wanted)
 
 
-@pytest.mark.parametrize(("key", "hint", "body"), FAILING)
+@pytest.mark.parametrize(("key", "hint", "body"), FAILING, ids=range(len(FAILING)))
 def test_a_wrong_answer_gets_its_hint(key, hint, body):
     name, slug = key
     answer = head(cells(name)[f"{slug}-answer"].source) + indent(dedent(body).strip(), "    ")
     with pytest.raises(NotYet) as refused:
-        try_answer(name, slug, answer, HELP)
+        try_answer(name, slug, answer)
     assert str(refused.value).startswith(hint)
-
-
-def listed():
-    """Every problem of the package, with its name."""
-    modules = [import_module(f"rbclassroom.assignments.problems.{topic}") for topic in TOPICS]
-    values = {name: value for module in modules for name, value in vars(module).items()}
-    return {name: value for name, value in values.items() if isinstance(value, Problem | Sampler)}
 
 
 @pytest.mark.parametrize(("name", "slug"), TESTS)
@@ -152,25 +228,14 @@ def test_lists_are_as_good_as_arrays(name, slug):
     try_answer(name, slug, wrapped)
 
 
-def test_every_listed_mistake_is_made_above():
-    hints = {hint for _, hint, _ in FAILING}
-    for name, problem in listed().items():
-        for mistake in problem.mistakes:
-            assert any(map(mistake.hint.startswith, hints)), (name, mistake.hint)
-
-
-def test_every_problem_of_the_package_is_set_once():
-    text = "\n".join(cell.source for notebook in SETS.values() for cell in notebook.cells)
-    for name in listed():
-        assert text.count(f"assert {name}.accepts(") == 1, name
-    assert set(WRONG) == set(TESTS)
-
-
-def test_no_two_mistakes_of_a_problem_have_one_hint():
-    for name, problem in listed().items():
-        starts = [mistake.hint[:30] for mistake in problem.mistakes]
-        assert len(set(starts)) == len(starts), name
-        assert all(isinstance(mistake, Mistake) for mistake in problem.mistakes)
+def test_every_problem_is_in_the_table_of_its_set():
+    for name, table in TABLES.items():
+        assert {slug for slug in table if slug != "helpers"} == {s for n, s in TESTS if n == name}
+        for slug, problem_data in table.items():
+            if slug != "helpers":
+                assert {"inputs", "law"} & set(problem_data)
+                starts = [mistake["hint"][:30] for mistake in problem_data["mistakes"]]
+                assert len(set(starts)) == len(starts) >= 4, slug
 
 
 def marks(cell):
@@ -238,36 +303,46 @@ def test_hidden_tests_need_nothing_of_the_package(name, slug):
     source = cells(name)[f"{slug}-test"].source
     hidden = source.partition("### BEGIN HIDDEN TESTS")[2]
     names = {node.id for node in ast.walk(ast.parse(hidden)) if isinstance(node, ast.Name)}
-    own = {key for key in names if key.isupper() or key in ("rbcourse", "rb")}
-    assert not {key for key in own if not key.startswith("DRAW_")}
+    assert not {key for key in names if key in ("rbcourse", "rb")}
     assert "import" not in hidden
 
 
 @pytest.mark.parametrize(("name", "slug"), TESTS)
 def test_hidden_tests_alone_refuse_what_only_looks_right(name, slug):
     """An answer that knows the visible inputs by heart and nothing else."""
-    problem = listed()[re.search(r"assert (\w+)\.accepts", cells(name)[f"{slug}-test"].source)[1]]
     source = cells(name)[f"{slug}-answer"].source
     function = re.search(r"def (\w+)\(", source)[1]
     hidden = cells(name)[f"{slug}-test"].source.partition("### BEGIN HIDDEN TESTS")[2]
-    space = {"__name__": "__main__"}
+    space = {"__name__": "__main__", "problem": problem}
     exec(cells(name)["setup"].source, space)
-    exec(re.search(r"from rbclassroom.*", cells(name)[f"{slug}-test"].source)[0], space)
-    if isinstance(problem, Sampler):
-        return
-    space[function] = lambda *arguments: problem.answer(*problem.inputs[0])
-    with pytest.raises((AssertionError, ValueError)):
-        exec(hidden, space)
+    with contextlib.chdir(SOURCE / name):
+        known = problem(name, slug)
+        if "law" in TABLES[name][slug]:
+            return
+        space[function] = lambda *arguments: known.answers[0]
+        with pytest.raises((AssertionError, ValueError)):
+            exec(hidden, space)
 
 
-def test_the_example_of_the_page_for_teachers_runs():
+def test_the_example_of_the_page_for_teachers_runs(tmp_path, monkeypatch):
     page = (SOURCE.parent / "README.md").read_text("utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    start = "import numpy as np\ndef area(r): return {}"
-    space = {"__name__": "__main__"}
-    exec(start.format("np.pi * r * r") + "\n" + code, space)
+    (table,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (test,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    head, right = "def area(r):\n", "    return np.pi * r * r"
+    solution = f"{head}    ### BEGIN SOLUTION\n{right}\n    ### END SOLUTION"
+    names = {"setup": "import numpy as np", "area-answer": solution, "area-test": test}
+    given = [new_code_cell(text) for text in names.values()]
+    for cell, name in zip(given, names, strict=True):
+        cell.metadata.nbgrader = {"grade_id": name}
+    folder = tmp_path / "ps9"
+    folder.mkdir()
+    (tmp_path / "ps9.toml").write_text(table, "utf-8")
+    nbformat.write(new_notebook(cells=given), folder / "ps9.ipynb")
+    monkeypatch.chdir(folder)
+    start = f"import numpy as np\n{head}"
+    exec(f"{start}{right}\n{test}", {"__name__": "__main__"})
     with pytest.raises(NotYet, match="This is the circumference"):
-        exec(start.format("2 * np.pi * r") + "\n" + code, {"__name__": "__main__"})
+        exec(f"{start}    return 2 * np.pi * r\n{test}", {"__name__": "__main__"})
 
 
 def test_the_page_for_teachers_lists_the_sets():

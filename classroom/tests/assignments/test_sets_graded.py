@@ -1,18 +1,19 @@
 """The problem sets handed out, handed in and graded, as students and teachers meet them."""
 
+import base64
 import csv
 import html
 import io
 import re
 import shutil
+import tomllib
 from pathlib import Path
-from textwrap import dedent, indent
+from textwrap import indent
 from zipfile import ZipFile
 
 import nbformat
 import pytest
 from nbgrader.api import Gradebook
-from wrong_answers import HELP, WRONG
 
 from rbclassroom.assignments.grade import grade_all
 from rbclassroom.assignments.handout import make_handout, release
@@ -20,6 +21,11 @@ from rbclassroom.assignments.handout import make_handout, release
 ROOT = Path(__file__).parents[3]
 ASSIGNMENTS = ROOT / "notebooks" / "assignments"
 SETS = sorted(path.parent.name for path in ASSIGNMENTS.glob("source/*/*.ipynb"))
+
+
+TABLES = {
+    name: tomllib.loads((ASSIGNMENTS / f"source/{name}.toml").read_text("utf-8")) for name in SETS
+}
 
 
 def source_of(name):
@@ -59,11 +65,11 @@ def wrong(name, text):
     """The release with a wrong answer in each problem."""
     notebook = nbformat.reads(text, as_version=4)
     for cell in notebook.cells:
-        key = name, cell.metadata.nbgrader.grade_id.removesuffix("-answer")
-        if key in WRONG:
-            _, body = WRONG[key][-1]
+        slug = cell.metadata.nbgrader.grade_id.removesuffix("-answer")
+        if slug in TABLES[name]:
+            code = TABLES[name][slug]["mistakes"][-1]["code"][-1]
             stub = cell.source.partition("    # YOUR CODE HERE")[0]
-            cell.source = f"{HELP}\n\n{stub}{indent(dedent(body).strip(), '    ')}"
+            cell.source = f"{TABLES[name]['helpers']}\n\n{stub}{indent(code.strip(), '    ')}"
     return nbformat.writes(notebook)
 
 
@@ -119,9 +125,9 @@ def test_wrong_answers_get_none_and_their_hints(course):
     found = row(course, name, "wrong")
     assert {found[key] for key in kinds(name)[0]} == {"0"}
     text = " ".join(page(course, name, "wrong").split())
-    for (set_, _), pairs in WRONG.items():
-        if set_ == name:
-            assert pairs[-1][0] in text
+    for slug, table in TABLES[name].items():
+        if slug != "helpers":
+            assert table["mistakes"][-1]["hint"][:40] in text
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -181,6 +187,11 @@ def test_no_file_of_a_handout_gives_anything_away(handouts, name):
     for line in hidden_lines(name, "HIDDEN TESTS|MARK SCHEME|SOLUTION"):
         assert not [text for text in shown if line in text], line
     packed = "\n".join(files.values())
-    for cell in notebook.cells:
-        for solution in re.findall(r"### BEGIN SOLUTION\n(.*?) *### END", cell.source, re.DOTALL):
-            assert solution not in packed
+    region = re.compile(r"### BEGIN SOLUTION\n(.*?) *### END", re.DOTALL)
+    secrets = [text for cell in notebook.cells for text in region.findall(cell.source)]
+    tables = [table for slug, table in TABLES[name].items() if slug != "helpers"]
+    secrets += [code for table in tables for m in table["mistakes"] for code in m["code"]]
+    for secret in secrets:
+        encoded = base64.b64encode(secret.encode()).decode().rstrip("=")[:-4]
+        hidden = [secret, secret[::-1], encoded]
+        assert not [text for text in hidden if len(text) > 40 and text in packed]

@@ -25,8 +25,8 @@ BORROWED = {
     "def helper(w): return exp_so3(w)\ndef answer(w): return helper(w)",
     "by way of NumPy": "import numpy as np, rbcourse\n"
     "def answer(w): return np.apply_along_axis(rbcourse.exp_so3, 0, w)",
-    "from the problem": "from rbclassroom.assignments.problems.rotations import TURN_ABOUT\n"
-    "def answer(w): return TURN_ABOUT.answer(w, 1.0)",
+    "from the problem": "from rbclassroom.assignments.problems import problem\n"
+    "def answer(w): return problem('ps2', 'turn').answers[0]",
 }
 
 

@@ -1,10 +1,13 @@
 """The machinery that runs, stores and copies lessons."""
 
 import os
+import runpy
+from pathlib import Path
 
 import nbformat
 import nbval.kernel
 import pytest
+from jupyter_client import KernelManager
 from jupyter_server.services.contents.largefilemanager import LargeFileManager
 from nbclient.exceptions import CellExecutionError
 from nbformat.sign import NotebookNotary, SQLiteSignatureStore
@@ -58,8 +61,11 @@ def test_runs_give_the_same_bytes(twice, stored):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there kernels listen at ports")
-def test_kernels_listen_at_files(stored):
+def test_kernels_listen_at_files(stored, monkeypatch, request):
     assert cell_of(stored, "kernel").outputs[0].text == "ipc\n"
+    monkeypatch.setattr(nbval.kernel, "KernelManager", KernelManager)
+    conftest = Path(__file__).parents[3] / "notebooks/conftest.py"
+    runpy.run_path(str(conftest))["pytest_configure"](request.config)
     assert nbval.kernel.KernelManager(kernel_name="python3").transport == "ipc"
 
 

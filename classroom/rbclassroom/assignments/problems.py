@@ -1,0 +1,32 @@
+"""The problems of a set, from the file ``NAME.json`` beside its notebook."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rbclassroom.assignments.marking import Drawing, Mistake, Problem
+from rbclassroom.assignments.marking_samplers import LAWS, Sampler
+
+
+def problem(name: str, slug: str) -> Problem | Sampler:
+    """Return a problem of the set in this folder.
+
+    Where a table of the set is beside the folder, as in the folder of the course, the data are
+    brought up to date first.
+    """
+    if Path("..", f"{name}.toml").is_file():
+        from rbclassroom.assignments.tables import update
+
+        update(Path.cwd())
+    text = Path(f"{name}.json").read_text("utf-8")
+    data = json.loads(text, object_hook=_as_array)[slug]
+    data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
+    if law := data.pop("law", None):
+        return Sampler(**LAWS[law], **data)
+    return (Drawing if data.pop("drawing") else Problem)(**data)
+
+
+def _as_array(found: dict[str, Any]) -> Any:
+    return np.array(found["array"]) if found.keys() == {"array"} else found

@@ -1,1 +1,0 @@
-"""The problems: answers, inputs, and common mistakes with their hints."""
