@@ -6,8 +6,8 @@ For small excursions; `rbclassroom.surveys.atlas` has large ones.
 from __future__ import annotations
 
 import csv
+import os
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,8 +80,9 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
 @lru_cache
 def _forms() -> dict[str, tuple[Array, Array]]:
     """Return the polynomials E: in each term the powers of the six inner products, and a factor."""
-    text = Path(__file__).with_name("leading_excess.csv").read_text(encoding="utf-8")
-    head, over, *rows = csv.reader(text.splitlines())
+    path = os.path.join(os.path.dirname(__file__), "leading_excess.csv")
+    with open(path, encoding="utf-8") as file:
+        head, over, *rows = csv.reader(file)
     powers = np.array([row[:6] for row in rows], dtype=int)
     forms = {}
     for column in range(6, len(head)):

@@ -54,19 +54,11 @@ def cost_of(one: Solution | Failure) -> float:
 
 
 class Equations(Protocol):
-    """R' = R ŵ and R p = c for a stack of problems; the unknowns are R at n nodes, and others.
-
-    Attributes
-    ----------
-    R0, R1 : ndarray, shape (N, 3, 3)
-        Where the curves begin and end.
-    together : int
-        How many problems are solved together: as many as fit into the cache.
-    """
+    """R' = R ŵ and R p = c for a stack of problems; the unknowns are R at n nodes, and others."""
 
     R0: Array
     R1: Array
-    together: int
+    together: int  # problems that are solved together: as many as fit into the cache
 
     def take(self, index: Any) -> Self:
         """Return those of some of the problems."""
@@ -256,14 +248,9 @@ def costs(functional: Functional, ends: Array, k: Array) -> Array:
 class Stationary:
     """R p = c for any functional; the unknowns are R, k = w⁽ᵐ⁾ at the nodes, and c.
 
-    Source: beyond BK 2.
+    `ends` are w0 and w1, and for the jerk a0 and a1, shape (N, m, 3).
 
-    Parameters
-    ----------
-    functional : Functional
-    R0, R1 : ndarray, shape (N, 3, 3)
-    ends : ndarray, shape (N, m, 3)
-        w0 and w1; for the jerk a0 and a1 too.
+    Source: beyond BK 2.
     """
 
     together = 24
@@ -352,15 +339,10 @@ def _integrals(R: Array, K: Array) -> Array:
 class BallStationary:
     """R w'' = c; the unknowns are R at the nodes, and c: w'' = Rᵀc gives w by integration.
 
-    Source: BK (19).
+    The linear systems are solved on `coarse` nodes, those of the first rotations. For one problem
+    this is 1.3 times as fast as `Stationary`, for stacks of 300 it is 2.5 times as fast.
 
-    Parameters
-    ----------
-    R0, R1 : ndarray, shape (N, 3, 3)
-    ends : ndarray, shape (N, 2, 3)
-        w0 and w1.
-    coarse : int, optional
-        On how many nodes the linear systems are solved: those of the first rotations.
+    Source: BK (19).
     """
 
     together = 128

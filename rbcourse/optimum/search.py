@@ -82,33 +82,18 @@ LIMITS = Limits()
 class Task(NamedTuple):
     """A stack of problems with one batch axis, and how to solve them.
 
-    Attributes
-    ----------
-    batch : tuple of int
-        The shape of the stack.
-    functional : Functional
-        The cost. If it is an `Effort`, the search also adds full turns to the starts, and bends
-        solutions about one axis, which may be saddles.
-    equations : Equations
-        When it is: R p = c, and the ends.
-    starts : callable
-        ``starts(index, n)``: curves to start from at n nodes, for some of the problems; and the
-        numbers, among these, of the problems that they are for.
-    solver : callable
-        ``solver(equations, R)``: what is found for some of the equations from these curves.
-    nodes : int
-        On how many nodes curves are started.
-    known : dict of int to Solution
-        Problems that are solved.
+    If the functional is an `Effort`, the search also adds full turns to the starts, and bends
+    solutions about one axis, which may be saddles.
     """
 
-    batch: tuple[int, ...]
+    batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
+    # from the numbers of some problems, and n: curves at n nodes, and which of these they are for
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
-    nodes: int = LIMITS.nodes
-    known: Mapping[int, Solution] = MappingProxyType({})
+    nodes: int = LIMITS.nodes  # on which curves are started
+    known: Mapping[int, Solution] = MappingProxyType({})  # problems that are solved
 
 
 def ball(given: Ends) -> Task:
