@@ -241,8 +241,9 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
     """Return the integral for each curve of a stack, as if they took from 0 to 1: halving panels.
 
     Each curve has panels of its own, halved while the rules of Clenshaw and Curtis with 9 and 17
-    nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` is what is
-    integrated at the times t, shape (T, K), on K curves, with their numbers. Messages name `name`.
+    nodes differ by more than `rtol` times the integral. ``density(some, t, index)``
+    returns the integrand at the times t, shape (T, K), on K curves, with their numbers. Messages
+    name `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")

@@ -31,7 +31,7 @@ __all__ = [
 
 
 def show(function: Callable[..., Any]) -> None:
-    """Print the code of a function that has a docstring, without it; ValueError if there is none.
+    """Print the code of a function without its docstring; ValueError if it has no docstring.
 
     Examples
     --------

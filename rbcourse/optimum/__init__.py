@@ -229,7 +229,7 @@ def stationary_so3(guess: Curve) -> Optimum:
 
 
 class ConvergenceError(RuntimeError):
-    """No curve was found; `residual` is what was left after a number of `iterations`."""
+    """No curve was found; `residual` is the error that was left after a number of `iterations`."""
 
     def __init__(self, residual: float, iterations: int) -> None:
         super().__init__(

@@ -130,7 +130,7 @@ def test_the_player_starts_with_the_still_frame(still, count):
     fig.savefig(full, format="png", dpi=120)  # twice as fine
     off = np.abs(pixels(io.BytesIO(animation.shown)) - pixels(full))
     assert off.mean() < 1  # stars before the cube
-    background = pixels(io.BytesIO(animation.background))  # what does not move
+    background = pixels(io.BytesIO(animation.background))  # the artists that do not move
     orange = np.abs(background - [0xD5, 0x5E, 0x00]).max(axis=-1) < 30
     assert not orange.any()  # the square on the cube
     assert (background < 128).any()  # the axes

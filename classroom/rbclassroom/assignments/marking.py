@@ -1,8 +1,8 @@
 """Problems that give hints: a student's function compared with answers and known mistakes.
 
-What is right is accepted; else `NotYet` is raised, whose text is one hint. The data of a problem
-are numbers: inputs, right answers, and what functions return that make a known mistake. A student's
-function that agrees with one of these on all inputs gets its hint.
+A right function is accepted; for any other `NotYet` is raised, with one hint as its text. The data
+of a problem are numbers: inputs, right answers, and the results of functions that make a known
+mistake. A student's function that agrees with one of these on all inputs gets its hint.
 """
 
 import copy

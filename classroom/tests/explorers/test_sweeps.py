@@ -1,4 +1,4 @@
-"""What the explorers draw and say is what the package computes, wherever their sliders are."""
+"""The drawings and the texts of explorers agree with the package at all settings of the sliders."""
 
 from functools import cache
 

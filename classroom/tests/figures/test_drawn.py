@@ -1,7 +1,7 @@
-"""Each figure of the lessons shows the numbers of its table, names and labels them, cuts nothing.
+"""Each figure of the lessons shows the numbers of its table and labels them; nothing is clipped.
 
-A figure of `FIGURES` is drawn on axes of its own. It returns the numbers that are to be found, by
-the title of their axes and the label of their artist; its description; and words of that.
+A figure of `FIGURES` is drawn on axes of its own. It returns the expected numbers, by the title of
+their axes and the label of their artist; its description; and words of the description.
 """
 
 import matplotlib.pyplot as plt
@@ -287,7 +287,7 @@ def profiles(*axes):
 
 @pytest.fixture(params=FIGURES)
 def drawn(request):
-    """A figure in the style of the course, its axes in the plane, and what is to be found."""
+    """A figure in the style of the course, its axes in the plane, and the expected numbers."""
     kinds, draw = FIGURES[request.param]
     with plt.style.context("rbcourse.rbcourse"):
         assert plt.rcParams["pdf.fonttype"] == 42
@@ -301,7 +301,7 @@ def drawn(request):
 
 
 def name_of(artist):
-    """The title of its axes, and its label, of what has them."""
+    """The title of the axes of an artist and its label, if it has them."""
     title, label = artist.axes.get_title().partition("\n")[0], str(artist.get_label())
     return ", ".join(part for part in (title, label) if part and not part.startswith("_"))
 

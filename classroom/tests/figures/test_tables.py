@@ -1,4 +1,4 @@
-"""The numbers of the lessons' figures are those of the mathematics, and what moves goes by them."""
+"""The numbers of the lessons' figures are those of the mathematics, and animations follow them."""
 
 import matplotlib.pyplot as plt
 import numpy as np
