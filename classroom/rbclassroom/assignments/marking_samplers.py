@@ -159,7 +159,7 @@ _DIAGONALS = _normalised(np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1]]))
 
 
 def _rotation_rows(R: Array) -> dict[str, Array]:
-    """Return numbers that are uniform: every entry, in several frames, and three angles by their law."""
+    """Return uniform numbers: every entry, in several frames, and three angles by their law."""
     rows = {f"the entry R[{i}, {j}]": _cosine(R[:, i, j]) for i in range(3) for j in range(3)}
     for i, x in enumerate(_DIAGONALS):
         for j, y in enumerate(_DIAGONALS):
