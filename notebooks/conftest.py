@@ -1,6 +1,11 @@
 """How lessons are run as tests: nbval runs and compares the cells, then all is compared as stored.
 
-That is what nbval leaves out: files, the form of the outputs, cells whose output it ignores.
+The second comparison covers files, the form of the outputs, and cells whose output nbval ignores.
+
+All uses of nbval's internals are in this file. nbval gives an item for each cell, a kernel, and the
+comparison of text. To replace it, collect one item for each lesson that runs it with
+`rbclassroom.course.notebooks.execute`, and does then what `Remains.runtest` does: `changed_lines`
+compares everything that a lesson stores.
 """
 
 import tempfile
