@@ -7,11 +7,10 @@ it was stopped.
 from __future__ import annotations
 
 import csv
-import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,8 +205,8 @@ def make_tables(
 ) -> None:
     """Compute the atlas, and write `maps` of the first seed and the `intervals` of each.
 
-    What is done is kept in the folder `chunks`, a folder in it for each body and seed; these are
-    deleted when the `tables` are written.
+    The costs of each body and seed are kept in a file of the folder `chunks`, so that a run that
+    was stopped goes on. The files are deleted when the `tables` are written.
     """
     if executor is None:
         with processes() as own:
@@ -216,20 +215,8 @@ def make_tables(
     for seed in seeds:
         problems = body_problems(draws, seed)
         for body, inertia in BODIES.items():
-            kept.append(chunks / f"{body}-{seed}")
-            with tqdm(desc=f"{body}, seed {seed}", total=len(problems.w0), unit="problem") as bar:
-
-                def report(done: int, total: int, bar: tqdm = bar) -> None:
-                    bar.update(done - bar.n)
-
-                costs = survey(
-                    problems,
-                    executor,
-                    inertia=inertia,
-                    ways=curves_for(body),
-                    folder=kept[-1],
-                    report=report,
-                )
+            kept.append(chunks / f"{body}-{seed}-{draws}.npz")
+            costs = _kept_costs(kept[-1], problems, body, executor)
             excess = with_choices(excesses(problems, costs, inertia))
             if seed == seeds[0]:
                 first[body] = excess
@@ -239,8 +226,27 @@ def make_tables(
     for name, table in {"maps": maps(first, draws), "intervals": _joined(parts)}.items():
         text = csv_text(table)
         (tables / f"atlas_{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-    for folder in kept:
-        shutil.rmtree(folder)
+    for path in kept:
+        path.unlink()
+
+
+def _kept_costs(path: Path, problems: Ends, body: str, executor: Executor) -> dict[str, Array]:
+    """Return the costs of a file; where it is missing, compute them and write it."""
+    if path.exists():
+        return dict(np.load(path))
+    with tqdm(desc=path.stem, total=len(problems.w0), unit="problem") as bar:
+
+        def report(done: int, total: int) -> None:
+            bar.update(done - bar.n)
+
+        inertia, ways = BODIES[body], curves_for(body)
+        costs = survey(problems, executor, inertia=inertia, ways=ways, report=report)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez(file, **cast(dict[str, Any], costs))
+    part.replace(path)
+    return costs
 
 
 def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:

@@ -1,22 +1,18 @@
-"""Surveys: what curves cost for many ends, chunk by chunk, on one machine or a cluster."""
+"""Surveys: costs of curves for many ends, in chunks, on one machine or a cluster."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import pickle
 import signal
-import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from inspect import signature
 from multiprocessing import get_context, parent_process
-from pathlib import Path
-from threading import Thread, current_thread, main_thread
-from typing import Any
+from threading import Thread
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +23,6 @@ from rbcourse import (
     Array,
     Curve,
     Ends,
-    __version__,
     acceleration_cost,
     geodesic_so3,
     minimum_acceleration_so3,
@@ -37,7 +32,7 @@ from rbcourse import (
 Report = Callable[[int, int], object]
 
 CHUNK = 500
-"""So many problems are computed, and written, together."""
+"""So many problems are computed together."""
 
 
 def survey(
@@ -46,10 +41,9 @@ def survey(
     *,
     inertia: ArrayLike | None = None,
     ways: Mapping[str, Maker] | None = None,
-    folder: str | os.PathLike[str] | None = None,
     report: Report | None = None,
 ) -> dict[str, Array]:
-    """Return what the optimum and closed forms cost, for each of many problems.
+    """Return the costs of the optimum and of closed forms, for each of many problems.
 
     Source: BK 1, BK 7, BK (18); for bodies beyond BK 1.
 
@@ -58,7 +52,7 @@ def survey(
     problems : Ends
         Arrays of one batch axis, N problems.
     executor : concurrent.futures.Executor, optional
-        What computes the chunks of `CHUNK` problems: any executor whose workers can import
+        It computes the chunks of `CHUNK` problems: any executor whose workers can import
         `rbcourse`, for example ``Client(...).get_executor()`` of dask.distributed for a cluster. By
         default `processes`, on all processors of this machine; a single chunk is computed in this
         process.
@@ -66,9 +60,6 @@ def survey(
         Of the body, in body axes. By default the body is a ball.
     ways : mapping of str to callable, optional
         The curves that are compared, ``make(R0, R1, w0, w1)``; by default `closed_forms`.
-    folder : path, optional
-        Each chunk is written there as soon as it is done. A survey that was stopped, and is called
-        again with the same problems, inertia and ways, goes on with the chunks that are missing.
     report : callable, optional
         ``report(done, total)`` is called after each chunk with numbers of problems.
 
@@ -81,17 +72,14 @@ def survey(
 
     Raises
     ------
-    ValueError
-        If an argument is not of its shape; if `ways` cannot be sent to another process; or if
-        `folder` cannot be written, or has a chunk of another survey, or one that cannot be read.
     ValueError, RuntimeError
-        If a way has no curve for one of the problems, or an integral does not settle. The message
-        names the way and the chunk.
+        If `ways` cannot be sent to another process, if a way has no curve for one of the problems,
+        or if an integral does not settle. The message names the way and the chunk.
 
     Notes
     -----
-    Ways that are sent to other processes, or stored with chunks, have to be functions of a module,
-    or partials of these; functions of a notebook are not. A script has to call this function below
+    Ways that are sent to other processes have to be functions of a module, or partials of these;
+    functions of a notebook are not. A script has to call this function below
     ``if __name__ == "__main__":``, as each new process imports the script.
 
     Examples
@@ -113,7 +101,7 @@ def survey(
         if name == "optimum":
             raise ValueError("ways: 'optimum' is the name of what all are compared with")
     work = partial(_costs, inertia, tuple(ways.items()))
-    return _in_chunks(work, ["optimum", *ways], problems, executor, folder, report)
+    return _in_chunks(work, ["optimum", *ways], problems, executor, report)
 
 
 def several_starts(
@@ -125,11 +113,11 @@ def several_starts(
     `survey`. The curves are stationary; none is proven to be the best. NaN where none is found
     (BK (19)).
     """
-    return _in_chunks(_from_each_start, list(starts()), problems, executor, None, report)
+    return _in_chunks(_from_each_start, list(starts()), problems, executor, report)
 
 
 def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Array:
-    """Return what the curves of ``make(R0, R1, w0, w1)`` cost for N problems, as `survey` does.
+    """Return the costs of the curves ``make(R0, R1, w0, w1)`` for N problems, as `survey` does.
 
     See `acceleration_cost` for 1e-10, and for any curve (BK (18)).
 
@@ -164,38 +152,28 @@ def _in_chunks(
     names: Sequence[str],
     problems: Ends,
     executor: Executor | None,
-    folder: str | os.PathLike[str] | None,
     report: Report | None,
 ) -> dict[str, Array]:
     """Return ``work(chunk)``, shape (len(names), n), of all chunks together, by name."""
     problems = _checked(problems)
     total = len(problems.w0)
     chunks = [problems.take(slice(k, k + CHUNK)) for k in range(0, total, CHUNK)]
-    found: dict[int, Array] = {}
-    files = {}
-    if folder is not None:
-        of = __version__.encode(), _pickled(work)
-        shapes = [(len(names), len(chunk.w0)) for chunk in chunks]
-        _try_to_write(Path(folder))
-        files = {
-            k: _File(Path(folder), k, (*of, *(x.tobytes() for x in chunk)), shapes[k])
-            for k, chunk in enumerate(chunks)
-        }
-        found = {k: file.read() for k, file in files.items() if file.path.exists()}
-    missing = [k for k in range(len(chunks)) if k not in found]
-    done = sum(len(chunks[k].w0) for k in found)
-    if report and done:
-        report(done, total)
+    if executor is None and len(chunks) > 1:
+        _check_that_it_can_be_sent(work)
+        with processes() as own:
+            return _in_chunks(work, names, problems, own, report)
+    alone, found = partial(_alone, os.getpid(), work), list[Array]([np.empty((len(names), 0))])
     with threadpool_limits(1):
-        for k, result in _results(partial(_alone, os.getpid(), work), chunks, missing, executor):
-            found[k] = result
-            if k in files:
-                files[k].write(result)
-            done += len(chunks[k].w0)
+        results = iter(map(alone, chunks) if executor is None else executor.map(alone, chunks))
+        for k in range(len(chunks)):
+            try:
+                found.append(next(results))
+            except (ValueError, RuntimeError) as error:
+                kind = ValueError if isinstance(error, ValueError) else RuntimeError
+                raise kind(f"chunk {k}, from problem {k * CHUNK} on: {error}") from error
             if report:
-                report(done, total)
-    columns = [found[k] for k in range(len(chunks))] or [np.empty((len(names), 0))]
-    return dict(zip(names, np.concatenate(columns, axis=-1), strict=True))
+                report(min(total, (k + 1) * CHUNK), total)
+    return dict(zip(names, np.concatenate(found, axis=-1), strict=True))
 
 
 @contextmanager
@@ -203,28 +181,15 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     """Give an executor of `workers` processes of this machine, by default one per processor.
 
     The processes are new ones: they share nothing with a notebook's threads. They end with the
-    block, and when this process is killed. When the block is left by an error, or by Ctrl-C, what
-    has begun is finished, with one more call for each process; the rest is dropped.
+    block, and when this process is killed. When an error or Ctrl-C ends the block, the chunks that
+    have not begun are dropped.
     """
     with ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent) as pool:
         try:
             yield pool
         except BaseException:
-            with _no_interrupts():  # a second one would leave the processes waiting
-                pool.shutdown(cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
             raise
-
-
-@contextmanager
-def _no_interrupts() -> Iterator[None]:
-    if current_thread() is not main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _end_with_parent() -> None:
@@ -240,48 +205,13 @@ def _end_with_parent() -> None:
     Thread(target=wait, daemon=True).start()
 
 
-def _results(
-    work: Callable[[Ends], Array], chunks: list[Ends], missing: list[int], executor: Executor | None
-) -> Iterator[tuple[int, Array]]:
-    """Yield the numbers and the results of the missing chunks, in the order in which they end."""
-    if executor is not None:
-        numbers = {executor.submit(work, chunks[k]): k for k in missing}
-        try:
-            for future in as_completed(numbers):
-                k = numbers[future]
-                with _told(k):
-                    result = future.result()
-                yield k, result
-        finally:
-            for future in numbers:
-                future.cancel()
-    elif len(missing) == 1:
-        with _told(missing[0]):
-            result = work(chunks[missing[0]])
-        yield missing[0], result
-    elif missing:
-        _pickled(work)
-        with processes() as own:
-            yield from _results(work, chunks, missing, own)
-
-
-@contextmanager
-def _told(chunk: int) -> Iterator[None]:
-    """Say in the message of an error from which chunk it comes."""
+def _check_that_it_can_be_sent(work: Callable[[Ends], Array]) -> None:
     try:
-        yield
-    except (ValueError, RuntimeError) as error:
-        kind = ValueError if isinstance(error, ValueError) else RuntimeError
-        raise kind(f"chunk {chunk}, from problem {chunk * CHUNK} on: {error}") from error
-
-
-def _pickled(work: Callable[[Ends], Array]) -> bytes:
-    try:
-        return pickle.dumps(work, protocol=4)
+        pickle.dumps(work)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise ValueError(
             f"ways: functions of a module, or partials of these, are wanted, for they are sent to "
-            f"other processes and stored with the chunks ({error})"
+            f"other processes ({error})"
         ) from error
 
 
@@ -319,54 +249,3 @@ def _costs(inertia: Array | None, ways: Sequence[tuple[str, Maker]], chunk: Ends
 
 def _from_each_start(chunk: Ends) -> Array:
     return np.stack([stationary_so3(make(*chunk)).cost for make in starts().values()])
-
-
-def _try_to_write(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ValueError(f"folder: {folder} cannot be written ({error})") from error
-
-
-class _File:
-    """A chunk on the disk: what was found, and a digest of what it was found for."""
-
-    def __init__(
-        self, folder: Path, number: int, of: Sequence[bytes], shape: tuple[int, int]
-    ) -> None:
-        self.path, self.shape = folder / f"chunk_{number:05}.npz", shape
-        digest = hashlib.sha256()
-        for part in of:
-            digest.update(len(part).to_bytes(8, "big") + part)
-        self.digest = digest.hexdigest()
-
-    def read(self) -> Array:
-        """Return what was found."""
-        try:
-            with self.path.open("rb") as file, np.load(file) as content:
-                digest, found = str(content["digest"]), content["costs"]
-        except Exception as error:  # zipfile raises what it likes
-            raise ValueError(f"folder: {self.path} cannot be read ({error}): delete it") from error
-        if (digest, found.shape, found.dtype) != (self.digest, self.shape, np.dtype(float)):
-            raise ValueError(
-                f"folder: {self.path} belongs to another survey, or to another version of the "
-                "package: choose another folder, or delete this one"
-            )
-        return found
-
-    def write(self, found: Array) -> None:
-        """Write what was found, all of it or nothing."""
-        if self.path.exists():
-            self.read()  # of another process: it must be the same survey
-        content: dict[str, Any] = {"digest": self.digest, "costs": found}
-        with tempfile.NamedTemporaryFile(dir=self.path.parent, delete=False) as file:
-            try:
-                np.savez(file, **content)
-                file.close()
-                os.replace(file.name, self.path)
-            except BaseException:
-                file.close()
-                os.unlink(file.name)
-                raise
