@@ -301,6 +301,15 @@ def test_backwards_in_time_two_are_the_same_and_three_are_not(name):
         assert np.all(off < 400 * EPS * scale * worse)
 
 
+def test_the_correction_of_fast_ends_is_reversible():
+    """The logarithm is the one nearest to the sum of Bézier's legs: often not the shortest."""
+    R0, R1, w0, w1 = ends(60, 2.5, 9)
+    w1 = 0.7 * w1
+    curve, back = (rb.corrected_bezier_so3(*x) for x in ((R0, R1, w0, w1), (R1, R0, -w1, -w0)))
+    t = np.linspace(0, 1, 11)
+    assert np.abs(back(1 - t) - curve(t)).max() < 1e-9
+
+
 def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_before():
     """Also of velocities just below 3π, whose legs are all but half-turns."""
     R0, R1, w0, w1 = ends(200)

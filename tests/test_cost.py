@@ -217,6 +217,27 @@ def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
         rb.torque_cost(rb.chain([0, 1, 3], R, leg=rb.geodesic_so3), BOOK)
 
 
+@pytest.mark.parametrize("unit", [1e-4, 1e4])
+def test_a_chain_is_smooth_in_any_unit_of_time(unit):
+    """Turned evenly: accelerations are rounding, and so are their jumps."""
+    axis, t = np.array([0.3, -0.5, 0.8]), np.array([0, 1, 3, 4.0])
+    chain = rb.chain(
+        unit * t,
+        rb.exp_so3(np.outer(t, axis)),
+        np.tile(axis / unit, (4, 1)),
+        leg=rb.exponential_cubic_so3,
+    )
+    assert rb.jerk_cost(chain) * unit**5 < 1e-20
+
+
+def test_the_breakpoints_of_a_chain_have_its_joints():
+    t = np.array([-1.0, 0, 2, 3, 7])
+    chain = rb.chain(t, rb.exp_so3(np.outer(t, [0.1, 0.2, 0])))
+    shares = (t - t[0]) / (t[-1] - t[0])
+    assert np.abs(chain.breakpoints[:, None] - shares).min(axis=0).max() < 1e-15
+    assert len(chain.breakpoints) >= 4 * 16
+
+
 def test_stacks_have_an_inertia_for_all_or_one_for_each():
     turns = np.array([[0.5, 0, 0.2], [0, 1, 0.3]])
     curves = rb.bezier_so3(I3, rb.exp_so3(turns), [1, 2, 0], [0, -1, 1])
