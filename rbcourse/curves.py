@@ -23,7 +23,7 @@ from rbcourse._checks import (
 from rbcourse._numerics import Array, blocks
 from rbcourse.so3 import hat, log_so3
 
-BLOCK = 6144  # rotations that are evaluated together, in the cache
+BLOCK = 5128  # rotations that are evaluated together, in the cache: a block of `rbcourse._foam`
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
 AnyCurve = TypeVar("AnyCurve", bound="Curve")
 
