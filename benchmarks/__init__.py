@@ -1,1 +1,1 @@
-"""What things take, side by side with what one would use instead: `python3 course.py bench`."""
+"""Times of the package beside others, for the same tasks: `python3 course.py bench`."""

@@ -1,67 +1,76 @@
-"""Time several calls in turn, so that all of them meet the same state of the machine."""
+"""Time the methods of a contest in turn, so that all of them meet the same state of the machine."""
 
-from dataclasses import dataclass
+import os
+import platform
+import re
+import tracemalloc
+from importlib.metadata import version
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
+from benchmarks.contests import roma, torch
 
-@dataclass(frozen=True)
-class Patience:
-    """How long to time.
+TIMES = ("time [s]", "time low [s]", "time high [s]")
+RATIOS = ("times ours [1]", "times ours low [1]", "times ours high [1]")
+"""The columns of median, lower and upper quartile."""
 
-    Parameters
-    ----------
-    loop : float
-        A short call is repeated until about so many seconds have passed.
-    contest : float
-        All rounds together take about so many seconds, within these bounds:
-    fewest, most : int
-        Numbers of rounds.
+
+def compete(contest, n, rng, machine, **timing):
+    """Return the rows of a contest with this N, one for each method: column to value."""
+    methods, error = contest.make(n, rng, *contest.options)
+    times = in_turn([method.call for method in methods.values()], **timing)
+    times /= [method.items for method in methods.values()]
+    rows = []
+    for (name, method), column in zip(methods.items(), times.T, strict=True):
+        off = error and method.value and float(error(np.asarray(method.value(method.call()))))
+        most, hidden = None, name.startswith(("RoMa", "SciPy"))  # from Python
+        if min(contest.sizes) < n == max(contest.sizes) and not hidden:
+            tracemalloc.start()
+            method.call()
+            _, most = tracemalloc.get_traced_memory()
+            tracemalloc.stop()
+        row = {"task": contest.task, "case": contest.case, "N [1]": n}
+        row |= {"method": name, "call": method.does}
+        spreads = np.percentile([column, column / times[:, 0]], [50, 25, 75], axis=1)
+        row |= zip(TIMES + RATIOS, spreads.T.ravel().tolist(), strict=True)
+        row |= {"rounds [1]": len(times), "error [1]": off, "peak memory [B]": most}
+        rows.append(row | {"machine": machine})
+    return rows
+
+
+def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter):
+    """Return the seconds for a call, shape (rounds, calls): in each round every one has its turn.
+
+    A short call is repeated until about `loop` seconds have passed. All rounds together take about
+    `total` seconds, but there are at least `fewest` and at most `most`.
     """
 
-    loop: float = 0.02
-    contest: float = 15.0
-    fewest: int = 5
-    most: int = 15
+    def seconds(call, times):
+        start = clock()
+        for _ in range(times):
+            call()
+        return (clock() - start) / times
+
+    once = np.min([[seconds(call, 1) for call in calls] for _ in range(2)], axis=0)
+    loops = np.maximum(1, np.round(loop / np.maximum(once, 1e-7))).astype(int)
+    rounds = int(np.clip(total // (loops @ once), fewest, most))
+    turns = list(zip(calls, loops, strict=True))
+    return np.array([[seconds(*turn) for turn in turns] for _ in range(rounds)])
 
 
-def in_turn(calls, patience, clock=perf_counter, tick=lambda: None):
-    """Return the seconds a call, shape (rounds, calls): in each round every one has its turn.
-
-    Parameters
-    ----------
-    calls : sequence of callable
-        What is timed; each has been called before.
-    patience : Patience
-        How many rounds, and how long a turn is.
-    clock : callable, optional
-        Returns the time in s.
-    tick : callable, optional
-        Is called after each round.
-    """
-    once = np.array([_seconds(call, 1, clock) for call in calls])
-    loops = np.maximum(1, np.round(patience.loop / np.maximum(once, 1e-7))).astype(int)
-    rounds = np.clip(patience.contest // (loops @ once), patience.fewest, patience.most)
-    times = []
-    for _ in range(int(rounds)):
-        times.append([_seconds(call, n, clock) for call, n in zip(calls, loops, strict=True)])
-        tick()
-    return np.array(times)
-
-
-def _seconds(call, times, clock):
-    start = clock()
-    for _ in range(times):
-        call()
-    return (clock() - start) / times
-
-
-def quartiles(values):
-    """Return the median, the lower and the upper quartile along the first axis."""
-    return np.percentile(values, [50, 25, 75], axis=0)
-
-
-def ratios(times):
-    """Return each call's time over that of the first call, within the rounds."""
-    return times / times[:, :1]
+def describe_machine():
+    """Return a line: the processor, the threads, and the versions of the packages."""
+    file = Path("/proc/cpuinfo")
+    known = re.search(r"model name\s*: (.*)", file.read_text() if file.exists() else "")
+    processor = known[1].strip() if known else platform.processor() or platform.machine()
+    simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    wide = "with" if any(x.startswith(("X86_V4", "AVX512")) for x in simd) else "without"
+    names = {"numpy": "NumPy", "scipy": "SciPy", "pytransform3d": "pytransform3d"}
+    names |= {"roma": "RoMa", "torch": "PyTorch"} if roma else {}
+    parts = [f"{processor}, {wide} AVX-512, {os.cpu_count()} threads"]
+    parts += [f"OPENBLAS_NUM_THREADS {os.environ.get('OPENBLAS_NUM_THREADS', 'not set')}"]
+    parts += [f"{torch.get_num_threads()} threads of PyTorch"] if roma else []
+    versions = [f"{shown} {version(name)}" for name, shown in names.items()]
+    return "; ".join([*parts, f"Python {platform.python_version()}", *versions])
