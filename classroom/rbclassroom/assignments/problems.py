@@ -8,6 +8,7 @@ import numpy as np
 
 from rbclassroom.assignments.marking import Drawing, Mistake, Problem
 from rbclassroom.assignments.marking_samplers import LAWS, Sampler
+from rbclassroom.assignments.student_code import NotYet
 
 
 def problem(name: str, slug: str) -> Problem | Sampler:
@@ -20,8 +21,10 @@ def problem(name: str, slug: str) -> Problem | Sampler:
         from rbclassroom.assignments.tables import update
 
         update(Path.cwd())
-    text = Path(f"{name}.json").read_text("utf-8")
-    data = json.loads(text, object_hook=_as_array)[slug]
+    file = Path(f"{name}.json")
+    if not file.is_file():
+        raise NotYet(f"{file} is missing. It came with the notebook: copy it into this folder.")
+    data = json.loads(file.read_text("utf-8"), object_hook=_as_array)[slug]
     data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
     if law := data.pop("law", None):
         return Sampler(**LAWS[law], **data)

@@ -32,6 +32,8 @@ def update(folder: Path) -> None:
     """Write the data of a set into its folder, if its table or notebook has changed since."""
     table, notebook = folder.parent / f"{folder.name}.toml", folder / f"{folder.name}.ipynb"
     if not table.is_file():
+        if "assignments.problems import problem" in notebook.read_text("utf-8"):
+            raise ValueError(f"{table} is missing: the tests of {notebook.name} need it")
         return
     state = hashlib.sha256(table.read_bytes() + notebook.read_bytes()).hexdigest()
     target = folder / f"{folder.name}.json"
@@ -42,12 +44,15 @@ def update(folder: Path) -> None:
 
 def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
     """Return the arguments of `Problem`, `Drawing` or `Sampler` for each problem of a set."""
-    table = tomllib.loads((folder.parent / f"{folder.name}.toml").read_text("utf-8"))
+    try:
+        table = tomllib.loads((folder.parent / f"{folder.name}.toml").read_text("utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{folder.name}.toml: {error}") from error
     notebook = nbformat.read(folder / f"{folder.name}.ipynb", as_version=4)
     cells = {grade_id(cell): cell.source for cell in notebook.cells if cell.cell_type == "code"}
     space: dict[str, Any] = {"__name__": "__main__"}
     answers = [text for name, text in cells.items() if name.endswith("-answer")]
-    for text in (cells["setup"], *answers, table.pop("helpers", "")):
+    for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
         exec(compile(text, folder.name, "exec"), space)
     found = {}
     for slug, problem in table.items():

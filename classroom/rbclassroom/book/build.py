@@ -176,8 +176,8 @@ class Sources:
     def put_course(self) -> None:
         """Write ``course.zip``, which runs: the package, the lessons without outputs, `course.py`.
 
-        The notebooks of teachers, with model answers and hidden tests, are left out; the checks
-        that students run are in the package, and know what is right.
+        The problem sets, with model answers and hidden tests, are left out; the check that students
+        run before they submit is in the package.
         """
         homes = "rbcourse", "classroom/rbclassroom"
         inside = (path for home in homes for path in (self.root / home).rglob("*.*"))

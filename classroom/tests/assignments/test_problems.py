@@ -3,6 +3,7 @@
 import ast
 import contextlib
 import re
+import shutil
 import tomllib
 from pathlib import Path
 from textwrap import dedent, indent
@@ -15,6 +16,7 @@ from nbformat.v4 import new_code_cell, new_notebook
 
 from rbclassroom.assignments.problems import problem
 from rbclassroom.assignments.student_code import NotYet
+from rbclassroom.assignments.tables import update
 
 SOURCE = Path(__file__).parents[3] / "notebooks" / "assignments" / "source"
 SETS = {path.stem: nbformat.read(path, as_version=4) for path in sorted(SOURCE.glob("*/*.ipynb"))}
@@ -343,6 +345,20 @@ def test_the_example_of_the_page_for_teachers_runs(tmp_path, monkeypatch):
     exec(f"{start}{right}\n{test}", {"__name__": "__main__"})
     with pytest.raises(NotYet, match="This is the circumference"):
         exec(f"{start}    return 2 * np.pi * r\n{test}", {"__name__": "__main__"})
+
+
+def test_missing_or_broken_tables_and_data_are_named(tmp_path, monkeypatch):
+    shutil.copytree(SOURCE / "ps2", tmp_path / "ps2", ignore=shutil.ignore_patterns("*.json"))
+    monkeypatch.chdir(tmp_path / "ps2")
+    with pytest.raises(NotYet, match=r"^ps2\.json is missing"):
+        problem("ps2", "turn")
+    with pytest.raises(ValueError, match=r"ps2\.toml is missing: the tests of ps2\.ipynb need it"):
+        update(tmp_path / "ps2")
+    for text, said in (("[turn", r"^ps2\.toml: "), ("[turn]\ninputs = 1", r"^ps2\.toml, turn: ")):
+        (tmp_path / "ps2.toml").write_text(text, "utf-8")
+        with pytest.raises(ValueError, match=said):
+            update(tmp_path / "ps2")
+    assert not (tmp_path / "ps2" / "ps2.json").exists()
 
 
 def test_the_page_for_teachers_lists_the_sets():
