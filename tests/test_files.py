@@ -1,6 +1,3 @@
-"""Paths as files: the same poses back, or the line and the reason; read by other parsers too."""
-
-import csv
 import re
 
 import numpy as np
@@ -9,7 +6,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import rbcourse as rb
-from rbcourse.files import HEADERS
+from rbcourse.files import load_plan, save_plan
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(111)
@@ -17,87 +14,70 @@ N = 40
 TIMES = 1305031098.6659 + np.cumsum(10.0 ** RNG.uniform(-6, 3, N))
 HALF_TURNS = [oracles.exp_so3(np.pi * e) for e in np.eye(3)]
 ROTATIONS = np.stack([*Rotation.random(N - 6, rng=RNG).as_matrix(), *HALF_TURNS, *[np.eye(3)] * 3])
-D = RNG.normal(size=(N, 3)) * 10.0 ** RNG.uniform(-9, 9, (N, 1))
+D, TWISTS = (RNG.normal(size=(N, k)) * 10.0 ** RNG.uniform(-9, 9, (N, 1)) for k in (3, 6))
 POSES = rb.pose_from_components(ROTATIONS, D)
-TWISTS = RNG.normal(size=(N, 6)) * 10.0 ** RNG.uniform(-9, 9, (N, 1))
-KINDS = {
-    "poses and twists": (POSES, TWISTS),
-    "poses": (POSES, None),
-    "rotations and velocities": (ROTATIONS, TWISTS[:, :3]),
-    "rotations": (ROTATIONS, None),
-}
-FULL = ",".join(HEADERS[True, True])
-PLAIN = ",".join(HEADERS[True, False])
+PLAIN = "time [s],x [m],y [m],z [m],qw [1],qx [1],qy [1],qz [1]"
+RATES = ",wx body [rad/s],wy body [rad/s],wz body [rad/s]"
+FULL = f"{PLAIN}{RATES},vx body [m/s],vy body [m/s],vz body [m/s]"
+PLAN = "vx world [m/s],vy world [m/s],vtheta [rad/s],duration [s]\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [("a.csv", kind) for kind in KINDS] + [(f"a.{end}", "poses") for end in ("tum", "txt", "TUM")],
-)
-def test_a_path_comes_back(tmp_path, name, kind):
-    poses, velocities = KINDS[kind]
-    rb.write_path(tmp_path / name, TIMES, poses, velocities)
-    times, again, twists = rb.read_path(str(tmp_path / name))
-    assert np.array_equal(times, TIMES)
-    assert np.abs(again[:, :3, :3] - poses[:, :3, :3]).max() < 8 * EPS
-    assert np.array_equal(again[:, :3, 3:], poses[:, :3, 3:])
-    assert (twists is None) if velocities is None else np.array_equal(twists, velocities)
+def test_a_path_comes_back(tmp_path):
+    for poses, velocities, endings in (
+        (POSES, TWISTS, ["csv"]),
+        (POSES, None, ["csv", "tum", "txt", "TUM"]),
+        (ROTATIONS, TWISTS[:, :3], ["csv"]),
+        (ROTATIONS, None, ["csv"]),
+    ):
+        for file in (tmp_path / f"a.{ending}" for ending in endings):
+            rb.write_path(file, TIMES, poses, velocities)
+            times, again, twists = rb.read_path(str(file))
+            assert np.array_equal(times, TIMES)
+            assert np.abs(again[:, :3, :3] - poses[:, :3, :3]).max() < 8 * EPS
+            assert np.array_equal(again[:, :3, 3:], poses[:, :3, 3:])
+            assert twists is velocities or np.array_equal(twists, velocities)
 
 
-def test_other_programs_read_a_tum_trajectory(tmp_path):
-    """SciPy's quaternions end with the scalar, as those of TUM do."""
-    rb.write_path(tmp_path / "path.tum", TIMES, POSES)
-    table = np.loadtxt(tmp_path / "path.tum")
-    assert np.array_equal(table[:, 0], TIMES)
-    got = RigidTransform.from_components(table[:, 1:4], Rotation.from_quat(table[:, 4:]))
-    assert np.array_equal(got.translation, POSES[:, :3, 3])
-    assert np.abs(got.rotation.as_matrix() - ROTATIONS).max() < 8 * EPS
+@pytest.mark.source("RR 3.2", "RR 4.2")
+def test_a_plan_comes_back_to_the_last_digit(tmp_path):
+    for kind, plan in {
+        "world": [(RNG.normal(size=3) * 10.0**k, 10.0**-k) for k in range(-9, 9)],
+        "body": [([1, 0, -0.5], 2), ([0.1, 1 / 3, np.pi], 0)],
+        "joints": [(RNG.normal(size=5), 0.1), ([0, -0.0, 1e-300, 1e300, 7], 3)],
+    }.items():
+        save_plan(tmp_path / "plan.csv", plan, kind)
+        again = load_plan(str(tmp_path / "plan.csv"), kind)
+        assert [(v.tolist(), d) for v, d in again] == [(list(v), d) for v, d in plan]
+        save_plan(str(tmp_path / "plan.csv"), [], kind)
+        assert load_plan(tmp_path / "plan.csv", kind) == []
+    save_plan(tmp_path / "plan.csv", [([1, 0, 0.25], 2)], "world")
+    assert (tmp_path / "plan.csv").read_bytes() == f"{PLAN}1.0,0.0,0.25,2.0\n".encode()
+    save_plan(tmp_path / "plan.csv", [([1, 0], 2)], "joints")
+    text = "v0 [rad/s],v1 [rad/s],duration [s]\n1.0,0.0,2.0\n"
+    assert (tmp_path / "plan.csv").read_bytes() == text.encode()
 
 
-def test_other_programs_read_the_csv(tmp_path):
-    rb.write_path(tmp_path / "path.csv", TIMES, POSES, TWISTS)
-    with open(tmp_path / "path.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-
-    def columns(name, letters="xyz"):
-        return np.array([[float(row[name.replace("*", x)]) for x in letters] for row in rows])
-
-    assert np.array_equal(columns("time [s]", "-")[:, 0], TIMES)
-    got = Rotation.from_quat(columns("q* [1]", "wxyz"), scalar_first=True).as_matrix()
-    assert np.abs(got - ROTATIONS).max() < 8 * EPS
-    assert np.array_equal(columns("* [m]"), POSES[:, :3, 3])
-    twists = np.hstack([columns("w* body [rad/s]"), columns("v* body [m/s]")])
-    assert np.array_equal(twists, TWISTS)
-
-
-def test_files_are_plain(tmp_path):
-    R = rb.matrix_from_quaternion([[0.6, 0, 0.8, 0], [1, 0, 0, 0]])
-    A = rb.pose_from_components(R, [[1, 2, -0.0], [3, 4, 5]])
-    rb.write_path(tmp_path / "path.tum", [0, 0.5], A)
-    text = (tmp_path / "path.tum").read_bytes().decode("ascii")
-    assert re.fullmatch(
-        r"# timestamp tx ty tz qx qy qz qw\n"
-        r"0\.0 1\.0 2\.0 -?0\.0 0\.0 0\.[78]\d+ 0\.0 0\.[56]\d*\n"
-        r"0\.5 3\.0 4\.0 5\.0 0\.0 0\.0 0\.0 1\.0\n",
-        text,
-    )
-    rb.write_path(tmp_path / "path.csv", [2], np.eye(3)[None], [[1, 2, 3]])
-    assert (tmp_path / "path.csv").read_bytes().decode("ascii") == (
-        "time [s],qw [1],qx [1],qy [1],qz [1],"
-        "wx body [rad/s],wy body [rad/s],wz body [rad/s]\n"
-        "2.0,1.0,0.0,0.0,0.0,1.0,2.0,3.0\n"
-    )
-
-
-def test_quaternions_go_on_without_a_change_of_sign_and_zeros_have_no_minus(tmp_path):
-    """Three turns about an axis: w passes zero, and no component jumps."""
-    t = np.linspace(0, 6 * np.pi, 200)
-    rb.write_path(tmp_path / "path.csv", t, rb.exp_so3(t[:, None] * [0.6, 0, 0.8]))
-    q = np.loadtxt(tmp_path / "path.csv", delimiter=",", skiprows=1)[:, 1:]
-    assert q[0, 0] == 1
-    assert np.abs(np.diff(q, axis=0)).max() < 0.05
-    rb.write_path(tmp_path / "path.csv", [0, 1, 2], rb.exp_so3([[0, 0, 0], [0, 0, 4], [0, 0, 2]]))
-    assert "-0.0," not in (tmp_path / "path.csv").read_text("utf-8")
+def test_other_programs_read_a_path(tmp_path):
+    """SciPy's quaternions end with the scalar, as those of TUM do; their signs do not jump."""
+    tum, csv = tmp_path / "path.tum", tmp_path / "path.csv"
+    rb.write_path(tum, TIMES, POSES)
+    rb.write_path(csv, TIMES, POSES, TWISTS)
+    assert tum.read_bytes().startswith(b"# timestamp tx ty tz qx qy qz qw\n13050")
+    assert csv.read_bytes().startswith(FULL.encode() + b"\n13050")
+    assert b"\r" not in tum.read_bytes() + csv.read_bytes()
+    assert b"-0.0," not in csv.read_bytes()
+    tum, table = np.loadtxt(tum), np.loadtxt(csv, delimiter=",", skiprows=1)
+    assert table[0, 4] > 0
+    assert np.all(np.vecdot(table[1:, 4:8], table[:-1, 4:8]) >= 0)
+    assert np.array_equal(table[:, 8:], TWISTS)
+    for rows, q in ((tum, tum[:, 4:]), (table, np.roll(table[:, 4:8], -1, axis=1))):
+        assert np.array_equal(rows[:, 0], TIMES)
+        got = RigidTransform.from_components(rows[:, 1:4], Rotation.from_quat(q))
+        assert np.array_equal(got.translation, POSES[:, :3, 3])
+        assert np.abs(got.rotation.as_matrix() - ROTATIONS).max() < 8 * EPS
+    rb.write_path(csv, [2], np.eye(3)[None], [[1, 2, 3]])
+    header = PLAIN.replace("x [m],y [m],z [m],", "") + RATES
+    assert csv.read_bytes() == f"{header}\n2.0,1.0,0.0,0.0,0.0,1.0,2.0,3.0\n".encode()
 
 
 def test_files_of_other_programs_are_read(tmp_path):
@@ -114,87 +94,103 @@ def test_files_of_other_programs_are_read(tmp_path):
     (tmp_path / "a.csv").write_bytes(text.encode())
     pose = rb.read_path(tmp_path / "a.csv")[1][0]
     assert np.array_equal(pose, rb.pose_from_components(np.eye(3), [1, 2, 3]))
+    text = "\ufeff" + PLAN.replace(",", " , ").strip() + '\r\n"1", 2 ,3e0,+.5\r\n-1,0,0,0\r\n\r\n'
+    (tmp_path / "plan.csv").write_bytes(text.encode())
+    plan = load_plan(tmp_path / "plan.csv", "world")
+    assert [[*v, d] for v, d in plan] == [[1, 2, 3, 0.5], [-1, 0, 0, 0]]
 
 
-GOOD = "0 0 0 0 0 0 0 1\n"
+GOOD, ROW, MOVE, WHEEL = "0 0 0 0 0 0 0 1\n", "0,0,0,0,1,0,0,0\n", "1,0,0,2\n", "duration [s]\n1\n"
 NUMBER = "a finite number wanted, got"
 UNIT = "a quaternion of norm 1 wanted, got one of"
 COLUMNS = ", line 1: the columns must be time [s], "
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "reason"),
-    [
-        ("a.tum", "", ": a pose wanted, the file ends"),
-        ("a.tum", "# timestamp tx ty tz qx qy qz qw\n", ": a pose wanted, the file ends"),
-        ("a.tum", GOOD + "1 0 0 0 0 0 1\n", ", line 2: numbers wanted: 8, got: 7"),
-        ("a.tum", "# x\n\n" + GOOD + "1 0 0 0 0 0 0 1 9\n", ", line 4: numbers wanted: 8, got: 9"),
-        ("a.tum", GOOD.replace(" ", ","), ", line 1: numbers wanted: 8, got: 1"),
-        ("a.tum", GOOD + GOOD, ", line 2: a time after 0.0 wanted, got 0.0"),
-        ("a.tum", "0 0 x 0 0 0 0 1\n", f", line 1, ty: {NUMBER} 'x'"),
-        ("a.tum", GOOD + "1 0 0 0 0 0 0 0\n", f", line 2: {UNIT} 0"),
-        ("a.tum", "0 0 0 0 0 0 0 1.0011\n", f", line 1: {UNIT} 1.0011"),
-        ("a.tum", GOOD + "\udcff\n", ", line 2: no text in UTF-8"),
-        ("a.csv", "", COLUMNS),
-        ("a.csv", "0,0,0,0,1,0,0,0\n", COLUMNS),
-        ("a.csv", FULL.replace("body", "world") + "\n", COLUMNS),
-        ("a.csv", FULL.replace("qw", "qx") + "\n", COLUMNS),
-        ("a.csv", PLAIN + "\n", ": a pose wanted, the file ends"),
-        ("a.csv", PLAIN + "\n0,0,0,0,1,0,0,0\n\n1,0,0,0,1,0,0,0\n", ", line 3: numbers wanted: 8"),
-        ("a.csv", PLAIN + "\n0,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n", ", line 3: a time after 0.0"),
-        ("a.csv", PLAIN + "\n0,0,0,0,0,0,0,0\n", f", line 2: {UNIT} 0"),
+BAD_FILES = {
+    "a.tum": [
+        ("# x\n\n" + GOOD + "1 0 0 0 0 0 0 1 9\n", ", line 4: numbers wanted: 8, got: 9"),
+        (GOOD + GOOD, ", line 2: a time after 0.0 wanted, got 0.0"),
+        ("0 0 x 0 0 0 0 1\n", f", line 1, ty: {NUMBER} 'x'"),
+        ("0 0 0 0 0 0 0 1.0011\n", f", line 1: {UNIT} 1.0011"),
     ],
-)
-def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, name, text, reason):
-    file = tmp_path / name
-    file.write_bytes(text.encode(errors="surrogateescape"))
-    with pytest.raises(ValueError, match=f"^{re.escape(f'{file}{reason}')}"):
-        rb.read_path(file)
-
-
-TWO = [0, 1]
-
-
-@pytest.mark.parametrize(
-    ("name", "times", "poses", "velocities", "message"),
-    [
-        ("a.tum", TWO, POSES[:2], TWISTS[:2], r"velocities: TUM has no columns .*\.csv$"),
-        ("a.txt", TWO, ROTATIONS[:2], None, r"poses: TUM has no rotations alone; .*\.csv$"),
-        (
-            "a.dat",
-            TWO,
-            POSES[:2],
-            None,
-            r"file: a name .* in \.csv, \.tum or \.txt, got .*dat",
+    "a.csv": [
+        (ROW, COLUMNS),
+        (FULL.replace("body", "world") + "\n", COLUMNS),
+        (PLAIN + "\n", ": a pose wanted, the file ends"),
+        (f"{PLAIN}\n{ROW}\n{ROW}", ", line 3: numbers wanted: 8"),
+    ],
+    "world": [
+        ("", f", line 1: {PLAN.strip().replace(',', ', ')} wanted, got "),
+        (PLAN.replace("world", "body"), ", line 1: vx world [m/s], "),
+        ("\n" + PLAN, ", line 1: vx world [m/s], "),
+        (PLAN + "1,0,0,2,\n", ", line 2: numbers wanted: 4, got: 5"),
+        (f"{PLAN}{MOVE}\n{MOVE}", ", line 3: numbers wanted: 4, got: 0"),
+        (PLAN.replace("\n", "\r") + "1,0,0,2\r1;0;0;2\r", ", line 3: numbers wanted: 4, got: 1"),
+        *(
+            (f"{PLAN}1,0,0,1\n1,{cell},0,2\n", f", line 3, vy world [m/s]: {NUMBER} {cell[:40]!r}")
+            for cell in ("", "x", "nan", "1e999", "1_0", "١", "1\xa0", "0x1", "x" * 90)
         ),
-        ("a", TWO, POSES[:2], None, r"file: a name wanted that ends in"),
-        ("a.csv", [1, 0], POSES[:2], None, r"times\[1\] is 0.0, a time after 1.0 is wanted"),
-        ("a.csv", [0], POSES[:2], None, r"times, poses: as many of each wanted, got 1 and 2"),
-        ("a.csv", TWO, 2 * POSES[:2], None, r"poses\[0\] is no pose \(project_se gives"),
-        ("a.csv", TWO, POSES[:2, :2], None, r"poses: shape"),
-        ("a.csv", TWO, POSES[:2], TWISTS[:2, :3], r"velocities: shape"),
-        ("a.csv", TWO, POSES[:2], TWISTS[:2] * np.nan, r"velocities\[0, 0\] is nan"),
-        ("a.csv", [], np.zeros((0, 4, 4)), None, r"times, poses: one or more wanted, got none"),
+        (PLAN + "1,0,0,-2\n", ", line 2: duration is -2.0, a duration from 0 up is wanted"),
+        (f'{PLAN}{MOVE}"{MOVE}{MOVE}', ", line 3: unexpected end of data"),
+        (f"{PLAN}{MOVE}\udcff,0,0,2\n", ", line 3: no text in UTF-8"),
+        (f"{PLAN}{MOVE}\udcff,0,0,2\n".replace("\n", "\r"), ", line 3: no text in UTF-8"),
     ],
-)
-def test_malformed_paths_are_not_written(tmp_path, name, times, poses, velocities, message):
-    with pytest.raises(ValueError, match=f"^{message}"):
-        rb.write_path(tmp_path / name, times, poses, velocities)
-    assert list(tmp_path.iterdir()) == []
+    "joints": [
+        (WHEEL, ", line 2: a velocity wanted, there is no column for it"),
+        ("", ", line 1: duration [s] wanted, got ''"),
+    ],
+}
 
 
-def test_files_of_another_kind_or_none_are_not_read(tmp_path):
-    with pytest.raises(ValueError, match=r"^file: a name wanted"):
-        rb.read_path(tmp_path / "a.bag")
-    with pytest.raises(FileNotFoundError):
-        rb.read_path(tmp_path / "a.csv")
+@pytest.mark.parametrize("kind", BAD_FILES)
+def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, kind):
+    file = tmp_path / (kind if "." in kind else "plan.csv")
+    for text, reason in BAD_FILES[kind]:
+        file.write_bytes(text.encode(errors="surrogateescape"))
+        with pytest.raises(ValueError, match=f"^{re.escape(f'{file}{reason}')}"):
+            rb.read_path(file) if "." in kind else load_plan(file, kind)
 
 
-def test_of_a_curve_written_at_its_joints_with_velocities_the_same_curve_is_chained(tmp_path):
-    t, A = [0, 0.5, 2], rb.pose_from_coordinates(RNG.normal(size=(3, 6)))
-    c = rb.chain(t, A)
-    rb.write_path(tmp_path / "a.csv", t, c(t), c(t, 1))
-    again = rb.chain(*rb.read_path(tmp_path / "a.csv"))
-    times = np.linspace(0, 2, 50)
-    for order in range(3):
-        assert np.abs(again(times, order) - c(times, order)).max() < 1e-12
+TWO, MOVES = [0, 1], TWISTS[:2]
+REFUSED = [
+    (rb.write_path, "a.tum", (TWO, POSES[:2], MOVES), r"velocities: TUM has no columns .*\.csv$"),
+    (rb.write_path, "a.txt", (TWO, ROTATIONS[:2]), r"poses: TUM has no rotations alone; .*\.csv$"),
+    (
+        rb.write_path,
+        "a.dat",
+        (TWO, POSES[:2]),
+        r"file: a name .* in \.csv, \.tum or \.txt, got .*dat",
+    ),
+    (rb.read_path, "a.bag", (), "file: a name wanted that ends in"),
+    (rb.write_path, "a.csv", ([1, 0], POSES[:2]), r"times\[1\] is 0.0, a time after 1.0 is wanted"),
+    (rb.write_path, "a.csv", ([0], POSES[:2]), "times, poses: as many of each wanted, got 1 and 2"),
+    (rb.write_path, "a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is no pose \(project_se gives"),
+    (rb.write_path, "a.csv", (TWO, POSES[:2, :2]), "poses: shape"),
+    (rb.write_path, "a.csv", (TWO, POSES[:2], MOVES[:, :3]), "velocities: shape"),
+    (rb.write_path, "a.csv", (TWO, POSES[:2], MOVES * np.nan), r"velocities\[0, 0\] is nan"),
+    (
+        rb.write_path,
+        "a.csv",
+        ([], np.zeros((0, 4, 4))),
+        "times, poses: one or more wanted, got none",
+    ),
+    (save_plan, "a.csv", ([([1, 0], 2)], "world"), r"plan\[0\] velocity: shape"),
+    (save_plan, "a.csv", ([([1, 0], 2), ([1], 2)], "joints"), r"plan\[1\] velocity: "),
+    (save_plan, "a.csv", ([([1, 0, 0], -2)], "body"), r"plan\[0\] duration is -2"),
+    (save_plan, "a.csv", ([([1, 2, 3], 1), ([1, 2, 3], np.nan)], "body"), r"plan\[1\]"),
+    (save_plan, "a.csv", (3, "joints"), "plan: a list of"),
+    (save_plan, "a.csv", ([], "arm"), "kind: one of 'world', 'body', 'joints' wanted, got 'arm'"),
+    (save_plan, "a.csv", ([], ["world"]), r"kind: one of .* wanted, got \['world'\]"),
+]
+
+
+def test_bad_arguments_are_refused_and_no_file_is_changed(tmp_path):
+    for function, name, arguments, message in REFUSED:
+        for file in (tmp_path / name, tmp_path / f"there_{name}"):
+            if "there" in file.name:
+                file.write_text("there", "utf-8")
+            with pytest.raises(ValueError, match=f"^{message}"):
+                function(file, *arguments)
+            assert file.exists() == ("there" in file.name)
+            assert not file.exists() or file.read_text("utf-8") == "there"
+    for read, more in ((rb.read_path, ()), (load_plan, ["world"])):
+        with pytest.raises(FileNotFoundError):
+            read(tmp_path / "b.csv", *more)
