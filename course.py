@@ -27,17 +27,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 UV = os.environ.get("UV") or shutil.which("uv")
-LISTS = {  # of exact versions, written by "course.py lock"
+LISTS = {  # of exact versions, each with all before it; "course.py lock" writes them
     "lessons": "environment.txt",
     "teach": "classroom/environment-teach.txt",
     "book": "classroom/environment-book.txt",
     "test": "tests/environment-test.txt",
-}
-NEEDED = {
-    "lessons": ["lessons"],
-    "teach": ["lessons", "teach"],
-    "book": ["lessons", "book"],
-    "test": list(LISTS),
 }
 PYTEST = "pytest -n auto --dist loadfile --no-loadscope-reorder"
 BROWSER = "pytest -n auto --dist worksteal classroom/tests/browser"
@@ -107,12 +101,13 @@ def run(*words):
 
 def set_up(environment):
     """Make .venv, or add to it what an environment needs."""
-    wanted = {name: fingerprint(ROOT / LISTS[name]) for name in NEEDED[environment]}
+    names = list(LISTS)[: list(LISTS).index(environment) + 1]
+    wanted = {name: fingerprint(ROOT / LISTS[name]) for name in names}
     found = read_stamp()
     if not found or found.get("lessons") != wanted["lessons"] or not os.path.exists(python()):
         create(found)
         found = {}
-    missing = [name for name in NEEDED[environment] if found.get(name) != wanted[name]]
+    missing = [name for name in names if found.get(name) != wanted[name]]
     if missing:
         print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
         install(*[word for name in missing for word in ("-r", LISTS[name])])

@@ -7,16 +7,13 @@ import tempfile
 from pathlib import Path
 
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
-LISTS = {  # with what each list installs; the lists that it adds to
-    "environment.txt": (COURSE, []),
-    "classroom/environment-teach.txt": ("-e ./classroom[lecture,grading]", ["environment.txt"]),
-    "classroom/environment-book.txt": ("-e ./classroom[book]", ["environment.txt"]),
-    "tests/environment-test.txt": (
-        "-e .[test,lint]\n-e ./classroom[lecture,grading,book,browser]",
-        ["environment.txt", "classroom/environment-teach.txt", "classroom/environment-book.txt"],
-    ),
+LISTS = {  # what each list adds to those before it
+    "environment.txt": COURSE,
+    "classroom/environment-teach.txt": "-e ./classroom[lecture,grading]\n",
+    "classroom/environment-book.txt": "-e ./classroom[book]\n",
+    "tests/environment-test.txt": "-e .[test,lint]\n-e ./classroom[browser]\n",
 }
-SLOW = "jsonschema<4.25"  # later releases take 1.5 s longer to import wherever notebooks are read
+SLOW = "jsonschema<4.25\n"  # later releases take 1.5 s longer to import wherever notebooks are read
 HEAD = "# Exact versions, for every system and Python; written by 'course.py lock'.\n"
 
 
@@ -28,7 +25,7 @@ def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
         command = [sys.executable, "-m", "uv", "pip", "compile", "--universal", "--no-header"]
         command += ["--annotation-style", "line", "--python-version", "3.11", "--quiet"]
         command += [*words, "-o", str(output), "-"]
-        subprocess.run(command, input=f"{COURSE}\n{wanted}\n{SLOW}\n", text=True, check=True)
+        subprocess.run(command, input=wanted + SLOW, text=True, check=True)
         return output.read_text("utf-8").splitlines()
 
 
@@ -37,14 +34,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="course.py lock")
     parser.add_argument("--upgrade", action="store_true", help="take the newest versions")
     upgrade = ["--upgrade"] * parser.parse_args().upgrade
-    paths = {name: Path(name) for name in LISTS}
-    now = "".join(path.read_text("utf-8") for path in paths.values() if path.exists())
-    everything, _ = LISTS["tests/environment-test.txt"]
-    now = "\n".join(compiled(everything, now, *upgrade))
-    for name, (wanted, smaller) in LISTS.items():
-        there = {_pin(line) for other in smaller for line in paths[other].read_text().splitlines()}
+    now = "".join(Path(name).read_text("utf-8") for name in LISTS if Path(name).exists())
+    now = "\n".join(compiled("".join(LISTS.values()), now, *upgrade))
+    wanted, there = "", set[str]()
+    for name, more in LISTS.items():
+        wanted += more
         lines = [line for line in compiled(wanted, now) if _pin(line) not in there]
-        paths[name].write_text(HEAD + "\n".join(lines) + "\n", "utf-8", newline="\n")
+        there.update(map(_pin, lines))
+        Path(name).write_text(HEAD + "\n".join(lines) + "\n", "utf-8", newline="\n")
         print(f"{name}: {len(lines)} distributions")
 
 
