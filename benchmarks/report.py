@@ -1,4 +1,4 @@
-"""The report of a run: the printed lines, the CSV, and the README's table of ratios."""
+"""The report of a run: the printed lines, the CSV, and the table of ratios in README.md."""
 
 import csv
 import math
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.contests import OURS
 
-README = Path(__file__).parents[1] / "README.md"
+README = Path(__file__).with_name("README.md")
 START, END = "<!-- benchmarks -->\n", "<!-- end of benchmarks -->\n"
 TABLE = [
     ("nearest rotation of {} matrices", "nearest rotation", "noisy"),

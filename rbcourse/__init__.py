@@ -108,7 +108,7 @@ from rbcourse.so3 import (
     vee_so3,
 )
 
-__version__ = "0.26.0"
+__version__ = "0.27.0"
 
 __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # rotations

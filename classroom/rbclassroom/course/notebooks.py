@@ -269,18 +269,19 @@ def _numbered(path: Path) -> Iterator[Path]:
 
 
 def main() -> None:
-    """Run a task from the command line, in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbclassroom.course.notebooks")
-    parser.add_argument("task", choices=["regenerate", "copy"])
-    parser.add_argument("lessons", nargs="*", help="how their names begin: 03; without, all")
-    words = parser.parse_args()
+    """Run lessons again from the command line, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="course.py figures")
+    help_ = "its number, such as 03; by default all lessons and the explorers"
+    parser.add_argument("lessons", nargs="*", metavar="LESSON", help=help_)
+    lessons = parser.parse_args().lessons
     try:
-        if words.task == "regenerate":
-            regenerate(Path("notebooks"), Path("figures"), words.lessons)
-        else:
-            copy_lessons(Path("notebooks"), Path("work"))
+        regenerate(Path("notebooks"), Path("figures"), lessons)
     except (OSError, ValueError) as error:
         sys.exit(str(error))
+    if not lessons:
+        from rbclassroom.explorers import recorded  # takes a second, which the lab does not need
+
+        recorded.main(Path("figures", "explorers"))
 
 
 if __name__ == "__main__":

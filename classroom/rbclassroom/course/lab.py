@@ -1,0 +1,91 @@
+"""Open the lessons in JupyterLab."""
+
+import argparse
+import json
+import os
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+from rbclassroom.course.notebooks import copy_lessons
+
+TEACHERS = ["@jupyter/nbgrader", "@voila-dashboards/jupyterlab-preview"]
+PARTS = ["formgrader", "validate_assignment", "assignment_list", "course_list"]
+OVERRIDES = {
+    "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
+    "@jupyterlab/filebrowser-extension:browser": {"showLastModifiedColumn": False},
+}
+DARK = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img, canvas) {
+  filter: invert(0.93) hue-rotate(180deg);
+}
+"""
+STILLS = """from rbclassroom.course.notebooks import before_saving
+get_config().ContentsManager.pre_save_hook = before_saving
+"""
+
+
+def configure() -> Path:
+    """Write the configuration of JupyterLab into the environment; return its folder.
+
+    JupyterLab asks for no news, shows names in full, leaves out the extensions for teachers,
+    encrypts what kernels send, inverts pictures in a dark theme, and saves explorers as stills.
+    """
+    shared = Path(sys.prefix, "share")
+    _write(shared / "jupyter" / "lab" / "settings" / "overrides.json", OVERRIDES)
+    folder = shared / "rbcourse"
+    off = {"disabledExtensions": dict.fromkeys(TEACHERS, True)}
+    _write(folder / "labconfig" / "page_config.json", off)
+    extensions = {f"nbgrader.server_extensions.{part}": False for part in PARTS}
+    server = {
+        "jpserver_extensions": {**extensions, "voila.server_extension": False},
+        "tornado_settings": {"static_custom_path": [str(folder / "custom")]},
+        "answer_yes": True,  # Ctrl-C ends it at once
+    }
+    settings = {
+        "ServerApp": server,
+        "LabApp": {"log_level": "ERROR", "custom_css": True},
+        "KernelManager": {"transport_encryption": "auto"},
+    }
+    _write(folder / "jupyter_server_config.json", settings)
+    (folder / "jupyter_server_config.py").write_text(STILLS)
+    (folder / "custom").mkdir(exist_ok=True)
+    (folder / "custom" / "custom.css").write_text(DARK)
+    return folder
+
+
+def _write(path: Path, content: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content))
+
+
+def main() -> None:
+    """Open lesson 00, in the folder of the course, until Ctrl-C."""
+    parser = argparse.ArgumentParser(
+        prog="course.py lab", epilog="Further arguments go to JupyterLab."
+    )
+    parser.add_argument("--edit", action="store_true", help="the originals, not copies in work/")
+    known, words = parser.parse_known_args()
+    if known.edit:
+        os.environ["RBCOURSE_EDIT"] = "1"
+    else:
+        copy_lessons(Path("notebooks"), Path("work"))
+    folder = "notebooks" if known.edit else "work"
+    address = f"--LabApp.default_url=/lab/tree/{folder}/00_start_here.ipynb"
+    words = [f"--ServerApp.root_dir={Path().resolve()}", "--log-level=ERROR", address, *words]
+    if hasattr(os, "geteuid") and os.geteuid() == 0:
+        words.append("--allow-root")
+    paths = [str(configure()), os.environ.get("JUPYTER_CONFIG_PATH")]
+    os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
+    print("JupyterLab opens in the browser. Stop it here, with Ctrl-C.", flush=True)
+    # of JupyterLab's own extensions; it reads its configuration twice
+    warnings.filterwarnings("ignore", category=DeprecationWarning)
+    warnings.filterwarnings("ignore", "Overriding existing pre_save_hook")
+    from jupyterlab.labapp import LabApp
+
+    sys.argv[1:] = []
+    LabApp.launch_instance(words)
+
+
+if __name__ == "__main__":
+    main()

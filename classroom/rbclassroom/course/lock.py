@@ -1,0 +1,53 @@
+"""Write the lists of exact versions that course.py installs."""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
+LISTS = {  # what each list adds to those before it
+    "environment.txt": COURSE,
+    "classroom/environment-teach.txt": "-e ./classroom[lecture,grading]\n",
+    "classroom/environment-book.txt": "-e ./classroom[book]\n",
+    "tests/environment-test.txt": "-e .[test,lint]\n-e ./classroom[browser]\n",
+}
+SLOW = "jsonschema<4.25\n"  # later releases take 1.5 s longer to import wherever notebooks are read
+HEAD = "# Exact versions, for every system and Python; written by 'course.py lock'.\n"
+
+
+def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
+    """Return the distributions that are wanted, one a line, with the preferred versions."""
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder, "output.txt")
+        output.write_text(preferred, "utf-8")
+        command = [sys.executable, "-m", "uv", "pip", "compile", "--universal", "--no-header"]
+        command += ["--annotation-style", "line", "--python-version", "3.11", "--quiet"]
+        command += [*words, "-o", str(output), "-"]
+        subprocess.run(command, input=wanted + SLOW, text=True, check=True)
+        return output.read_text("utf-8").splitlines()
+
+
+def main() -> None:
+    """Write all lists, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="course.py lock")
+    parser.add_argument("--upgrade", action="store_true", help="take the newest versions")
+    upgrade = ["--upgrade"] * parser.parse_args().upgrade
+    now = "".join(Path(name).read_text("utf-8") for name in LISTS if Path(name).exists())
+    now = "\n".join(compiled("".join(LISTS.values()), now, *upgrade))
+    wanted, there = "", set[str]()
+    for name, more in LISTS.items():
+        wanted += more
+        lines = [line for line in compiled(wanted, now) if _pin(line) not in there]
+        there.update(map(_pin, lines))
+        Path(name).write_text(HEAD + "\n".join(lines) + "\n", "utf-8", newline="\n")
+        print(f"{name}: {len(lines)} distributions")
+
+
+def _pin(line: str) -> str:
+    return line.partition("#")[0].strip()
+
+
+if __name__ == "__main__":
+    main()
