@@ -1,4 +1,4 @@
-"""The benchmarks run and agree, and the README says what they found. Nothing is timed here."""
+"""The benchmarks run and agree, and their README states the results. Nothing is timed here."""
 
 from functools import cache, partial
 from itertools import count
@@ -11,7 +11,7 @@ from benchmarks import __main__ as bench
 from benchmarks import contests, figure, report, timing
 from benchmarks.contests import CONTESTS, OURS
 
-STORED = report.README.parent / "benchmarks/benchmarks.csv"
+STORED = report.README.with_name("benchmarks.csv")
 
 
 class Clock:
