@@ -60,7 +60,7 @@ _TO_READ = (
     "*This page is for reading. Get the problem set as a zip from your teacher; teachers make it "
     "with* `python3 course.py handout {name}`."
 )
-_TAKE = "(green button *Code*, *Download ZIP*, then unpack; or `git clone`)"
+_TAKE = "(*Code*, *Download ZIP*, unpack; or `git clone`)"
 _REDIRECT = """<!doctype html>
 <meta charset="utf-8"><meta http-equiv="refresh" content="0; url={0}">
 <title>Moved</title><p>This page is now <a href="{0}">{0}</a>.</p>
@@ -163,7 +163,7 @@ class Sources:
             if path == "README.md":
                 rows = re.findall(r"^\| \[\d\d .*", text, re.MULTILINE)
                 self.shown["table"] = relinked("\n".join(rows), path, "lessons/index.md")
-                text = "# Install and run\n\n" + text[text.index("## Run") :]
+                text = "# Install and run\n\n" + text[text.index("## Start") :]
                 take = '(<a href="course.zip">course.zip</a>, then unpack; '
                 take += "it has what `lab`, `lecture`, `check` and `figures` need"
                 if self.repository:

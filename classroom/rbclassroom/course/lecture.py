@@ -211,13 +211,18 @@ def open_votes(address: str) -> Phones | None:
 
 def main() -> None:
     """Show a lesson from the command line, in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbclassroom.course.lecture")
+    parser = argparse.ArgumentParser(prog="course.py lecture")
     parser.add_argument("lesson", help="its number: 01")
+    parser.add_argument("--check", action="store_true", help="test it before class; show nothing")
     parser.add_argument("--no-browser", action="store_true", help="print the address only")
     parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="of this machine")
     words = parser.parse_args()
     try:
         path = find_lesson(words.lesson, Path("notebooks"))
+        if words.check:
+            from rbclassroom.course import rehearsal  # it imports this module
+
+            sys.exit(rehearsal.report(path))
         phones = None if words.votes is None else open_votes(words.votes)
     except ValueError as error:
         sys.exit(str(error))

@@ -1,12 +1,10 @@
 """Try a lesson before class: cells run, no request leaves the machine, access needs a token."""
 
-import argparse
 import http.client
 import json
 import logging
 import re
 import shutil
-import sys
 import threading
 import time
 import webbrowser
@@ -19,7 +17,7 @@ from urllib.parse import urlsplit
 import nbformat
 from tornado.ioloop import IOLoop, PeriodicCallback
 
-from rbclassroom.course.lecture import find_lesson, serve
+from rbclassroom.course.lecture import serve
 
 BROWSERS = ("firefox", "chromium", "chromium-browser", "google-chrome", "msedge")
 HEARTBEAT = "window.voila_heartbeat()"
@@ -207,18 +205,8 @@ def _look_for_browser() -> list[str]:
     return []
 
 
-def main() -> None:
-    """Try a lesson from the command line, in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbclassroom.course.rehearsal")
-    parser.add_argument("lesson", help="its number: 01")
-    try:
-        path = find_lesson(parser.parse_args().lesson, Path("notebooks"))
-    except ValueError as error:
-        sys.exit(str(error))
+def report(path: Path) -> bool:
+    """Print whether a lesson is ready to be shown, or what is missing; return whether it is not."""
     missing = check(path)
     print("\n".join(f"not ready: {what}" for what in missing) or "ready")
-    sys.exit(bool(missing))
-
-
-if __name__ == "__main__":
-    main()
+    return bool(missing)

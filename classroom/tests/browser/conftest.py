@@ -12,8 +12,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
+from packages import find_program
 from playwright.sync_api import expect, sync_playwright
 from servers import serving
+
+from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PATIENCE = 600_000  # milliseconds; long enough for a slow machine
@@ -38,8 +41,8 @@ def pytest_sessionstart(session):
     config = session.config
     if hasattr(config, "workerinput") or config.option.collectonly:
         return
-    if not os.environ.get("CHROMIUM"):
-        raise pytest.UsageError("CHROMIUM must name a browser; course.py browser looks for one")
+    names = "chromium", "chromium-browser", "google-chrome", "msedge"
+    os.environ["CHROMIUM"] = os.environ.get("CHROMIUM") or find_program("chromium", *names)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the servers end too
     stack = ExitStack()
     config.add_cleanup(stack.close)
@@ -59,8 +62,9 @@ def started():
         course, env = Path(home, "course"), environment(home)
         for folder in ("notebooks", "benchmarks"):
             shutil.copytree(ROOT / folder, course / folder)
-        copy = ["-m", "rbclassroom.course.notebooks", "copy"]
-        subprocess.run([sys.executable, *copy], cwd=course, env=env, check=True)
+        code = "copy_lessons(Path('notebooks'), Path('work'))"
+        code = f"from rbclassroom.course.notebooks import Path, copy_lessons; {code}"
+        subprocess.run([sys.executable, "-c", code], cwd=course, env=env, check=True)
         chromium = {"executablePath": os.environ["CHROMIUM"], "args": QUIET}
         Path(home, "chromium.json").write_text(json.dumps(chromium))
         browser = ["playwright", "launch-server", "--browser=chromium"]
@@ -70,7 +74,7 @@ def started():
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             lab.append("--allow-root")
         address = r"(http://127\.0\.0\.1:\d+)/lab\?(token=\w+)"
-        configured = env | {"JUPYTER_CONFIG_PATH": str(Path(sys.prefix, "share", "rbcourse"))}
+        configured = env | {"JUPYTER_CONFIG_PATH": str(configure())}
         with (
             serving(browser, course, os.environ | env, r"(ws://\S+)\n") as found,
             serving(lab, course, configured, address) as server,
