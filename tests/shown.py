@@ -1,12 +1,16 @@
 """What the artists of a saved figure show, recorded where a lesson draws it, beside its numbers.
 
 A kernel that runs `record` (see conftest.py) writes for each figure all numbers that its artists
-hold, an animation's in all frames. `not_shown` looks for the columns of the CSV among them.
+hold, an animation's in all frames, and stops at a figure that is clipped or has no labels.
+`not_shown` looks for the columns of the CSV among the numbers: if a title or a label names a
+column, among those of the artists that have this title or label.
 """
 
 import csv
 import os
+import pickle
 import re
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -28,25 +32,43 @@ SHARES = {
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames at the ends only
     r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,  # the cell
 }
-
-
+FIGURES = Path(__file__).parents[1] / "figures"
+LETTERS = str.maketrans("ω₁₂₃", "w123")  # of labels, as columns have them
+BAR = "<colorbar>"
 GETTERS = "get_data", "get_data_3d", "get_segments", "get_xy", "get_offsets", "get_array"
 
 
+def columns(file):
+    """The columns of a CSV by their names, as words."""
+    with file.open(encoding="utf-8", newline="") as lines:
+        header, *rows = csv.reader(lines)
+    return dict(zip(header, np.array(rows).T, strict=True))
+
+
+def numbers(name):
+    """The numbers of a committed figure, by the names of their columns."""
+    return {key: x.astype(float) for key, x in columns(FIGURES / f"{name}.csv").items()}
+
+
 def record(folder):
-    """Let figures that are saved write what they show into a folder."""
+    """Let figures that are saved write what they show into a folder, and check how they look."""
     import rbcourse.draw
     from rbcourse.draw import animate, save
 
     save_figure, render, frames = save.save_figure, animate.render, {}
 
     def saved(fig, name, data, alt):
-        numbers = np.concatenate([*frames.pop(fig, []), *numbers_of(fig.findobj())])
-        np.save(Path(folder) / f"{name}.npy", np.unique(numbers[np.isfinite(numbers)]))
-        return save_figure(fig, name, data, alt)
+        pools = defaultdict(list)
+        for key, values in [*frames.pop(fig, []), *by_names(fig.findobj())]:
+            pools[key].append(values)
+        pools = {key: np.unique(np.concatenate(values)) for key, values in pools.items()}
+        (Path(folder) / f"{name}.pickle").write_bytes(pickle.dumps(pools))
+        picture = save_figure(fig, name, data, alt)
+        check_looks(fig)
+        return picture
 
     def rendered(fig, update, count):
-        frames[fig] = [x for i in range(count) for x in numbers_of(update(i))]
+        frames[fig] = [pair for i in range(count) for pair in by_names(update(i))]
         return render(fig, update, count)
 
     for module in (rbcourse.draw, save, animate):
@@ -54,15 +76,29 @@ def record(folder):
     animate.render = rendered
 
 
+def by_names(artists):
+    """The numbers that artists hold, under "" and under the titles and labels of the artists."""
+    for artist in artists:
+        title = title_of(getattr(artist, "axes", None))
+        label = str(artist.get_label()).removeprefix("about ").translate(LETTERS)
+        for values in numbers_of([artist]):
+            for key in {"", f"title {title}", f"label {label}", f"label {title} {label}"}:
+                yield key, values[np.isfinite(values)]
+
+
+def title_of(ax):
+    """The first line of the title of axes; "" where some axes of a figure have none."""
+    if not hasattr(ax, "get_title"):
+        return ""
+    others = [other for other in ax.figure.axes if other.axison and other.get_label() != BAR]
+    return ax.get_title().partition("\n")[0] if all(x.get_title() for x in others) else ""
+
+
 def numbers_of(artists):
     """The numbers that artists hold, as flat arrays: coordinates, heights, values of a map."""
     for artist in artists:
         held = [getattr(artist, name)() for name in GETTERS if hasattr(artist, name)]
         held += [getattr(artist, name) for name in ("U", "V") if hasattr(artist, name)]
-        for segment in getattr(artist, "_segments3d", ()):
-            along = np.diff(segment[:2], axis=0)  # of an arrow: its direction
-            held += [segment, along, along / (np.linalg.norm(along) or 1)]
-            held.append(-held[-1])
         faces = getattr(artist, "corners", None)  # of a body
         if type(artist).__name__ == "Poly3DCollection":
             faces = np.asarray([face[:4] for face in artist._faces])
@@ -78,24 +114,59 @@ def numbers_of(artists):
                     yield np.ma.filled(np.ma.asarray(part, dtype=float), np.nan).ravel()
 
 
+def check_looks(fig):
+    """Fail where a figure is clipped, has axes without labels, or has curves that look the same."""
+    flat = [ax for ax in fig.axes if ax.name == "rectilinear"]
+    box = fig.get_tightbbox().transformed(fig.dpi_scale_trans)
+    assert (box.min > -1).all(), box
+    assert (box.max < fig.bbox.max + 1).all(), box
+    colours = {}
+    for ax in fig.axes:
+        named = [line for line in ax.lines if not line.get_label().startswith("_")]
+        looks = {(str(line.get_color()), line.get_marker()) for line in named}
+        assert len(looks) == len(named), ax
+        for line in named:  # a label that is on two axes has one colour
+            place = title_of(ax), line.get_label()
+            assert colours.setdefault(place, line.get_color()) == line.get_color(), place
+    for ax in flat:
+        if ax.axison:
+            assert any(other.get_xlabel() for other in flat) or fig.get_supxlabel()
+            assert any(other.get_ylabel() for other in flat) or fig.get_supylabel()
+        for artist in [*ax.lines, *ax.patches]:
+            if artist.get_transform().contains_branch(ax.transData):
+                places = artist.get_path().transformed(artist.get_transform()).vertices
+                if ax.get_aspect() == 1:  # a picture: marks are not cut either
+                    places = artist.get_window_extent().corners()
+                assert not (places < ax.bbox.min - 1e-6).any(), artist
+                assert not (places > ax.bbox.max + 1e-6).any(), artist
+
+
 def not_shown(figures, shown):
     """The columns of the CSV files of figures whose numbers the artists do not hold."""
     for file in sorted(figures.glob("*.csv")):
         if not file.with_suffix(".png").exists():
             continue  # a table beside figures
-        pool = np.load(shown / f"{file.stem}.npy")
-        with file.open(encoding="utf-8", newline="") as lines:
-            header, *rows = csv.reader(lines)
-        if "drawn [1]" in header:
-            rows = [row for row in rows if row[header.index("drawn [1]")] == "1"]
-        for column, cells in zip(header, zip(*rows, strict=True), strict=True):
+        pools, table = pickle.loads((shown / f"{file.stem}.pickle").read_bytes()), columns(file)
+        rows = table.get("drawn [1]", np.array("1")) == "1"
+        for column, cells in table.items():
             place = f"{file.stem}, {column}"
             share = min((s for form, s in SHARES.items() if re.fullmatch(form, place)), default=1)
             if share:
-                values = np.unique(np.array(cells, dtype=float))
+                pool = pools[name_for(column, pools)]
+                values = np.unique(cells[rows].astype(float))
                 lost = [v for v in values if not (held(pool, v) or held(pool, np.degrees(v)))]
                 if len(lost) > (1 - share) * len(values):
                     yield f"{place}: {len(lost)} of {len(values)} are not in the picture"
+
+
+def name_for(column, pools):
+    """The label, or else the title, that names a column; "" if none does."""
+    plain = column.split(" [")[0]
+    for name in (plain, plain.rpartition(" ")[0], plain.removesuffix(" median excess")):
+        if name and f"label {name}" in pools:
+            return f"label {name}"
+    titles = (name for name in pools if f"title {plain}".startswith(f"{name} "))
+    return max(titles, key=len, default="")
 
 
 def held(pool, value):

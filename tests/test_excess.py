@@ -1,15 +1,14 @@
 import importlib.util
 import itertools
 import re
-from fractions import Fraction
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbclassroom.surveys import atlas
-from rbcourse import excess
+from rbclassroom.surveys.atlas import random_problems
 from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 
@@ -17,24 +16,41 @@ ROOT = Path(__file__).parents[1]
 SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "docs/near_optimal.py")
 exact = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(exact)
+FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
+
+
+def bent(*ends, bend):
+    """Quintics with random accelerations at their ends; some cost much more than the optimum."""
+    return rb.exponential_quintic_so3(
+        *ends, *bend * np.random.default_rng(4).normal(size=(2, *ends[2].shape))
+    )
+
+
 TABULATED = [name for name in rb.CLOSED_FORMS if name != "corrected_bezier_so3"]
+CURVES = rb.CLOSED_FORMS | {f"bent by {x}": partial(bent, bend=x) for x in (0.3, 3.0)}
 pytestmark = pytest.mark.source("beyond BK 10")
 
 
-def scaled(ends, s):
-    """Return the problems with σ, w0 and w1 s times as large."""
-    turn = s * rb.log_so3(ends.turn)
-    return Ends(ends.R0, ends.R0 @ rb.exp_so3(turn), s * ends.w0, s * ends.w1)
+@cache
+def problems(count, size, seed, scale=1.0):
+    """Random problems, σ, w0 and w1 times a scale, and twice the costs of their optima."""
+    R0, R1, w0, w1 = random_problems(count, size, rng=seed)
+    turn = scale * rb.log_so3(R0.mT @ R1)
+    ends = Ends(R0, R0 @ rb.exp_so3(turn), scale * w0, scale * w1)
+    return ends, cost(rb.minimum_acceleration_so3(*ends))
 
 
-def excesses(name, ends):
-    """Return cost over optimum, minus 1, by Gauss's rule: smooth curves only."""
+def cost(curve):
+    """Twice ∫ ‖w'‖² dt by Gauss's rule: smooth curves only."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
-    best, cost = (
-        weights @ np.sum(curve((nodes + 1) / 2, 2) ** 2, axis=-1)
-        for curve in (rb.minimum_acceleration_so3(*ends), rb.CLOSED_FORMS[name](*ends))
-    )
-    return cost / best - 1
+    return weights @ np.sum(curve((nodes + 1) / 2, 2) ** 2, axis=-1)
+
+
+def solved(name, *given):
+    """Closed forms for `problems`, and their excess over the optima."""
+    ends, best = problems(*given)
+    curves = CURVES[name](*ends)
+    return curves, cost(curves) / best - 1
 
 
 def test_the_table_is_the_derived_one(tmp_path):
@@ -45,7 +61,7 @@ def test_the_table_is_the_derived_one(tmp_path):
 
 def test_the_constants_near_a_geodesic():
     """Terms of second order in e and d; of first order in both for the cumulative."""
-    ss, ee, dd, se, sd, Q = exact.ss, exact.ee, exact.dd, exact.se, exact.sd, exact.QQ
+    ss, ee, dd, se, sd = exact.ss, exact.ee, exact.dd, exact.se, exact.sd
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |sigma x e|², |sigma x d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
     wanted = {
@@ -57,74 +73,60 @@ def test_the_constants_near_a_geodesic():
     }
     for c, bezier, along, mean in ((180, 14580, 9, 445.5), (175, 14175, 25, 1093.5)):
         assert (bezier / c, (2 + along) / 2 * bezier / c) == (81, mean)  # the note's ratios
-    forms, orders = exact.forms(), np.array([0, 0, 2, 2, 1, 1, 2])
+    orders = np.array([0, 0, 2, 2, 1, 1, 2])
     for name, form in wanted.items():
-        few = {power: x for power, x in forms[name].terms() if orders @ power == 2}
+        few = {power: x for power, x in FORMS[name].terms() if orders @ power == 2}
         assert exact.RING.from_dict(few) == form, name
 
 
 def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
     """6401/180180 a⁴ for the projection, and a sixteenth for quaternions; others are exact."""
-    ss, forms, Q = exact.ss, exact.forms(), exact.QQ
+    ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
     wanted = dict.fromkeys(("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"), 0)
-    wanted |= {"projected_cubic_so3": Q(6401, 180180), "quaternion_cubic_so3": Q(6401, 16 * 180180)}
+    wanted |= {"projected_cubic_so3": projection, "quaternion_cubic_so3": projection / 16}
     for name, factor in wanted.items():
-        found = forms[name].compose(list(at_rest.items())).exquo(12 * ss)
+        found = FORMS[name].compose(list(at_rest.items())).exquo(12 * ss)
         assert found == factor * ss**2, name
 
 
 def test_the_deviation_in_the_package_is_the_derived_one():
     """Exactly, with fractions, as polynomials in t."""
     numbers = np.random.default_rng(5).integers(-9, 9, (3, 3))
-    vectors = np.array([[Fraction(int(n), 3) for n in row] for row in numbers])
-
-    def rational(x):
-        return exact.QQ(x.numerator, x.denominator)
-
+    vectors = np.array([[Q(int(n), 3) for n in row] for row in numbers])
     u, bump = exact.RING(2) * exact.t - 1, exact.t**2 * (1 - exact.t) ** 2
-    coefficients = bezier_deviation(*vectors)
     pairs = itertools.combinations_with_replacement(vectors, 2)
     symbols = exact.ss, exact.se, exact.sd, exact.ee, exact.ed, exact.dd
-    inner = [(s, rational(Fraction(x @ y))) for s, (x, y) in zip(symbols, pairs, strict=True)]
-    theirs = exact.deviations()["bezier_so3"]
+    inner = [(s, x @ y) for s, (x, y) in zip(symbols, pairs, strict=True)]
+    theirs = [share.subs(inner) for share in exact.deviations()["bezier_so3"]]
     for i in range(3):
-        ours = sum((rational(c[i]) * u**k for k, c in enumerate(coefficients)), exact.RING(0))
-        shares = zip(theirs, vectors, strict=True)
-        total = sum((rational(v[i]) * share.subs(inner) for share, v in shares), exact.RING(0))
-        assert total == bump * ours
+        ours = sum(c[i] * u**k for k, c in enumerate(bezier_deviation(*vectors)))
+        assert sum(v[i] * share for share, v in zip(theirs, vectors, strict=True)) == bump * ours
 
 
 @pytest.mark.parametrize("name", TABULATED)
 def test_power_and_leading_term_against_the_solver(name):
     """Its relative error falls with the next power: the second, for the cumulative the first."""
     power, least = (2, 1.6) if name == "cumulative_bezier_so3" else (4, 3.4)
-    ends, errors = atlas.random_problems(20, 1.0, rng=6), []
+    found, errors = [], []
     for s in (0.4, 0.2, 0.1):
-        some = scaled(ends, s)
-        found = excesses(name, some)
-        errors.append(np.median(np.abs(found / rb.leading_excess(name, *some) - 1)))
-        if s == 0.2:
-            before = found
-    assert np.all(np.abs(np.log2(before / found) - power) < 0.5)
+        found.append(solved(name, 20, 1.0, 6, s)[1])
+        leading = rb.leading_excess(name, *problems(20, 1.0, 6, s)[0])
+        errors.append(np.median(np.abs(found[-1] / leading - 1)))
+    assert np.all(np.abs(np.log2(found[1] / found[2]) - power) < 0.5)
     assert errors[0] < 0.1
     assert min(errors[0] / errors[1], errors[1] / errors[2]) > least
 
 
-@pytest.mark.parametrize(
-    ("name", "over"),
-    [
-        ("projected_cubic_so3", 6300),
-        ("quaternion_cubic_so3", 256 * 6300),
-        ("cayley_cubic_so3", 2800),
-    ],
-)
+OVER = {"projected_cubic_so3": 6300, "quaternion_cubic_so3": 256 * 6300, "cayley_cubic_so3": 2800}
+
+
+@pytest.mark.parametrize(("name", "over"), OVER.items())
 def test_the_cost_along_geodesics_of_curves_that_leave_them(name, over):
     """With e = d = 0 they deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
-    start = np.broadcast_to(np.eye(3), (2, 3, 3))
-    curves = rb.CLOSED_FORMS[name](start, rb.exp_so3(sigma), sigma, sigma)
+    curves = rb.CLOSED_FORMS[name](I3, rb.exp_so3(sigma), sigma, sigma)
     found = rb.acceleration_cost(curves) / 2 * over / sizes**10
     assert found == pytest.approx(1, abs=0.1)
     assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # a relative error of second order
@@ -132,28 +134,28 @@ def test_the_cost_along_geodesics_of_curves_that_leave_them(name, over):
 
 def test_the_corrected_curve_has_the_eighth_power():
     """By the solver in the median; by the estimate, which sees smaller ones, for each problem."""
-    ends = atlas.random_problems(20, 1.0, rng=7)
-    large, small = (excesses("corrected_bezier_so3", scaled(ends, s)) for s in (0.9, 0.6))
-    assert 7.5 < np.median(np.log(large / small) / np.log(1.5)) < 8.5
-    large, small = (
-        rb.excess_estimate(rb.corrected_bezier_so3(*scaled(ends, s))) for s in (0.6, 0.4)
+    (large, _), (middle, middle_one), (_, small_one) = (
+        (excess, rb.excess_estimate(curves))
+        for curves, excess in (
+            solved("corrected_bezier_so3", 20, 1.0, 7, s) for s in (0.9, 0.6, 0.4)
+        )
     )
-    power = np.log(large / small) / np.log(1.5)
-    assert 7.5 < power.min() <= power.max() < 8.5
+    assert 7.5 < np.median(np.log(large / middle) / np.log(1.5)) < 8.5
+    powers = np.log(middle_one / small_one) / np.log(1.5)
+    assert 7.5 < powers.min() <= powers.max() < 8.5
 
 
-@pytest.mark.parametrize("name", rb.CLOSED_FORMS)
+@pytest.mark.parametrize("name", CURVES)
 @pytest.mark.source("beyond BK 11")
 def test_the_estimate_within_a_fifth_or_none(name):
     for size in (0.5, 1, 2):
-        ends = atlas.random_problems(150, size, rng=8)
-        curves = rb.CLOSED_FORMS[name](*ends)
-        estimate, true = rb.excess_estimate(curves), excesses(name, ends)
+        curves, true = solved(name, 80, size, 8)
+        estimate = rb.excess_estimate(curves)
         fastest = np.linalg.norm(curves(np.linspace(0, 1, 33), 1), axis=-1).max(axis=0)
         assert np.all(np.isnan(estimate[(fastest > 2.51) | (true > 1.25)]))
         assert np.all(np.isfinite(estimate[(fastest < 2.49) & (true < 0.8)]))
         holds = np.isfinite(estimate)
-        assert holds.sum() > (0 if size == 2 else 100)
+        assert size == 2 or holds.sum() > 40
         assert np.all(np.abs(estimate - true)[holds] < 0.2 * true[holds] + 1e-11)
 
 
@@ -161,48 +163,28 @@ def test_the_correction_turns_the_way_that_bezier_turns():
     """Ends that want the other way round: by σ of the short way it would cost far more."""
     rng = np.random.default_rng(2)
     turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))
-    w = [0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3))
-    ends = np.broadcast_to(np.eye(3), (20, 3, 3)), rb.exp_so3(turn), *w
-    plain, corrected = (
-        rb.acceleration_cost(make(*ends)) for make in (rb.bezier_so3, rb.corrected_bezier_so3)
+    ends = I3, rb.exp_so3(turn), *([0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3)))
+    plain, corrected, best = (
+        rb.acceleration_cost(make(*ends))
+        for make in (rb.bezier_so3, rb.corrected_bezier_so3, rb.minimum_acceleration_so3)
     )
-    best = rb.minimum_acceleration_so3(*ends).cost
     assert np.all(corrected - best < 0.5 * (plain - best) + 1e-9 * best)
 
 
-@pytest.mark.source("beyond BK 11")
-@pytest.mark.parametrize("bend", [0.3, 3.0])
-def test_the_estimate_of_other_curves(bend):
-    """Quintics with random accelerations at their ends; some cost much more than the optimum."""
-    ends = atlas.random_problems(200, 0.7, rng=3)
-    curves = rb.exponential_quintic_so3(
-        *ends, *bend * np.random.default_rng(4).normal(size=(2, 200, 3))
-    )
-    true = (
-        rb.acceleration_cost(curves) / rb.acceleration_cost(rb.minimum_acceleration_so3(*ends)) - 1
-    )
-    estimate = rb.excess_estimate(curves)
-    assert np.isfinite(estimate).sum() > 100
-    assert np.all(np.isnan(estimate[true > 1.25]))
-    assert np.nanmax(np.abs(estimate / true - 1)) < 0.2
-
-
-def test_the_estimate_of_the_optimum_is_zero():
-    curve = rb.minimum_acceleration_so3(*atlas.random_problems(50, 0.6, rng=9))
-    assert np.all(np.abs(rb.excess_estimate(curve)) < 1e-13)
-
-
 def test_stacks_and_durations():
-    ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in atlas.random_problems(6, 0.5, rng=1)))
-    estimate = rb.excess_estimate(rb.bezier_so3(*ends))
+    ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in random_problems(6, 0.5, rng=1)))
+    curves = rb.bezier_so3(*ends)
+    estimate = rb.excess_estimate(curves)
     assert estimate.shape == rb.leading_excess("bezier_so3", *ends).shape == (2, 3)
     for T in (1, 20):
-        one = rb.retime(rb.bezier_so3(*ends.take((1, 2))), T)
+        one = rb.retime(curves[1, 2], T)
         assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
 
 
-def test_where_the_optimum_costs_nothing_or_is_not_found_the_excess_is_nan():
-    ends = np.eye(3), rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
+def test_the_estimate_of_the_optimum_is_zero_and_nan_where_it_costs_nothing_or_is_not_found():
+    best = rb.minimum_acceleration_so3(*random_problems(50, 0.6, rng=9))
+    assert np.all(np.abs(rb.excess_estimate(best)) < 1e-13)
+    ends = I3, rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
     assert np.isnan(rb.leading_excess("projected_cubic_so3", *ends))
     assert np.isnan(rb.excess_estimate(rb.geodesic_so3(*ends[:2])))
     w0, w1 = [[0, 0, 0.5], [1e160, 0, 0]], [[0, 0.5, 0], [0, 1e160, 0]]
@@ -219,19 +201,17 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
         smooth = 3 * t**2 - 2 * t**3, 6 * t - 6 * t**2, 6 - 12 * t, -12
         return smooth[order] + 40**order * bumps[order]
 
-    line = rb.projected_line_so3(np.eye(3), rb.exp_so3([0, 0, 0.5]), jolt)
+    line = rb.projected_line_so3(I3, rb.exp_so3([0, 0, 0.5]), jolt)
     assert np.isnan(rb.excess_estimate(line))
     assert rb.acceleration_cost(line) < 1.5 * 24 * 0.5**2  # neither costly nor fast
 
 
-@pytest.mark.parametrize("name", [["bezier_so3"], "corrected_bezier_so3"])
-def test_other_names_and_curves_are_refused(name):
-    ends = np.eye(3), np.eye(3), [0, 0, 1], [0, 0, 1]
-    said = re.escape(f"is wanted, got {name!r}")
-    with pytest.raises(ValueError, match=rf"^name: one of projected_cubic_so3, .* {said}"):
-        rb.leading_excess(name, *ends)
-    with pytest.raises(ValueError, match="curve: a Curve wanted"):
-        rb.excess_estimate(np.eye(3))
-    with pytest.raises(ValueError, match=r"on SO\(3\)"):
-        rb.excess_estimate(rb.geodesic_se3(np.eye(4), np.eye(4)))
-    assert set(excess._forms()) == set(TABULATED)
+def test_other_names_and_curves_are_refused():
+    assert set(FORMS) == set(TABULATED)
+    for name in (["bezier_so3"], "corrected_bezier_so3"):
+        message = re.escape(f"name: one of {', '.join(FORMS)} is wanted, got {name!r}")
+        with pytest.raises(ValueError, match=f"^{message}"):
+            rb.leading_excess(name, I3, I3, [0, 0, 1], [0, 0, 1])
+    for curve, message in ((I3, "curve: a Curve wanted"), (rb.geodesic_se3(I4, I4), r"on SO\(3\)")):
+        with pytest.raises(ValueError, match=message):
+            rb.excess_estimate(curve)

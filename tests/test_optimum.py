@@ -1,416 +1,292 @@
-"""The optimum: two solvers of ours, SciPy's, and the equation itself."""
+"""The optima: two solvers of ours, SciPy's, direct minimisation, and the equations themselves."""
 
-import warnings
+import functools
+import re
 
 import numpy as np
 import oracles
 import pytest
-from numpy.polynomial import Chebyshev
+from optima import (
+    BOOK,
+    COSTS,
+    I3,
+    OPTIMA,
+    PAPER,
+    REST,
+    SOLVERS,
+    deviation,
+    random_problems,
+    some,
+    times,
+)
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
-from rbcourse import optimum
-from rbcourse.closed_forms import CLOSED_FORMS
-from rbcourse.curves import Ends
 from rbcourse.optimum import search
 from rbcourse.optimum.chebyshev import grid, interpolation
-from rbcourse.optimum.collocation import cost_of, relax_ball
-from rbcourse.optimum.search import ball, cheapest
 
-REST = np.zeros(3)
-ALONG = np.pi / 6 * np.array([1, 2, 3])
-PAPER = {
-    "4b": (ALONG, ALONG, ALONG + np.eye(3)[0]),
-    "4c": (ALONG, ALONG, ALONG + 5 * np.eye(3)[0]),
-    "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
-}
-ASTRAY = (
-    [-0.46787982, 1.84514378, 2.04665512],
-    [-1.84205908, -6.79718364, -1.48113244],
-    [2.12409307, -7.32863165, -2.12777328],
-)
-every_solver = pytest.mark.parametrize(
-    "solver", [rb.minimum_acceleration_so3, rb.shoot_minimum_acceleration_so3]
-)
+every_solver = pytest.mark.parametrize("what", SOLVERS)
+every_optimum = pytest.mark.parametrize("what", OPTIMA)
+of_forces = pytest.mark.parametrize("what", ["acceleration", "torque"])
 TIMES = np.linspace(0, 1, 101)
+FEW = random_problems(2, 5, 2.0, 4.0)
 
 
-def random_ends(rng, angle, speed, count):
-    """Turns and two velocities, uniform in balls, shape (3, count, 3)."""
-    directions = rng.normal(size=(3, count, 3))
-    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    lengths = np.reshape([angle, speed, speed], (3, 1, 1)) * np.cbrt(rng.random((3, count, 1)))
-    return lengths * directions
-
-
-@pytest.mark.source("BK (19)", "BK (20)", "BK 6.2", "BK 6.3", "BK Fig. 4", "BK Fig. 5")
-@every_solver
-@pytest.mark.parametrize("case", PAPER)
-def test_the_curve_is_that_of_scipys_solver(case, solver):
+def of_paper(case):
+    """A problem, without an inertia and accelerations."""
     turn, w0, w1 = PAPER[case]
-    theirs = oracles.minimum_acceleration(turn, w0, w1)
-    assert theirs.success
-    y = theirs.sol(TIMES)
-    nodes, weights = np.polynomial.legendre.leggauss(200)
-    cost = weights @ np.sum(theirs.sol((nodes + 1) / 2)[7:10] ** 2, axis=0)
-    ours = solver(np.eye(3), rb.exp_so3(turn), w0, w1)
-    assert np.abs(ours(TIMES) - oracles.rotation_of_quaternions(y[:4])).max() < 1e-9
-    assert np.abs(ours(TIMES, 1) - y[4:7].T).max() < 1e-9
-    assert rb.acceleration_cost(ours) == pytest.approx(cost, rel=1e-9)
+    return I3, rb.exp_so3(turn), w0, w1, None, REST, REST
 
 
-@pytest.mark.source("BK (19)", "BK (20)", "BK Prop. 7")
-@every_solver
-@pytest.mark.parametrize("case", PAPER)
-def test_the_curve_solves_the_equation_also_with_its_ends_exchanged(case, solver):
-    """By interpolants of w alone, and of R for its velocity."""
-    turn, w0, w1 = PAPER[case]
-    R0 = Rotation.random(rng=19).as_matrix()
-    R1 = R0 @ rb.exp_so3(turn)
-    curve, back = solver(R0, R1, w0, w1), solver(R1, R0, -w1, -w0)
-    assert np.abs(back(1 - TIMES) - curve(TIMES)).max() < 1e-10
-    assert np.abs(curve([0, 1]) - [R0, R1]).max() < 1e-11
-    assert np.abs(curve([0, 1], 1) - [w0, w1]).max() < 1e-11
-    t = np.linspace(0.1, 0.9, 25)
-    degree = 30 if case != "4c" else 44
-    w = [Chebyshev.interpolate(lambda t, i=i: curve(t, 1)[:, i], degree, [0, 1]) for i in range(3)]
-    value, first, second, third = (np.array([p.deriv(k)(t) for p in w]).T for k in range(4))
-    scale = np.linalg.norm(third, axis=1).max()
-    assert np.abs(third + np.cross(value, second)).max() < 1e-9 * scale
-    rate = np.array([oracles.derivative_by_differences(curve, u) for u in t])
-    assert np.abs(rate - curve(t) @ rb.hat_so3(curve(t, 1))).max() < 1e-9
-    assert np.abs(first - curve(t, 2)).max() < 1e-9
-    constant = (curve(t) @ second[..., None])[..., 0]
-    assert np.abs(constant - curve.c).max() < 1e-9 * scale
-
-
-@pytest.mark.source("BK 6.2")
-@every_solver
-@pytest.mark.parametrize("shares", [(1, 1), (0, 0), (2, 0.5), (0, 3), (-0.3, 1.5)])
-def test_end_velocities_along_the_geodesic_give_the_closed_form(solver, shares):
-    R0 = Rotation.random(rng=4).as_matrix()
-    p = CubicHermiteSpline([0, 1], [0, 1], shares)
-    curve = solver(R0, R0 @ rb.exp_so3(ALONG), *np.outer(shares, ALONG))
-    assert np.abs(curve(TIMES) - R0 @ rb.exp_so3(np.outer(p(TIMES), ALONG))).max() < 1e-9
-    for order in (1, 2):
-        assert np.abs(curve(TIMES, order) - np.outer(p(TIMES, order), ALONG)).max() < 1e-9
-
-
-FAST = random_ends(np.random.default_rng(12), np.pi, 12, 400)
-
-
-@pytest.fixture(scope="module")
-def fastest():
-    """The optima of all problems of FAST, in one stack."""
-    return rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(FAST[0]), *FAST[1:])
-
-
-@pytest.mark.source("BK 6.2")
-def test_fast_problems_converge_to_their_ends(fastest):
-    assert fastest.residual.max() < 1e-11
-    R1 = rb.exp_so3(FAST[0])
-    assert np.abs(fastest([0, 1]) - np.stack(np.broadcast_arrays(np.eye(3), R1))).max() < 1e-11
-    assert np.abs(fastest([0, 1], 1) - FAST[1:]).max() < 1e-11
-
-
-@pytest.mark.source("BK 1", "BK 6.2")
-@pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_no_closed_form_costs_less(fastest, name):
-    slow = np.full(400, True)
-    if "bezier_so3" in name and "cumulative" not in name:
-        slow = (np.linalg.norm(FAST[1:], axis=-1) < 9.42).all(axis=0)
-    turn, w0, w1 = FAST[:, slow]
-    times = np.linspace(0, 1, 2001)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "margin < 1e-6", RuntimeWarning)
-        curves = CLOSED_FORMS[name](np.eye(3), rb.exp_so3(turn), w0, w1)
-    for part in (slice(i, i + 100) for i in range(0, len(turn), 100)):
-        squares = np.sum(curves[part](times, 2) ** 2, axis=-1)
-        rough = 2 * np.trapezoid(squares, times, axis=0)  # never much too low
-        assert np.all(rough > fastest.cost[slow][part] * (1 - 1e-3))
-
-
-@pytest.mark.source("BK 6.2")
-def test_neither_way_round_costs_less(fastest):
-    """Newton's method from Bézier's curves in cumulative form, written out, all four ways."""
-    turn, w0, w1 = FAST
-    ends = Ends(np.eye(3) + np.zeros((400, 1, 1)), rb.exp_so3(turn), w0, w1)
-    first, last, R1 = rb.exp_so3(-w0 / 3), rb.exp_so3(-w1 / 3), ends.R1
-    middle = rb.log_so3(first @ R1 @ last)
-    axis = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
-    t = grid(17).t[:, None]
-    for ways in (0, -1, 1, -2):
-        legs = (1 - (1 - t) ** 3) * w0[:, None] / 3, t**3 * w1[:, None] / 3
-        between = (3 * t**2 - 2 * t**3) * (middle + 2 * np.pi * ways * axis)[:, None]
-        R = rb.exp_so3(legs[0]) @ rb.exp_so3(between) @ rb.exp_so3(legs[1])
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = relax_ball(ball(ends).equations, R)
-        costs = 2 * np.array([cost_of(one) for one in found])
-        assert np.all(costs > fastest.cost * (1 - 1e-9))
-
-
-@pytest.mark.source("BK 6.2")
-def test_a_turned_room_a_turned_body_and_reversed_time_change_no_cost(fastest):
-    (turn, w0, w1), rng = FAST, np.random.default_rng(3)
-    L, Q = (Rotation.random(400, rng=rng).as_matrix() for _ in range(2))
-    R1 = rb.exp_so3(turn)
-    inside = [(Q.mT @ w[..., None])[..., 0] for w in (w0, w1)]
-    for ends in ((L, L @ R1, w0, w1), (Q, R1 @ Q, *inside), (R1, np.eye(3), -w1, -w0)):
-        cost = rb.minimum_acceleration_so3(*ends).cost
-        assert np.abs(cost / fastest.cost - 1).max() < 1e-9
-
-
-@every_solver
-def test_a_problem_whose_short_way_leads_astray(solver):
-    """That costs 3504; Bézier's curves 603 and 553, the way round that was found first 549."""
-    turn, w0, w1 = np.array(ASTRAY)
-    curve = solver(np.eye(3), rb.exp_so3(turn), w0, w1)
-    assert curve.cost == pytest.approx(502.3476, rel=1e-6)
-    assert rb.acceleration_cost(curve) == pytest.approx(curve.cost, rel=1e-9)
-
-
-def cost_about_an_axis(angle, k0, k1):
-    """2 ∫ p''² of the cubic p from 0 to the angle with these rates."""
-    square, cube = 3 * angle - 2 * k0 - k1, k0 + k1 - 2 * angle
-    return 8 * (square**2 + 3 * square * cube + 3 * cube**2)
-
-
-@pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
-def test_fast_spins_about_one_axis_make_as_many_turns_as_cost_least(speed):
-    """There p(t) is a cubic, to σ and any number of turns; the optimum costs no more."""
-    rng = np.random.default_rng(speed)
-    sigma, k0 = rng.uniform(-np.pi, np.pi, 60), rng.uniform(speed - 5, speed + 5, 60)
-    k1, axis = k0 + rng.uniform(-0.5, 0.5, 60), Rotation.random(rng=rng).as_matrix()[0]
-    turn, *rates = (x[:, None] * axis for x in (sigma, k0, k1))
-    curve = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(turn), *rates)
-    angles = sigma + 2 * np.pi * np.arange(-12, 13)[:, None]
-    assert np.all(curve.cost < cost_about_an_axis(angles, k0, k1).min(axis=0) + 1e-9 * speed**2)
-
-
-@pytest.mark.parametrize("seed", [None, 1, 2])
-def test_along_a_path_of_goals_the_cost_has_no_jump(seed):
-    """Where two families cross it bends; a step then is no larger than its neighbours."""
-    given = random_ends(np.random.default_rng(seed), np.pi, 12, 1)[:, 0] if seed else ASTRAY
-    axis, w0, w1 = np.array(given)
-    turns = np.linspace(0, 2 * np.pi, 500)[:, None] * axis / np.linalg.norm(axis)
-    cost = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3(turns), w0, w1).cost
-    steps = np.abs(np.diff(cost))
-    assert np.all(steps[1:-1] < 3 * np.maximum(steps[:-2], steps[2:]) + 1e-9 * cost.max())
-
-
-@pytest.mark.source("BK (18)")
-@pytest.mark.parametrize("case", PAPER)
-def test_direct_minimisation_finds_the_same_curve(case):
-    turn, *rates = PAPER[case]
-    ends = np.eye(3), rb.exp_so3(turn), *rates
-    best = rb.minimum_acceleration_so3(*ends)
-    w, cost = oracles.least_directly(lambda w, a: np.sqrt(2) * a, ends, best)
-    assert best.cost == pytest.approx(cost, rel=1e-9)
-    assert np.abs(best(TIMES, 1) - w(TIMES)).max() < 1e-6
-
-
-@pytest.mark.parametrize("short_of", [0, 1e-15, 1e-9, 1e-4])
-def test_near_half_turns_converge(short_of):
-    """From rest to rest the geodesic; it is returned though the projected cubic jumps."""
-    axes = np.array([[0, 0, 1], [0.6, -0.8, 0], [1, 1, 1], [-0.3, 0.2, 0.7], [0.1, -2, 1]])
-    R1 = rb.exp_so3((np.pi - short_of) * axes / np.linalg.norm(axes, axis=1, keepdims=True))
-    curves = rb.minimum_acceleration_so3(np.eye(3), R1, REST, REST)
-    assert np.abs(curves(1) - R1).max() < 1e-11
-    assert curves.cost == pytest.approx(np.full(5, 24 * (np.pi - short_of) ** 2), rel=1e-9)
-    tumbling = rb.minimum_acceleration_so3(np.eye(3), R1, [1, 2, 3], [-3, 0, 1])
-    assert tumbling.residual.max() < 1e-11
-    for i, R in enumerate(R1):
-        alone = rb.minimum_acceleration_so3(np.eye(3), R, [1, 2, 3], [-3, 0, 1])
-        assert np.abs(tumbling(TIMES)[:, i] - alone(TIMES)).max() < 1e-10
-
-
-@pytest.mark.parametrize("short_of", [0, 1e-9, 1e-6])
-@pytest.mark.parametrize("speeds", [(-0.72, 0.735), (-0.3, 0.31), (-1, 1.02), (-3, 3.1), (2, 2)])
-def test_no_turn_too_many_near_half_turns(short_of, speeds):
-    """Along the axis p(t) is a cubic; σ is the shortest."""
-    angle, rates = np.pi - short_of, np.outer(speeds, [0, 0, 1])
-    curve = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3([0, 0, angle]), *rates)
-    assert rb.acceleration_cost(curve) <= cost_about_an_axis(angle, *speeds) * (1 + 1e-9)
-    assert curve.cost == pytest.approx(rb.acceleration_cost(curve), rel=1e-12)
-
-
+@pytest.mark.source("BK (18)", "BK (19)", "BK (20)", "BK Prop. 7", "BK 6.2", "BK 6.3")
+@pytest.mark.source("BK Fig. 4", "BK Fig. 5", "beyond BK 3", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize(
-    ("turn", "w0", "w1"),
+    ("what", "problem"),
     [
-        ([-0.1, 2.5, -1.7], [-7.1, 7.0, 4.1], [-7.2, 0.4, 8.0]),
-        ([0.6, 0.4, -2.9], [6.0, -2.5, 8.6], [-0.2, 7.1, -8.1]),
+        *((what, of_paper(case)) for what in ("ball", "shooting") for case in PAPER),
+        *((what, some(FEW, i)) for what in ("acceleration", "torque", "jerk") for i in range(2)),
     ],
 )
-def test_fast_problems_whose_projected_cubics_lead_newtons_method_nowhere(turn, w0, w1):
-    ends = np.eye(3), rb.exp_so3(turn), w0, w1
-    curve, near = rb.minimum_acceleration_so3(*ends), rb.projected_cubic_so3(*ends)
-    assert curve.residual < 1e-11
-    assert np.abs(curve([0, 1], 1) - [w0, w1]).max() < 1e-11
-    assert rb.acceleration_cost(curve) < rb.acceleration_cost(near)
+def test_solve_bvp_and_direct_minimisation_find_the_same_curve(what, problem):
+    *ends, G, a0, a1 = problem
+    curve, tolerance = SOLVERS[what](*problem), 1e-8
+    ends += [a0, a1] * (what == "jerk")
+    if what in ("ball", "shooting"):
+        theirs = oracles.minimum_acceleration(rb.log_so3(ends[1]), *ends[2:])
+        nodes, weights = np.polynomial.legendre.leggauss(200)
+        cost = weights @ np.sum(theirs.sol((nodes + 1) / 2)[7:10] ** 2, axis=0)
+        assert theirs.success
+        tolerance = 1e-9
+    else:
+        of = {"acceleration": ("effort", G, np.linalg.inv(G)), "torque": ("effort", G, I3)}
+        theirs, cost = oracles.stationary(of.get(what, ("jerk",)), ends, curve)
+        cost *= 2 if what == "jerk" else 1
+    y = theirs.sol(TIMES)
+    assert np.abs(curve(TIMES) - oracles.rotation_of_quaternions(y[:4])).max() < tolerance
+    assert np.abs(curve(TIMES, 1) - y[4:7].T).max() < tolerance
+    w, least = oracles.least_directly(functools.partial(deviation, what, G), ends, curve)
+    assert np.abs(curve(TIMES, 1) - w(TIMES)).max() < 1e-6
+    assert [cost, least] == pytest.approx([curve.cost] * 2, rel=1e-9)
 
 
-@every_solver
-def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(solver):
-    turn, *rates = PAPER["4b"]
-    R1 = rb.exp_so3(turn)
-    rounded, exact = (solver(np.eye(3), R, *rates) for R in (R1.round(8), R1))
-    assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
-    assert np.abs(rounded(TIMES) - exact(TIMES)).max() < 1e-7
+@every_optimum
+def test_the_cost_is_the_integral(what):
+    problems = random_problems(5, 33)
+    curves = OPTIMA[what](*problems)
+    x, weights = np.polynomial.legendre.leggauss(120)
+    rates = (np.moveaxis(curves((x + 1) / 2, k), 0, 1) for k in (1, 2, 3))
+    u = deviation(what, problems[4][:, None], *rates)
+    assert curves.cost == pytest.approx(np.sum(u**2, axis=-1) @ weights / 2, rel=1e-12)
+    slower = rb.retime(curves, 3.0)
+    for some_of, i in ((curves, slice(None)), (curves[3], 3), (slower, slice(None))):
+        assert COSTS[what](some_of, problems[4][i]) == pytest.approx(some_of.cost, rel=1e-10)
+    assert times(slower(1.2), slower.costate(1.2)) == pytest.approx(slower.c, rel=1e-9)
 
 
-@pytest.mark.parametrize("power", [-320, -162, -161, -160, -156, -150, -100, -20])
-def test_tiny_motions_cost_what_their_cubic_costs(power):
-    """Squares of such velocities are 0 in floating point; the solver must not add a full turn."""
-    speed = 10.0**power
-    curve = rb.minimum_acceleration_so3(np.eye(3), np.eye(3), [0, 0, speed], REST)
-    assert curve.cost == pytest.approx(8 * speed**2, rel=1e-4, abs=1e-40)
-    assert np.abs(curve(0.5) - np.eye(3)).max() <= speed
+@pytest.mark.source("beyond BK 2", "BK (19)")
+@every_optimum
+def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
+    curves = OPTIMA[what](*random_problems(20, 35))
+    t = np.linspace(0.02, 0.98, 37)
+    p = curves.costate(t)
+    size = 1 + np.abs(p).max(axis=(0, 2))[:, None]
+    assert np.all(np.abs(times(curves(t), p) - curves.c) < 1e-11 * size)
+    assert np.abs(curves[3].costate(0.3) - curves.costate(0.3)[3]).max() < 1e-11 * size[3]
+    assert what != "ball" or np.array_equal(p, curves(t, 3))
 
 
-def test_a_curve_that_costs_more_than_a_start_is_returned_with_a_warning(monkeypatch):
-    def expensive(task):
-        found = cheapest(task)
-        return [found[0]._replace(beaten=True), *found[1:]]
+@of_forces
+@pytest.mark.parametrize("size", [2.0, 0.3, 1e-6, 1e9])
+def test_of_a_round_body_it_is_the_balls_optimum(what, size):
+    """And near it for a body that is almost round."""
+    ends, power = random_problems(6, 32)[:4], 2 if what == "torque" else 1
+    curves, of_balls = OPTIMA[what](*ends, size * I3), rb.minimum_acceleration_so3(*ends)
+    for order in range(4):
+        assert np.array_equal(curves(TIMES, order), of_balls(TIMES, order))
+    assert curves.cost == pytest.approx(size**power * of_balls.cost / 2, rel=1e-14)
+    assert curves.c == pytest.approx(size**power * of_balls.c, rel=1e-13)
+    assert COSTS[what](curves, size * I3) == pytest.approx(curves.cost, rel=1e-10)
+    almost = OPTIMA[what](*ends, size * np.diag([1, 1 + 1e-9, 1 - 1e-9]))
+    assert almost.cost == pytest.approx(curves.cost, rel=1e-7)
+    assert np.abs(almost(TIMES, 1) - of_balls(TIMES, 1)).max() < 1e-5
 
-    monkeypatch.setattr(optimum, "cheapest", expensive)
-    ends = ENDS.take(slice(3))
+
+@pytest.mark.source("BK 6.2")
+@pytest.mark.parametrize("what", ["ball", "shooting", "acceleration", "torque"])
+@pytest.mark.parametrize("shares", [(1, 1), (0, 0), (2, 0.5), (0, 3), (-0.3, 1.5)])
+def test_about_a_principal_axis_it_is_a_cubic(what, shares):
+    """Of a ball all axes are principal."""
+    frame, R0 = Rotation.random(2, rng=4).as_matrix()
+    moments, angle = np.array([1.0, 2.2, 2.9]), 1.3 if what in ("acceleration", "torque") else 1.96
+    G = (frame * moments) @ frame.T
+    p, (j, k) = CubicHermiteSpline([0, 1], [0, 1], shares), shares
+    square = 12 * angle**2 * (1 - j - k + (j**2 + j * k + k**2) / 3)
+    for axis, moment in zip(frame.T, moments, strict=True):
+        turn = angle * axis
+        ends = R0, R0 @ rb.exp_so3(turn), j * turn, k * turn
+        curve = SOLVERS[what](*ends, (G + G.T) / 2)
+        assert np.abs(curve(TIMES) - R0 @ rb.exp_so3(np.outer(p(TIMES), turn))).max() < 1e-11
+        for order in (1, 2):
+            assert np.abs(curve(TIMES, order) - np.outer(p(TIMES, order), turn)).max() < 1e-9
+        factor = {"acceleration": moment, "torque": moment**2}.get(what, 2)
+        assert curve.cost == pytest.approx(factor * square, rel=1e-12)
+
+
+@pytest.mark.source("beyond BK 5")
+@pytest.mark.parametrize("angle", [0.1, 1.0, 2.67, np.pi - 1e-9])
+def test_least_jerk_from_rest_to_rest_is_the_geodesic(angle):
+    axis = np.array([0.6, 0, 0.8])
+    curve = rb.minimum_jerk_so3(I3, rb.exp_so3(angle * axis), REST, REST, REST, REST)
+    share = TIMES**3 * (10 - 15 * TIMES + 6 * TIMES**2)
+    assert np.abs(curve(TIMES) - rb.exp_so3(np.outer(angle * share, axis))).max() < 1e-10
+    assert curve.cost == pytest.approx(1440 * angle**2, rel=1e-11)
+
+
+@every_optimum
+def test_moved_or_reversed_ends_and_another_unit_change_nothing_else(what):
+    size = (100, 36, np.pi, 12.0) if what == "ball" else (12, 36, 2.5, 5.0)
+    R0, R1, w0, w1, G, a0, a1 = problems = random_problems(*size)
+    L, Q = Rotation.random(2, rng=4).as_matrix()
+    curves, (v0, v1, b0, b1) = OPTIMA[what](*problems), np.stack([w0, w1, a0, a1]) @ Q
+    R = curves(TIMES)
+    moved = OPTIMA[what](L @ R0 @ Q, L @ R1 @ Q, v0, v1, Q.T @ G @ Q, b0, b1)
+    back = OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
+    for other, want in ((moved, L @ R @ Q), (back, R[::-1])):
+        assert other.cost == pytest.approx(curves.cost, rel=1e-10)
+        assert np.abs(other(TIMES) - want).max() < 1e-8
+    tripled = OPTIMA[what](R0, R1, w0, w1, 3 * G, a0, a1)
+    factor = {"acceleration": 3, "torque": 9}.get(what, 1)
+    assert tripled.cost == pytest.approx(factor * curves.cost, rel=1e-12)
+    assert np.abs(tripled(TIMES) - R).max() < 1e-11
+    assert tripled.c == pytest.approx(factor * curves.c, rel=1e-9)
+
+
+def test_the_numbers_that_other_programs_found():
+    *ends, _, _, _ = of_paper("4c")
+    G = np.diag([1, 2, 2.9])
+    assert rb.minimum_acceleration_so3(*ends, G).cost == pytest.approx(98.454424335438, rel=1e-12)
+    assert rb.minimum_torque_so3(*ends, G).cost == pytest.approx(101.909358271737, rel=1e-12)
+    jerk = rb.minimum_jerk_so3(*ends, REST, REST)
+    assert jerk.cost == pytest.approx(2 * 4550.04139829186, rel=1e-12)
+
+
+@pytest.mark.source("BK 6.2")
+@every_optimum
+def test_a_stack_of_which_one_body_is_round_is_what_each_is_alone(what):
+    problems = random_problems(6, 39, 2.0, 5.0)
+    problems[4][2] = 0.7 * I3
+    stack = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
+    alone = [OPTIMA[what](*some(problems, i)) for i in range(6)]
+    for said in (stack.converged, stack.residual, stack.cost, stack.iterations, stack.nodes):
+        assert said.shape == (2, 3)
+    assert stack.converged.dtype == bool
+    assert all(type(one.cost) is float and one.converged is True for one in alone)
+    assert stack.cost == pytest.approx(np.reshape([one.cost for one in alone], (2, 3)), rel=1e-10)
+    R = stack(TIMES)
+    assert np.abs(R.mT @ R - I3).max() < 20 * np.finfo(float).eps
+    for order in range(4):
+        values = stack(TIMES, order)
+        want = np.stack([one(TIMES, order) for one in alone], axis=1).reshape(values.shape)
+        assert np.abs(values - want).max() < 1e-10 * (1 + np.abs(values).max())
+    assert stack.costate([0.1, 0.2]).shape == (2, 2, 3, 3)
+    off = stack[1, 0].costate(0.3) - stack.costate(0.3)[1, 0]
+    assert np.abs(off).max() < 1e-12 * (1 + np.abs(stack.c[1, 0]).max())
+
+
+@pytest.mark.parametrize(("what", "speed"), [*((what, 1e160) for what in OPTIMA), ("ball", 1e3)])
+def test_a_hopeless_problem_is_named_and_harms_no_other(what, speed):
+    problems = random_problems(6, 41, 2.0, 4.0)
+    problems[0][4], problems[1][4] = I3, rb.exp_so3([1, 2, 0])
+    good, others = OPTIMA[what](*problems), np.arange(6) != 4
+    problems[2][4], problems[3][4] = [speed, 0, 0], [0, speed, 0]
+    message = r"^1 of 6 problems did not converge, .* \[1, 1\]: there the curve is NaN"
+    with pytest.warns(RuntimeWarning, match=message) as said:
+        curves = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
+    assert [warning.filename for warning in said] == [OPTIMA[what].__code__.co_filename]
+    assert np.array_equal(curves.converged.ravel(), others)
+    assert np.array_equal(curves.residual.ravel() < 1e-11, others)
+    assert curves.cost.ravel()[others] == pytest.approx(good.cost[others], rel=1e-10)
+    for order in range(3):
+        values = curves(TIMES, order).reshape(101, 6, -1)
+        want = good(TIMES, order).reshape(101, 6, -1)
+        assert np.isnan(values[:, 4]).all()
+        assert np.abs(values - want)[:, others].max() < 1e-10
+    own = curves.at_own_times(np.full((2, 3), 0.5)).reshape(6, 3, 3)
+    assert np.abs(own - good(0.5))[others].max() < 1e-10
+    for values in (own[4], curves.costate(0.5)[1, 1], curves.c[1, 1], curves.cost[1, 1]):
+        assert np.isnan(values).all()
+    assert np.isfinite(curves.c.reshape(6, 3)[others]).all()
+
+
+@pytest.mark.source("BK 6.3")
+def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
+    R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
+    with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
+        curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
+    assert not curve.converged.any()
+    for values in (curve(TIMES), curve(TIMES, 1), curve(TIMES, 2), curve.c, curve.cost):
+        assert np.isnan(values).all()
+    with pytest.raises(ValueError, match=r"^guess: a curve is NaN, it did not converge"):
+        rb.stationary_so3(curve)
+    for what, speed in (*((what, 1) for what in SOLVERS), ("ball", 1e-10), ("ball", 1e148)):
+        with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iter") as failed:
+            SOLVERS[what](I3, R, *(speed * w), BOOK, REST, REST)
+        assert isinstance(failed.value, RuntimeError)
+        assert failed.value.residual > 1e-11
+        assert failed.value.iterations >= 0
+    poses, rates = rb.pose_from_components([I3, R], np.eye(2, 3)), np.ones((4, 3, 3))
+    rates[:2, 2] = w
+    with pytest.warns(RuntimeWarning, match=r"^1 of 3 problems .* \[2\]:"):
+        broken = rb.minimum_acceleration_se3(*poses, *rates)
+    motion = rb.minimum_acceleration_se3(*poses, *rates[:, :2])
+    assert np.array_equal(broken.rotation.converged, [True, True, False])
+    assert np.isnan(broken(TIMES)[:, 2, :3, :3]).all()
+    for order in range(3):
+        values = broken(TIMES, order)
+        assert np.isnan(values[:, 2]).any(axis=tuple(range(1, values.ndim - 1))).all()
+        assert np.abs(values[:, :2] - motion(TIMES, order)).max() < 1e-10
+
+
+def test_the_search_tells_where_newtons_method_fails_from_the_cheapest_start(monkeypatch):
+    """Of the first of three problems it is made to fail on all curves but those that turn the
+    other way round."""
+    real, turns = search._follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
+    ends = I3, turns, [0, 0, 1], [1, 0, 0]
+    good = rb.minimum_acceleration_so3(*ends)
+
+    def failing(task, problem, R, found):
+        far = np.trace(R[:, R.shape[1] // 2], axis1=1, axis2=2) < 0
+        kept = far | (problem > 0)
+        real(task, problem[kept], R[kept], found)
+
+    monkeypatch.setattr(search, "_follow", failing)
     said = r"^1 of 3 problems may not .* \[0\]: a curve that was tried costs less"
     with pytest.warns(RuntimeWarning, match=said) as warned:
         curves = rb.minimum_acceleration_so3(*ends)
     assert [warning.filename for warning in warned] == [__file__]
     assert np.array_equal(curves.converged, [False, True, True])
-    assert np.abs(curves(TIMES) - STACK(TIMES)[:, :3]).max() < 1e-10
-
-
-def test_the_search_tells_where_newtons_method_fails_from_the_cheapest_start(monkeypatch):
-    """It is made to fail on all curves but those that turn the other way round."""
-    real = search._follow
-
-    def failing(task, problem, R, found):
-        far = np.trace(R[:, R.shape[1] // 2], axis1=1, axis2=2) < 0
-        real(task, problem[far], R[far], found)
-
-    monkeypatch.setattr(search, "_follow", failing)
-    with pytest.warns(RuntimeWarning, match="a curve that was tried costs less"):
-        curve = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3([0, 0, 1]), [0, 0, 1], [1, 0, 0])
-    assert not curve.converged
-    assert curve.cost > 100
+    assert curves.cost[0] > 100
+    assert np.abs(curves(TIMES) - good(TIMES))[:, 1:].max() < 1e-10
 
 
 @every_solver
-def test_no_motion_at_all(solver):
-    curve = solver(np.eye(3), np.eye(3), REST, REST)
-    assert np.abs(curve(TIMES) - np.eye(3)).max() < 1e-14
+def test_no_motion_at_all(what):
+    curve = SOLVERS[what](I3, I3, REST, REST, BOOK, REST, REST)
+    name = {"torque": "MinimumTorque", "jerk": "MinimumJerk"}.get(what, "MinimumAcceleration")
+    assert f"{name} on SO(3)" in repr(curve)
+    assert curve.cost == COSTS[what](curve, BOOK) == 0
+    assert np.abs(curve(TIMES) - I3).max() < 1e-14
     assert np.abs(curve(TIMES, 2)).max() < 1e-14
-    assert rb.acceleration_cost(curve) == 0
 
 
-@pytest.mark.parametrize(
-    ("solver", "speed"),
-    [
-        *((rb.minimum_acceleration_so3, speed) for speed in (1000, 1e150, 1e160, 1e308)),
-        (rb.shoot_minimum_acceleration_so3, 1e160),
-    ],
-)
-def test_a_failure_to_converge_tells_residual_and_iterations(solver, speed):
-    with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iterations") as failed:
-        solver(np.eye(3), rb.exp_so3([1, 2, 0]), [speed, 0, 0], [0, speed, 0])
-    assert isinstance(failed.value, RuntimeError)
-    assert failed.value.residual > 1e-11
-    assert failed.value.iterations >= 0
-
-
-TURNS = random_ends(np.random.default_rng(300), 3, 6, 300)
-STARTS = Rotation.random(300, rng=300).as_matrix()
-ENDS = Ends(STARTS, STARTS @ rb.exp_so3(TURNS[0]), *TURNS[1:])
-STACK = rb.minimum_acceleration_so3(*ENDS)
-
-
-@pytest.mark.source("BK (18)", "BK (19)", "BK 6.2")
-def test_a_stack_of_problems_is_solved():
-    """As each alone; the jerk in the fixed frame is the constant c."""
-    assert STACK.converged.dtype == bool
-    assert STACK.converged.all()
-    for said in (STACK.converged, STACK.residual, STACK.cost, STACK.iterations, STACK.nodes):
-        assert said.shape == (300,)
-    assert 0 <= STACK.residual.min() <= STACK.residual.max() < 1e-11
-    assert np.abs(STACK([0, 1]) - [ENDS.R0, ENDS.R1]).max() < 1e-11
-    assert np.abs(STACK([0, 1], 1) - [ENDS.w0, ENDS.w1]).max() < 1e-11
-    R = STACK(TIMES)
-    assert np.abs(R.mT @ R - np.eye(3)).max() < 20 * np.finfo(float).eps
-    assert STACK.cost == pytest.approx(rb.acceleration_cost(STACK), rel=1e-9)
-    for i in range(0, 300, 30):
-        alone = rb.minimum_acceleration_so3(*ENDS.take(i))
-        assert np.abs(R[:, i] - alone(TIMES)).max() < 1e-10
-        assert np.abs(STACK.c[i] - alone.c).max() < 1e-10 * (1 + np.linalg.norm(alone.c))
-        assert STACK.cost[i] == pytest.approx(alone.cost, rel=1e-10)
-        assert type(alone.cost) is float
-        assert alone.converged is True
-    scale = 1 + np.linalg.norm(STACK.c, axis=-1, keepdims=True)
-    for t in (0.1, 0.5, 0.85):
-        rate = oracles.derivative_by_differences(lambda u: STACK(u, 1), t)
-        assert np.all(np.abs(rate - STACK(t, 2)) < 1e-11 * scale)
-        jerk = oracles.derivative_by_differences(lambda u: STACK(u, 2), t)
-        assert np.all(np.abs((STACK(t) @ jerk[..., None])[..., 0] - STACK.c) < 1e-8 * scale)
-
-
-@pytest.mark.parametrize(("speed", "shape"), [(1e160, (12,)), (1e160, (3, 4)), (1e3, (3, 4))])
-def test_a_hopeless_problem_is_named_and_harms_no_other(speed, shape):
-    R0, R1, w0, w1 = (x.copy() for x in ENDS.take(slice(12)))
-    R0[7], R1[7] = np.eye(3), rb.exp_so3([1, 2, 0])
-    w0[7], w1[7] = [speed, 0, 0], [0, speed, 0]
-    ends = [x.reshape(*shape, *x.shape[1:]) for x in (R0, R1, w0, w1)]
-    name = r"\[7\]" if len(shape) == 1 else r"\[1, 3\]"
-    message = f"^1 of 12 problems did not converge, .* {name}:"
-    with pytest.warns(RuntimeWarning, match=message) as said:
-        curve = rb.minimum_acceleration_so3(*ends)
-    assert [warning.filename for warning in said] == [__file__]
-    others = np.arange(12) != 7
-    assert np.array_equal(curve.converged.ravel(), others)
-    lost = curve[np.unravel_index(7, shape)]
-    assert not lost.converged
-    assert np.isnan(lost(0.5)).all()
-    for order, core in ((0, (3, 3)), (1, (3,)), (2, (3,))):
-        values = curve(TIMES, order).reshape(101, 12, *core)
-        assert np.isnan(values[:, 7]).all()
-        assert np.abs(values - STACK(TIMES, order)[:, :12])[:, others].max() < 1e-10
-    own = curve.at_own_times(np.full(shape, 0.5)).reshape(12, 3, 3)
-    assert np.isnan(own[7]).all()
-    assert np.abs(own - STACK(0.5)[:12])[others].max() < 1e-10
-    assert np.isnan([*curve.c.reshape(12, 3)[7], curve.cost.ravel()[7]]).all()
-    assert curve.cost.ravel()[others] == pytest.approx(STACK.cost[:12][others], rel=1e-10)
-    assert np.isfinite(curve.c.reshape(12, 3)[others]).all()
-    assert np.array_equal(curve.residual.ravel() < 1e-11, others)
-
-
-def test_a_stack_of_only_hopeless_problems_is_nan_everywhere():
-    w = 1e160 * np.eye(3)[:2]
-    with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
-        curve = rb.minimum_acceleration_so3(np.eye(3), rb.exp_so3([1, 2, 0]), w, w[::-1])
-    assert not curve.converged.any()
-    for values in (curve(TIMES), curve(TIMES, 1), curve(TIMES, 2), curve.c, curve.cost):
-        assert np.isnan(values).all()
-
-
-@pytest.mark.source("BK 6.3")
-def test_of_a_stack_of_motions_a_hopeless_one_is_nan():
-    R0, R1, w0, w1 = (x.copy() for x in ENDS.take(slice(4)))
-    d0, d1, *v = np.random.default_rng(63).normal(size=(4, 4, 3))
-    poses = rb.pose_from_components(R0, d0), rb.pose_from_components(R1, d1)
-    motion = rb.minimum_acceleration_se3(*poses, w0, w1, *v)
-    assert np.abs(motion(TIMES)[..., :3, :3] - STACK(TIMES)[:, :4]).max() < 1e-10
-    w0[2], w1[2] = [1e160, 0, 0], [0, 1e160, 0]
-    with pytest.warns(RuntimeWarning, match=r"^1 of 4 problems .* \[2\]:"):
-        broken = rb.minimum_acceleration_se3(*poses, w0, w1, *v)
-    others = np.arange(4) != 2
-    assert np.array_equal(broken.rotation.converged, others)
-    assert np.isnan(broken(TIMES)[:, 2, :3, :3]).all()
-    for order in (0, 1, 2):
-        values = broken(TIMES, order)
-        assert np.isnan(values[:, 2]).any(axis=tuple(range(1, values.ndim - 1))).all()
-        assert np.abs(values - motion(TIMES, order))[:, others].max() < 1e-10
+@pytest.mark.parametrize("what", ["ball", "shooting"])
+def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(what):
+    _, R1, *rates = of_paper("4b")[:4]
+    rounded, exact = (SOLVERS[what](I3, R, *rates) for R in (R1.round(8), R1))
+    assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
+    assert np.abs(rounded(TIMES) - exact(TIMES)).max() < 1e-7
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
@@ -424,8 +300,36 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
     assert found[0] == found[1]
 
 
+def test_a_guess_is_followed():
+    ends = random_problems(6, 42, 2.0, 4.0)[:4]
+    found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
+    assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
+
+
 def test_a_guess_that_is_not_a_curve_on_so3_is_refused():
     motion = rb.geodesic_se3(np.eye(4), np.eye(4))
-    for guess in (np.eye(3), motion, rb.chain([1, 2], [np.eye(3)] * 2)):
+    for guess in (I3, motion, rb.chain([1, 2], [I3] * 2)):
         with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) from t = 0 on is wanted"):
             rb.stationary_so3(guess)
+
+
+ENDS = I3, I3, REST, REST
+
+
+@pytest.mark.parametrize(
+    "make", [rb.minimum_acceleration_so3, rb.minimum_torque_so3, rb.normal_cubic_so3]
+)
+@pytest.mark.parametrize(
+    ("G", "message"),
+    [
+        (np.diag([1.0, 2, 0]), "is not positive definite, to rounding: its eigenvalues are 0, "),
+        (np.diag([1.0, 2, -1]), "is not positive definite, to rounding: its eigenvalues are -1"),
+        (np.stack([I3, -I3]), "[1] is not positive definite"),
+        (I3 + 0.1 * I3[1], " is not symmetric"),
+        (5e307 * I3, ": eigenvalues from 1e-150 to 1e150 are wanted, they are 5e+307"),
+        (1e-310 * BOOK, ": eigenvalues from 1e-150 to 1e150 are wanted"),
+    ],
+)
+def test_bad_inertias_are_named(make, G, message):
+    with pytest.raises(ValueError, match=f"^inertia ?{re.escape(message)}"):
+        make(*ENDS, G)

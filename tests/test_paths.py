@@ -2,6 +2,7 @@
 
 import re
 from functools import partial
+from inspect import signature
 
 import numpy as np
 import oracles
@@ -27,52 +28,71 @@ WITH_VELOCITIES = [
     rb.minimum_acceleration_se3,
 ]
 LEGS = [*WITHOUT_VELOCITIES, *WITH_VELOCITIES, rb.projected_quintic_so3]
-CASES = [
-    pytest.param(leg, poses, id=f"{leg.__name__}-{poses.shape[-1]}")
-    for leg in LEGS
-    for poses in (ROTATIONS, POSES)
-    if poses is POSES or leg.__name__.endswith("so3")
-]
+every_leg = pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
+both_groups = pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"])
+V = np.hstack([TWISTS[:, :3], np.einsum("nij,nj->ni", ROTATIONS, TWISTS[:, 3:])])
+ENDS = {"R0": ROTATIONS[:-1], "R1": ROTATIONS[1:], "A0": POSES[:-1], "A1": POSES[1:]}
+for k, rates in enumerate((V[:-1] * H[:, None], V[1:] * H[:, None])):
+    ENDS |= {f"w{k}": rates[:, :3], f"d{k}_dot": rates[:, 3:]}
 
 
-def two_point_curve(leg, i, velocities):
-    """The curve from pose i to the next in the time of a leg, by its own arguments."""
-    ends = POSES[i : i + 2] if leg.__name__.endswith("se3") else ROTATIONS[i : i + 2]
-    rates = H[i] * velocities[i : i + 2]
-    moved = np.einsum("nij,nj->ni", ROTATIONS[i : i + 2], rates[:, 3:])
-    more = [*rates[:, :3], *moved] if ends.shape[-1] == 4 else rates[:, :3]
-    return leg(*ends) if leg in WITHOUT_VELOCITIES else leg(*ends, *more)
+def own_poses(leg):
+    return POSES if leg.__name__.endswith("se3") else ROTATIONS
 
 
-@pytest.mark.parametrize(("leg", "poses"), CASES)
+@every_leg
+@both_groups
 def test_a_chain_is_at_its_poses_with_joints_as_smooth_as_stated(leg, poses):
-    """The curve just before a joint, against the curve there."""
-    c = rb.chain(TIMES, poses, leg=leg)
+    """The curve just before a joint, against the curve there; and the two-point curves, at times of
+    any shape. It neither changes nor reads later the arrays that it is given."""
+    poses = POSES if own_poses(leg) is POSES else poses
+    given = [TIMES.copy(), poses.copy(), TWISTS[:, : 3 if poses is ROTATIONS else 6].copy()]
+    if leg in WITHOUT_VELOCITIES:
+        given.pop()
+    if leg is rb.projected_quintic_so3:
+        given[2] = rb.bessel_velocities(TIMES, poses)
+    velocities = given[2].copy() if given[2:] else None
+    for array in given:
+        array.flags.writeable = False
+    c = rb.chain(*given, leg=leg)
+    for array in given:
+        array.flags.writeable = True
+        array.fill(0)
     assert c.domain == (TIMES[0], TIMES[-1])
     assert np.abs(c(TIMES) - poses).max() < 60 * EPS
     assert np.abs(c(np.nextafter(TIMES[1:], -9)) - poses[1:]).max() < 200 * EPS
     assert np.abs(c.jumps(0)).max() < 200 * EPS
-    smooth = {rb.projected_quintic_so3: 2}.get(leg, int(leg in WITH_VELOCITIES))
+    assert c([], 1).shape == (0, 3 * c.size - 6)
+    many = RNG.uniform(*c.domain, size=5000)  # in several blocks
+    smooth = {rb.projected_quintic_so3: 2}.get(leg, int(velocities is not None))
     inner = TIMES[1:-1]
     for order in range(3):
         jumps = c(inner, order) - c(np.nextafter(inner, -9), order)
         assert np.abs(jumps - c.jumps(order)).max() < 1e-12
-        assert (np.abs(jumps).max() < 1e-12) == (order <= smooth) or leg in WITHOUT_VELOCITIES
-    assert leg not in WITHOUT_VELOCITIES or np.abs(c.jumps(1)).max() > 0.1
-
-
-@pytest.mark.parametrize("leg", LEGS[:-1], ids=lambda leg: leg.__name__)
-def test_between_two_poses_it_is_the_two_point_curve(leg):
-    size = 6 if leg.__name__.endswith("se3") else 3
-    given = TWISTS[:, :size] if leg in WITH_VELOCITIES else None
-    c = rb.chain(TIMES, POSES if size == 6 else ROTATIONS, given, leg=leg)
-    share = np.linspace(0, 1, 12)[:-1]
-    for i in range(N - 1):
-        one = two_point_curve(leg, i, TWISTS)
-        t = TIMES[i] + share * H[i]
+        assert (np.abs(jumps).max() < 1e-12) == (order <= smooth) or velocities is None
+        assert np.abs(c(many, order)[::500] - c(many[::500], order)).max() < 1e-12
+    if velocities is None:
+        assert np.abs(c.jumps(1)).max() > 0.1
+    else:
+        assert np.abs(c(TIMES, 1) - velocities).max() < 400 * EPS
+        assert np.array_equal(c.velocities, velocities)
+    needed = [one.name for one in signature(leg).parameters.values() if one.default is one.empty]
+    if poses is own_poses(leg) and set(needed) <= set(ENDS):
+        one = leg(**{name: ENDS[name] for name in needed})
+        t = TIMES[:-1] + np.linspace(0, 1, 12)[:-1, None] * H
         for order, tolerance in enumerate((60, 400, 4000)):
-            off = c(t, order) - one((t - TIMES[i]) / H[i], order) / H[i] ** order
-            assert np.abs(off).max() < tolerance * EPS / H[i] ** order
+            values = c(t, order).swapaxes(1, -1) * H**order
+            want = one.at_own_times((t - TIMES[:-1]) / H, order).swapaxes(1, -1)
+            assert np.abs(values - want).max() < tolerance * EPS
+
+
+@every_leg
+def test_equal_neighbours_are_a_rest(leg):
+    poses = own_poses(leg)[[0, 1, 2, 2, 3]]
+    poses[3, :3, :3] @= rb.exp_so3([1e-15, 0, 0])
+    c = rb.chain(range(5), poses, leg=leg)
+    assert np.abs(c([2.1, 2.5, 2.9]) - poses[2]).max() < 40 * EPS
+    assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
 
 
 @pytest.mark.parametrize("ratio", [1, 10, 100, 1e4])
@@ -90,13 +110,12 @@ def test_uneven_steps_cost_no_digits(leg, ratio):
         assert np.abs(c.jumps(order)).max() < 20 * EPS * scales[order]
 
 
-@pytest.mark.parametrize("ratio", [1, 10, 100, 1e4])
+@pytest.mark.parametrize("ratio", [1, 100, 1e4])
 def test_quintics_between_uneven_times_are_the_nearest_rotations(ratio):
     """Against 60 digits; the rounding of M, however large, over its two least eigenvalues."""
     times = np.append(0, np.cumsum([1, ratio, 1, ratio, ratio, 1, 1, ratio]))
     legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic_so3).legs
-    for i, s in np.ndindex(N - 1, 5):
-        share = [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9][s]
+    for i, share in zip(range(N - 1), [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9, 0.3, 0.6, 0.9], strict=True):
         M = oracles.polynomial_through(legs.ends[i], share)
         R = oracles.nearest_rotation(M)
         gap = oracles.two_smallest_eigenvalues(R.T @ M)
@@ -104,58 +123,18 @@ def test_quintics_between_uneven_times_are_the_nearest_rotations(ratio):
         assert np.abs(legs[i](share * legs.duration[i]) - R).max() < 8 * EPS * max(1, size / gap)
 
 
-def test_optima_are_rotations_between_their_nodes_and_those_found_by_shooting():
-    """Their series are cut off at 3e-12."""
-    R = rb.chain(TIMES, ROTATIONS, 8 * TWISTS[:, :3], leg=rb.minimum_acceleration_so3)
-    R = R(np.linspace(*R.domain, 300))
-    assert np.abs(R.mT @ R - np.eye(3)).max() < 10 * EPS
-    c, other = (
-        rb.chain(TIMES[:3], ROTATIONS[:3], TWISTS[:3, :3], leg=leg)
-        for leg in (rb.shoot_minimum_acceleration_so3, rb.minimum_acceleration_so3)
-    )
-    t = np.linspace(*c.domain, 20)
-    assert np.abs(c(t) - other(t)).max() < 1e-9
-
-
-@pytest.mark.parametrize(("leg", "poses"), CASES)
-def test_it_has_the_velocities_that_it_is_given(leg, poses):
-    velocities = TWISTS[:, : 3 if poses is ROTATIONS else 6]
-    if leg in WITHOUT_VELOCITIES:
-        with pytest.raises(ValueError, match=r"^velocities: the legs ask for none"):
-            rb.chain(TIMES, poses, velocities, leg=leg)
-    else:
-        c = rb.chain(TIMES, poses, velocities, leg=leg)
-        assert np.abs(c(TIMES, 1) - velocities).max() < 400 * EPS
-        assert np.abs(c.jumps(1)).max() < 1e-12
-        assert np.array_equal(c.velocities, velocities)
-
-
-@pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"])
+@both_groups
 def test_without_velocities_it_has_bessels_but_rests_at_its_ends(poses):
+    """The quintic bends as their parabolas do."""
     c, chosen = rb.chain(TIMES, poses), rb.bessel_velocities(TIMES, poses)
     assert np.abs(c(TIMES[1:-1], 1) - chosen[1:-1]).max() < 400 * EPS
     assert not c(TIMES[[0, -1]], 1).round(14).any()
     assert not c.velocities[[0, -1]].any()
-
-
-@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
-def test_equal_neighbours_are_a_rest(leg):
-    poses = POSES if leg.__name__.endswith("se3") else ROTATIONS
-    poses = poses[[0, 1, 2, 2, 3]]
-    poses[3, :3, :3] @= rb.exp_so3([1e-15, 0, 0])
-    c = rb.chain(range(5), poses, leg=leg)
-    assert np.abs(c([2.1, 2.5, 2.9]) - poses[2]).max() < 40 * EPS
-    assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
-
-
-def test_the_quintic_bends_as_the_parabola_does():
     c = rb.chain(TIMES, POSES, leg=rb.projected_quintic_so3)
-    d = POSES[:, :3, 3]
     for i in range(1, N - 1):
-        bends = [
-            2 * np.polyfit(TIMES[i - 1 : i + 2] - TIMES[i], x, 2)[0] for x in d[i - 1 : i + 2].T
-        ]
-        assert np.abs(c(TIMES[i], 2)[3:] - ROTATIONS[i].T @ bends).max() < 1e-12
+        near = slice(i - 1, i + 2)
+        bend = 2 * np.polyfit(TIMES[near] - TIMES[i], POSES[near, :3, 3], 2)[0]
+        assert np.abs(c(TIMES[i], 2)[3:] - ROTATIONS[i].T @ bend).max() < 1e-12
     assert np.abs(c(TIMES[[0, -1]], 2)).max() < 1e-12
 
 
@@ -173,28 +152,27 @@ def test_the_origin_has_as_many_ends_as_legs_ask_for(leg, other):
     assert np.abs(path - same).max() < 1e-13
 
 
-def test_times_in_any_order_and_shape():
-    c = rb.chain(TIMES, POSES)
-    t = RNG.uniform(*c.domain, size=(3, 5000))
-    for order in range(3):
-        one_by_one = [c(x, order) for x in t[1, ::500]]
-        assert np.abs(c(t, order)[1, ::500] - one_by_one).max() < 1e-12
-    assert c(t[:0]).shape == (0, 5000, 4, 4)
-    assert c([], 1).shape == (0, 6)
-    with pytest.raises(ValueError, match=r"^t is 3.5, a time in \[1, 3\] is wanted"):
-        rb.chain([1, 3], POSES[:2])(3.5)
-
-
 def test_own_functions_make_legs():
+    """Also partial ones, and those whose curves are many paths and one rotation."""
+
     def slow(R0, R1, duration=1):
         rest = np.zeros(3)
         return rb.exponential_cubic_so3(R0, R1, rest, rest, duration=duration)
+
+    def sliding(A0, A1, duration):
+        turn = rb.geodesic_so3(np.eye(3), np.eye(3), duration=duration)
+        return rigid_motion(RigidMotion, turn, A0[:, :3, 3], A1[:, :3, 3])
 
     c = rb.chain(TIMES, POSES, leg=slow)
     assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # its turn rests at each pose
     assert np.abs(c(TIMES[2] + 0.3 * H[2])[:3, :3] - slow(*ROTATIONS[2:4])(0.3)).max() < 40 * EPS
     frozen = partial(rb.projected_line_so3, f=lambda t, k: [t, 1 + 0 * t][k])
     assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
+    places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
+    c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))
+    t = np.linspace(*c.domain, 50)
+    for order in range(3):
+        assert np.abs(c(t, order) - other(t, order)).max() < 1e-12
 
 
 FAR = rb.pose_from_components(ROTATIONS, POSES[:, :3, 3] + [5e5, 5.3e6, 100])
@@ -205,28 +183,6 @@ MOVES = partial(rb.geodesic_se3, POSES[:2], POSES[1:3])
 
 def turned_by(w):
     return lambda R0, R1, **T: rb.geodesic_so3(R0, R1 @ rb.exp_so3(w), **T)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (([0, 1, 1], ROTATIONS[:3]), "times[2] is 1.0, a time after 1.0 is wanted"),
-        (([0, np.nan, 1], POSES[:3]), "times[1] is nan"),
-        (([0, 1], POSES[:3]), "times, poses: as many of each wanted, got 2 and 3"),
-        (([], POSES[:0]), "times, poses: one or more wanted, got none"),
-        (([0, 1e-200], POSES[:2]), "times[0] and times[1] are 1e-200 apart: too near, or"),
-        (([0], POSES[:1]), "times, poses: two or more wanted, got 1"),
-        (([0, 1], POSES[0]), "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got (4, 4)"),
-        (([0, 1], [np.eye(4), 2 * np.eye(4)]), "poses[1] is no pose (project_se gives"),
-        (([0, 1], [-np.eye(3)] * 2), "poses[0] is no rotation (project_so gives"),
-        (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
-        (([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) wanted, got (2, 3)"),
-        (([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 wanted, one a pose, got 3"),
-    ],
-)
-def test_no_path_is_refused(arguments, message):
-    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
-        rb.chain(*arguments)
 
 
 @pytest.mark.parametrize(
@@ -250,6 +206,45 @@ def test_no_leg_is_refused(poses, leg, message):
         rb.chain([0, 1, 2], poses[:3], leg=leg)
 
 
+PATHS = [
+    (([0, 1, 1], ROTATIONS[:3]), "times[2] is 1.0, a time after 1.0 is wanted"),
+    (([0, np.nan, 1], POSES[:3]), "times[1] is nan"),
+    (([0, 1e-200], POSES[:2]), "times[0] and times[1] are 1e-200 apart: too near, or too far"),
+    (([-1.7e308, 1.7e308], POSES[:2]), "times[0] and times[1] are inf apart"),
+    (([0], POSES[:1]), "times, poses: two or more wanted, got 1"),
+    (([0, 1], POSES[0]), "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got (4, 4)"),
+    (([0, 1], [-np.eye(3)] * 2), "poses[0] is no rotation (project_so gives"),
+    (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
+]
+LATE = rb.chain([1e9, 2e9], ROTATIONS[:2])
+UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        *((rb.chain, *path) for path in PATHS),
+        *((rb.bessel_velocities, *path) for path in PATHS),
+        (rb.chain, ([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) wanted, got (2"),
+        (rb.chain, ([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 wanted, one a pose, got 3"),
+        (
+            partial(rb.chain, leg=rb.screw_se3),
+            (TIMES, POSES, TWISTS),
+            "velocities: the legs ask fo",
+        ),
+        (LATE, (3.5,), "t is 3.5, a time in [1000000000, 2000000000] is"),
+        (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
+        (rb.retime, (np.sin, 1), "curve: a Curve wanted, got"),
+        (rb.retime, (UNEVEN[0], 0), "duration is 0.0, a duration from 1e-100"),
+        (rb.retime, (UNEVEN[0], [1, 2]), "duration: one, or one for each curve"),
+        (rb.retime, (LATE, 1e-9), "duration is 1e-09: that vanishes beside"),
+    ],
+)
+def test_bad_paths_velocities_times_and_durations_are_refused(function, arguments, message):
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        function(*arguments)
+
+
 def test_a_leg_that_is_lost_is_named():
     """Velocities for which the cubic through a turn of 2 rad is of rank 1 in its middle."""
     turn = np.array([0, 0, 2.0])
@@ -261,44 +256,29 @@ def test_a_leg_that_is_lost_is_named():
     for t in (1.5, [0.2, 0.7, 1.5, 1.7], [1.7, 1.5]):
         with pytest.raises(ValueError, match=r"^leg 1, from 1\.0 to 2\.0, 0\.5 after its start:"):
             c(t)
+    w = np.outer([0, 0, 1, 0], [1e160, 0, 0])  # the optimum is not found
+    message = r"^leg: it found no curve from poses\[1\] to poses\[2\] \(NaN\)"
+    with pytest.warns(RuntimeWarning), pytest.raises(ValueError, match=message):
+        rb.chain(range(4), ROTATIONS[:4], w, leg=rb.minimum_acceleration_so3)
 
 
 @pytest.mark.parametrize("duration", [1e-9, 0.25, 3, 1e12])
-@pytest.mark.parametrize(
-    "c", [rb.chain(TIMES, POSES), rb.projected_cubic_se3(*POSES[:2], *TWISTS[:4, :3])]
-)
-def test_retimed_curves_are_run_through_evenly(c, duration):
-    again = rb.retime(c, duration)
-    (first, last), (start, end) = c.domain, again.domain
+def test_retimed_chains_are_run_through_evenly(duration):
+    c = rb.chain(TIMES, POSES)
+    again, (first, last) = rb.retime(c, duration), c.domain
+    start, end = again.domain
     assert (start, end) == (first, first + duration)
     rate = (last - first) / duration
+    t = np.minimum(start + np.linspace(0, 1, 7) * (end - start), end)
+    tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # its times are rounded
     for order in range(3):
-        t = np.minimum(start + np.linspace(0, 1, 7) * (end - start), end)
         want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
-        tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # its times are rounded
         assert np.abs(again(t, order) - want).max() <= tolerance * np.abs(want).max()
     assert np.abs(again([start, end]) - c([first, last])).max() < 60 * EPS
-
-
-def test_a_time_beyond_the_duration_of_its_curve_is_refused():
-    uneven = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
-    with pytest.raises(ValueError, match=r"^t\[1, 2\] is 9.0, a time in \[0, "):
-        uneven.at_own_times([0 * H, np.where(np.arange(N - 1) == 2, 9, 0)])
-
-
-@pytest.mark.parametrize(
-    ("curve", "duration", "message"),
-    [
-        (np.sin, 1, "curve: a Curve wanted, got"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), 0, "duration is 0.0, a duration from 1e-100"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), np.inf, "duration is inf"),
-        (rb.geodesic_so3(*ROTATIONS[:2]), [1, 2], "duration: one, or one for each curve"),
-        (rb.chain([1e9, 2e9], ROTATIONS[:2]), 1e-9, "duration is 1e-09: that vanishes beside"),
-    ],
-)
-def test_a_bad_duration_is_refused(curve, duration, message):
-    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
-        rb.retime(curve, duration)
+    again = rb.retime(rb.chain(1.3e9 + TIMES, ROTATIONS), 1e-3)  # from epoch times on
+    assert np.abs(again.legs.duration / H * np.ptp(TIMES) / 1e-3 - 1).max() < 1e-5
+    assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
+    assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
 
 
 def test_costs_of_chains_and_retimed_curves():
@@ -332,22 +312,9 @@ def test_a_chain_whose_velocity_jumps_has_no_cost():
     assert 0 < rb.acceleration_cost(stops) < np.inf
 
 
-def test_a_chain_neither_reads_nor_writes_its_arguments_later():
-    arrays = TIMES.copy(), POSES.copy(), TWISTS.copy()
-    for array in arrays:
-        array.flags.writeable = False
-    c = rb.chain(*arrays)
-    before = c(TIMES)
-    for array in arrays:
-        array.flags.writeable = True
-        array[:] = 0
-    assert np.array_equal(c(TIMES), before)
-    assert np.array_equal(c.velocities, TWISTS)
-
-
 def test_far_from_the_origin_it_is_the_same_motion():
     """Eastings and northings at 1 kHz, slow: no rests, no jumps, and a cost."""
-    t = np.arange(200) / 1000
+    t = np.arange(60) / 1000
     here = rb.pose_from_coordinates(t[:, None] * [0, 0, 4e-3, 4e-3, 0, 0])
     far = here.copy()
     far[:, :3, 3] += [5e5, 5.3e6, 100]
@@ -357,60 +324,28 @@ def test_far_from_the_origin_it_is_the_same_motion():
     assert np.abs(c.jumps(1)).max() < 1e-12
     turning, same = (rb.acceleration_cost_parts(one)[0] for one in (c, other))
     assert turning == pytest.approx(same, rel=1e-9)
-
-
-def test_durations_are_kept_from_epoch_times_on_and_of_any_size():
-    again = rb.retime(rb.chain(1.3e9 + TIMES, ROTATIONS), 1e-3)
-    assert np.abs(again.legs.duration / H * np.ptp(TIMES) / 1e-3 - 1).max() < 1e-5
-    assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
-    assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
-
-
-def test_an_optimum_that_is_not_found_is_named():
-    V = np.zeros((4, 3))
-    V[2] = [1e160, 0, 0]
-    message = r"^leg: it found no curve from poses\[1\] to poses\[2\] \(NaN\)"
-    with pytest.warns(RuntimeWarning), pytest.raises(ValueError, match=message):
-        rb.chain(range(4), ROTATIONS[:4], V, leg=rb.minimum_acceleration_so3)
-
-
-def test_a_dwell_is_a_rest_wherever_it_is_seen_from():
-    """Poses equal but for the rounding of their products, at the origin of the frame too."""
-    stay = POSES[[0, 1, 1, 2]]
-    for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
-        seen = np.stack([frame @ A for A in stay])
-        seen[2] = (frame @ POSES[5]) @ (rb.inverse_se3(POSES[5]) @ stay[2])
-        seen[:, :3, :3] = rb.project_so(seen[:, :3, :3])
-        c = rb.chain(range(4), seen)
-        assert not c.velocities[1:3].any()
-
-
-def test_near_neighbours_are_no_rest_and_near_half_turns_no_half_turns():
-    R = rb.exp_so3([[0, 0, 0], [0, 0, 1e-6], [0, 0, 2e-6], [0, 0, np.pi + 1e-6 - 1e-5]])
-    assert np.abs(rb.chain(range(3), R[:3]).velocities[1] - [0, 0, 1e-6]).max() < 1e-12
-    assert np.abs(rb.log_so3(rb.chain([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
-
-
-def test_poses_1e11_m_away_are_met():
     far = POSES[:3].copy()
     far[:, :3, 3] *= 1e11
     assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
 
 
-def test_legs_of_many_paths_and_one_rotation():
-    def sliding(A0, A1, duration):
-        turn = rb.geodesic_so3(np.eye(3), np.eye(3), duration=duration)
-        return rigid_motion(RigidMotion, turn, A0[:, :3, 3], A1[:, :3, 3])
-
-    places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
-    c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))
-    t = np.linspace(*c.domain, 50)
-    for order in range(3):
-        assert np.abs(c(t, order) - other(t, order)).max() < 1e-12
+def test_a_dwell_is_a_rest_wherever_it_is_seen_from_and_near_neighbours_are_none():
+    """Poses equal but for the rounding of their products, at the origin of the frame too."""
+    stay = POSES[[0, 1, 1, 2]]
+    for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
+        seen = frame @ stay
+        seen[2] = (frame @ POSES[5]) @ (rb.inverse_se3(POSES[5]) @ stay[2])
+        seen[:, :3, :3] = rb.project_so(seen[:, :3, :3])
+        assert not rb.chain(range(4), seen).velocities[1:3].any()
+    near_half_turn = np.pi + 1e-6 - 1e-5
+    R = rb.exp_so3(np.outer([0, 1e-6, 2e-6, near_half_turn], [0, 0, 1]))
+    assert np.abs(rb.chain(range(3), R[:3]).velocities[1] - [0, 0, 1e-6]).max() < 1e-12
+    assert np.abs(rb.log_so3(rb.chain([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
 
 
 def test_bessels_velocities_are_those_of_the_parabola_through_three():
-    """Of R_i exp(x(t)), x through the logarithms of the neighbours; and of d."""
+    """Of R_i exp(x(t)), x through the logarithms of the neighbours; and of d. Moved poses have
+    moved velocities."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)
@@ -421,39 +356,7 @@ def test_bessels_velocities_are_those_of_the_parabola_through_three():
         w = oracles.right_jacobian_so3(here[:3]) @ slope[:3]
         assert np.abs(chosen[i, :3] - w).max() < 200 * EPS
         assert np.abs(chosen[i, 3:] - ROTATIONS[i].T @ slope[3:]).max() < 200 * EPS
-
-
-def test_moved_poses_have_moved_velocities():
-    """Moved in the fixed frame not at all; by another body frame as that frame sees them."""
     A = rb.pose_from_coordinates([0.4, -1, 2, 3, 1, 5])
-    chosen = rb.bessel_velocities(TIMES, POSES)
     assert np.abs(rb.bessel_velocities(TIMES, A @ POSES) - chosen).max() < 200 * EPS
-    turned = rb.bessel_velocities(TIMES, ROTATIONS @ A[:3, :3])
-    assert np.abs(turned - chosen[:, :3] @ A[:3, :3]).max() < 200 * EPS
-
-
-def test_paths_of_uniform_velocity_or_acceleration_have_their_own_velocities():
-    """Two poses; a ball that is thrown, and a turn about one axis that is sped up."""
-    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])
+    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # of two poses the constant one
     assert np.abs(w - oracles.log_so3(ROTATIONS[0].T @ ROTATIONS[1]) / 2).max() < 10 * EPS
-    t = TIMES[:, None]
-    turn, place = [0.3, -0.2, 0.1] * t**2 / 4, [1.0, 2, 0] * t + [0, 0, -4.9] * t**2
-    poses = rb.pose_from_coordinates(np.hstack([turn, place]))
-    want = np.hstack([[0.3, -0.2, 0.1] * t / 2, [1.0, 2, 0] + [0, 0, -9.8] * t])
-    got = rb.bessel_velocities(TIMES, poses)
-    got[:, 3:] = np.einsum("nij,nj->ni", poses[:, :3, :3], got[:, 3:])
-    assert np.abs(got - want).max() < 1e-12
-
-
-@pytest.mark.parametrize(
-    ("times", "poses", "message"),
-    [
-        ([0, 0], POSES[:2], r"^times\[1\] is 0.0, a time after 0.0 is wanted"),
-        ([0, 1], HALF_TURN, "half-turn apart"),
-        ([-1.7e308, 1.7e308], POSES[:2], r"^times\[0\] and times\[1\] are inf apart"),
-        ([1], POSES[:1], "^times, poses: two or more"),
-    ],
-)
-def test_no_path_has_no_bessel_velocities(times, poses, message):
-    with pytest.raises(ValueError, match=message):
-        rb.bessel_velocities(times, poses)

@@ -456,7 +456,7 @@ def distributions_for(requirements):
     return [importlib.metadata.distribution(name) for name in asked]
 
 
-NEEDS_LECTURE = ["course.lecture", "course.rehearsal", "course.votes"]
+NEEDS_LECTURE = [f"course.{name}" for name in ("lab", "lecture", "rehearsal", "show", "votes")]
 NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))

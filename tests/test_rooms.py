@@ -50,8 +50,8 @@ LIBRARIES = {
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
-    "rbclassroom.course": {"PIL", "jupyter_server", "nbclient", "nbformat", "segno", "tornado"}
-    | {"traitlets", "voila"},
+    "rbclassroom.course": {"PIL", "jupyter_server", "jupyterlab", "nbclient", "nbformat"}
+    | {"segno", "tornado", "traitlets", "voila"},
     "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
     | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
     "rbclassroom.book": {"nbformat", "pygments", "sphinx"},

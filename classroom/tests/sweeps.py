@@ -1,41 +1,45 @@
-"""Each slider of an explorer at 25 places of its range, and pairs of extremes."""
+"""Explorers at all settings of their controls, and what they show there."""
 
 import re
-from itertools import combinations
+from functools import cache
+from itertools import combinations, product
 
 import numpy as np
 
-
-def settings(explorer):
-    """Every setting to try: one control at a time over its range, then ends in pairs."""
-    ranges = {name: _range(control) for name, control in explorer.controls.items()}
-    for name, values in ranges.items():
-        yield from ({name: value} for value in values)
-    for (one, first), (other, second) in combinations(ranges.items(), 2):
-        yield from (
-            {one: a, other: b} for a in (first[0], first[-1]) for b in (second[0], second[-1])
-        )
+from rbclassroom import explorers
 
 
-def sweep(explorer, **base):
-    """Put each setting on top of these values; give all values, of those that can be served."""
+@cache
+def made(name):
+    """An explorer; one of each is enough."""
+    return getattr(explorers, f"{name}_explorer")()
+
+
+def sweep(name, **base):
+    """Put each setting on top of these values; yield all values and texts, if there is a picture.
+
+    Everywhere an explorer shows values or says why not, and no number is "nan" or "-0".
+    """
+    explorer = made(name)
+    explorer.restart()
     first = explorer.values | base
     for setting in settings(explorer):
         explorer.put(**first | setting)
+        said = read_off(explorer)
+        assert len(said) >= 2 or notice(explorer), setting
+        assert not re.search(r"\bnan\b|-0\.?0*(?![.\d])", "\n".join(said.values())), setting
         if not notice(explorer).startswith("Nothing to show"):
-            yield explorer.values
+            yield explorer.values, said
 
 
-def points(artist):
-    """The points of a line in the plane or in space, shape (n, 2) or (n, 3)."""
-    if hasattr(artist, "get_data_3d"):
-        return np.stack(artist.get_data_3d(), axis=-1)
-    return np.stack(artist.get_data(), axis=-1)
-
-
-def corners(box):
-    """The corners of the first six faces of a box, shape (6, 4, 3)."""
-    return box.corners[:6]
+def settings(explorer):
+    """Each control at nine places of its range, then all pairs of extremes."""
+    ranges = {name: _range(control) for name, control in explorer.controls.items()}
+    for name, values in ranges.items():
+        yield from ({name: value} for value in values)
+    for pair in combinations(ranges, 2):
+        for ends in product(*(ranges[name][:: len(ranges[name]) - 1] for name in pair)):
+            yield dict(zip(pair, ends, strict=True))
 
 
 def _range(control):
@@ -44,29 +48,34 @@ def _range(control):
         values = [control.min + i * control.step for i in range(steps)] + [control.max]
     else:
         values = [option[1] if isinstance(option, tuple) else option for option in control.options]
-    last = len(values) - 1
-    return [
-        values[round(i)] for i in np.unique(np.append(np.linspace(0, last, 24), last / 2).round())
-    ]
+    return [values[i] for i in np.unique(np.linspace(0, len(values) - 1, 9).round().astype(int))]
+
+
+def points(artist):
+    """The points of a line in the plane or in space, shape (n, 2) or (n, 3)."""
+    data = artist.get_data_3d() if hasattr(artist, "get_data_3d") else artist.get_data()
+    return np.stack(data, axis=-1)
 
 
 def read_off(explorer):
-    """What is to be read, by name, with plain minus signs and spaces."""
+    """The texts that are to be read, by name, with plain minus signs and spaces."""
     ((rows, *_),) = explorer.picture.run["texts"]
     return {name: text.replace("−", "-").replace("\u2007", " ") for name, text in rows}
 
 
+def reads(text, wanted):
+    """Whether the numbers of a text are these, but for half of their last digits."""
+    found = re.findall(r"-?\d+(?:\.\d+)?", text)
+    digits = np.array([len(each.partition(".")[2]) for each in found])
+    return np.all(np.abs(np.array(found, float) - np.ravel(wanted)) <= 0.51 * 10.0**-digits)
+
+
 def notice(explorer):
-    """What is to be noted; "" if nothing."""
+    """The notice, or ""."""
     return explorer.picture.run["notice"] or explorer.picture.run["texts"][0][1]
 
 
 def tell(explorer, **message):
-    """Send what the browser sends: the ``index`` of a state, or the ``place`` of a click."""
+    """Send a message of the browser: the ``index`` of a state, or the ``place`` of a click."""
     data = {"method": "custom", "content": message}
     explorer.picture._handle_msg({"content": {"data": data}, "buffers": []})
-
-
-def numbers_in(text):
-    """The numbers of a text."""
-    return np.array(re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text), dtype=float)

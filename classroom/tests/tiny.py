@@ -24,7 +24,7 @@ def lesson_at(folder, *cells):
 @contextmanager
 def lecture(folder, *further):
     """The address of a lecture, and the process."""
-    words = [*MODULE, "rbclassroom.course.lecture", "1", "--no-browser", *further]
+    words = [*MODULE, "rbclassroom.course.show", "1", "--no-browser", *further]
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
         try:
             yield server.stdout.readline().split()[-1], server

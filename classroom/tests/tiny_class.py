@@ -10,19 +10,10 @@ import uuid
 import nbformat
 from nbgrader.api import Gradebook
 from nbgrader.converters import GenerateAssignment
-from tiny_set import ANSWERS, write_tiny_set
+from tiny_set import ANSWERS, cell, write_tiny_set
 
 from rbclassroom.assignments.grade import course_config, run_step
 from rbclassroom.assignments.handout import release
-
-
-def cell(notebook, grade_id):
-    """The cell of a name."""
-    (found,) = [
-        c for c in notebook.cells if c.metadata.get("nbgrader", {}).get("grade_id") == grade_id
-    ]
-    return found
-
 
 CONFIG = """
 import re
@@ -36,18 +27,13 @@ c = get_config()
 configure(c)
 c.Execute.timeout = 1
 c.Execute.iopub_timeout = 600
-ENDLESS = "endless"
 
 
 def limit(cell):
-    if ENDLESS not in cell.source:
-        return None
-    own = re.search(r"BEGUN-\\w+", cell.source)
-    name = own[0] if own else "BEGUN-*"
-    while not (begun := list(Path(tempfile.gettempdir()).glob(f"*/work/{name}"))):
+    begun = re.search(r"begun-\\w+", cell.source)
+    while begun and not list(Path(tempfile.gettempdir()).glob(f"*/work/{begun[0]}")):
         time.sleep(0.01)
-    begun[0].unlink()
-    return 1
+    return 0.1 if begun else None
 
 
 c.Execute.timeout_func = limit
@@ -57,28 +43,26 @@ c.Execute.timeout_func = limit
 def make_template(folder):
     """Write a course folder with the tiny set and its gradebook.
 
-    Only cells whose source says that they are endless have a limit, a second from when they write
-    a file that says that they have begun. Returned are the folder, the set as it is handed out,
-    and how the names of these files begin.
+    Only cells that say when they have `begun` have a limit, which begins then. Returned are the
+    folder and the set as it is handed out.
     """
-    begun = f"begun-{uuid.uuid4().hex}"
     write_tiny_set(folder)
-    (folder / "nbgrader_config.py").write_text(CONFIG.replace("BEGUN", begun))
+    (folder / "nbgrader_config.py").write_text(CONFIG)
     assert run_step(GenerateAssignment, course_config("ps0", folder))["success"]
-    return folder, release("ps0", folder)["ps0.ipynb"], begun
+    return folder, release("ps0", folder)["ps0.ipynb"]
+
+
+def begun():
+    """Return what a cell writes when its endless part begins; each has its own."""
+    return f"open('begun-{uuid.uuid4().hex}', 'w').close()"
 
 
 class Class:
     """A course folder with the tiny set, and students who hand in."""
 
     def __init__(self, folder, template):
-        made, self.given, self.begun = template
+        made, self.given = template
         self.folder = shutil.copytree(made, folder, dirs_exist_ok=True)
-
-    @property
-    def begin(self):
-        """What a cell writes when it begins; each has its own."""
-        return f"open('{self.begun}-{uuid.uuid4().hex}', 'w').close()"
 
     def gradebook(self):
         return Gradebook(f"sqlite:///{self.folder / 'gradebook.db'}")
@@ -105,7 +89,10 @@ class Class:
     def graded(self, student):
         return self.folder / "autograded" / student / "ps0" / "ps0.ipynb"
 
+    def page(self, student):
+        """The feedback."""
+        return (self.folder / "feedback" / student / "ps0" / "ps0.html").read_text("utf-8")
+
     def feedback(self, student):
         """The text of the feedback."""
-        page = (self.folder / "feedback" / student / "ps0" / "ps0.html").read_text("utf-8")
-        return html.unescape(re.sub(r"<[^>]*>", "", page.split("<body>", 1)[1]))
+        return html.unescape(re.sub(r"<[^>]*>", "", self.page(student).split("<body>", 1)[1]))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Annulus, Rectangle
 
+import rbcourse as rb
 from rbclassroom.course.agreement import polygons, split
 from rbcourse.draw import bodies
 from rbcourse.draw.display import PARTS, Display, joined
@@ -26,37 +27,30 @@ def recorded(ax, *artists):
     return polygons(state, list(display.styles))
 
 
-def test_a_line_is_where_it_is_drawn(ax):
+def test_a_line_is_recorded_with_its_places_and_its_style(ax):
     (line,) = ax.plot([0, 0.5, 1], [0, 1, 0.25], color="#ff8000", lw=3.6, ls=(0, (2, 1)))
     ((style, more, places),) = recorded(ax, line)
     assert np.abs(places - [[0, 200], [150, 0], [300, 150]]).max() <= 0.5 / PARTS
-    fill, stroke, width, dashes, cap, join, box, marker = style
-    assert (fill, stroke, width, cap, join) == (None, "#ff8000ff", 5.0, "butt", "round")
-    assert dashes == (10.0, 5.0)  # in widths of the line
-    assert box == (0, 0, 300, 200)
-    assert marker == ()
+    assert style[:3] == (None, "#ff8000ff", 5.0)
+    assert style[3] == (10.0, 5.0)  # in widths of the line
+    assert style[4:] == ("butt", "round", (0, 0, 300, 200), ())
     assert not more
 
 
-def test_a_patch_is_filled_with_its_colours(ax):
+def test_patches_have_their_colours_and_holes_belong_to_them(ax):
     patch = ax.add_patch(Rectangle((0.1, 0.25), 0.5, 0.5, fc=(0, 0, 1, 0.5), ec="black", lw=0))
-    ((style, _, places),) = recorded(ax, patch)
+    ring = ax.add_patch(Annulus((0.5, 0.5), 0.4, 0.2))
+    (style, _, places), outer, inner = recorded(ax, patch, ring)
     corners = {tuple(place) for place in np.round(places)}
     assert corners == {(30, 150), (180, 150), (180, 50), (30, 50)}
     assert style[:3] == ("#0000ff80", None, 0)
-
-
-def test_a_hole_belongs_to_what_it_is_in(ax):
-    ring = ax.add_patch(Annulus((0.5, 0.5), 0.4, 0.2))
-    outer, inner = recorded(ax, ring)
-    assert not outer[1]
-    assert inner[1]
+    assert (outer[1], inner[1]) == (False, True)
     assert inner[0] == outer[0]
-    assert np.ptp(inner[2][:, 0]) == pytest.approx(300 * 0.4, abs=1)
-    assert np.ptp(outer[2][:, 0]) == pytest.approx(300 * 0.8, abs=1)
+    for (_, _, places), radius in ((outer, 0.4), (inner, 0.2)):
+        assert np.ptp(places[:, 0]) == pytest.approx(2 * 300 * radius, abs=1)
 
 
-def test_a_state_is_what_the_artists_are_then_and_none_may_be_empty(ax):
+def test_each_state_has_what_is_drawn_then_and_none_may_be_empty(ax):
     (line,) = ax.plot([], [])
     display, states = Display(ax.figure), []
     for x in (0.2, np.nan, 0.6):
@@ -64,18 +58,10 @@ def test_a_state_is_what_the_artists_are_then_and_none_may_be_empty(ax):
         states.append(display.record([line]))
     first, none, last = (polygons(state, list(display.styles)) for state in split(joined(states)))
     assert none == []
-    assert np.abs(first[0][2][:, 0] - 60).max() <= 1
-    assert np.abs(last[0][2][:, 0] - 180).max() <= 1
+    for ((_, _, places),), x in ((first, 60), (last, 180)):
+        assert np.abs(places[:, 0] - x).max() <= 1
     assert first[0][0] == last[0][0]
-    assert len(list(display.styles)) == 1
-
-
-def test_far_places_do_not_come_back_on_the_other_side(ax):
-    patch = ax.add_patch(Rectangle((-1e6, 0), 2e6, 1e6))
-    ((_, _, places),) = recorded(ax, patch)
-    assert places[:, 0].min() < 0
-    assert places[:, 0].max() > 300
-    assert places[:, 1].min() < 0
+    assert len(display.styles) == 1
 
 
 def test_a_marker_is_kept_once_and_drawn_at_each_point(ax):
@@ -89,13 +75,16 @@ def test_a_marker_is_kept_once_and_drawn_at_each_point(ax):
 
 
 @pytest.mark.parametrize("width", [3, 15])
-def test_what_leaves_the_picture_keeps_its_slope(ax, width):
+def test_lines_that_leave_the_picture_keep_their_slope_and_far_places_their_side(ax, width):
     ax.figure.set_size_inches(width, 4)
     (line,) = ax.plot([0, 5], [0, 5])
-    ((_, _, places),) = recorded(ax, line)
+    patch = ax.add_patch(Rectangle((-1e6, 0), 2e6, 1e6))
+    (_, _, places), (_, _, far) = recorded(ax, line, patch)
     x, y = (places / [100 * width, 400]).T
     assert np.abs(y - (1 - x)).max() < 1 / (400 * PARTS)
     assert x.max() > 1
+    assert far[:, 0].min() < 0 < 100 * width < far[:, 0].max()
+    assert far[:, 1].min() < 0
 
 
 def test_figures_that_are_too_large_are_refused(ax):
@@ -104,14 +93,18 @@ def test_figures_that_are_too_large_are_refused(ax):
         Display(ax.figure)
 
 
-def test_a_face_that_has_no_area_in_whole_numbers_is_its_edge(ax):
-    """In the browser its plane would part nothing from nothing."""
+def test_faces_are_recorded_at_their_places_and_those_without_area_as_edges(ax):
+    """In the browser the plane of a face without area would part nothing from nothing."""
     space = ax.figure.add_subplot(projection="space")
-    space.fit(-np.ones(3), np.ones(3))
+    space.fit(np.full(3, -1.5), np.full(3, 4.5))
+    cube, sight = bodies.draw_box(space, np.eye(4), 1.0), space.sight()
+    bodies.move_box(cube, rb.exp_se3([0.5, 1.0, 0.5, 1, 2, 1]), 1.0)
     bodies.draw_box(space, np.eye(4), np.array([1.0, 1.0, 1e-4]))
     ax.remove()
     found = recorded(space)
+    for (_, _, places), corners in zip(found[:7], cube.corners, strict=True):
+        assert np.abs(places - sight.scale * (corners - sight.middle)).max() <= 0.5 / PARTS
     kinds = [style[9] for style, _, _ in found]
-    assert kinds.count("line") == 4
-    for (_, _, places), kind in zip(found, kinds, strict=True):
+    assert (kinds[:7].count("face"), kinds[7:].count("line")) == (7, 4)
+    for (_, _, places), kind in zip(found[7:], kinds[7:], strict=True):
         assert kind == "line" or np.linalg.matrix_rank(places - places[0]) == 2

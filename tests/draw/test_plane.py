@@ -17,70 +17,56 @@ def ax():
     plt.close(fig)
 
 
-def corners(pose, length):
-    x, y, theta = pose
-    turn = length * np.exp(1j * theta)
-    return complex(x, y) + turn * np.array([-2 - 1j, 2 - 1j, 2 + 1j, -2 + 1j]) / 4
+def way_of(line):
+    return np.transpose(line.get_data())
 
 
 def assert_body(outline, nose, pose, length):
-    ahead = rb.planar.matrix_from_planar(pose) @ [length / 2, 0, 1]  # as the lesson says
-    assert np.abs(nose.get_xydata()[1] - ahead[:2]).max() < 1e-14
-    wanted = corners(pose, length)
-    assert np.abs(outline.get_xy()[:4] @ [1, 1j] - wanted).max() < 1e-14
-
-
-def assert_all_is_seen(ax, length):
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    places = np.concatenate([corners(pose, length) for pose in PATH])
-    assert left < places.real.min() <= places.real.max() < right
-    assert low < places.imag.min() <= places.imag.max() < high
+    """The body is in this pose, and in the picture."""
+    A, ax = rb.planar.matrix_from_planar(pose), outline.axes
+    ahead = A @ [length / 2, 0, 1]  # as the lesson says
+    assert np.abs(way_of(nose)[1] - ahead[:2]).max() < 1e-14
+    corners = length / 4 * np.array([[-2, -1], [2, -1], [2, 1], [-2, 1]]) @ A[:2, :2].T + A[:2, 2]
+    assert np.abs(outline.get_xy()[:4] - corners).max() < 1e-14
+    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    assert ((low < corners) & (corners < high)).all()
     assert (ax.get_aspect(), ax.get_xlabel(), ax.get_ylabel()) == (1, "x (m)", "y (m)")
 
 
-@pytest.mark.source("RR 3.3")
-def test_rectangles_stand_at_the_poses_of_the_table_and_all_is_seen(ax):
-    way, *bodies = plane.draw_route(ax, PATH, 1.5, shown=[0, 2, 3])
+@pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
+def test_rectangles_stand_at_the_poses_of_the_table_and_move_along_their_way(ax):
+    way, *bodies = plane.draw_route(ax, PATH, 1.5, shown=[0, 1, 2, 3])
     assert {text.get_text(): text.xy[0] for text in ax.texts} == {"start": 0, "goal": 1}
     table = plane.path_table(PATH)
     assert list(table) == ["x [m]", "y [m]", "theta [rad]"]
     assert np.array_equal(np.transpose(list(table.values())), PATH)
-    assert np.array_equal(np.transpose(way.get_data()), PATH[:, :2])
-    for i, outline, nose in zip([0, 2, 3], bodies[::2], bodies[1::2], strict=True):
-        assert_body(outline, nose, PATH[i], 1.5)
-    assert_all_is_seen(ax, 1.5)
-
-
-@pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
-def test_the_rectangle_moves_and_leaves_its_way(ax):
+    assert np.array_equal(way_of(way), PATH[:, :2])
+    for pose, outline, nose in zip(PATH, bodies[::2], bodies[1::2], strict=True):
+        assert_body(outline, nose, pose, 1.5)
+    ax.clear()
     update = plane.moving_route(ax, PATH, 0.8, shown=[1, 3])
-    assert_all_is_seen(ax, 0.8)
     for ghost, nose, i in zip(ax.patches[:2], ax.lines[:2], (1, 3), strict=True):
         assert_body(ghost, nose, PATH[i], 0.8)
-    for i in (0, 3, 1):
+    for i in (0, 3, 2, 1):
         way, outline, nose = update(i)
         assert_body(outline, nose, PATH[i], 0.8)
-        assert np.array_equal(np.transpose(way.get_data()), PATH[: i + 1, :2])
+        assert np.array_equal(way_of(way), PATH[: i + 1, :2])
 
 
 def test_two_ways_are_compared(ax):
     raised = PATH + np.array([0, 1, 0]) * [[0], [1], [2], [0.5]]
-    pair = {"one": PATH, "other": raised}
-    point = [0.3, -0.2]
-    artists = plane.draw_compared(ax, pair, 1, shown=[1], points=[[0, 0], point])
-    for (way, outline, nose), path, c in zip(
-        [artists[:3], artists[3:]], [PATH, raised], [0, complex(*point)], strict=True
-    ):
-        wanted = path[:, :2] @ [1, 1j] + c * np.exp(1j * path[:, 2])
-        assert np.abs(np.transpose(way.get_data()) @ [1, 1j] - wanted).max() < 1e-14
+    pair, points = {"one": PATH, "other": raised}, ([0, 0], [0.3, -0.2])
+    artists = plane.draw_compared(ax, pair, 1, shown=[1], points=points)
+    for k, (name, path) in enumerate(pair.items()):
+        way, outline, nose = artists[3 * k : 3 * k + 3]
+        wanted = path[:, :2] @ [1, 1j] + points[k] @ np.array([1, 1j]) * np.exp(1j * path[:, 2])
+        assert np.abs(way_of(way) @ [1, 1j] - wanted).max() < 1e-14
         assert_body(outline, nose, path[1], 1)
-    assert [one.get_linestyle() for one in artists] == 3 * ["-"] + 3 * ["--"]
-    assert [artists[0].get_label(), artists[3].get_label()] == ["one", "other"]
-    assert ax.get_ylim()[1] > 4.5
+        assert {one.get_linestyle() for one in (way, outline, nose)} == {("-", "--")[k]}
+        assert way.get_label() == name
     way = plane.draw_compared(ax, pair, 1, shown=[1])[3]
-    assert np.abs(np.transpose(way.get_data()) - raised[:, :2]).max() < 1e-14
-    said = plane.describe_compared({"here": pair})
-    assert said == (
+    assert np.abs(way_of(way) - raised[:, :2]).max() < 1e-14
+    assert plane.describe_compared({"here": pair}) == (
         "A rectangle on two ways beside each other, the second dashed: here. "
         "The ways of each pair: here: one and other, the centres apart by 2 m at most."
     )

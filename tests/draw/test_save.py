@@ -2,7 +2,6 @@
 
 import html
 import re
-from functools import partial
 from itertools import combinations
 
 import matplotlib.pyplot as plt
@@ -21,7 +20,7 @@ def saved(folder, monkeypatch, alt="a line"):
     return save.save_figure(fig, "line", TABLE, alt)
 
 
-def test_a_figure_is_saved_as_picture_document_and_numbers_of_the_same_bytes(tmp_path, monkeypatch):
+def test_picture_document_and_numbers_have_the_same_bytes_each_time(tmp_path, monkeypatch):
     picture, _ = (saved(tmp_path / folder, monkeypatch) for folder in "ab")
     files, again = ({f.name: f.read_bytes() for f in (tmp_path / x).iterdir()} for x in "ab")
     assert set(files) == {"line.png", "line.pdf", "line.csv"}
@@ -42,30 +41,27 @@ def seen(colour, matrix):
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
-def test_colours_can_be_told_apart_by_all_eyes():
+EYES = {
+    "normal": "1 0 0 0 1 0 0 0 1",
+    "protan": "0.152286 1.052583 -0.204868 0.114503 0.786281 0.099216 -0.003882 -0.048116 1.051998",
+    "deutan": "0.367322 0.860646 -0.227968 0.280085 0.672501 0.047413 -0.011820 0.042940 0.968881",
+    "tritan": "1.255528 -0.076749 -0.178779 -0.078411 0.930809 0.147602 0.004733 0.691367 0.303900",
+}
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_colours_can_be_told_apart_by_all_eyes(eye):
     """The deficiencies in full, by Machado, Oliveira and Fernandes 2009; differences as CIE76."""
-    eyes = {
-        "normal": "1 0 0 0 1 0 0 0 1",
-        "protan": "0.152286 1.052583 -0.204868 0.114503 0.786281 0.099216 "
-        "-0.003882 -0.048116 1.051998",
-        "deutan": "0.367322 0.860646 -0.227968 0.280085 0.672501 0.047413 "
-        "-0.011820 0.042940 0.968881",
-        "tritan": "1.255528 -0.076749 -0.178779 -0.078411 0.930809 0.147602 "
-        "0.004733 0.691367 0.303900",
-    }
-    for eye, entries in eyes.items():
-        matrix = np.array(entries.split(), dtype=float).reshape(3, 3)
-        for one, other in combinations(save.COLOURS.values(), 2):
-            apart = np.linalg.norm(seen(one, matrix) - seen(other, matrix))
-            assert apart > 16.9, (eye, one, other)
+    matrix = np.array(EYES[eye].split(), dtype=float).reshape(3, 3)
+    for one, other in combinations(save.COLOURS.values(), 2):
+        assert np.linalg.norm(seen(one, matrix) - seen(other, matrix)) > 16.9, (one, other)
 
 
 def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RBCOURSE_FIGURES", raising=False)
-    fig, _ = plt.subplots()
-    save.save_figure(fig, "empty", TABLE, "nothing")
-    assert (tmp_path / "figures" / "empty.png").exists()
+    save.save_table("empty", TABLE)
+    assert (tmp_path / "figures" / "empty.csv").exists()
 
 
 @pytest.mark.parametrize(
@@ -77,33 +73,25 @@ def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
         ('A < "B": no end', 'A &lt; "B": no end'),
     ],
 )
-def test_the_caption_is_the_first_sentence_and_the_files(tmp_path, monkeypatch, alt, sentence):
-    picture = saved(tmp_path, monkeypatch, alt)
+def test_the_caption_is_the_first_sentence_and_the_files(alt, sentence):
+    picture = save.Picture("line", alt, b"", 100)
+    page, files = picture._repr_html_(), "line.png, .pdf, .csv"
     assert repr(picture) == f"line: {alt}"
-    assert f'alt="{html.escape(alt)}"' in picture._repr_html_()
-    said = f"<figcaption>{sentence} <small>line.png, .pdf, .csv</small></figcaption></figure>"
-    assert picture._repr_html_().endswith(said)
+    assert f'alt="{html.escape(alt)}"' in page
+    assert page.endswith(f"<figcaption>{sentence} <small>{files}</small></figcaption></figure>")
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ({"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "one shape wanted, got t [1] (2,), x [m] (3,)"),
-        *(
-            ({"body": ["a"], name: [1.0]}, f"data: {name!r} has to end with")
-            for name in ("pitch [deg]", "t", "angle (rad)", "x[m]")
-        ),
-    ],
-)
-@pytest.mark.parametrize(
-    "saved", [save.save_figure, partial(animate.save_animation, update=list, frames=2)]
-)
+RAGGED = {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "one shape wanted, got t [1] (2,), x [m] (3,)"
+
+
+@pytest.mark.parametrize("name", ["pitch [deg]", "t", "angle (rad)", "x[m]", None])
 def test_tables_that_are_ragged_or_lack_units_are_refused_and_nothing_is_written(
-    table, message, saved, tmp_path, monkeypatch
+    name, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
-    fig, _ = plt.subplots()
-    with pytest.raises(ValueError, match=re.escape(message)):
-        saved(fig, "bad", table, alt="")
+    unit = {"body": ["a"], name: [1.0]}, f"data: {name!r} has to end with"
+    table, message = unit if name else RAGGED
+    for saved, more in ((save.save_figure, ()), (animate.save_animation, (list, 2))):
+        with pytest.raises(ValueError, match=re.escape(message)):
+            saved(plt.Figure(), "bad", table, "", *more)
     assert list(tmp_path.iterdir()) == []
-    plt.close(fig)

@@ -1,4 +1,4 @@
-"""On the sphere: what is drawn is what was computed."""
+"""Spheres show the computed images of vectors."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -8,36 +8,26 @@ import rbcourse as rb
 from rbcourse.draw import spheres
 
 R = rb.sample_rotation(50, rng=1)
-V0 = np.array([0.0, 0, 1])
-V1 = np.array([0.0, 0.2, 1])
-IMAGES = {"one": (R @ V0, R @ V1), "other": (-R @ V0, -R @ V1)}
-TABLE = spheres.image_table(IMAGES)
-
-
-@pytest.fixture
-def panels():
-    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"})
-    yield axes
-    plt.close(fig)
+V0, V1 = R @ [0, 0, 1], R @ [0, 0.2, 1]
+IMAGES = {"one": (V0, V1), "other": (-V0, -V1)}
 
 
 @pytest.mark.source("RR 2.2", "RR Fig. 4", "RR Fig. 5")
-@pytest.mark.parametrize("shown", [0, 1, 17, 50])
-def test_the_first_images_are_marked(panels, shown):
-    artists = spheres.moving_images(panels, IMAGES)(shown)
-    for k, (v0, v1) in enumerate(IMAGES.values()):
-        strokes, dots = artists[2 * k : 2 * k + 2]
-        drawn = np.transpose(strokes.get_data_3d()).reshape(-1, 3, 3)
-        assert np.array_equal(drawn[:, :2], np.stack([v0, v1], axis=1)[:shown])
-        assert np.isnan(drawn[:, 2]).all()  # one stroke ends before the next begins
-        assert np.array_equal(np.transpose(dots.get_data_3d()), v0[:shown])
-        assert panels[k].get_title() == list(IMAGES)[k]
-
-
-def test_the_table_has_a_row_for_each_rotation_and_the_description_counts():
-    assert list(TABLE)[:6] == [f"one {v} {axis} [1]" for v in ("v0", "v1") for axis in "xyz"]
-    assert np.array_equal(TABLE["other v1 y [1]"], -(R @ V1)[:, 1])
-    said = spheres.describe_images(IMAGES)
-    inside = (np.abs((R @ V0)[:, 2]) < 0.5).sum()
-    assert "under 50 random rotations" in said
+def test_the_first_images_are_marked_listed_and_counted():
+    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"})
+    update = spheres.moving_images(axes, IMAGES)
+    assert [ax.get_title() for ax in axes] == list(IMAGES)
+    for shown in (17, 50, 1, 0):
+        found = [np.transpose(line.get_data_3d()) for line in update(shown)]
+        for strokes, dots, (v0, v1) in zip(found[::2], found[1::2], IMAGES.values(), strict=True):
+            parts = strokes.reshape(-1, 3, 3)
+            assert np.array_equal(parts[:, :2], np.stack([v0, v1], axis=1)[:shown])
+            assert np.isnan(parts[:, 2]).all()  # one stroke ends before the next begins
+            assert np.array_equal(dots, v0[:shown])
+    plt.close(fig)
+    table, said = spheres.image_table(IMAGES), spheres.describe_images(IMAGES)
+    assert list(table)[:6] == [f"one {v} {axis} [1]" for v in ("v0", "v1") for axis in "xyz"]
+    assert np.array_equal(table["other v1 y [1]"], -V1[:, 1])
+    inside = (np.abs(V0[:, 2]) < 0.5).sum()
+    assert "under 50 random rotations, a stroke at each image showing how it is turned." in said
     assert f"area: one: {inside}, other: {inside}." in said

@@ -8,12 +8,7 @@ from pathlib import Path
 
 from nbclient.exceptions import CellExecutionError
 
-from rbclassroom.assignments.collect import collect
-from rbclassroom.assignments.grade import grade_all
-from rbclassroom.assignments.handout import make_handout, make_solutions
-
-LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
-LISTS += ["not on the roster", "missing"]
+from rbclassroom.assignments.collect import LISTS, collect
 
 
 def main() -> None:
@@ -33,18 +28,23 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
         sys.stdout.reconfigure(errors="replace")
     try:
-        if known.task == "grade":
-            grade_all(known.sets, assignments, known.require_box)
+        if known.task == "grade":  # what needs nbgrader takes a second to import
+            from rbclassroom.assignments.grade import grade
+
+            grade(known.sets, assignments, known.require_box)
         elif known.task == "collect":
             rows = collect(known.folder, assignments, known.due)
             for kind in LISTS:
                 own = [f"  {what}: {why}" for name, what, why in rows if name == kind]
                 if own or kind == "collected":
                     print(f"{kind}: {len(own)}", *own, sep="\n")
-        elif known.solutions:
-            print(make_solutions(known.set, assignments))
         else:
-            print(make_handout(known.set, assignments, Path()))
+            from rbclassroom.assignments.handout import make_handout, make_solutions
+
+            if known.solutions:
+                print(make_solutions(known.set, assignments))
+            else:
+                print(make_handout(known.set, assignments, Path()))
     except (OSError, ValueError, CellExecutionError) as error:
         sys.exit(str(error))
 

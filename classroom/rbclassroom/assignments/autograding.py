@@ -25,17 +25,10 @@ from nbgrader import preprocessors as nbgrader
 from traitlets import Integer
 from traitlets.config import Config
 
-from rbclassroom.assignments import sandbox
-from rbclassroom.assignments.client import CUT, BoundedClient
-from rbclassroom.assignments.restore import (
-    Refused,
-    is_answer,
-    is_test,
-    marks_of,
-    name_cell,
-    restore,
-)
-from rbclassroom.assignments.tampering import find_in_cells
+from rbclassroom.assignments import locked_cells, sandbox
+from rbclassroom.assignments.forbidden import find_in_cells
+from rbclassroom.assignments.locked_cells import Refused, marks_of, name_cell
+from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
 # what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
@@ -79,13 +72,13 @@ def inert_html(content: object) -> str:
     >>> inert_html('<p onclick="steal()">x</p><img src="https://a.b/c.png"><script>1</script>')
     '<p>x</p><img>&lt;script&gt;1&lt;/script&gt;'
     """
-    inert = bleach.clean(str(content), TAGS, _is_inert, protocols={"data"})
+
+    def is_inert(tag: str, name: str, value: str) -> bool:
+        embedded = name == "src" and value.startswith("data:image/")
+        return tag == "img" and (name in ("alt", "title") or embedded)
+
+    inert = bleach.clean(str(content), TAGS, is_inert, protocols={"data"})
     return LINK.sub(r"\\text", str(inert))
-
-
-def _is_inert(tag: str, name: str, value: str) -> bool:
-    embedded = name == "src" and value.startswith("data:image/")
-    return tag == "img" and (name in ("alt", "title") or embedded)
 
 
 class _Renderer(IPythonRenderer):
@@ -116,11 +109,11 @@ class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
-        remarks = restore(nb, original)
+        remarks = locked_cells.restore(nb, original)
         if len(remarks) > 2:
             remarks[1:] = [f"and {len(remarks) - 1} more changes"]
-        for cell in nb.cells:
-            if is_answer(cell) or not marks_of(cell):  # what looks like a region stops nbgrader
+        for cell in nb.cells:  # what looks like a region stops nbgrader
+            if locked_cells.is_answer(cell) or not marks_of(cell):
                 regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
                 cell.source = re.sub(regions, r"\1-\2", cell.source)
         nb, resources = super().preprocess(nb, resources)
@@ -137,11 +130,10 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
 
     def preprocess(self, nb: NotebookNode, resources: Any, km: Any = None) -> Any:
         """Run all cells; errors are among the outputs."""
-        remarks, path = nb.metadata.get("remarks", []), resources["metadata"]["path"]
         step: Any = self.parent
         course, name = step.parent.coursedir, resources["nbgrader"]["assignment"]
         source = course.format_path(course.source_directory, ".", name)
-        self.folder = Path(tempfile.mkdtemp())
+        self.folder, path = Path(tempfile.mkdtemp()), resources["metadata"]["path"]
         work = self.folder / "work"
         try:
             # the files of the set; those of the student could pass for modules of the tests
@@ -152,27 +144,26 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         finally:
             resources["metadata"]["path"] = path
             sandbox.delete(self.folder)
+        remarks = nb.metadata.setdefault("remarks", [])
         for at, cell in enumerate(nb.cells):
-            outputs = cell.get("outputs", [])
+            outputs, marks = cell.get("outputs", []), marks_of(cell)
             errors = {output.get("ename") for output in outputs} - {None}
-            what = [f"stopped after {self.timeout} s"] * (at in self.slow)
-            what += [CUT] * (at in self.cut)
-            what += ["takes too much memory"] * ("MemoryError" in errors)
+            faults = [f"stopped after {self.timeout} s"] * (at in self.slow)
+            faults += [CUT] * (at in self.cut)
+            faults += ["takes too much memory"] * ("MemoryError" in errors)
+            remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in faults]
             if at in self.slow:  # in place of where in the tests it was interrupted
-                outputs = [output for output in outputs if output.output_type != "error"]
+                outputs[:] = [output for output in outputs if output.output_type != "error"]
                 said = f"This cell took longer than {self.timeout} s and was stopped."
                 outputs.append(new_output("error", ename="Timeout", evalue="", traceback=[said]))
-                cell.outputs = outputs
-            remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in what]
             for output in (output for output in outputs if "data" in output):
                 output.metadata = NotebookNode()
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
                     output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
-            marks = marks_of(cell)  # in the feedback with scores
-            if is_test(cell) and marks["points"] and not marks.get("score", True) and not errors:
+            failed = marks.get("points") and not marks.get("score", True)  # in the feedback
+            if locked_cells.is_test(cell) and failed and not errors:
                 outputs.append(new_output("stream", name="stdout", text=UNSEEN))
-        nb.metadata["remarks"] = remarks
         return nb, resources
 
     def create_kernel_manager(self) -> Any:
@@ -190,9 +181,8 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         """Run a cell."""
         try:
             return super().preprocess_cell(cell, resources, index)
-        except DeadKernelError as error:
+        except (DeadKernelError, CellTimeoutError) as error:
             where = name_cell(self.nb.cells, index)
-            over = f"or {self.seconds} s were over: grade by hand"
-            raise Refused(f"Python ended in or before {where}, {over}") from error
-        except CellTimeoutError as error:
-            raise Refused(f"{name_cell(self.nb.cells, index)} cannot be stopped") from error
+            why = f"Python ended in or before {where}, or {self.seconds} s were over: grade by hand"
+            stuck = isinstance(error, CellTimeoutError)
+            raise Refused(f"{where} cannot be stopped" if stuck else why) from error

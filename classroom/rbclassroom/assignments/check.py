@@ -12,7 +12,6 @@ import shutil
 import sys
 import tempfile
 import time
-from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +19,11 @@ import nbformat
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 
-from rbclassroom.assignments.client import CELL_SECONDS, CUT, BoundedClient
-from rbclassroom.assignments.restore import (
-    grade_id,
-    is_answer,
-    is_test,
-    marks_of,
-    name_cell,
-    read_notebook,
-    restore,
-    title_of,
-)
-from rbclassroom.assignments.tampering import find_in_cells
-from rbclassroom.assignments.writing import write_whole
+from rbclassroom.assignments import locked_cells
+from rbclassroom.assignments.forbidden import find_in_cells
+from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
+from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient
+from rbclassroom.assignments.safe_files import write_whole
 from rbclassroom.course.notebooks import KERNEL
 
 
@@ -45,13 +36,14 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
         raise ValueError(f"{path} is missing: there is no such file")
     if path.suffix != ".ipynb":
         raise ValueError(f"{path.name} is no notebook; give the file that ends with .ipynb")
-    notebook, (name, given) = read_notebook(path.read_bytes(), path.name), _find_original(path)
-    original = read_notebook(given, name)
+    notebook = locked_cells.read_notebook(path.read_bytes(), path.name)
+    name, given = _find_original(path)
+    original = locked_cells.read_notebook(given, name)
     saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     print(f"checking {path.name}, last saved {saved}", flush=True)
     if path.name != name:
         print(f"it is to be submitted under the name {name}")
-    remarks = restore(notebook, original)
+    remarks = locked_cells.restore(notebook, original)
     for at, line, what in find_in_cells(notebook.cells):  # it could be meant to deceive the tests
         where = f"{name_cell(notebook.cells, at)}, line {line}"
         remarks.append(f"{where} {what}: change it, or a person has to look")
@@ -60,9 +52,8 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
         for file in path.parent.iterdir():
             if file.is_file() and file.suffix not in (".whl", ".zip"):
                 shutil.copy(file, own)
-        remarks += _run(notebook, own, seconds)
-    for what in remarks:
-        print(f"- {what}")
+        remarks += _run(notebook, Path(own), seconds)
+    print("".join(f"- {what}\n" for what in remarks), end="")
     passed = _print_problems(notebook, original)
     nbformat.validate(notebook)
     content = (nbformat.writes(notebook) + "\n").encode()
@@ -85,9 +76,8 @@ def _find_original(path: Path) -> tuple[str, bytes]:
         return f"{name}.ipynb", release(name, course)[f"{name}.ipynb"]
     same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
     if len(same) != 1:
-        raise ValueError(
-            f"{folder / path.name} is missing; unpack the handout again, and work there"
-        )
+        missing = f"{folder / path.name} is missing"
+        raise ValueError(f"{missing}; unpack the handout again, and work there")
     return same[0].name, same[0].read_bytes()
 
 
@@ -101,40 +91,37 @@ class _Client(BoundedClient):
         print(f"\rrunning cell {self.at + 1} of {len(self.nb.cells)} ", end="", flush=True)
 
     def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
-        """Note the time."""
         super().on_cell_executed(cell, cell_index, execute_reply)
         self.took = self.took | {cell_index: time.monotonic() - self.began}
 
 
-def _run(notebook: NotebookNode, own: str, seconds: int) -> list[str]:
+def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
     """Run all cells; say what did not go well, except in a problem."""
     log = logging.getLogger(__name__)
     log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
-    cells, remarks = notebook.cells, list[str]()
+    cells, ends = notebook.cells, list[str]()
     client = _Client(notebook, log=log, kernel_name=KERNEL["name"], timeout=seconds)
-    client.folder, client.resources = Path(own), {"metadata": {"path": own}}
+    client.folder, client.resources = own, {"metadata": {"path": str(own)}}
     try:
-        client.execute(env={**os.environ, "IPYTHONDIR": own})
+        client.execute(env={**os.environ, "IPYTHONDIR": str(own)})
     except (DeadKernelError, CellTimeoutError) as error:
         if isinstance(error, DeadKernelError):
             why = "it called exit, or used up the memory"
-            remarks.append(f"the kernel died in cell {client.at + 1}: {why}")
+            ends.append(f"the kernel died in cell {client.at + 1}: {why}")
         cells[client.at].execution_count = None
-        remarks.append(f"the cells after cell {client.at + 1} were not run")
+        ends.append(f"the cells after cell {client.at + 1} were not run")
     except (OSError, RuntimeError, KeyError) as error:
         why = f"Python could not be started, or stopped ({error})"
         raise ValueError(f"{why}; install what requirements.txt of the handout lists") from error
     print(flush=True)
-    long = f"took longer than {seconds} s and was stopped"
-    remarks += [f"{name_cell(cells, at)} {long}" for at in client.slow]
-    near = f"took more than half of the {seconds} s that grading allows: make it faster"
+    near = f" took more than half of the {seconds} s that grading allows: make it faster"
     slow = {at for at, took in client.took.items() if took > seconds / 2} - {*client.slow}
-    remarks += [f"{name_cell(cells, at)} {near}" for at in sorted(slow)]
-    remarks += [f"{name_cell(cells, at)}: {CUT}" for at in client.cut]
+    faults = [(at, f" took longer than {seconds} s and was stopped") for at in client.slow]
+    faults += [(at, near) for at in sorted(slow)] + [(at, f": {CUT}") for at in client.cut]
     for at, cell in enumerate(cells):
         if _error(cell) and not (is_test(cell) or is_answer(cell) or at in client.slow):
-            remarks.append(f"{name_cell(cells, at)} fails: {_error(cell)}")
-    return remarks
+            faults.append((at, f" fails: {_error(cell)}"))
+    return ends + [f"{name_cell(cells, at)}{fault}" for at, fault in faults]
 
 
 def _error(cell: NotebookNode) -> str:
@@ -150,18 +137,18 @@ def _error(cell: NotebookNode) -> str:
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
     """Print a line a problem, under its title; return which of the visible tests passed."""
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
-    problems = defaultdict[str, list[tuple[str, str]]](list)
+    problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered = [], True
     for at, cell in enumerate(notebook.cells):
-        error, found = _error(cell), problems[title_of(notebook.cells, at)]
-        where = f"cell {at + 1}"
+        error, where = _error(cell), f"cell {at + 1}"
+        found = problems.setdefault(locked_cells.title_of(notebook.cells, at), [])
         if is_answer(cell):
             answered = cell.source.strip() not in ("", empty[grade_id(cell)])
             if not answered:
                 found.append(("empty", f"{where} is not answered yet"))
             elif error:
                 found.append(("FAILED", f"{where} {error}"))
-            elif marks_of(cell).get("grade"):
+            elif locked_cells.marks_of(cell).get("grade"):
                 found.append(("words", f"{where} is graded by a person"))
         elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
             found.append(("hidden", f"{where} has hidden tests only"))

@@ -15,15 +15,14 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 from zipfile import BadZipFile, ZipFile
 
-from rbclassroom.assignments.restore import decode, grade_id, read_notebook
-from rbclassroom.assignments.writing import write_csv, write_whole
+from rbclassroom.assignments.locked_cells import decode, grade_id, read_notebook
+from rbclassroom.assignments.safe_files import write_csv, write_whole
 
 MOODLE = re.compile(
-    r"(?:.*?/)??(?P<name>[^/]+?)(?:_(?P<id>\d+))?"
-    r"_assignsubmission_(?P<kind>[a-z]+)(?:_?/|_)(?P<file>.+)"
+    r"(?:.*?/)??(?P<name>[^/]+?)(?:_(?P<id>\d+))?_assignsubmission_[a-z]+(?:_?/|_)(?P<file>.+)"
 )
 CANVAS = re.compile(
     r"(?:.*?/)??(?:(?P<name>[^/]+?)_)??(?P<late>LATE_)?(?P<id>\d+|anon_[^/_]+)"
@@ -33,7 +32,9 @@ JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_St
 FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
 # RuntimeError is raised for a password, NotImplementedError, one of them, for a method
 BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
-Rows = list[tuple[str, str, str]]
+LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
+LISTS += ["not on the roster", "missing"]
+Row = tuple[str, str, str]  # one of the lists, a file or a student, and why
 
 
 class Upload(NamedTuple):
@@ -47,10 +48,7 @@ class Upload(NamedTuple):
     content: bytes
 
 
-Uploads = Iterator[Upload]
-
-
-def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Rows:
+def collect(folder: Path, assignments: Path, due: datetime | None = None) -> list[Row]:
     """Put the notebooks of a folder into ``submitted/`` and tell what became of each file.
 
     Of several files of a student for a set the newest is taken; what is in ``submitted/`` is
@@ -59,14 +57,17 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
     if not folder.is_dir():
         raise ValueError(f"{folder}: there is no such folder")
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
-    submitted, rows = assignments / "submitted", Rows()
+    submitted, rows = assignments / "submitted", list[Row]()
     groups = defaultdict[tuple[str, str, str], list[Upload]](list)
-    for upload in find(folder, rows):
-        name, why = _match(upload, sets)
-        if name:
-            groups[name, _student(upload.about, roster), upload.about["id"]].append(upload)
+    for found in _find(folder):
+        if not isinstance(found, Upload):
+            rows.append(found)
+            continue
+        name, why = _match(found, sets)
+        if why:
+            rows.append(("unmatched", found.file, why))
         else:
-            rows.append(("unmatched", upload.file, why))
+            groups[name, _student(found.about, roster), found.about["id"]].append(found)
     namesakes = Counter((name, student) for name, student, _ in groups)
     for (name, student), several in namesakes.items():
         if several > 1 and (submitted / student / name).exists():
@@ -94,53 +95,41 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> Row
     return rows
 
 
-def find(folder: Path, rows: Rows) -> Uploads:
-    """Find the notebooks in a folder, in the zips in it, and in the zips of students."""
+def _find(folder: Path) -> Iterator[Upload | Row]:
+    """Yield the notebooks in a folder, in the zips in it, and in the zips of students."""
     for path in sorted(folder.rglob("*")):
         name = _shown(path.relative_to(folder).as_posix())
         if path.is_symlink():
-            rows.append(("refused", name, "a link"))
+            yield "refused", name, "a link"
         elif path.is_file():
             with path.open("rb") as stream:
                 date = datetime.fromtimestamp(path.stat().st_mtime)
-                yield from _look(name, name, stream, date, rows)
+                yield from _look(name, name, stream, date)
 
 
-def _shown(name: str) -> str:
-    """Return a name in composed letters that can be written and stand in a line."""
-    with contextlib.suppress(UnicodeError):  # many zips are in UTF-8 and do not say so
-        name = name.encode("cp437").decode("utf-8")
-    name = name.encode("utf-8", "replace").decode("utf-8")
-    return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
-
-
-def _owner(name: str) -> re.Match[str] | None:
-    return MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
-
-
-def _look(label: str, name: str, stream: IO[bytes], date: datetime, rows: Rows) -> Uploads:
+def _look(label: str, name: str, stream: IO[bytes], date: datetime) -> Iterator[Upload | Row]:
     """Look at a file; its name, with the zips that it was in, tells the student."""
     suffix, owner = Path(name).suffix.lower(), _owner(name)
     try:
         if JUNK.search(f"/{owner['file'] if owner else name}"):
-            rows.append(("ignored", label, "not to be submitted"))
+            yield "ignored", label, "not to be submitted"
         elif suffix == ".zip":
             with ZipFile(stream) as zipped:
-                yield from _look_into(zipped, label, name, date, rows)
+                yield from _look_into(zipped, label, name, date)
         elif suffix != ".ipynb":
-            rows.append(("ignored", label, "no notebook, and no zip"))
+            yield "ignored", label, "no notebook, and no zip"
         elif not owner:
-            rows.append(("unmatched", label, "its name names no student"))
+            yield "unmatched", label, "its name names no student"
         else:
             read_notebook(content := stream.read(), "it")
             about = {key: value or "" for key, value in owner.groupdict().items()}
             number, prepared = int(about.get("number", 0)), "/to_submit/" in f"/{about['file']}"
             yield Upload(number, _written(date), prepared, label, about, content)
     except BROKEN as error:
-        rows.append(("refused", label, str(error)))
+        yield "refused", label, str(error)
 
 
-def _look_into(zipped: ZipFile, label: str, name: str, date: datetime, rows: Rows) -> Uploads:
+def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterator[Upload | Row]:
     entries = [(_shown(e.filename), e) for e in zipped.infolist() if not e.is_dir()]
     # the name of a whole download may look like that of an upload to Canvas
     whole = label == name and not MOODLE.fullmatch(name) and any(_owner(n) for n, _ in entries)
@@ -156,10 +145,22 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime, rows: Row
             # what a student packed has the dates of the student's machine
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:
-            rows.append(("refused", f"{label}: {inner}", str(error)))
-        else:
-            full = f"{name}/{inner}" if upload else inner
-            yield from _look(f"{label}: {inner}", full, io.BytesIO(content), when, rows)
+            yield "refused", f"{label}: {inner}", str(error)
+            continue
+        full = f"{name}/{inner}" if upload else inner
+        yield from _look(f"{label}: {inner}", full, io.BytesIO(content), when)
+
+
+def _shown(name: str) -> str:
+    """Return a name in composed letters that can be written and stand in a line."""
+    with contextlib.suppress(UnicodeError):  # many zips are in UTF-8 and do not say so
+        name = name.encode("cp437").decode("utf-8")
+    name = name.encode("utf-8", "replace").decode("utf-8")
+    return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
+
+
+def _owner(name: str) -> re.Match[str] | None:
+    return MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
 
 
 def _written(date: datetime) -> str:
@@ -204,9 +205,10 @@ def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
     best = max(sets, key=lambda name: (shared[name], name in named))
     if not shared[best]:
         return "", "its cells are of no set"
-    if named and best not in named:
-        return "", f"named {named[0]}, but its cells are of {best}"
-    return best, ""
+    return (
+        best,
+        "" if best in named or not named else f"named {named[0]}, but its cells are of {best}",
+    )
 
 
 def _plain(name: str) -> str:
@@ -219,12 +221,10 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
     """Return the id in the roster of a student, or what can be made of the name."""
     canvas, plain, number = "number" in about, _plain(about["name"]), _plain(about["id"])
     found = [r["id"] for r in roster if canvas and r.get("lms_user_id") == about["id"]]
-    for row in () if found else roster:
-        words = row.get("last_name", ""), row.get("first_name", "")
-        same = sorted(_plain(" ".join(words)).split("_")) == sorted(plain.split("_"))
-        if canvas:  # which writes the last name first, without spaces
-            same = _plain("".join(words)).replace("_", "") == plain.replace("_", "")
-        found += [row["id"]] * (same and bool(plain))
+    key: Any = "".join if canvas else sorted  # Canvas writes the last name first, without spaces
+    for row in roster if plain and not found else ():
+        words = _plain(f"{row.get('last_name', '')} {row.get('first_name', '')}")
+        found += [row["id"]] * (key(words.split("_")) == key(plain.split("_")))
     if len(found) == 1:
         return found[0]
     # of an unknown or anonymous student, or a name that Windows does not allow for a folder
@@ -232,7 +232,7 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
     return plain if alone else f"{plain}_{number}".strip("_") or "student"
 
 
-def _take(best: Upload, place: Path) -> tuple[str, str, str]:
+def _take(best: Upload, place: Path) -> Row:
     """Put a file in its place, unless what is there is newer."""
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
     text = decode(best.content).encode()

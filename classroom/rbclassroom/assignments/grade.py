@@ -26,36 +26,59 @@ from nbgrader.coursedir import CourseDirectory
 from nbgrader.utils import capture_log, rmtree
 from traitlets.config import Config
 
-from rbclassroom.assignments import sandbox
+from rbclassroom.assignments import locked_cells, sandbox
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.handout import find_set, read_config
-from rbclassroom.assignments.restore import (
-    Refused,
-    grade_id,
-    is_answer,
-    marks_of,
-    read_notebook,
-    title_of,
-)
+from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
+from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.tables import update
-from rbclassroom.assignments.writing import write_csv
 
 WORKERS = 2  # so many students are graded at once
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
-Work = Future[list[str]]
+Job = tuple[str, str]  # a set and a student
+Row = dict[str, Any]
 
 
-def grade(name: str, assignments: Path) -> Path:
-    """Grade all submissions of a set, write the feedback and a table; a line a student is printed.
+def grade(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:
+    """Grade all submissions of some sets, or of all sets that there are submissions of.
 
-    What a human has given points for is kept. A submission that is refused loses the points that
-    a machine gave it before, and its feedback. When points of one student change while another
-    is graded, or exceed the maximum, a ValueError names them and no table is written;
+    A line is printed for each submission; feedback and a table for each set are written. What a
+    human has given points for is kept. A submission that is refused loses the points that a
+    machine gave it before, and its feedback. When points of one student change while another is
+    graded, or exceed the maximum, a ValueError names them and no table is written;
     ``gradebook.before-NAME.db`` holds the gradebook as it was.
     """
+    chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
+    if not chosen:
+        raise ValueError("There are no submissions: submitted/STUDENT/ps1/ps1.ipynb")
+    if why := sandbox.missing():
+        if require_box:
+            raise ValueError(f"There is no box for submissions: {why}")
+        print(f"Submissions run without a box, and can do what you can: {why}", flush=True)
+    jobs, tables = [job for name in chosen for job in _prepare(name, assignments)], []
+    rows: dict[Job, Row] = {}
+    for (name, student), row in _graded(jobs, assignments, not why):
+        said = [f"graded, {row['total']} of {row['maximum']}"] if "total" in row else []
+        said += [f"by hand: {row['by hand']}"] if row.get("by hand") else []
+        print(f"{name}, {student}:", "; ".join([*said, row["remarks"]]), flush=True)
+        start = {"student": student, "set": name, "boxed": "no" if why else "yes"}
+        rows[name, student] = start | row
+        own = [job for job in jobs if job[0] == name]
+        if rows.keys() >= {*own}:
+            lines = [rows[job] for job in own]
+            for what, reason in _not_collected(name, assignments, {who for _, who in own}):
+                lines.append({"student": _tidy(what), "set": name, "remarks": _tidy(reason)})
+                print(f"{name}, {lines[-1]['student']}: {lines[-1]['remarks']}", flush=True)
+            tables.append(assignments / f"{name}-grades.csv")
+            write_csv(tables[-1], lines)
+            print(tables[-1], flush=True)
+    return tables
+
+
+def _prepare(name: str, assignments: Path) -> list[Job]:
+    """Bring the gradebook and the files of a set up to date; return what there is to grade."""
     config = course_config(name, assignments)
-    course = CourseDirectory(config=config)
     students = sorted(path.parent.name for path in assignments.glob(f"submitted/*/{name}/"))
     if not students:
         raise ValueError(f"There is no submission of {name}: submitted/STUDENT/{name}/{name}.ipynb")
@@ -64,49 +87,48 @@ def grade(name: str, assignments: Path) -> Path:
         table.open("a").close()
     except PermissionError as error:
         raise ValueError(f"{table} cannot be written: close it where it is open") from error
-    before = Path(course.root, "gradebook.db")
+    before = Path(config.CourseDirectory.root, "gradebook.db")
     if before.exists():
         shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
     update(find_set(name, assignments))
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
         raise ValueError(f"{name} cannot be graded: {last_line(done)}")
-    with Gradebook(course.db_url) as gradebook:
-        known, rows = _points(gradebook), dict[str, dict[str, Any]]()
-    boxed = not sandbox.missing()
-    todo, works = students[::-1], dict[Work, tuple[str, ProcessPoolExecutor]]()
+    return [(name, student) for student in students]
+
+
+def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[Job, Row]]:
+    """Grade submissions, several at once but one of a student; yield the row of each."""
+    course, todo = CourseDirectory(config=course_config(jobs[0][0], assignments)), list(jobs)
+    works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY,))
+    with Gradebook(course.db_url) as gradebook:
+        known = _points(gradebook)
     with ExitStack() as stack:
         free = [stack.enter_context(worker()) for _ in range(WORKERS)]
         while todo or works:
-            while todo and free:
-                student, pool = todo.pop(), free.pop()
-                works[pool.submit(grade_one, name, assignments, student, boxed)] = student, pool
-            at_work = sorted(student for student, _ in works.values())
+            at_work = {student for (_, student), _ in works.values()}
+            ready = [job for job in todo if job[1] not in at_work]
+            if free and ready:
+                job, pool = ready[0], free.pop()
+                todo.remove(job)
+                works[pool.submit(grade_one, *job, assignments, boxed)] = job, pool
+                continue
             for work in wait(works, return_when=FIRST_COMPLETED).done:
-                student, pool = works.pop(work)
+                (name, student), pool = works.pop(work)
                 broken = isinstance(work.exception(), BrokenExecutor)
                 free.append(stack.enter_context(worker()) if broken else pool)
                 with Gradebook(course.db_url) as gradebook:
-                    now = _points(gradebook)
-                    for other in sorted({*known, *now} - set(at_work)):
-                        if known.get(other) != now.get(other):
-                            when = f"during the grading of {' and '.join(at_work)}"
-                            where = f"gradebook.before-{name}.db holds what they were"
-                            raise ValueError(f"The points of {other} changed {when}. {where}")
-                    rows[student] = _row(gradebook, course, student, work)
-                    known = now | {student: _points(gradebook).get(student)}
-                print(f"{student}: {_summary(rows[student])}", flush=True)
-    first = {"set": name, "boxed": "yes" if boxed else "no"}
-    lines = [{"student": student} | first | rows[student] for student in students]
-    for what, why in _not_collected(name, assignments, students):
-        lines.append({"student": _tidy(what), "set": name, "remarks": _tidy(why)})
-        print(f"{lines[-1]['student']}: {lines[-1]['remarks']}", flush=True)
-    write_csv(table, lines)
-    return table
+                    row = _row(gradebook, assignments, name, student, work)
+                    known, before = _points(gradebook), known
+                if others := sorted({other for other, *_ in known ^ before} - at_work):
+                    when = f"during the grading of {' and '.join(sorted(at_work))}"
+                    where = f"gradebook.before-{name}.db holds what they were"
+                    raise ValueError(f"The points of {others[0]} changed {when}. {where}")
+                yield (name, student), row
 
 
-def _not_collected(name: str, assignments: Path, students: list[str]) -> Iterator[tuple[str, str]]:
+def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
     """Yield the files that `collect` could not use, perhaps for this set, and who is missing."""
     report = assignments / "submitted" / "report.csv"
     if not report.exists():
@@ -151,12 +173,10 @@ def last_line(done: dict[str, str]) -> str:
     return (refused or others or done["error"].strip().splitlines()[-1:])[0]
 
 
-def _points(gradebook: Any) -> dict[str, Any]:
+def _points(gradebook: Any) -> set[tuple[str, str, float]]:
     """Return the points of each student in each set."""
-    return {
-        student.id: sorted((of.assignment.name, of.score) for of in student.submissions)
-        for student in gradebook.students
-    }
+    submissions = (each for student in gradebook.students for each in student.submissions)
+    return {(each.student_id, each.assignment.name, each.score) for each in submissions}
 
 
 def _begin(memory: int) -> None:
@@ -172,7 +192,7 @@ def _begin(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
 
 
-def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
+def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     """Grade one submission; return remarks on it."""
     if boxed and sandbox.missing():
         raise Refused(f"there is no box any more: {sandbox.missing()}")
@@ -190,9 +210,8 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
     if not done["success"]:
         raise Refused(last_line(done))
     remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
-    for key, words in _words(graded).items():
-        if words != before.get(key, words):
-            remarks.append(f"{key} is another answer than when it was graded before")
+    changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
+    remarks += [f"{key} is another answer than when it was graded before" for key in changed]
     done = run_step(GenerateFeedback, config)
     if done["success"]:
         page = folder / "feedback" / student / name / f"{name}.html"
@@ -204,20 +223,18 @@ def grade_one(name: str, folder: Path, student: str, boxed: bool) -> list[str]:
 
 def _with_titles(page: str, graded: Path) -> str:
     """Return a page of feedback whose list names problems, where nbgrader has "Test cell"."""
-    cells = nbformat.read(graded, as_version=4).cells
+    cells, names = nbformat.read(graded, as_version=4).cells, {}
     for at, cell in enumerate(cells):
-        link = f'<a href="#{grade_id(cell)}">'
-        kind = "in words" if is_answer(cell) else "tests"
-        title = re.sub(r" \(\d+ points?\)$", "", title_of(cells, at))
-        name = f"{html.escape(title)}, {kind}".replace("\\", "\\\\")  # re.sub reads it
-        page = re.sub(f"({re.escape(link)})[^<]*</a>", rf"\g<1>{name}</a>", page)
-    return page
+        title = re.sub(r" \(\d+ points?\)$", "", locked_cells.title_of(cells, at))
+        names[grade_id(cell)] = f"{title}, {'in words' if is_answer(cell) else 'tests'}"
+    link = re.compile(r'(<a href="#([\w-]+)">)[^<]*(?=</a>)')
+    return link.sub(lambda m: m[1] + html.escape(names[m[2]]) if m[2] in names else m[0], page)
 
 
 def _words(path: Path) -> dict[str, str]:
     """Return the answers that a human grades, as they were graded last."""
     cells = nbformat.read(path, as_version=4).cells if path.exists() else []
-    words = (cell for cell in cells if is_answer(cell) and marks_of(cell).get("grade"))
+    words = (cell for cell in cells if is_answer(cell) and locked_cells.marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}
 
 
@@ -234,16 +251,15 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
     if path.stat().st_size > LARGEST:
         raise Refused(f"{wanted} has more than {LARGEST:,} bytes")
     content = path.read_bytes()
-    read_notebook(content, wanted)
+    locked_cells.read_notebook(content, wanted)
     if content.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
         raise Refused(f"{wanted} is not plain UTF-8: collect it again, or save it in Jupyter")
 
 
-def _row(gradebook: Any, course: CourseDirectory, student: str, work: Work) -> dict[str, Any]:
+def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[str]]) -> Row:
     """Return the row of a student in the table."""
-    name, error = course.assignment_id, work.exception()
-    if error:  # the others are graded
-        _withdraw(gradebook, Path(course.root), name, student)
+    if error := work.exception():  # the others are graded
+        _withdraw(gradebook, root, name, student)
         why = str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
         why = "its process ended, or took too long" if isinstance(error, BrokenExecutor) else why
         return {"remarks": f"refused: {_tidy(why)}"}
@@ -256,13 +272,14 @@ def _row(gradebook: Any, course: CourseDirectory, student: str, work: Work) -> d
         raise ValueError(f"{student} has {total} points: look at the gradebook")
     to_do = [g.name for g in grades if g.auto_score is None and g.manual_score is None]
     late = submission.assignment.total_seconds_late
-    row = {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades}
-    row["automatic"] = f"{sum(grade.auto_score or 0 for grade in grades):g}"
-    row["total"] = f"{submission.score:g}"
-    row["maximum"] = f"{submission.max_score:g}"
-    row["by hand"] = " ".join(to_do)
-    row["late"] = f"{late / 3600:.1f} h" if late else ""
-    return row | {"remarks": "; ".join(map(_tidy, work.result()))}
+    return {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades} | {
+        "automatic": f"{sum(grade.auto_score or 0 for grade in grades):g}",
+        "total": f"{submission.score:g}",
+        "maximum": f"{submission.max_score:g}",
+        "by hand": " ".join(to_do),
+        "late": f"{late / 3600:.1f} h" if late else "",
+        "remarks": "; ".join(map(_tidy, work.result())),
+    }
 
 
 def _tidy(words: str) -> str:
@@ -283,26 +300,3 @@ def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:
     for points in grades:
         points.auto_score, points.needs_manual_grade = None, True
     gradebook.db.commit()
-
-
-def _summary(row: dict[str, Any]) -> str:
-    points = f"graded, {row['total']} of {row['maximum']}" if "total" in row else ""
-    by_hand = f"by hand: {row['by hand']}" if row.get("by hand") else ""
-    return "; ".join(filter(None, [points, by_hand, row["remarks"]]))
-
-
-def grade_all(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:
-    """Grade sets, or all of which there are submissions, one after the other."""
-    chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
-    if not chosen:
-        raise ValueError("There are no submissions: submitted/STUDENT/ps1/ps1.ipynb")
-    if why := sandbox.missing():
-        if require_box:
-            raise ValueError(f"There is no box for submissions: {why}")
-        print(f"Submissions run without a box, and can do what you can: {why}", flush=True)
-    tables = []
-    for name in chosen:
-        print(f"{name}:", flush=True)
-        tables.append(grade(name, assignments))
-        print(tables[-1])
-    return tables

@@ -4,6 +4,7 @@ import copy
 import io
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,15 +19,12 @@ from nbgrader.nbgraderformat import ValidationError
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
-from rbclassroom.assignments.client import BoundedClient
-from rbclassroom.assignments.restore import is_answer
+from rbclassroom.assignments.locked_cells import is_answer
+from rbclassroom.assignments.notebook_runner import BoundedClient
+from rbclassroom.assignments.safe_files import write_whole
 from rbclassroom.assignments.tables import update
-from rbclassroom.assignments.writing import write_whole
 from rbclassroom.course.notebooks import KERNEL
 
-# what a student needs of environment.txt
-NEEDED = ["numpy", "scipy", "matplotlib", "pillow", "anywidget", "ipykernel", "ipywidgets"]
-NEEDED += ["jupyterlab", "nbclient", "nbformat", "threadpoolctl", "tqdm"]
 LEFTOVER = re.compile(
     r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
     re.IGNORECASE,
@@ -69,48 +67,39 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
     paths = [path for path in paths if ".ipynb_checkpoints" not in path.parts]
     files = {path.relative_to(source).as_posix(): path.read_bytes() for path in paths}
     files[f"{name}.ipynb"] = (nbformat.writes(notebook) + "\n").encode()
-    _refuse_leaks(name, given, files)
+    given_away = _leak(name, given, notebook, files)
+    if given_away:
+        raise ValueError(f"{name}: {given_away}")
     return files
 
 
-def _refuse_leaks(name: str, given: NotebookNode, files: dict[str, bytes]) -> None:
-    """Raise a ValueError if a file has solutions, hidden tests or mark schemes of a notebook."""
-    notebook = nbformat.reads(files[f"{name}.ipynb"].decode(), as_version=4)
+def _leak(name: str, given: NotebookNode, notebook: NotebookNode, files: dict[str, bytes]) -> str:
+    """Return which file shows solutions, hidden tests or mark schemes of a notebook, if any."""
     taken, common = _lines(given) - _lines(notebook), ("import ", "from ", "raise ")
     secrets = sorted(line for line in taken if len(line) >= 12 and not line.startswith(common))
+    if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
+        return "nbgrader leaves the attachment of an answer there"
     for path, content in files.items():
-        texts = [content.decode("utf-8", errors="replace")]
+        text = content.decode("utf-8", errors="replace")
         if path == f"{name}.ipynb":
-            texts = [text for cell in notebook.cells for text in (cell.source, str(cell.metadata))]
-            if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
-                raise ValueError(f"{name}: nbgrader leaves the attachment of an answer there")
+            text = "\n".join(f"{cell.source}\n{cell.metadata}" for cell in notebook.cells)
         elif path.endswith(".ipynb"):
-            raise ValueError(f"{name}: {path} is a second notebook; a set has one")
-        for text in texts:
-            shown = [*(line for line in secrets if line in text), *LEFTOVER.findall(text)]
-            if shown:
-                raise ValueError(f"{name}: {path} gives away {shown[0]!r}")
+            return f"{path} is a second notebook; a set has one"
+        if shown := [*(line for line in secrets if line in text), *LEFTOVER.findall(text)]:
+            return f"{path} gives away {shown[0]!r}"
+    return ""
 
 
 def _lines(notebook: NotebookNode) -> set[str]:
     return {line.strip() for cell in notebook.cells for line in cell.source.splitlines()}
 
 
-def student_requirements(environment: str, *wheels: str) -> str:
-    """Return the requirements of the students."""
-    pins = {line.partition("==")[0]: line for line in environment.split() if "==" in line}
-    lines = [*(pins[name] for name in NEEDED), *(f"./{wheel}" for wheel in wheels)]
-    return "".join(f"{line}\n" for line in lines)
-
-
 def build_wheel(course: Path) -> tuple[str, bytes]:
     """Build a distribution, the same byte for byte each time, without the network."""
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, "-m", "flit_core.wheel", "--outdir", folder]
-        first = {"SOURCE_DATE_EPOCH": "315532800"}  # the first day a zip knows
-        subprocess.run(
-            words, cwd=course, env={**os.environ, **first}, check=True, capture_output=True
-        )
+        own = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the first day a zip knows
+        subprocess.run(words, cwd=course, env=own, check=True, capture_output=True)
         (built,) = Path(folder).glob("*.whl")
         return built.name, built.read_bytes()
 
@@ -119,11 +108,13 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
     """Write ``handouts/NAME.zip``, which is what the students get; the same bytes each time."""
     files = release(name, assignments)
     wheels = dict(build_wheel(folder) for folder in (course, course / "classroom"))
-    environment = (course / "environment.txt").read_text("utf-8")
+    environment = (course / "environment.txt").read_text("utf-8").splitlines()
+    pins = [line.partition("#")[0].strip() for line in environment if line[:1] not in ("#", "-")]
+    required = [*pins, *(f"./{wheel}" for wheel in wheels)]
     readme = Path(__file__).with_suffix(".txt").read_text("ascii")
     own = {
         f"original/{name}.ipynb": files[f"{name}.ipynb"],
-        "requirements.txt": student_requirements(environment, *wheels).encode(),
+        "requirements.txt": "".join(f"{line}\n" for line in required).encode(),
         "README.txt": readme.format(name=name).replace("\n", "\r\n").encode("ascii"),
         **wheels,
     }
@@ -146,7 +137,9 @@ def pack(files: dict[str, bytes]) -> bytes:
 
 def make_solutions(name: str, assignments: Path) -> Path:
     """Write ``handouts/NAME-solutions.ipynb``: model answers, run, without hidden tests."""
-    notebook = nbformat.read(find_set(name, assignments) / f"{name}.ipynb", as_version=4)
+    source = find_set(name, assignments)
+    update(source)
+    notebook = nbformat.read(source / f"{name}.ipynb", as_version=4)
     for step in (nbgrader.ClearHiddenTests(), nbgrader.ClearMarkScheme()):
         notebook, _ = step.preprocess(notebook, {})
     for cell in notebook.cells:
@@ -154,9 +147,12 @@ def make_solutions(name: str, assignments: Path) -> Path:
         cell.source = re.sub(r"\s*^\*\*Mark scheme\b.*", "", cell.source, flags=re.M | re.S)
         cell.metadata = NotebookNode()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        work = shutil.copytree(
+            source, Path(folder, "work"), ignore=shutil.ignore_patterns("*.ipynb")
+        )
         client = BoundedClient(notebook, kernel_name=KERNEL["name"])
         client.folder, client.allow_errors = Path(folder), False
-        client.execute(cwd=folder)
+        client.execute(cwd=str(work))
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     target = assignments / "handouts" / f"{name}-solutions.ipynb"
     return write_whole(target, (nbformat.writes(notebook) + "\n").encode())

@@ -21,16 +21,7 @@ IN_RADIANS = (
 
 
 class Mistake(NamedTuple):
-    """A common mistake.
-
-    Attributes
-    ----------
-    hint : str
-        For the student.
-    results : sequence
-        What some functions that make this mistake return: for each a list, with a result for each
-        input of the problem.
-    """
+    """A common mistake: the hint, and the results of some functions that make it on all inputs."""
 
     hint: str
     results: Sequence[Sequence[Any]]
@@ -40,29 +31,16 @@ class Mistake(NamedTuple):
 class Problem:
     """A function to be written, which returns numbers.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The names of its arguments.
-    inputs : sequence of sequence
-        The arguments of each trial; so many, and so general, that no mistake agrees with the
-        answer, or with another mistake, on all of them.
-    answers : sequence
-        The right result of each trial.
-    mistakes : sequence of Mistake
-    allowed : sequence of str
-        Names of the package that the student may use.
-    accuracy : float
-        How far an entry may be off, in units of the largest entry, or of 1.
-    angles : sequence of int
-        Which entries of a result are angles that count up to full turns.
+    The `inputs` are so many, and so general, that no mistake agrees with the answer, or with
+    another mistake, on all of them. A result may be off by `accuracy`, in units of the largest
+    entry, or of 1; its entries with the indices `angles` count up to full turns.
     """
 
-    names: Sequence[str]
-    inputs: Sequence[Sequence[Any]]
-    answers: Sequence[Any]
+    names: Sequence[str]  # of the arguments
+    inputs: Sequence[Sequence[Any]]  # the arguments of each trial
+    answers: Sequence[Any]  # the right result of each trial
     mistakes: Sequence[Mistake] = ()
-    allowed: Sequence[str] = ()
+    allowed: Sequence[str] = ()  # names of the package that the student may use
     accuracy: float = 1e-9
     angles: Sequence[int] = ()
 
@@ -78,41 +56,37 @@ class Problem:
 
     def same(self, got: Any, wanted: Any) -> bool:
         """Return whether two results are the same, to the accuracy of the problem."""
-        one, other = as_numbers(got), as_numbers(wanted)
+        one, other, angles = as_numbers(got), as_numbers(wanted), list(self.angles)
         if one is None or other is None or one.shape != other.shape:
             return False
-        one, other = self._read(one), self._read(other)
+        one, other = (
+            np.r_[np.delete(x, angles), np.cos(x.ravel()[angles]), np.sin(x.ravel()[angles])]
+            for x in (one, other)
+        )
         scale = max(1.0, float(np.abs(other).max(initial=0)))
         return bool(np.abs(one - other).max(initial=0) <= self.accuracy * scale)
-
-    def _read(self, numbers: Array) -> Array:
-        """Return numbers with the cosine and the sine of each angle in its place."""
-        if not self.angles:
-            return numbers
-        turned = numbers.ravel()[list(self.angles)]
-        rest = np.delete(numbers, self.angles)
-        return np.concatenate([rest, np.cos(turned), np.sin(turned)])
 
     def _examine(self, function: Callable[..., Any]) -> None:
         given = [self._run(function, trial) for trial in self.inputs]
         right = [self.same(*pair) for pair in zip(given, self.answers, strict=True)]
         if all(right):
             return
-        if mistake := self._made(given):
-            raise NotYet(mistake.hint)
-        if mistake := self._made([_in_radians(value) for value in given]):
-            raise NotYet(f"{IN_RADIANS} There is a second mistake: {mistake.hint}")
+        if hint := self._hint(given):
+            raise NotYet(hint)
+        numbers = [(value, as_numbers(value)) for value in given]
+        meant = [value if number is None else np.radians(number) for value, number in numbers]
+        if hint := self._hint(meant):  # in degrees
+            raise NotYet(f"{IN_RADIANS} There is a second mistake: {hint}")
         first = right.index(False)
         arguments = zip(self.names, self.inputs[first], strict=False)
         called = "For " + ", ".join(f"{name} = {show(value)}" for name, value in arguments)
         raise NotYet(self._describe(called, given[first], self.answers[first]))
 
-    def _made(self, given: list[Any]) -> Mistake | None:
-        """Return the first mistake that gives these results."""
+    def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
             if any(all(map(self.same, given, results)) for results in mistake.results):
-                return mistake
-        return None
+                return mistake.hint
+        return ""
 
     def _run(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
         arguments = tuple(copy.deepcopy(trial))
@@ -122,10 +96,9 @@ class Problem:
         return result
 
     def _describe(self, called: str, got: Any, wanted: Any) -> str:
-        wanted = np.asarray(wanted)
+        wanted, numbers = np.asarray(wanted), as_numbers(got)
         if got is None:
             return f"{called} your function returns nothing. Is the line with return missing?"
-        numbers = as_numbers(got)
         if numbers is None:
             complex_ = isinstance(got, np.ndarray | complex) and np.iscomplexobj(got)
             why = " It is complex: return its real part." if complex_ else ""
@@ -133,12 +106,10 @@ class Problem:
         if numbers.shape != wanted.shape:
             return f"{called} the shape {wanted.shape} is wanted; yours is {numbers.shape}."
         if not np.isfinite(numbers).all():
-            return (
-                f"{called} your result is not finite: {show(numbers)}. Is something divided by 0?"
-            )
+            why = "Is something divided by 0?"
+            return f"{called} your result is not finite: {show(numbers)}. {why}"
         text = f"{called} the result should be {show(wanted)}; yours is {show(numbers)}"
-        off = float(np.abs(numbers - wanted).max(initial=0))
-        return f"{text}, off by {off:.1g}."
+        return f"{text}, off by {np.abs(numbers - wanted).max(initial=0):.1g}."
 
 
 @dataclass(frozen=True)
@@ -157,9 +128,8 @@ class Drawing(Problem):
         axes = self._draw(function, self.inputs[0])
         for name, label in (("x", axes.get_xlabel()), ("y", axes.get_ylabel())):
             if not label.strip():
-                raise NotYet(
-                    f"The curves are right. The {name} axis needs a label: what, and its unit."
-                )
+                needs = f"The {name} axis needs a label: what, and its unit."
+                raise NotYet(f"The curves are right. {needs}")
 
     def same(self, got: Any, wanted: Any) -> bool:
         """Return whether each wanted curve is among those that were drawn, from either end."""
@@ -170,11 +140,7 @@ class Drawing(Problem):
         return curves_of(self._draw(function, trial))
 
     def _draw(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
-        from matplotlib.figure import Figure
-
-        axes = Figure().subplots()
-        call_student(function, (axes, *copy.deepcopy(trial)), self.allowed)
-        return axes
+        return draw(lambda *given: call_student(function, given, self.allowed), trial)
 
     def _describe(self, called: str, got: Any, wanted: Any) -> str:
         if not got:
@@ -191,33 +157,37 @@ class Drawing(Problem):
         return f"Point {i} of the curve should be {show(lost[i])}; yours is {show(near[i])}."
 
 
+def draw(function: Callable[..., Any], trial: Sequence[Any]) -> Any:
+    """Return new axes on which a function has drawn."""
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    function(axes, *copy.deepcopy(trial))
+    return axes
+
+
 def curves_of(axes: Any) -> list[Array]:
     """Return the points of all lines, dots, bars and steps on axes."""
     from matplotlib.cbook import STEP_LOOKUP_MAP
     from matplotlib.container import BarContainer
     from matplotlib.patches import Polygon, StepPatch
 
-    found = [np.array(line.get_xydata(), float) for line in axes.lines]
-    found += [np.array(dots.get_offsets(), float) for dots in axes.collections]
+    found = [line.get_xydata() for line in axes.lines]
+    found += [dots.get_offsets() for dots in axes.collections]
     for bars in (c for c in axes.containers if isinstance(c, BarContainer)):
-        found.append(np.array([[b.get_x() + b.get_width() / 2, b.get_height()] for b in bars]))
+        found.append([(b.get_x() + b.get_width() / 2, b.get_height()) for b in bars])
     outlines = [p.get_xy() for p in axes.patches if isinstance(p, Polygon)]
     outlines += [path.vertices for shape in axes.collections for path in shape.get_paths()]
     for line in axes.lines:
-        if str(line.get_drawstyle()).startswith("steps"):
-            steps = STEP_LOOKUP_MAP[line.get_drawstyle()]
-            outlines.append(np.column_stack(steps(*line.get_xydata().T)))
-    found += map(_treads, outlines)
+        if (style := line.get_drawstyle()) != "default":
+            outlines.append(np.column_stack(STEP_LOOKUP_MAP[style](*line.get_xydata().T)))
+    for a, b in ((np.array(outline[:-1]), np.array(outline[1:])) for outline in outlines):
+        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # each runs to the right
+        found.append((a + b)[treads] / 2)
     for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
         found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))
-    return [curve for curve in found if curve.ndim == 2 and len(curve)]
-
-
-def _treads(outline: Any) -> Array:
-    """Return middle and height of each piece of an outline that runs to the right."""
-    a, b = np.array(outline[:-1], float), np.array(outline[1:], float)
-    level = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])
-    return np.asarray((a + b)[level] / 2)
+    curves = [np.array(points, float) for points in found]
+    return [curve for curve in curves if curve.ndim == 2 and len(curve)]
 
 
 def as_numbers(value: Any) -> Array | None:
@@ -234,12 +204,6 @@ def show(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > 16:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]
-
-
-def _in_radians(value: Any) -> Any:
-    """Return numbers in radians that were meant in degrees, and anything else as it is."""
-    numbers = as_numbers(value)
-    return value if numbers is None else np.radians(numbers)
 
 
 def _plain(value: Any) -> Any:

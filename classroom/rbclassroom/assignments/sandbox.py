@@ -52,7 +52,7 @@ def missing() -> str:
 
 
 def prepare(folder: Path) -> None:
-    """Make what the kernel keeps in its folder, and the folder that it works in."""
+    """Make the folders in which the kernel works and keeps its files."""
     for name in ("work", "tmp", "matplotlib"):
         (folder / name).mkdir(exist_ok=True)
     for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):  # seconds to make anew
@@ -84,16 +84,15 @@ def environment(folder: Path) -> dict[str, str]:
 def box(folder: Path, seconds: int) -> list[str]:
     """Return the words that run a command in a box, which can write to a folder only."""
     packages = (path for package in (rbcourse, rbclassroom) for path in package.__path__)
-    python = [sys.prefix, sys.base_prefix, *packages]
+    python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
-    is_root = os.geteuid() == 0
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
+    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # until it becomes nobody
     # it ends with this process, and after some seconds
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
     words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]
     words += [*(f"--unshare-{kind}" for kind in kinds), "--cap-drop", "ALL"]
-    for power in ("SETUID", "SETGID", "DAC_READ_SEARCH"):  # until it becomes nobody
-        words += ["--cap-add", f"CAP_{power}"] * is_root
+    words += [word for power in powers for word in ("--cap-add", f"CAP_{power}")]
     words += ["--unsetenv", "JPY_PARENT_PID", "--dir", "/etc", "--proc", "/proc", "--dev", "/dev"]
     for path in SYSTEM:
         link = os.path.islink(path)

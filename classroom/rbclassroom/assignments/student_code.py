@@ -8,20 +8,11 @@ import sys
 import textwrap
 import traceback
 from collections.abc import Iterator, Sequence
-from itertools import chain
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-LIBRARIES = {
-    "rbcourse",
-    "rbclassroom",
-    "scipy",
-    "sympy",
-    "pytransform3d",
-    "jax",
-    "torch",
-    "quaternion",
-}
+LIBRARIES = {"rbcourse", "rbclassroom", "scipy", "sympy", "pytransform3d", "jax", "torch"}
+LIBRARIES |= {"quaternion"}
 
 
 class NotYet(AssertionError):
@@ -36,26 +27,20 @@ def call_student(
 ) -> list[Any]:
     """Return what a student's function returns, each time."""
     for foreign in _foreign_names(function, allowed):
-        raise NotYet(
-            f"This uses {foreign}. Write it yourself: with Python, NumPy, and what the problem set "
-            "allows."
-        )
+        how = "Write it yourself: with Python, NumPy, and what the problem set allows."
+        raise NotYet(f"This uses {foreign}. {how}")
     try:
         return [function(*arguments) for _ in range(times)]
     except NotImplementedError:
         raise NotYet("Nothing is written here yet.") from None
     except Exception as error:
-        raise NotYet(_trouble(error)) from None
-
-
-def _trouble(error: Exception) -> str:
-    own = [
-        linecache.getline(frame.f_code.co_filename, line).strip()
-        for frame, line in traceback.walk_tb(error.__traceback__)
-        if frame.f_globals.get("__name__") == "__main__"
-    ]
-    where = f' at "{own[-1]}"' if own and own[-1] else ""
-    return f"Your function stops{where}: {type(error).__name__}: {error}"
+        lines = [
+            linecache.getline(frame.f_code.co_filename, line).strip()
+            for frame, line in traceback.walk_tb(error.__traceback__)
+            if frame.f_globals.get("__name__") == "__main__"
+        ]
+        where = f' at "{lines[-1]}"' if lines and lines[-1] else ""
+        raise NotYet(f"Your function stops{where}: {type(error).__name__}: {error}") from None
 
 
 def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
@@ -84,4 +69,4 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
 
 def _names(code: CodeType) -> list[str]:
     inner = [_names(part) for part in code.co_consts if isinstance(part, CodeType)]
-    return [*code.co_names, *chain.from_iterable(inner)]
+    return sum(inner, list(code.co_names))

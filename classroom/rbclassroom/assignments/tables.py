@@ -20,12 +20,13 @@ from typing import Any
 import nbformat
 import numpy as np
 
-from rbclassroom.assignments.marking import curves_of
+from rbclassroom.assignments.locked_cells import grade_id
+from rbclassroom.assignments.marking import curves_of, draw
 from rbclassroom.assignments.marking_samplers import LAWS, quantiles
-from rbclassroom.assignments.restore import grade_id
-from rbclassroom.assignments.writing import write_whole
+from rbclassroom.assignments.safe_files import write_whole
 
 DRAWS = 5000
+Function = Callable[..., Any]
 
 
 def update(folder: Path) -> None:
@@ -38,7 +39,11 @@ def update(folder: Path) -> None:
     state = hashlib.sha256(table.read_bytes() + notebook.read_bytes()).hexdigest()
     target = folder / f"{folder.name}.json"
     if not target.exists() or json.loads(target.read_text("utf-8")).get("state") != state:
-        text = json.dumps({"state": state, **evaluate(folder)}, default=_plain)
+
+        def plain(value: Any) -> Any:  # in a form that JSON has
+            return {"array": value.tolist()} if isinstance(value, np.ndarray) else value.item()
+
+        text = json.dumps({"state": state, **evaluate(folder)}, default=plain)
         write_whole(target, text.encode())
 
 
@@ -50,8 +55,8 @@ def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
         raise ValueError(f"{folder.name}.toml: {error}") from error
     notebook = nbformat.read(folder / f"{folder.name}.ipynb", as_version=4)
     cells = {grade_id(cell): cell.source for cell in notebook.cells if cell.cell_type == "code"}
-    space: dict[str, Any] = {"__name__": "__main__"}
     answers = [text for name, text in cells.items() if name.endswith("-answer")]
+    space: dict[str, Any] = {"__name__": "__main__"}
     for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
         exec(compile(text, folder.name, "exec"), space)
     found = {}
@@ -64,53 +69,43 @@ def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> dict[str, Any]:
-    name, mistakes = re.findall(r"^def (\w+)\(", answer, re.MULTILINE)[-1], problem["mistakes"]
-    functions = [[function_of(answer, code, space) for code in m["code"]] for m in mistakes]
-    if law := problem.get("law"):
-        rows = LAWS[law]["uniforms"]
-        results = [[_quantiles(function, rows) for function in some] for some in functions]
-        known: dict[str, Any] = {"law": law}
-    else:
-        names = list(inspect.signature(space[name]).parameters)
-        drawing = names[0] == "ax"
-        inputs = eval(problem["inputs"], space)
+    kept = "law", "allowed", "accuracy", "angles"
+    known: dict[str, Any] = {key: problem[key] for key in kept if key in problem}
+    inputs = eval(problem.get("inputs", "[]"), space)
+    names = list(inspect.signature(space[_name(answer)]).parameters)
+    drawing = names[0] == "ax"
 
-        def run(function: Callable[..., Any]) -> list[Any]:
-            trials = (copy.deepcopy(trial) for trial in inputs)
-            return [(_draw(function, trial) if drawing else function(*trial)) for trial in trials]
+    def run(function: Function) -> list[Any]:
+        if "law" in known:
+            rng = np.random.default_rng(1)
+            drawn = np.array([function(rng) for _ in range(DRAWS)])
+            rows = LAWS[known["law"]]["uniforms"](drawn)
+            return [quantiles(row).round(4) for row in rows.values()]
+        if drawing:
+            return [curves_of(draw(function, trial)) for trial in inputs]
+        return [function(*copy.deepcopy(trial)) for trial in inputs]
 
-        results = [[run(function) for function in some] for some in functions]
-        known = {"drawing": drawing, "names": names[drawing:], "inputs": inputs}
-        known |= {"answers": run(space[name])} | ({"accuracy": 1e-6} if drawing else {})
-    known |= {key: problem[key] for key in ("allowed", "accuracy", "angles") if key in problem}
-    hints = [mistake["hint"] for mistake in mistakes]
-    pairs = zip(hints, results, strict=True)
-    return known | {"mistakes": [{"hint": hint, "results": some} for hint, some in pairs]}
+    if "law" not in known:
+        known |= {"drawing": drawing, "names": names[drawing:], "inputs": inputs}
+        known["answers"] = run(space[_name(answer)])
+    known["mistakes"] = [
+        {
+            "hint": m["hint"],
+            "results": [run(function_of(answer, code, space)) for code in m["code"]],
+        }
+        for m in problem["mistakes"]
+    ]
+    return known
 
 
-def function_of(answer: str, code: str, space: dict[str, Any]) -> Callable[..., Any]:
+def function_of(answer: str, code: str, space: dict[str, Any]) -> Function:
     """Return the function of an answer cell with another body."""
     head = re.split(r" *### BEGIN SOLUTION", answer)[0]
     own = dict(space)
     exec(compile(head + indent(code.strip(), "    "), "<mistake>", "exec"), own)
-    function: Callable[..., Any] = own[re.findall(r"^def (\w+)\(", head, re.MULTILINE)[-1]]
+    function: Function = own[_name(head)]
     return function
 
 
-def _draw(function: Callable[..., Any], trial: Any) -> list[Any]:
-    from matplotlib.figure import Figure
-
-    axes = Figure().subplots()
-    function(axes, *trial)
-    return curves_of(axes)
-
-
-def _quantiles(function: Callable[..., Any], rows: Callable[[Any], dict[str, Any]]) -> list[Any]:
-    rng = np.random.default_rng(1)
-    drawn = np.array([function(rng) for _ in range(DRAWS)])
-    return [quantiles(row).round(4) for row in rows(drawn).values()]
-
-
-def _plain(value: Any) -> Any:
-    """Return an array or a number of NumPy's in a form that JSON has."""
-    return {"array": value.tolist()} if isinstance(value, np.ndarray) else value.item()
+def _name(text: str) -> str:
+    return str(re.findall(r"^def (\w+)\(", text, re.MULTILINE)[-1])

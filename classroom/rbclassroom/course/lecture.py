@@ -1,13 +1,11 @@
 """Show a lesson to a class: in large letters, without code, run afresh, without a network."""
 
-import argparse
 import logging
 import os
 import re
 import secrets
 import signal
 import socket
-import sys
 import tempfile
 import threading
 import webbrowser
@@ -207,27 +205,3 @@ def open_votes(address: str) -> Phones | None:
         return Phones(address)
     except (ValueError, OSError) as error:
         raise ValueError(f"Phones cannot vote at {address}: {error}.") from error
-
-
-def main() -> None:
-    """Show a lesson from the command line, in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="course.py lecture")
-    parser.add_argument("lesson", help="its number: 01")
-    parser.add_argument("--check", action="store_true", help="test it before class; show nothing")
-    parser.add_argument("--no-browser", action="store_true", help="print the address only")
-    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="of this machine")
-    words = parser.parse_args()
-    try:
-        path = find_lesson(words.lesson, Path("notebooks"))
-        if words.check:
-            from rbclassroom.course import rehearsal  # it imports this module
-
-            sys.exit(rehearsal.report(path))
-        phones = None if words.votes is None else open_votes(words.votes)
-    except ValueError as error:
-        sys.exit(str(error))
-    present(path, not words.no_browser, phones)
-
-
-if __name__ == "__main__":
-    main()

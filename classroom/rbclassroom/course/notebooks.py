@@ -1,13 +1,11 @@
 """Execute and store the lessons, byte for byte the same each time."""
 
-import argparse
 import hashlib
 import json
 import os
 import platform
 import re
 import shutil
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -266,23 +264,3 @@ def _tags(notebook: Any) -> list[Any]:
 
 def _numbered(path: Path) -> Iterator[Path]:
     return (path.with_stem(f"{path.stem}_{number}") for number in count(2))
-
-
-def main() -> None:
-    """Run lessons again from the command line, in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="course.py figures")
-    help_ = "its number, such as 03; by default all lessons and the explorers"
-    parser.add_argument("lessons", nargs="*", metavar="LESSON", help=help_)
-    lessons = parser.parse_args().lessons
-    try:
-        regenerate(Path("notebooks"), Path("figures"), lessons)
-    except (OSError, ValueError) as error:
-        sys.exit(str(error))
-    if not lessons:
-        from rbclassroom.explorers import recorded  # takes a second, which the lab does not need
-
-        recorded.main(Path("figures", "explorers"))
-
-
-if __name__ == "__main__":
-    main()

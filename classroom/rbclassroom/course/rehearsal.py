@@ -203,10 +203,3 @@ def _look_for_browser() -> list[str]:
         name += ", to be opened by hand"
     print(f"browser: {name}", flush=True)
     return []
-
-
-def report(path: Path) -> bool:
-    """Print whether a lesson is ready to be shown, or what is missing; return whether it is not."""
-    missing = check(path)
-    print("\n".join(f"not ready: {what}" for what in missing) or "ready")
-    return bool(missing)

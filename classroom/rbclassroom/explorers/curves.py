@@ -5,29 +5,18 @@ from typing import Any
 
 import numpy as np
 
+import rbcourse as rb
 from rbclassroom.explorers import widgets
-from rbclassroom.explorers.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse import (
-    Array,
-    angle_between,
-    exp_so3,
-    geodesic_se3,
-    pose_from_components,
-    pose_from_coordinates,
-    screw_from_pose,
-    screw_se3,
-)
-from rbcourse.connection import geodesic_flow
+from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
-from rbcourse.metrics import box_inertia
 from rbcourse.projected_line import f, line_singular_value, theta
 
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8
 _EDGES = np.array([0.20, 0.13, 0.03])  # of a book of half a kilogram, in m
-_MOMENTS = np.diag(box_inertia(_EDGES, 0.5))
+_MOMENTS = np.diag(rb.metrics.box_inertia(_EDGES, 0.5))
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
 _SPINS = {"axis 1": 0, "axis 2": 1, "axis 3": 2}
@@ -41,17 +30,16 @@ def theta_explorer() -> Explorer:
     f over time. Controls: the ``angle`` a in degrees, and the time ``t``, which plays (BK Prop.
     6, BK (15), BK (16), BK Cor. 1, BK Cor. 2, BK Fig. 2, BK Fig. 3).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
         ax.set(xlim=(-1.12, 1.12), ylim=(-0.35, 1.25), aspect="equal")
         ax.set_axis_off()
         side = fig.add_axes((0.57, 0.16, 0.4, 0.76))
         side.plot([0, 1], [0, 1], color=COLOURS["reference"], lw=1)
         side.set(xlim=(0, 1), ylim=(0, 1), xlabel="time t", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
-        black, pink = {"color": "black"}, {"color": COLOURS["projection"]}
+        black, pink, blue = ({"color": COLOURS[name]} for name in ("optimum", "projection", "z"))
         dot: dict[str, Any] = {"marker": "o", "ms": 10, "ls": ""}
-        artists: dict[str, Any] = {
+        artists = {
             "arc": new_line(ax, **black, lw=2.5),
             "chord": new_line(ax, **black, lw=1),
             "ray": new_line(ax, **pink, ls="--", lw=1.5),
@@ -59,9 +47,9 @@ def theta_explorer() -> Explorer:
             "line": new_line(ax, **black, **{**dot, "ms": 5}, label="line"),
             "shadow": new_line(ax, **pink, **dot, label="its projection"),
             "theta": new_line(side, **pink, label="θ(t)"),
-            "f": new_line(side, color=COLOURS["z"], ls="--", label="f(t)"),
+            "f": new_line(side, **blue, ls="--", label="f(t)"),
             "theta now": new_line(side, **pink, **dot, clip_on=False),
-            "f now": new_line(side, color=COLOURS["z"], **dot, clip_on=False),
+            "f now": new_line(side, **blue, **dot, clip_on=False),
         }
         handles = [artists[name] for name in ("even", "line", "shadow")]
         fig.legend(handles=handles, loc="lower left", handlelength=1, bbox_to_anchor=(0, -0.01))
@@ -74,30 +62,18 @@ def theta_explorer() -> Explorer:
     def show(angle: float, t: float) -> dict[str, str]:
         a = np.radians(angle)
         ends = np.exp(1j * (np.pi / 2 + a * np.array([0.5, -0.5])))
-        line = ends[0] + t * (ends[1] - ends[0])
-
-        def at(share: Any) -> Any:
-            return ends[0] * np.exp(-1j * a * np.asarray(share))
-
-        shadow = at(theta(t, a))
-        for name, places in {
-            "arc": at(_TIMES),
-            "chord": ends,
-            "ray": np.array([0, shadow]),
-            "even": at([t]),
-            "line": np.array([line]),
-            "shadow": np.array([shadow]),
-        }.items():
-            artists[name].set_data(places.real, places.imag)
+        shares: dict[str, Any] = {"arc": _TIMES, "even": [t], "shadow": [theta(t, a)]}
+        places = {name: ends[0] * np.exp(-1j * a * np.array(s)) for name, s in shares.items()}
+        places |= {"chord": ends, "line": ends[:1] + t * (ends[1:] - ends[:1])}
+        places["ray"] = np.append(0, places["shadow"])
+        for name, where in places.items():
+            artists[name].set_data(where.real, where.imag)
         for name, curve in {"theta": theta, "f": f}.items():
             artists[name].set_data(_TIMES, curve(_TIMES, a))
             artists[f"{name} now"].set_data([t], [curve(t, a)])
-        return {
-            "θ(t)": f"{theta(t, a):.3f}",
-            "dθ/dt": f"{theta(t, a, 1):.3f}",
-            "f(t)": f"{f(t, a):.3f}",
-            "s(t), of the line": f"{line_singular_value(t, a):.3f}",
-        }
+        said = {"θ(t)": theta(t, a), "dθ/dt": theta(t, a, 1), "f(t)": f(t, a)}
+        said["s(t), of the line"] = line_singular_value(t, a)
+        return {name: f"{value:.3f}" for name, value in said.items()}
 
     return Explorer("The line and its shadow", fig, artists, controls, show, plays="t")
 
@@ -109,22 +85,19 @@ def screw_explorer() -> Explorer:
     in degrees, where the body goes, ``x`` and ``z`` in m, and the time ``t``, which plays (BK 2.6,
     BK (10), BK (14)).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.5)
         draw_box(ax, np.eye(4), _SIDE).set_alpha(0.3)
-        black, orange = {"color": COLOURS["optimum"]}, {"color": COLOURS["screw"]}
+        black, orange = COLOURS["optimum"], COLOURS["screw"]
         artists: dict[str, Any] = {
             "axis": new_line(ax, color=COLOURS["reference"], ls="-.", lw=2, label="its axis"),
-            "geodesic way": new_line(ax, **black, label="geodesic"),
-            "screw way": new_line(ax, **orange, ls="--", label="screw"),
-            "goal": draw_box(ax, np.eye(4), _SIDE),
-            "geodesic": draw_box(ax, np.eye(4), _SIDE),
-            "screw": draw_box(ax, np.eye(4), _SIDE),
+            "geodesic way": new_line(ax, color=black, label="geodesic"),
+            "screw way": new_line(ax, color=orange, ls="--", label="screw"),
+            **{name: draw_box(ax, np.eye(4), _SIDE) for name in ("goal", "geodesic", "screw")},
         }
         artists["goal"].set_alpha(0.3)
-        artists["geodesic"].set_edgecolor(COLOURS["optimum"])
-        artists["screw"].set_edgecolor(COLOURS["screw"])
+        artists["geodesic"].set_edgecolor(black)
+        artists["screw"].set_edgecolor(orange)
         fig.legend(loc="lower left", ncols=3, handlelength=1.5, columnspacing=1)
     controls = {
         "angle": widgets.slider("turn (°)", 120.0, -180.0, 180.0, 1.0),
@@ -136,21 +109,21 @@ def screw_explorer() -> Explorer:
 
     def show(angle: float, tilt: float, x: float, z: float, t: float) -> dict[str, str]:
         axis = np.array([np.sin(np.radians(tilt)), 0, np.cos(np.radians(tilt))])
-        goal = pose_from_coordinates([*(np.radians(angle) * axis), x, 0, z])
-        ways = {"geodesic": geodesic_se3(np.eye(4), goal), "screw": screw_se3(np.eye(4), goal)}
-        poses = {name: way(t) for name, way in ways.items()}
-        for name, way in ways.items():
-            artists[f"{name} way"].set_data_3d(*way(t * _TIMES)[:, :3, 3].T)
-            move_box(artists[name], poses[name], _SIDE)
+        goal = rb.pose_from_coordinates([*(np.radians(angle) * axis), x, 0, z])
         move_box(artists["goal"], goal, _SIDE)
-        bolt = screw_from_pose(goal)
+        poses, said = {}, {}
+        for name, curve in {"geodesic": rb.geodesic_se3, "screw": rb.screw_se3}.items():
+            way = curve(np.eye(4), goal)
+            poses[name] = pose = way(t)
+            artists[f"{name} way"].set_data_3d(*way(t * _TIMES)[:, :3, 3].T)
+            move_box(artists[name], pose, _SIDE)
+            said[f"turned, {name}"] = apart(np.eye(3), pose[:3, :3])
+        bolt = rb.screw_from_pose(goal)
         artists["axis"].set_data_3d(*(bolt.point + np.outer([-2.5, 2.5], bolt.axis)).T)
         far = ", not in sight" if np.linalg.norm(bolt.point) > 3 else ""
-        turned = {n: angle_between(np.eye(3), pose[:3, :3]) for n, pose in poses.items()}
-        apart = np.linalg.norm((poses["screw"] - poses["geodesic"])[:3, 3])
-        return {
-            **{f"turned, {n}": f"{numbers(np.degrees(a), 1)}°" for n, a in turned.items()},
-            "origins apart": f"{numbers(apart, 2)} m",
+        origins = np.linalg.norm((poses["screw"] - poses["geodesic"])[:3, 3])
+        return said | {
+            "origins apart": f"{numbers(origins, 2)} m",
             "its axis through": f"({numbers(bolt.point, 1)}) m{far}" if angle else "none",
             "slide along it": f"{numbers(bolt.pitch, 2)} m per rad" if angle else "all of the way",
         }
@@ -166,28 +139,20 @@ def flip_explorer() -> Explorer:
     degrees; the time ``t`` in s, which plays, and starts again when another axis is chosen (BK (8),
     BK 2.4).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)
         ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
         side = fig.add_axes((0.6, 0.19, 0.37, 0.6))
         side.set(xlim=(0, 8), ylim=(-4.4, 4.4), xlabel="time t (s)", ylabel="ω (rad/s)")
         side.set_xticks([0, 2, 4, 6, 8])
         artists: dict[str, Any] = {"book": draw_box(ax, np.eye(4), _EDGES)}
-        for number, axis in zip("123", "xyz", strict=True):
-            artists[f"axis {number}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
-            artists[f"number {number}"] = ax.text(0, 0, 0, number, ha="center", va="center")
-        for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True), start=1):
-            style = {"color": COLOURS[axis], "ls": dash}
-            artists[f"w{i}"] = new_line(side, **style, label=f"ω{'₁₂₃'[i - 1]}")
+        for i, (axis, low, dash) in enumerate(zip("xyz", "₁₂₃", ("-", "--", "-."), strict=True), 1):
+            artists[f"axis {i}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
+            artists[f"number {i}"] = ax.text(0, 0, 0, f"{i}", ha="center", va="center")
+            artists[f"w{i}"] = new_line(side, color=COLOURS[axis], ls=dash, label=f"ω{low}")
         artists["now"] = side.axvline(0, color="black", lw=1.5)
-        side.legend(
-            loc="lower center",
-            bbox_to_anchor=(0.4, 1),
-            ncols=3,
-            handlelength=1.8,
-            columnspacing=0.6,
-        )
+        above: Any = {"loc": "lower center", "bbox_to_anchor": (0.4, 1)}
+        side.legend(**above, ncols=3, handlelength=1.8, columnspacing=0.6)
     controls = {
         "axis": widgets.choice("spin about", list(_SPINS)),
         "off": widgets.slider("off axis by (°)", 4.0, 0.0, _OFF_MOST, _OFF_STEP),
@@ -197,18 +162,18 @@ def flip_explorer() -> Explorer:
     def show(axis: str, off: float, t: float) -> dict[str, str]:
         R, w = (part[:, _SPINS[axis], round(off / _OFF_STEP)] for part in _spins())
         k = round(t / 8 * (len(_SPIN_TIMES) - 1))
-        move_box(artists["book"], pose_from_components(R[k], np.zeros(3)), _EDGES)
-        for i in range(3):
-            half = _EDGES[i] / 2
+        move_box(artists["book"], rb.pose_from_components(R[k], np.zeros(3)), _EDGES)
+        for i, half in enumerate(_EDGES / 2):
             ends = np.outer(R[k, :, i], half * np.array([-1, 1]) + [-0.055, 0.055])
             artists[f"axis {i + 1}"].set_data_3d(*ends)
             artists[f"number {i + 1}"].set_position_3d((half + 0.072) * R[k, :, i])
             artists[f"w{i + 1}"].set_data(_SPIN_TIMES[: k + 1], w[: k + 1, i])
         artists["now"].set_xdata([t, t])
-        times_over = np.count_nonzero(np.diff(w[: k + 1, _SPINS[axis]] > 0))
+        itself = w[: k + 1, _SPINS[axis]]
+        times_over = np.count_nonzero(np.diff(itself > 0))
         return {
             "ω": f"({numbers(w[k], 2)}) rad/s",
-            f"of {axis} itself": f"{numbers(w[k, _SPINS[axis]], 2)} rad/s",
+            f"of {axis} itself": f"{numbers(itself[-1], 2)} rad/s",
             "turned over": f"{times_over} times" if times_over != 1 else "once",
         }
 
@@ -217,7 +182,7 @@ def flip_explorer() -> Explorer:
 
 
 @lru_cache(maxsize=1)
-def _spins() -> tuple[Array, Array]:
+def _spins() -> tuple[rb.Array, rb.Array]:
     """Return orientations and angular velocities by time, axis and angle off it.
 
     All are integrated at once, before a slider is touched: even one takes too long to follow it.
@@ -229,5 +194,5 @@ def _spins() -> tuple[Array, Array]:
     ahead = _SEEN_FIRST - (L @ _SEEN_FIRST)[..., None] * L
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
     body = np.stack([ahead, np.cross(L, ahead), L], axis=-2)
-    upright = exp_so3([0, 0, AZIMUTH]) @ body  # the momentum upwards
-    return geodesic_flow(np.diag(_MOMENTS), upright, w0, _SPIN_TIMES)
+    upright = rb.exp_so3([0, 0, AZIMUTH]) @ body  # the momentum upwards
+    return rb.geodesic_flow(np.diag(_MOMENTS), upright, w0, _SPIN_TIMES)

@@ -3,7 +3,7 @@
 import base64
 import html
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,23 +18,23 @@ import traitlets
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from rbcourse import angle_between
 from rbcourse.draw.display import ENGINE, Display, joined
 from rbcourse.draw.pictures import drawn
 
-DPI = 100
-"""Pixels per inch of a picture at its own size."""
 LABELS = 13.0
 """Size of all letters in the pictures, in points: 18 pixels."""
+_SIZED = ("legend.fontsize", "legend.title_fontsize", "xtick.labelsize", "ytick.labelsize")
+_STYLES: Any = ["default", "rbcourse.rbcourse", dict.fromkeys(_SIZED, LABELS)]
 
 
 class Canvas(anywidget.AnyWidget):
-    """The picture in the browser, which draws states that it is sent; see canvas.js.
+    """The picture in the browser, which draws the states that it is sent; see canvas.js.
 
-    ``made`` stays as it is. A ``run`` are states that follow one another, those of what plays. All
-    of one version have the same values of the other controls; a notice, of a click perhaps, is with
-    the first of a version. The browser sends a message with the ``index`` of a state that it has
-    not got, or with the ``place`` of a click: the share of the width from the left, and of the
-    height from the top.
+    ``made`` never changes. A ``run`` has consecutive states of what plays. All runs of one version
+    have the same values of the other controls; a notice, of a click perhaps, is with the first of a
+    version. The browser sends a message with the ``index`` of a state that it lacks, or with the
+    ``place`` of a click: the share of the width from the left, and of the height from the top.
     """
 
     _esm = ENGINE + Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
@@ -44,45 +44,31 @@ class Canvas(anywidget.AnyWidget):
 
 @dataclass(frozen=True)
 class State:
-    """What an explorer shows: artists, what they draw, what is to be read, and all as one line."""
+    """The artists that an explorer shows, what they draw, and its texts for display.js."""
 
     shown: list[Any]
     drawn: NDArray[np.int16]
-    said: dict[str, str]
-    notice: str
-    line: str
-
-    @property
-    def texts(self) -> list[Any]:
-        """What is to be read, for display.js."""
-        return [list(self.said.items()), self.notice, self.line]
+    texts: list[Any]  # pairs of a name and a value, a notice, and all of it as one line
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
-    """A picture, its controls, and what is to be read off it.
+    """A picture, its controls, and the values that are to be read.
 
-    What does not move is drawn once. What plays is drawn by the browser, which asks for the states
-    that it has not got; each change of another control is sent as one state. What cannot be served
-    is said in the panel; then nothing is drawn that moves.
+    The background is drawn once. The browser draws what plays, and asks for the states that it
+    lacks; each change of another control is sent as one state. Where nothing can be shown, the
+    panel says why, and nothing is drawn that moves.
 
     Parameters
     ----------
-    name : str
-        What it is called.
-    fig : Figure
-        The figure with everything on it; its axes must not change.
-    artists : mapping of str to artist
-        What moves, with names, in the order in which it is drawn.
-    controls : mapping of str to widget
-        Sliders and choices, with names.
+    name, fig
+        Its title, and the figure with everything on it; the axes of the figure must not change.
+    artists, controls : mapping of str
+        The artists that move, in the order in which they are drawn; sliders and choices.
     show : callable
-        ``show(**values)`` moves the artists to what the controls say, one keyword for each, and
-        returns what is to be read: names, and what is said of them. It may raise a ValueError or a
-        RuntimeError, or warn.
-    plays : str
-        Which control the play button moves: one that `widgets.stepped` has made.
-    seconds : float, optional
-        How long it plays.
+        ``show(**values)`` moves the artists to the values of the controls, and returns texts that
+        are to be read, by name. It may raise a ValueError or a RuntimeError, or warn.
+    plays, seconds
+        The control that the play button moves, made by `widgets.stepped`; and how long it plays.
     point : callable, optional
         ``point(x, y)`` gets the place of a click in the pixels of Matplotlib, and returns the
         controls to be set, as a dict; it may raise a ValueError.
@@ -105,12 +91,9 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         self.steps = [value for _, value in self.time.options]
         self._first, self._resting, self._version = self.values, False, 0
         self.display, self.background = Display(fig), self.draw(None, zoom=2)
-        self.play = ipywidgets.Play(
-            value=self.time.index,
-            max=len(self.steps) - 1,
-            interval=max(40, round(1000 * seconds / (len(self.steps) - 1))),
-            show_repeat=False,
-        )
+        last = len(self.steps) - 1
+        interval = max(40, round(1000 * seconds / last))
+        self.play = ipywidgets.Play(self.time.index, max=last, interval=interval, show_repeat=False)
         self.reset = ipywidgets.Button(description="Reset", layout={"width": "5em"})
         self.reset.add_class("rbcourse-reset")
         said = ipywidgets.HTML()
@@ -123,16 +106,15 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             "clickable": point is not None,
             "parts": [part.model_id for part in (self.time, self.play, said, *others)],
         }
-        self.picture = Canvas(made=made)
+        wide = {"flex": f"0 1 {self.display.width}px", "min_width": "0"}
+        self.picture = Canvas(made=made, layout=wide)
         panel = ipywidgets.VBox(
             [ipywidgets.HBox([self.play, self.reset]), *self.controls.values(), said],
             layout={"flex": "1 1 19em", "min_width": "0"},
         )
         panel.add_class("rbcourse-panel")
-        self.picture.layout = {"flex": f"0 1 {self.display.width}px", "min_width": "0"}
-        super().__init__(
-            [self.picture, panel], layout={"flex_flow": "row wrap", "align_items": "flex-start"}
-        )
+        flow = {"flex_flow": "row wrap", "align_items": "flex-start"}
+        super().__init__([self.picture, panel], layout=flow)
         self.add_class("rbcourse-explorer")
         self._follow()
         for control in others:
@@ -142,11 +124,11 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 
     @property
     def values(self) -> dict[str, Any]:
-        """What the controls say, by name."""
+        """The values of the controls, by name."""
         return {name: control.value for name, control in self.controls.items()}
 
     def put(self, **values: Any) -> None:
-        """Set some of the controls, in their order, and send once what is shown."""
+        """Set some of the controls, in their order, and send the result once."""
         self._resting = True
         try:
             for name in [name for name in self.controls if name in values]:
@@ -156,12 +138,12 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             self._follow()
 
     def restart(self) -> None:
-        """Set all controls to what they were at first; stop playing."""
+        """Set all controls to their first values; stop playing."""
         self.play.playing = False
         self.put(**self._first)
 
     def state(self, **values: Any) -> State:
-        """Return what is shown with these values, and the other controls as they are."""
+        """Return the state with these values, and those of the other controls."""
         shown, said, notice = list(self.artists.values()), {}, ""
         with warnings.catch_warnings(record=True, action="always") as warned:
             try:
@@ -173,26 +155,30 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             artist.set_visible(bool(shown))
         parts = (f"{name}: {' '.join(text.split())}" for name, text in said.items())
         line = f"{self.name}. {'; '.join(parts) or notice}"
-        return State(shown, self.display.record(shown), said, notice, line)
+        return State(shown, self.display.record(shown), [list(said.items()), notice, line])
 
     def draw(self, shown: Sequence[Any] | None, zoom: float = 1) -> bytes:
-        """Return these artists as a PNG over what does not move, so many times as fine.
+        """Return these artists as a PNG over what does not move, `zoom` times as fine.
 
         None: without what is in space, which may be turned.
         """
-        with look():
+        with plt.style.context(_STYLES):
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
 
     def _follow(self, _: Any = None, notice: str = "") -> None:
-        """Send what is shown now, and what is to be noted until something moves."""
+        """Send the present state, with a notice that stays until something moves."""
         if not self._resting:
             self._version += 1
             self._push(self.time.index, [self.state()], notice)
 
     def _answer(self, _: Any, asked: Mapping[str, Any], __: Any) -> None:
-        """Send states for 50 ms, from the one on that is asked for; or go where a click wants."""
-        if "place" in asked:
-            return self._go(*asked["place"])
+        """Send states for 50 ms, from the one on that is asked for; or follow a click."""
+        if "place" in asked and self._point:
+            (right, down), (width, height) = asked["place"], self.display.size
+            try:
+                return self.put(**self._point(width * right, height * (1 - down)))
+            except ValueError as error:
+                return self._follow(notice=str(error))
         states, end = [], monotonic() + 0.05
         for value in self.steps[asked["index"] :]:
             states.append(self.state(**{self.plays: value}))
@@ -200,18 +186,10 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
                 break
         self._push(asked["index"], states)
 
-    def _go(self, right: float, down: float) -> None:
-        assert self._point is not None
-        try:
-            width, height = self.display.size
-            self.put(**self._point(width * right, height * (1 - down)))
-        except ValueError as error:
-            self._follow(notice=str(error))
-
     def _push(self, first: int, states: Sequence[State], notice: str = "") -> None:
         self.picture.run = {
             "version": self._version,
-            "number": self.picture.run.get("number", 0) + 1,  # what is equal is not sent
+            "number": self.picture.run.get("number", 0) + 1,  # equal values are not sent
             "index": first,
             "states": joined([state.drawn for state in states]),
             "texts": [state.texts for state in states],
@@ -220,8 +198,8 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         }
 
     def __repr__(self) -> str:
-        """Return the name, and what is to be read."""
-        return self.state().line
+        """Return the name, and all that is to be read."""
+        return self.state().texts[-1]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:
         """Return the explorer, and a still of it for readers without a kernel."""
@@ -235,20 +213,12 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 
 
 @contextmanager
-def look() -> Any:
-    """Draw as all figures of the course are drawn, with all letters of one size."""
-    sizes = dict.fromkeys(
-        ("legend.fontsize", "legend.title_fontsize", "xtick.labelsize", "ytick.labelsize"), LABELS
-    )
-    with plt.style.context(["default", "rbcourse.rbcourse", sizes]):
-        yield
-
-
-def new_figure() -> Figure:
-    """Return a figure for an explorer; to be used within `look`."""
-    fig = Figure(figsize=(5.6, 3.8), dpi=DPI)
-    fig.set_layout_engine("none")
-    return fig
+def new_figure() -> Iterator[Figure]:
+    """Give a figure for an explorer, to be drawn upon in the style of the course."""
+    with plt.style.context(_STYLES):
+        fig = Figure(figsize=(5.6, 3.8), dpi=100)
+        fig.set_layout_engine("none")
+        yield fig
 
 
 def new_space(fig: Figure, place: tuple[float, float, float, float], reach: float) -> Any:
@@ -264,6 +234,11 @@ def new_space(fig: Figure, place: tuple[float, float, float, float], reach: floa
 def new_line(ax: Any, **style: Any) -> Any:
     """Draw a line without points, in the plane or in space, to be filled."""
     return ax.plot(*[[]] * (3 if ax.name == "space" else 2), **style)[0]
+
+
+def apart(R: Any, S: Any) -> str:
+    """Return the largest angle between rotations, or stacks of them, in degrees, as text."""
+    return f"{numbers(np.degrees(angle_between(R, S)).max(), 1)}°"
 
 
 def numbers(values: Any, digits: int) -> str:

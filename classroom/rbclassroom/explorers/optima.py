@@ -4,26 +4,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+import rbcourse as rb
 from rbclassroom.explorers import widgets
-from rbclassroom.explorers.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse import (
-    Curve,
-    acceleration_cost_parts,
-    angle_between,
-    exp_so3,
-    log_so3,
-    minimum_acceleration_se3,
-    minimum_acceleration_so3,
-    pose_from_components,
-    pose_from_coordinates,
-    projected_cubic_se3,
-)
+from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
 from rbcourse.draw.save import COLOURS, FORMS
 
-Solved = tuple[dict[str, Curve], dict[str, float]]
+Solved = tuple[list[rb.Curve], dict[str, str]]
 
 _TIMES = np.linspace(0, 1, 61)
 _SIGMA = np.pi / 6 * np.array([1, 2, 3])
@@ -43,8 +31,7 @@ def minimum_acceleration_explorer() -> Explorer:
     and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig.
     4).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.16, 0.46, 0.71))
         ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
         artists: dict[str, Any] = {}
@@ -53,8 +40,7 @@ def minimum_acceleration_explorer() -> Explorer:
                 artists[f"{way} {axis}"] = new_line(ax, color=COLOURS[axis], ls=dash)
             ax.plot([], [], color="0.3", ls=dash, label=name)
         for axis, number in zip("xyz", "₁₂₃", strict=True):
-            style: Any = {"color": COLOURS[axis], "va": "center"}
-            artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", **style)
+            artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", color=COLOURS[axis], va="center")
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
         artists["now"] = ax.axvline(0, color="0.6", lw=1)
         space = new_space(fig, (0.63, 0.24, 0.41, 0.6), 1.0)
@@ -70,15 +56,15 @@ def minimum_acceleration_explorer() -> Explorer:
     }
 
     def show(rival: str, size: float, t: float, k: float) -> dict[str, str]:
-        curves, costs = _solved_rotations(rival, size, k)
-        for way, curve in zip(("optimum", "rival"), curves.values(), strict=True):
-            for axis, line in zip("xyz", log_so3(curve(_TIMES)).T, strict=True):
+        curves, said = _solved_rotations(rival, size, k)
+        for way, curve in zip(("optimum", "rival"), curves, strict=True):
+            for axis, line in zip("xyz", rb.log_so3(curve(_TIMES)).T, strict=True):
                 artists[f"{way} {axis}"].set_data(_TIMES, line)
-            move_box(artists[f"{way} box"], pose_from_components(curve(t), np.zeros(3)), _BOX)
+            move_box(artists[f"{way} box"], rb.pose_from_components(curve(t), np.zeros(3)), _BOX)
         artists["now"].set_xdata([t, t])
         for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
-        return {**_compared(costs), "apart at most": _apart(curves, _TIMES)}
+        return {**said, "apart at most": apart(*(curve(_TIMES) for curve in curves))}
 
     return Explorer("Minimum acceleration", fig, artists, controls, show, plays="k", seconds=6)
 
@@ -91,10 +77,9 @@ def cube_explorer() -> Explorer:
     ``rise``, that of the velocity at the end in m per unit time; and the time ``t``, which plays
     (BK 6.3, BK (14), BK Fig. 5).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         artists: dict[str, Any] = {}
-        for way, left in zip(_WAYS, (0.0, 0.5), strict=True):
+        for (way, dash), left in zip(_WAYS.items(), (0.0, 0.5), strict=True):
             ax: Any = fig.add_axes((left - 0.09, -0.05, 0.65, 1.0), projection="space")
             ax.fit(_LOW, _HIGH, zoom=1.04)
             ax.view_init(elev=18, azim=-22)
@@ -102,11 +87,9 @@ def cube_explorer() -> Explorer:
             for name, end in zip("xyz", 5 * np.eye(3), strict=True):
                 ax.plot(*np.outer(end, [0, 1]), color="0.7", lw=1.5, zorder=0)
                 ax.text(*(1.2 * end), name, color="0.5", ha="center", va="center")
-            style = {"color": "black", "lw": 1, "ls": _WAYS[way]}
-            artists[f"{way} way"] = new_line(ax, **style)
-            artists[f"{way} goal"] = draw_box(ax, np.eye(4), _SIDE)
+            artists[f"{way} way"] = new_line(ax, color="black", lw=1, ls=dash)
+            artists |= {name: draw_box(ax, np.eye(4), _SIDE) for name in (f"{way} goal", way)}
             artists[f"{way} goal"].set_alpha(0.25)
-            artists[way] = draw_box(ax, np.eye(4), _SIDE)
             fig.text(left + 0.25, 0.94, way, ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
         artists["difference"].set(**_OUTLINE)
@@ -119,13 +102,13 @@ def cube_explorer() -> Explorer:
     }
 
     def show(turn: float, spin: float, rise: float, t: float) -> dict[str, str]:
-        curves, costs = _solved_poses(turn, spin, rise)
-        for way, curve in curves.items():
+        curves, said = _solved_poses(turn, spin, rise)
+        for way, curve in zip(_WAYS, curves, strict=True):
             artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
             move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
             move_box(artists[way], curve(t), _SIDE)
-        move_box(artists["difference"], curves["optimum"](t), _SIDE)
-        return {**_compared(costs), "apart now": _apart(curves, t)}
+        move_box(artists["difference"], curves[0](t), _SIDE)
+        return {**said, "apart now": apart(*(curve(t)[:3, :3] for curve in curves))}
 
     return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")
 
@@ -134,35 +117,27 @@ def cube_explorer() -> Explorer:
 def _solved_rotations(rival: str, size: float, k: float) -> Solved:
     """Solve BK (21) with these two changed."""
     sigma = size * _SIGMA
-    ends = np.eye(3), exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
-    return _with_costs({"optimum": minimum_acceleration_so3(*ends), rival: FORMS[rival](*ends)})
+    ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
+    return _compared(rival, rb.minimum_acceleration_so3(*ends), FORMS[rival](*ends))
 
 
 @lru_cache(maxsize=64)
 def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
-    """Solve BK 6.3 with these three changed; while only the time runs it stays solved."""
+    """Solve BK 6.3 with these three changed, once for all times."""
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
-    A0, A1 = np.eye(4), pose_from_coordinates([*sigma, 8, 10, 12])
-    ends = A0, A1, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
-    best, near = minimum_acceleration_se3(*ends), projected_cubic_se3(*ends)
-    return _with_costs({"optimum": best, "projection": near})
+    goal = rb.pose_from_coordinates([*sigma, 8, 10, 12])
+    ends = np.eye(4), goal, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
+    best = rb.minimum_acceleration_se3(*ends)
+    return _compared("projection", best, rb.projected_cubic_se3(*ends))
 
 
-def _with_costs(curves: dict[str, Curve]) -> Solved:
-    return curves, {way: float(acceleration_cost_parts(c)[0]) for way, c in curves.items()}
-
-
-def _compared(costs: dict[str, float]) -> dict[str, str]:
-    low, high = costs.values()
+def _compared(rival: str, *curves: rb.Curve) -> Solved:
+    """Return the optimum and its rival, and the texts on their costs."""
+    low, high = (float(rb.acceleration_cost_parts(curve)[0]) for curve in curves)
     if low > 1e-12:
         ratio = numbers(high / low, 3)
     else:
         ratio = "none: the optimum costs nothing" if high > 1e-12 else "none: both cost nothing"
+    costs = {"optimum": low, rival: high}
     said = {f"cost, {way}": f"{numbers(cost, 3)} rad²" for way, cost in costs.items()}
-    return {**said, "their ratio": ratio}
-
-
-def _apart(curves: dict[str, Curve], t: ArrayLike) -> str:
-    """Return by how much two motions are turned against each other, at most, at these times."""
-    best, near = (curve(t)[..., :3, :3] for curve in curves.values())
-    return f"{numbers(np.degrees(angle_between(best, near).max()), 1)}°"
+    return list(curves), {**said, "their ratio": ratio}

@@ -1,5 +1,6 @@
 """Explorers for pages without Python: the states of one control and of what plays, recorded."""
 
+import argparse
 import html
 import sys
 from collections.abc import Sequence
@@ -7,11 +8,11 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-import numpy as np
-
 from rbclassroom import explorers
 from rbclassroom.course.agreement import reconciled
+from rbclassroom.course.notebooks import regenerate
 from rbclassroom.explorers.explorer import Explorer, numbers
+from rbclassroom.explorers.paths import LEGS
 from rbcourse.draw.display import Player
 
 _PAGE = Template("""\
@@ -27,60 +28,51 @@ $figure</html>
 """)
 
 _LESSON = "In the lesson, with Python, every control moves, with all of its steps."
-MOVED: dict[str, tuple[str, Any]] = {
-    "arm": ("theta1", np.arange(-180, 181, 30)),
-    "body": ("turn", np.arange(25, 176, 25)),
-    "chain": ("leg", None),
-    "cube": ("spin", np.arange(-5, 6, 2)),
-    "flip": ("axis", None),
-    "minimum_acceleration": ("size", np.arange(2, 15, 2) / 10),
-    "planar": ("omega1", np.arange(-90, 91, 15)),
-    "projection": ("e12", np.arange(-5, 6) / 5),
-    "random": ("sampler", None),
-    "rotation": ("gamma", np.arange(-140, 176, 45)),
-    "screw": ("tilt", np.arange(0, 91, 15)),
-    "theta": ("angle", np.arange(10, 171, 10)),
+MOVED: dict[str, tuple[str, Sequence[Any]]] = {
+    "arm": ("theta1", range(-180, 181, 30)),
+    "body": ("turn", range(25, 176, 25)),
+    "chain": ("leg", list(LEGS)),
+    "cube": ("spin", range(-5, 6, 2)),
+    "flip": ("axis", ["axis 1", "axis 2", "axis 3"]),
+    "minimum_acceleration": ("size", [tenths / 10 for tenths in range(2, 15, 2)]),
+    "planar": ("omega1", range(-90, 91, 15)),
+    "projection": ("e12", [fifths / 5 for fifths in range(-5, 6)]),
+    "random": ("sampler", ["three angles", "uniform"]),
+    "rotation": ("gamma", range(-140, 176, 45)),
+    "screw": ("tilt", range(0, 91, 15)),
+    "theta": ("angle", range(10, 171, 10)),
 }
-"""Of each explorer the control that is recorded beside what plays, and its values: all of a choice.
-
-They are steps of its slider; between them nothing is made up.
-"""
+"""Of each explorer the control that is recorded beside what plays, and which of its values."""
 
 
 def record(explorer: Explorer, name: str, moved: str, values: Sequence[Any]) -> Player:
     """Return an explorer as a figure that moves without Python, in exactly these states.
 
-    `values` are those of the control `moved`, what it is now among them; what plays has all of its
-    steps, and the other controls stay as they are.
+    `values` are those of the control `moved`, its present value among them; what plays has all of
+    its steps, and the other controls stay as they are.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
-    labels = {each: control.description for each, control in explorer.controls.items()}
-    stays = [f"{labels[each]} = {_text(now[each])}" for each in now if each not in (moved, plays)]
+    label = {each: control.description for each, control in explorer.controls.items()}
+    stays = [f"{label[each]} = {_text(now[each])}" for each in now if each not in (moved, plays)]
     fixed = f" Here these stay: {'; '.join(stays)}." if stays else ""
     caption = f"{explorer.name}, recorded.{fixed} {_LESSON}"
     shown = explorer.state()
     still = explorer.draw(shown.shown, zoom=2)  # before the artists move on
     states = [explorer.state(**{moved: x, plays: t}) for x in values for t in explorer.steps]
+    first = values.index(now[moved])
+    controls = [
+        {"label": label[moved], "values": [_text(value) for value in values], "first": first},
+        {"label": label[plays], "values": list(time._options_labels), "first": time.index},
+    ]
     return Player(
         name,
-        shown.line,
+        shown.texts[-1],
         f"<figcaption>{html.escape(caption)}</figcaption>",
         still,
         explorer.background,
         explorer.display,
         [state.drawn for state in states],
-        [
-            {
-                "label": labels[moved],
-                "values": [_text(value) for value in values],
-                "first": list(values).index(now[moved]),
-            },
-            {
-                "label": labels[plays],
-                "values": [text for text, _ in time.options],
-                "first": time.index,
-            },
-        ],
+        controls,
         explorer.play.interval,
         [state.texts for state in states],
     )
@@ -90,14 +82,13 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else numbers(value, 2).rstrip("0").rstrip(".")
 
 
-def main(folder: Path) -> None:
+def write_pages(folder: Path) -> None:
     """Write a page for each explorer into a folder."""
     folder.mkdir(exist_ok=True)
-    for name, (moved, values) in MOVED.items():
+    for name, moved in MOVED.items():
         print(f"{name} ...", flush=True)
         explorer = getattr(explorers, f"{name}_explorer")()
-        chosen = list(explorer.controls[moved].options) if values is None else values.tolist()
-        figure = record(explorer, f"{name}_explorer", moved, chosen)._repr_html_()
+        figure = record(explorer, f"{name}_explorer", *moved)._repr_html_()
         page = _PAGE.substitute(title=html.escape(explorer.name), figure=figure)
         file = folder / f"{name}.html"
         if file.exists():
@@ -105,5 +96,19 @@ def main(folder: Path) -> None:
         file.write_text(page, encoding="utf-8", newline="\n")
 
 
+def main() -> None:
+    """Run lessons and explorers again, in the folder of the course; store the changes."""
+    parser = argparse.ArgumentParser(prog="course.py figures")
+    help_ = "its number, such as 03; by default all lessons and the explorers"
+    parser.add_argument("lessons", nargs="*", metavar="LESSON", help=help_)
+    lessons = parser.parse_args().lessons
+    try:
+        regenerate(Path("notebooks"), Path("figures"), lessons)
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
+    if not lessons:
+        write_pages(Path("figures", "explorers"))
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

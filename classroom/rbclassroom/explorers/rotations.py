@@ -5,49 +5,37 @@ from typing import Any
 
 import numpy as np
 
+import rbcourse as rb
 from rbclassroom.explorers import widgets
-from rbclassroom.explorers.explorer import Explorer, look, new_figure, new_line, new_space, numbers
-from rbcourse import (
-    Array,
-    angle_between,
-    log_so3,
-    matrix_from_zyx,
-    orthonormalize_gram_schmidt,
-    pose_from_components,
-    project_so,
-    quaternion_from_matrix,
-)
+from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import draw_sphere
-from rbcourse.sampling import sample_rotation, sample_rotation_naive, uniformity_tests
+from rbcourse.sampling import sample_rotation_naive, uniformity_tests
 
 _BOX = np.array([1.3, 0.8, 0.25])
-_SAMPLERS = {"three angles": sample_rotation_naive, "uniform": sample_rotation}
+_SAMPLERS = {"three angles": sample_rotation_naive, "uniform": rb.sample_rotation}
 _MOST = 2000
 _BINS = np.linspace(-1, 1, 21)
 
 
 def rotation_explorer() -> Explorer:
-    """Return an explorer of orientations: three angles, and what else says the same.
+    """Return an explorer of orientations: three angles, and other representations.
 
     A box with its axes. Dashed: the axes of the three turns, of the first one z of the room, of the
     second the y that the first has turned, of the third the body's own x. Dotted: the axis of the
-    one turn that does it all. Controls: ``alpha beta gamma``, the ZYX angles in degrees; ``beta``
+    one turn that replaces them. Controls: ``alpha beta gamma``, the ZYX angles in degrees; ``beta``
     plays (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.3)
         artists: dict[str, Any] = {"box": draw_box(ax, np.eye(4), _BOX)}
-        looks = {"first turn": "z", "second turn": "y", "third turn": "x"}
-        artists |= {
-            name: new_line(ax, ls="--", color=COLOURS[axis], lw=1.5, label=f"{name}'s axis")
-            for name, axis in looks.items()
-        }
+        for axis, name in zip("zyx", ("first turn", "second turn", "third turn"), strict=True):
+            look = {"ls": "--", "color": COLOURS[axis], "lw": 1.5}
+            artists[name] = new_line(ax, **look, label=f"{name}'s axis")
         artists["axis"] = new_line(ax, ls=":", color="black", lw=3, label="one axis for all")
         artists |= _axes_of(ax, "body", ls="-", lw=3.5)
-        _legend(fig, [artists[name] for name in (*looks, "axis")])
+        fig.legend(loc="lower left", ncols=2, handlelength=1.6, columnspacing=1)
     controls = {
         "alpha": widgets.slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
         "beta": widgets.stepped("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
@@ -56,54 +44,49 @@ def rotation_explorer() -> Explorer:
 
     def show(alpha: float, beta: float, gamma: float) -> dict[str, str]:
         angles = np.radians([alpha, beta, gamma])
-        R = matrix_from_zyx(angles)
-        move_box(artists["box"], pose_from_components(R, np.zeros(3)), _BOX)
+        R = rb.matrix_from_zyx(angles)
+        move_box(artists["box"], rb.pose_from_components(R, np.zeros(3)), _BOX)
         _move_axes(artists, "body", R)
-        second = matrix_from_zyx(angles * [1, 0, 0])[:, 1]
+        second = rb.matrix_from_zyx(angles * [1, 0, 0])[:, 1]
         turns = {"first turn": np.array([0, 0, 1]), "second turn": second, "third turn": R[:, 0]}
         for name, axis in turns.items():
             artists[name].set_data_3d(*np.outer(axis, [-1.25, 1.05]))
-        r = log_so3(R)
+        r = rb.log_so3(R)
         angle = float(np.linalg.norm(r))
         axis = r / angle if angle > 0 else np.zeros(3)
         artists["axis"].set_data_3d(*np.outer(axis, [-1.25, 1.25]))
         said = {
             "matrix": _lines(R),
-            "quaternion": numbers(quaternion_from_matrix(R), 2),
+            "quaternion": numbers(rb.quaternion_from_matrix(R), 2),
             "axis": numbers(axis, 2) if angle > 0 else "any",
-            "angle": _angle(R),
+            "angle": apart(np.eye(3), R),
         }
         if abs(beta) == 90:
             sign = "−" if beta > 0 else "+"
-            left = (alpha - np.sign(beta) * gamma + 180) % 360 - 180
-            said["gimbal lock"] = (
-                f"first and third axis coincide,\nα {sign} γ = {numbers(left, 0)}°"
-            )
+            left = numbers((alpha - np.sign(beta) * gamma + 180) % 360 - 180, 0)
+            said["gimbal lock"] = f"first and third axis coincide,\nα {sign} γ = {left}°"
         return said
 
     return Explorer("An orientation", fig, artists, controls, show, plays="beta")
 
 
 def projection_explorer() -> Explorer:
-    """Return an explorer of repairs: a matrix pulled away from SO(3), and what two make of it.
+    """Return an explorer of repairs: a matrix pulled away from SO(3), and two methods to repair it.
 
     Grey: the columns of I + pull · E. Full: the nearest rotation. Dashed: Gram–Schmidt. Controls:
     the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it is pulled, ``pull``, which
     plays (BK 4, BK Prop. 2, RR 1.4).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.5)
-        looks: dict[str, Any] = {
-            "M": {"ls": "-", "lw": 7, "colour": "0.75", "zorder": 1},
-            "nearest": {"ls": "-", "lw": 3.5},
-            "Gram–Schmidt": {"ls": "--", "lw": 2},
+        artists = {
+            **_axes_of(ax, "M", "0.75", ls="-", lw=7, zorder=1),
+            **_axes_of(ax, "nearest", ls="-", lw=3.5),
+            **_axes_of(ax, "Gram–Schmidt", ls="--", lw=2),
         }
-        artists: dict[str, Any] = {}
-        for name, style in looks.items():
-            artists |= _axes_of(ax, name, **style)
+        for name in ("M", "nearest", "Gram–Schmidt"):
             artists[f"{name} z"].set_label(name)
-        _legend(fig, [artists[f"{name} z"] for name in looks])
+        fig.legend(loc="lower left", ncols=2, handlelength=1.6, columnspacing=1)
     controls = {
         "e12": widgets.slider("y leans", 0.8, -1.0, 1.0, 0.05),
         "e23": widgets.slider("z leans", 0.0, -1.0, 1.0, 0.05),
@@ -113,7 +96,7 @@ def projection_explorer() -> Explorer:
 
     def show(e12: float, e23: float, e33: float, pull: float) -> dict[str, str]:
         M = np.eye(3) + pull * np.array([[0, e12, 0], [0, 0, e23], [0, 0, e33]])
-        R, (G, fate) = project_so(M), _gram_schmidt(M)
+        R, (G, fate) = rb.project_so(M), _gram_schmidt(M)
         for name, matrix in (("M", M), ("nearest", R), ("Gram–Schmidt", G)):
             _move_axes(artists, name, matrix)
         singular = np.linalg.svd(M, compute_uv=False)
@@ -123,7 +106,7 @@ def projection_explorer() -> Explorer:
             "singular values": numbers(singular, 2),
             "M to nearest": numbers(np.linalg.norm(M - R), 3),
             "M to Gram–Schmidt": fate or numbers(np.linalg.norm(M - G), 3),
-            "angle between": "none" if fate else _angle(R.T @ G),
+            "angle between": "none" if fate else apart(R, G),
         }
         if singular[1] + np.sign(det) * singular[2] < 1e-9:
             said["nearest?"] = "several are equally near"
@@ -132,42 +115,35 @@ def projection_explorer() -> Explorer:
     return Explorer("Two repairs", fig, artists, controls, show, plays="pull")
 
 
-def _gram_schmidt(M: Array) -> tuple[Array, str]:
+def _gram_schmidt(M: rb.Array) -> tuple[rb.Array, str]:
     """Return the Gram–Schmidt result for M, and why it is no rotation, or "" if it is one."""
     try:
-        G = orthonormalize_gram_schmidt(M)
+        G = rb.orthonormalize_gram_schmidt(M)
     except ValueError:
         return np.zeros((3, 3)), "none: M is flat"
     return G, "" if np.linalg.det(G) > 0 else "a mirror"
 
 
 def random_explorer() -> Explorer:
-    """Return an explorer of random rotations: where they carry e₁, and how sure one can be.
+    """Return an explorer of random rotations: the images of e₁, and tests of uniformity.
 
     Controls: the ``sampler``, "three angles" or "uniform"; the ``number`` of rotations, which
     plays: always the first of the same 2000; and the ``seed`` of these (RR 2, RR 2.1, RR 2.2).
     """
-    with look():
-        fig = new_figure()
+    with new_figure() as fig:
         ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="space")
         draw_sphere(ax)
         fig.text(0.26, 0.91, "images of e₁", ha="center")
-        style = {"marker": "o", "ls": "", "ms": 4, "mew": 0, "color": COLOURS["projection"]}
-        artists = {"points": new_line(ax, **style)}
+        pink = {"color": COLOURS["projection"]}
+        artists: dict[str, Any] = {"points": new_line(ax, **pink, marker="o", ls="", ms=4, mew=0)}
         side = fig.add_axes((0.62, 0.19, 0.36, 0.69))
-        side.set(
-            xlim=(0, 3.2),
-            ylim=(-1, 1),
-            yticks=[-1, -0.5, 0, 0.5, 1],
-            title="their heights",
-            xlabel="density",
-        )
+        side.set(xlim=(0, 3.2), ylim=(-1, 1), title="their heights", xlabel="density")
+        side.set_yticks([-1, -0.5, 0, 0.5, 1])
         side.axvline(0.5, color="black", ls="--", lw=1.5)
         side.text(0.85, 0, "dashed:\nuniform", va="center")
         fig.text(0.26, 0.02, "pale: the far side", ha="center")
-        artists["histogram"] = side.stairs(
-            np.zeros(20), _BINS, orientation="horizontal", color=COLOURS["projection"], lw=2
-        )
+        steps: Any = {"orientation": "horizontal", "lw": 2, **pink}
+        artists["histogram"] = side.stairs(np.zeros(20), _BINS, **steps)
     controls = {
         "sampler": widgets.choice("sampler", list(_SAMPLERS)),
         "number": widgets.stepped("rotations", 40.0, 20.0, _MOST, 20.0),
@@ -184,18 +160,16 @@ def random_explorer() -> Explorer:
         said = {"|height| > ½": f"{numbers(100 * caps, 1)} %; uniform: 50 %"}
         if len(R) < 100:
             return {**said, "p-values": "from 100 rotations on"}
-        p = {name: uniformity_tests(R)[name].p_value for name in ("image of e₁", "angle")}
-        return said | {f"p, {name}": _said_p(value) for name, value in p.items()}
+        for name in ("image of e₁", "angle"):
+            p = uniformity_tests(R)[name].p_value
+            said[f"p, {name}"] = "< 1e-6: not uniform" if p < 1e-6 else f"{p:.2g}"
+        return said
 
     return Explorer("Random rotations", fig, artists, controls, show, plays="number", seconds=10)
 
 
-def _said_p(value: float) -> str:
-    return "< 1e-6: not uniform" if value < 1e-6 else f"{value:.2g}"
-
-
 @lru_cache(maxsize=8)
-def _sample(sampler: str, seed: int) -> Array:
+def _sample(sampler: str, seed: int) -> rb.Array:
     return _SAMPLERS[sampler](_MOST, rng=seed)
 
 
@@ -210,22 +184,14 @@ def _axes_of(ax: Any, name: str, colour: str | None = None, **style: Any) -> dic
     return artists
 
 
-def _angle(R: Array) -> str:
-    return f"{numbers(np.degrees(angle_between(np.eye(3), R)), 1)}°"
-
-
-def _move_axes(artists: dict[str, Any], name: str, M: Array) -> None:
+def _move_axes(artists: dict[str, Any], name: str, M: rb.Array) -> None:
     for axis, column in zip("xyz", M.T, strict=True):
         artists[f"{name} {axis}"].set_data_3d(*np.outer(column, [0, 1]))
         if f"{name} {axis} letter" in artists:
             artists[f"{name} {axis} letter"].set_position_3d(1.15 * column)
 
 
-def _legend(fig: Any, handles: list[Any]) -> None:
-    fig.legend(handles=handles, loc="lower left", ncols=2, handlelength=1.6, columnspacing=1)
-
-
-def _lines(M: Array) -> str:
+def _lines(M: rb.Array) -> str:
     """Return a matrix as lines, in which all numbers are equally wide."""
     rows = (numbers(row, 3).split(", ") for row in M)
     return "\n".join("  ".join(x.rjust(6, "\u2007") for x in row) for row in rows)

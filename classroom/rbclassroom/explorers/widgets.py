@@ -7,33 +7,32 @@ import numpy as np
 
 from rbclassroom.explorers.explorer import numbers
 
-_WIDE, _FULL = {"description_width": "9.5em"}, {"width": "auto"}
+_WIDE: dict[str, Any] = {"description_width": "9.5em"}
+_LOOK: dict[str, Any] = {"style": _WIDE, "layout": {"width": "auto"}}
 
 
 def slider(label: str, value: float, low: float, high: float, step: float) -> Any:
     """Return a slider."""
     limits = {"min": low, "max": high, "step": step, "readout_format": f".{_digits(step)}f"}
-    return ipywidgets.FloatSlider(value, description=label, style=_WIDE, layout=_FULL, **limits)
+    return ipywidgets.FloatSlider(value, description=label, **_LOOK, **limits)
 
 
 def stepped(label: str, value: float, low: float, high: float, step: float) -> Any:
     """Return a slider of what plays: it has these steps and nothing in between."""
     values = np.round(np.arange(low, high + step / 2, step), _digits(step)) + 0.0
     options = [(numbers(x, _digits(step)), x) for x in values.tolist()]
-    return ipywidgets.SelectionSlider(
-        options=options, value=value, description=label, style=_WIDE, layout=_FULL
-    )
+    return ipywidgets.SelectionSlider(options=options, value=value, description=label, **_LOOK)
 
 
 def choice(label: str, options: list[str]) -> Any:
-    """Return buttons of which one is chosen, the first to begin with."""
+    """Return buttons, one of which is chosen, the first to begin with."""
     style = {**_WIDE, "button_width": "auto"}
     return ipywidgets.ToggleButtons(options=options, description=label, style=style)
 
 
 def menu(label: str, options: list[str]) -> Any:
-    """Return a menu of which one line is chosen, the first to begin with: for many options."""
-    return ipywidgets.Dropdown(options=options, description=label, style=_WIDE, layout=_FULL)
+    """Return a menu, one line of which is chosen, the first to begin with: for many options."""
+    return ipywidgets.Dropdown(options=options, description=label, **_LOOK)
 
 
 def _digits(step: float) -> int:

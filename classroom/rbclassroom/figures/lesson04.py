@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
+from rbclassroom.figures import columns, named
 from rbcourse import Array, orthonormalize_gram_schmidt, project_so
 from rbcourse.draw.save import COLOURS, Table
 
@@ -32,85 +33,70 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))
     table: dict[str, Array] = {"steps [1]": counts.astype(float)}
+    wanted = set(counts.tolist())
     for name, (factor, repair) in ways.items():
-        table[f"{name} [1]"] = _defects(counts, factor.astype(np.float32), repair)
+        R, defects = np.eye(3, dtype=np.float32), []
+        x, y, z = factor.astype(np.float32)
+        for count in range(1, int(counts[-1]) + 1):
+            R = R[:, :1] * x + R[:, 1:2] * y + R[:, 2:] * z  # libraries round products differently
+            if count in wanted:
+                exact = R.astype(np.float64)
+                defects.append(np.linalg.norm(exact.T @ exact - np.eye(3)))
+            if repair and count % 100 == 0:
+                R = repair(R).astype(np.float32)
+        table[f"{name} [1]"] = np.array(defects)
     return table
 
 
-def _defects(counts: Array, factor: Array, repair: Repair | None) -> Array:
-    """Return the defects; products entry by entry, because libraries round them differently."""
-    R: Array = np.eye(3, dtype=np.float32)
-    defects, wanted = [], set(counts.tolist())
-    for count in range(1, int(counts[-1]) + 1):
-        R = R[:, :1] * factor[0] + R[:, 1:2] * factor[1] + R[:, 2:] * factor[2]
-        if count in wanted:
-            exact = R.astype(np.float64)
-            defects.append(np.linalg.norm(exact.T @ exact - np.eye(3)))
-        if repair and count % 100 == 0:
-            R = repair(R).astype(np.float32)
-    return np.array(defects)
-
-
-def draw_drift(ax: Axes, data: Table) -> list[Any]:
+def draw_drift(ax: Axes, data: Table) -> None:
     """Draw how matrices leave the rotations as they are multiplied."""
-    (_, steps), *ways = ((name, np.asarray(column)) for name, column in data.items())
+    (_, steps), *ways = named(" [1]", data).items()
     looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
-    lines = [
-        ax.loglog(steps, defect, color=colour, ls=dash, label=name.removesuffix(" [1]"))[0]
-        for (name, defect), (colour, dash) in zip(ways, looks, strict=True)
-    ]
+    for (name, defect), (colour, dash) in zip(ways, looks, strict=True):
+        ax.loglog(steps, defect, color=colour, ls=dash, label=name)
     ax.set(xlabel="products", ylabel="defect ‖RᵀR − I‖", xlim=(1, steps[-1]))
     ax.legend()
-    return lines
 
 
 def describe_drift(data: Table) -> str:
     """Return in words what `draw_drift` shows."""
-    steps = np.asarray(data["steps [1]"])
-    said = [
-        f"{name.removesuffix(' [1]')}: {np.asarray(column)[-1]:.0e}"
-        for name, column in data.items()
-        if name != "steps [1]"
-    ]
+    (_, steps), *ways = named(" [1]", data).items()
     return (
         "The defect of matrices that are multiplied again and again, over the number of products, "
-        f"both axes logarithmic. After {steps[-1]:.0f} products it is, {'; '.join(said)}."
+        f"both axes logarithmic. After {steps[-1]:.0f} products it is, "
+        f"{'; '.join(f'{name}: {defect[-1]:.0e}' for name, defect in ways)}."
     )
 
 
 def column_table(matrices: Mapping[str, Array]) -> Table:
     """Return x and y of the two columns of each 2 × 2 matrix, a row for each column, as a table."""
-    return {
-        f"{name} {axis} [1]": row
-        for name, M in matrices.items()
-        for axis, row in zip("xy", M, strict=True)
-    }
+    return columns("{} {} [1]", {name: M.T for name, M in matrices.items()})
 
 
-def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> list[Any]:
+def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     """Draw the columns of 2 × 2 matrices as arrows, each matrix on its own axes.
 
     The first matrix is the given one. Its arrows are repeated in grey behind those of the others,
     and a dotted line joins each tip with its grey one. The titles say what the two lines come to,
     the root of the sum of their squares: the Frobenius distance (BK Prop. 2, RR 1.4).
     """
-    given, *others = matrices.values()
+    given = next(iter(matrices.values()))
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
-    artists = [_draw_arrows(axes[0], given, [COLOURS["x"], COLOURS["y"]])]
-    for ax, M in zip(axes[1:], others, strict=True):
-        artists.append(_draw_arrows(ax, given, ["0.7"]))
-        artists.append(_draw_arrows(ax, M, [COLOURS["x"], COLOURS["y"]]))
-        artists += ax.plot(*np.stack([given, M], axis=1), color="black", ls=":", zorder=4)
+    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.025, "zorder": 3}
     for ax, (name, M) in zip(axes, matrices.items(), strict=True):
+        title = f"{name}\n{_sense(M)}"
+        if M is not given:
+            ax.quiver([0, 0], [0, 0], *given, color="0.7", **style)
+            ax.plot(*np.stack([given, M], axis=1), color="black", ls=":", zorder=4)
+            title += f", misses {np.linalg.norm(M - given):.2f}"
+        ax.quiver([0, 0], [0, 0], *M, color=[COLOURS["x"], COLOURS["y"]], **style)
         ax.add_patch(Circle((0, 0), 1, fill=False, color="0.8", lw=1))
-        missed = "" if M is given else f", misses {np.linalg.norm(M - given):.2f}"
-        ax.set(aspect="equal", title=f"{name}\n{_sense(M)}{missed}", xlabel="x")
-        ax.set(xlim=(-edge, edge), ylim=(-edge, edge), xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+        ax.set(aspect="equal", title=title, xlabel="x", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+        ax.set(xlim=(-edge, edge), ylim=(-edge, edge))
     axes[0].set_ylabel("y")
-    (x, y), second = given.T[0] / 2, given.T[1]
-    axes[0].text(x, y, "first", color=COLOURS["x"], ha="right", va="bottom")
-    axes[0].text(second[0], second[1], " second", color=COLOURS["y"], va="top")
-    return artists
+    (x, second_x), (y, second_y) = given
+    axes[0].text(x / 2, y / 2, "first", color=COLOURS["x"], ha="right", va="bottom")
+    axes[0].text(second_x, second_y, " second", color=COLOURS["y"], va="top")
 
 
 def describe_columns(matrices: Mapping[str, Array]) -> str:
@@ -119,15 +105,10 @@ def describe_columns(matrices: Mapping[str, Array]) -> str:
     said = [f"{name} {_sense(M)}, {np.linalg.norm(M - given):.2f} away" for name, M in others]
     return (
         f"The columns of {first} as arrows, the first orange, the second green; then those of "
-        f"{', '.join(matrices).removeprefix(f'{first}, ')}, with {first}'s behind in grey. "
+        f"{', '.join(name for name, _ in others)}, with {first}'s behind in grey. "
         f"{first} {_sense(given)}. {'; '.join(said)}, by the root of the sum of the squares of "
         "the two dotted lines from tip to tip."
     )
-
-
-def _draw_arrows(ax: Axes, M: Array, colours: Sequence[str]) -> Any:
-    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.025, "zorder": 3}
-    return ax.quiver([0, 0], [0, 0], *M, color=colours, **style)
 
 
 def _sense(M: Array) -> str:
@@ -141,40 +122,32 @@ def shadows(M: Array) -> dict[str, Array]:
     M are matrices [[a, b], [c, d]], shape (n, 2, 2), with a positive determinant; the shadow is
     x = (a + d)/2, y = (c − b)/2.
     """
-    matrices = {"M": M, **{name: fix(M) for name, fix in _REPAIRS.items()}}
     return {
         name: np.stack([A[:, 0, 0] + A[:, 1, 1], A[:, 1, 0] - A[:, 0, 1]], axis=-1) / 2
-        for name, A in matrices.items()
+        for name, A in {"M": M, **{name: fix(M) for name, fix in _REPAIRS.items()}}.items()
     }
 
 
 def shadow_table(points: Mapping[str, Array]) -> Table:
     """Return `shadows` as a table."""
-    return {
-        f"{name} {axis} [1]": column
-        for name, places in points.items()
-        for axis, column in zip("xy", places.T, strict=True)
-    }
+    return columns("{} {} [1]", points)
 
 
-def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> list[Any]:
+def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> None:
     """Draw the `shadows` of matrices, and where each of the two repairs takes them, on its axes.
 
-    Return for each repair the dots, then the lines to the circle (BK 4, BK Prop. 2).
+    (BK 4, BK Prop. 2)
     """
-    artists: list[Any] = []
     circle = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
-    start = points["M"]
-    for ax, name in zip(axes, _REPAIRS, strict=True):
+    for ax, (name, colour) in zip(axes, _COLOURS.items(), strict=True):
+        ways = np.stack([points["M"], points[name]])
         ax.plot(circle.real, circle.imag, color="0.6", lw=1)
-        artists += ax.plot(*start.T, "o", ms=5, color=_COLOURS[name])
-        ways = np.stack([start, points[name]])
-        artists += ax.plot(*ways.transpose(2, 0, 1), color=_COLOURS[name], lw=1.5)
-        ax.plot(*ways[1].T, "o", ms=4, mfc="white", mec=_COLOURS[name])
+        ax.plot(*ways[0].T, "o", ms=5, color=colour)
+        ax.plot(*ways.transpose(2, 0, 1), color=colour, lw=1.5)
+        ax.plot(*ways[1].T, "o", ms=4, mfc="white", mec=colour)
         ax.plot(0, 0, "+", color="0.3", ms=9)
         ax.set(aspect="equal", title=name, xlabel="(a + d)/2", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes[0].set_ylabel("(c − b)/2")
-    return artists
 
 
 def describe_shadows(points: Mapping[str, Array]) -> str:
@@ -205,27 +178,25 @@ def frame_table(M: Array, angles: ArrayLike) -> Table:
     return table
 
 
-def draw_frames(ax: Axes, data: Table) -> list[Any]:
+def draw_frames(ax: Axes, data: Table) -> None:
     """Draw which rotation two repairs find, over the angle of the frame (BK Prop. 3)."""
-    frame = np.degrees(data["frame [rad]"])
-    lines = [
-        ax.plot(frame, np.degrees(data[f"{name} [rad]"]), color=_COLOURS[name], ls=dash, label=name)
-        for name, dash in zip(_REPAIRS, ("-", "--"), strict=True)
-    ]
+    (_, frame), *found = named(" [rad]", data).items()
+    frame = np.degrees(frame)
+    for (name, angle), dash in zip(found, ("-", "--"), strict=True):
+        ax.plot(frame, np.degrees(angle), color=_COLOURS[name], ls=dash, label=name)
     ax.set(xlabel="the body frame is turned by (°)", ylabel="rotation found (°)")
     ax.set(xlim=(frame[0], frame[-1]), xticks=np.arange(frame[0], frame[-1] + 1, 45))
     ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
-    return [line for (line,) in lines]
 
 
 def describe_frames(data: Table) -> str:
     """Return in words what `draw_frames` shows."""
-    found = {name: np.degrees(np.asarray(data[f"{name} [rad]"])) for name in _REPAIRS}
+    _, *found = named(" [rad]", data).items()
     ranges = [
         f"{name} finds {angle.min():.1f} to {angle.max():.1f} degrees"
         if np.ptp(angle) > 1e-6
         else f"{name} finds {angle[0]:.1f} degrees in every frame"
-        for name, angle in found.items()
+        for name, angle in ((name, np.degrees(angle)) for name, angle in found)
     ]
     return (
         "The angle of the rotation that two repairs find, over the angle by which the body frame "

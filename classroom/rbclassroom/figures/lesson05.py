@@ -13,10 +13,11 @@ from rbcourse.sampling import angle_law
 Bins = Mapping[str, tuple[Array, Mapping[str, Array]]]
 """For each column of a histogram the edges of its bins, and the densities of each sample."""
 
+_HEIGHT: Any = (-1, 1), lambda z: (z + 1) / 2
 _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
     "angle": ("angle (rad)", (0, np.pi), angle_law),
-    "height of e₁": ("height of the image of e₁", (-1, 1), lambda z: (z + 1) / 2),
-    "height of e₃": ("height of the image of e₃", (-1, 1), lambda z: (z + 1) / 2),
+    "height of e₁": ("height of the image of e₁", *_HEIGHT),
+    "height of e₃": ("height of the image of e₃", *_HEIGHT),
 }
 """The columns of a histogram: label, range, and their distribution for uniform rotations."""
 
@@ -27,20 +28,16 @@ def histograms(R: Mapping[str, Array]) -> Bins:
     The columns are the angle and the heights of the images of e₁ and e₃; a density is the number
     in a bin over its width and n.
     """
-    bins = {}
-    for column, (_, (low, high), _) in _LAWS.items():
-        edges, densities = np.linspace(low, high, 21), {}
-        for name, matrices in R.items():
-            counts, _ = np.histogram(np.clip(_shown(column, matrices), low, high), edges)
+    bins = {
+        c: (np.linspace(*limits, 21), dict[str, Array]()) for c, (_, limits, _) in _LAWS.items()
+    }
+    for name, matrices in R.items():
+        cosine = (np.trace(matrices, axis1=-2, axis2=-1) - 1) / 2
+        values = np.arccos(np.clip(cosine, -1, 1)), matrices[:, 2, 0], matrices[:, 2, 2]
+        for x, (edges, densities) in zip(values, bins.values(), strict=True):
+            counts, _ = np.histogram(np.clip(x, edges[0], edges[-1]), edges)
             densities[name] = counts / (len(matrices) * np.diff(edges))
-        bins[column] = edges, densities
     return bins
-
-
-def _shown(column: str, R: Array) -> Array:
-    if column == "angle":
-        return np.arccos(np.clip((np.trace(R, axis1=-2, axis2=-1) - 1) / 2, -1, 1))
-    return R[:, 2, 0 if column.endswith("₁") else 2]
 
 
 def histogram_table(bins: Bins) -> Table:
@@ -52,26 +49,19 @@ def histogram_table(bins: Bins) -> Table:
     return table
 
 
-def draw_histograms(axes: Sequence[Axes], bins: Bins) -> list[Any]:
-    """Draw the histograms of two samples of rotations on three axes, and the law of uniform ones.
-
-    (RR 2)
-    """
-    artists: list[Any] = []
-    colours = COLOURS["projection"], COLOURS["z"]
+def draw_histograms(axes: Sequence[Axes], bins: Bins) -> None:
+    """Draw the histograms of two samples of rotations, and the law of uniform ones (RR 2)."""
     for ax, (column, (label, limits, law)) in zip(axes, _LAWS.items(), strict=True):
         edges, densities = bins[column]
-        for (name, density), colour in zip(densities.items(), colours, strict=True):
-            artists.append(ax.stairs(density, edges, color=colour, lw=2, label=name))
+        for (name, density), look in zip(densities.items(), ("projection", "z"), strict=True):
+            ax.stairs(density, edges, color=COLOURS[look], lw=2, label=name)
         fine = np.linspace(*limits, 201)
-        density = np.diff(law(fine)) / np.diff(fine)
-        middle = (fine[:-1] + fine[1:]) / 2
-        artists += ax.plot(middle, density, color="black", ls="--", lw=1.5, label="the law")
+        density, middle = np.diff(law(fine)) / np.diff(fine), (fine[:-1] + fine[1:]) / 2
+        ax.plot(middle, density, color="black", ls="--", lw=1.5, label="the law")
         ax.set(xlabel=label, xlim=limits, ylim=(0, None))
     axes[0].set_xticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
     axes[0].set_ylabel("density")
     axes[0].legend()
-    return artists
 
 
 def describe_histograms(bins: Bins) -> str:

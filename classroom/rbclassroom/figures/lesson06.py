@@ -8,120 +8,81 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc
-from numpy.typing import ArrayLike
 
+from rbclassroom.figures import columns
 from rbcourse import Array, angle_between
 from rbcourse.draw.bodies import draw_arrow, draw_box, draw_triad
 from rbcourse.draw.save import COLOURS, Table
 from rbcourse.draw.scene import OVER
 from rbcourse.draw.spheres import draw_sphere
 
+_MARKED: dict[str, Any] = {"marker": "o", "markevery": 10}
 _MOTIONS: dict[str, dict[str, Any]] = {
-    "geodesic": {
-        "color": COLOURS["optimum"],
-        "ls": "-",
-        "marker": "o",
-        "markevery": 10,
-        "ms": 9,
-        "mfc": "white",
-    },
-    "projected line": {
-        "color": COLOURS["projection"],
-        "ls": "--",
-        "marker": "o",
-        "markevery": 10,
-        "ms": 5,
-    },
+    "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 9, "mfc": "white", **_MARKED},
+    "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 5, **_MARKED},
 }
+_COLOURS: Any = plt.get_cmap("viridis_r")
 _DASHES: list[Any] = ["-", "--", "-.", ":", (0, (6, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1))]
+_LABELS = {"t": "time t", "angle": "angle a (rad)", "theta": "θ"}
+_LABELS |= {"theta_dot": "dθ/dt", "f_dot": "df/dt"}
 
 
-LABELS = {
-    "t": "time t",
-    "angle": "angle a (rad)",
-    "theta": "θ",
-    "theta_dot": "dθ/dt",
-    "f": "f",
-    "f_dot": "df/dt",
-    "s": "s",
-}
-"""How the columns of a table are called on an axis."""
+def draw_family(ax: Axes, data: Table) -> None:
+    """Draw up to six curves of a table (angle, abscissa, value) (BK Fig. 2, BK Fig. 3)."""
+    (p_label, p), (x_label, x), (y_label, y) = _columns(data)
+    sixths = np.arange(1, 6) * np.pi / 6
+    rows = {*np.abs(p[:, :1] - sixths).argmin(axis=0).tolist(), len(p) - 1}
+    for row, dash in zip(sorted(rows), _DASHES, strict=False):
+        look = {"color": _COLOURS(p[row, 0] / np.pi), "ls": dash, "label": _pi_fraction(p[row, 0])}
+        ax.plot(x[row], y[row], **look)
+    ax.set(xlabel=x_label, ylabel=y_label, xlim=(x.min(), x.max()))
+    ax.legend(title=p_label, loc="center left", bbox_to_anchor=(1, 0.5))
 
 
-def draw_family(ax: Axes, data: Table) -> list[Any]:
-    """Draw up to six curves of a table (parameter, abscissa, value), each for one parameter.
-
-    BK Fig. 2, BK Fig. 3.
-    """
-    (_, parameter), (x_name, x), (y_name, y) = _columns(data)
-    lines = []
-    for row, dash in zip(_shown_rows(parameter), _DASHES, strict=False):
-        angle = parameter[row, 0]
-        look = {"color": _angle_colour(angle), "ls": dash, "label": pi_fraction(angle)}
-        lines += ax.plot(x[row], y[row], **look)
-    ax.set(xlabel=_label(x_name), ylabel=_label(y_name), xlim=(x.min(), x.max()))
-    ax.legend(title="angle a (rad)", loc="center left", bbox_to_anchor=(1, 0.5))
-    return lines
-
-
-def draw_surface(ax: Any, data: Table) -> list[Any]:
-    """Draw a table (parameter, abscissa, value) as a surface over abscissa and parameter.
-
-    An angle has the colour of its curve in `draw_family` (BK Fig. 2, BK Fig. 3).
-    """
-    (p_name, parameter), (x_name, x), (y_name, y) = _columns(data)
-    colours = _angle_colour(parameter)
-    look = {"facecolors": colours, "shade": False, "lw": 0.3, "edgecolor": "white"}
-    surface = ax.plot_surface(x, parameter, y, rcount=24, ccount=34, **look)
+def draw_surface(ax: Any, data: Table) -> None:
+    """Draw such a table as a surface, with the colours of the curves (BK Fig. 2, BK Fig. 3)."""
+    (p_label, p), (x_label, x), (y_label, y) = _columns(data)
+    look = {"facecolors": _COLOURS(p / np.pi), "shade": False, "lw": 0.3, "edgecolor": "white"}
+    ax.plot_surface(x, p, y, rcount=24, ccount=34, **look)
     ax.set(xticks=[0, 0.5, 1])
-    ax.set_xlabel(_label(x_name), labelpad=7)
-    ax.set_ylabel(_label(p_name), labelpad=13)
+    ax.set_xlabel(x_label, labelpad=7)
+    ax.set_ylabel(p_label, labelpad=13)
     ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
-    ax.text2D(0.06, 0.88, _label(y_name), transform=ax.transAxes)
+    ax.text2D(0.06, 0.88, y_label, transform=ax.transAxes)
     ax.view_init(elev=24, azim=-128)
     ax.set_box_aspect((1, 1, 0.75), zoom=0.95)
-    return [surface]
 
 
 def describe_family(data: Table) -> str:
     """Return in words what `draw_family` and `draw_surface` show."""
-    (_, parameter), (_, x), (y_name, y) = _columns(data)
+    (_, p), (_, x), (y_label, y) = _columns(data)
     at = np.linspace(0, x.shape[1] - 1, 5).round().astype(int)
     ends = [
-        f"for the {which} angle, {pi_fraction(parameter[row, 0])} rad, it is "
+        f"for the {which} angle, {_pi_fraction(p[row, 0])} rad, it is "
         + ", ".join(f"{value:.3g}" for value in y[row, at])
         for which, row in (("smallest", 0), ("largest", -1))
     ]
     times = ", ".join(f"{value:g}" for value in x[0, at])
     return (
-        f"{_label(y_name)} over the time t, for {len(parameter)} angles a, as a surface and as "
+        f"{y_label} over the time t, for {len(p)} angles a, as a surface and as "
         f"curves, a colour for each angle. At the times {times} {'; '.join(ends)}."
     )
 
 
-def draw_chord(ax: Axes, data: Table) -> list[Any]:
+def draw_chord(ax: Axes, data: Table) -> None:
     """Draw equal steps along a chord of the upper unit circle, and the rays that project them."""
-    t, x, y, arc_x, arc_y = (np.asarray(column) for column in data.values())
-    circle = Arc((0, 0), 2, 2, theta1=0, theta2=180, color=COLOURS["reference"], lw=1)
-    ax.add_patch(circle)
-    rays = ax.plot(
-        [np.zeros_like(x), arc_x], [np.zeros_like(y), arc_y], color=COLOURS["reference"], lw=0.8
-    )
-    chord = ax.plot(x, y, "s-", color=COLOURS["optimum"], ms=5, label="equal steps on the chord")
-    arc = ax.plot(
-        arc_x,
-        arc_y,
-        "o",
-        color=COLOURS["projection"],
-        ms=8,
-        label="their projections on the circle",
-    )
+    t, x, y, *projected = (np.asarray(column) for column in data.values())
+    grey: Any = {"color": COLOURS["reference"]}
+    ax.add_patch(Arc((0, 0), 2, 2, theta1=0, theta2=180, lw=1, **grey))
+    ax.plot(*([np.zeros_like(x), end] for end in projected), lw=0.8, **grey)
+    steps, marks = "equal steps on the chord", "their projections on the circle"
+    ax.plot(x, y, "s-", color=COLOURS["optimum"], ms=5, label=steps)
+    ax.plot(*projected, "o", color=COLOURS["projection"], ms=8, label=marks)
     for k, offset in ((0, (-16, -22)), (len(x) // 2, (8, 8)), (-1, (-54, -4))):
         ax.annotate(f"t = {t[k]:g}", (x[k], y[k]), offset, textcoords="offset points")
     ax.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.16, 1.08))
     ax.set(xlabel="real part", ylabel="imaginary part")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
-    return [circle, *rays, *chord, *arc]
 
 
 def describe_chord(data: Table) -> str:
@@ -139,33 +100,29 @@ def path_table(t: Array, paths: Mapping[str, Array], speeds: Mapping[str, Array]
     """Return paths of a point and angular speeds as a table."""
     table = {"t [1]": t}
     for name, path in paths.items():
-        table |= {f"{name} {axis} [1]": x for axis, x in zip("xyz", path.T, strict=True)}
-        table |= {f"{name} speed [rad]": speeds[name]}
+        table |= columns("{} {} [1]", {name: path}) | {f"{name} speed [rad]": speeds[name]}
     return table
 
 
-def draw_paths(ax: Any, paths: Mapping[str, Array]) -> list[Any]:
-    """Draw on the unit sphere the paths of one point, shape (times, 3), every tenth time marked.
-
-    They are those of a "geodesic" and a "projected line".
-    """
+def draw_paths(ax: Any, paths: Mapping[str, Array]) -> None:
+    """Draw the paths of one point, shape (times, 3), by a "geodesic" and a "projected line"."""
     draw_sphere(ax)
-    lines = [ax.plot(*path.T, **_MOTIONS[name])[0] for name, path in paths.items()]
+    for name, path in paths.items():
+        ax.plot(*path.T, label=name, **_MOTIONS[name])
     way = paths["geodesic"]
     start, middle, end = way[[0, len(way) // 2, -1]]
     for when, place in (("t = 0", start), ("t = 1", end)):
         ax.text(*(0.82 * place), when, ha="center", va="center")
     x, y, z = np.cross(start, end) / np.linalg.norm(np.cross(start, end)) + middle / 2
     ax.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
-    return lines
 
 
-def draw_speeds(ax: Axes, t: Array, speeds: Mapping[str, Array]) -> list[Any]:
-    """Draw the angular speeds of these two motions over time, every tenth time marked."""
-    lines = [ax.plot(t, speeds[name], label=name, **style)[0] for name, style in _MOTIONS.items()]
-    ax.set(xlabel=LABELS["t"], ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
+def draw_speeds(ax: Axes, t: Array, speeds: Mapping[str, Array]) -> None:
+    """Draw the angular speeds of these two motions over time."""
+    for name, style in _MOTIONS.items():
+        ax.plot(t, speeds[name], label=name, **style)
+    ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
     ax.legend()
-    return lines
 
 
 def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> str:
@@ -188,58 +145,32 @@ def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> s
 
 
 def _columns(data: Table) -> list[tuple[str, Array]]:
-    return [(name, np.asarray(column, dtype=float)) for name, column in data.items()]
+    """Return the columns of a table with their labels on axes."""
+    plain = {name.split(" [")[0]: np.asarray(column, float) for name, column in data.items()}
+    return [(_LABELS.get(name, name), column) for name, column in plain.items()]
 
 
-def _label(column: str) -> str:
-    name = column.split(" [")[0]
-    return LABELS.get(name, name)
-
-
-def _angle_colour(angle: ArrayLike) -> Any:
-    return plt.get_cmap("viridis_r")(np.asarray(angle) / np.pi)
-
-
-def _shown_rows(parameter: Array) -> list[int]:
-    """Return the rows nearest to the five multiples of π/6 below π, and the last."""
-    sixths = np.arange(1, 6) * np.pi / 6
-    nearest = [int(np.abs(parameter[:, 0] - angle).argmin()) for angle in sixths]
-    return sorted({*nearest, len(parameter) - 1})
-
-
-def pi_fraction(angle: float) -> str:
-    """Return an angle in rad as a fraction of π.
-
-    Examples
-    --------
-    >>> pi_fraction(5 * np.pi / 6), pi_fraction(np.pi), pi_fraction(-np.pi / 2), pi_fraction(0)
-    ('5π/6', 'π', '−π/2', '0')
-    """
+def _pi_fraction(angle: float) -> str:
+    """Return an angle in rad as a fraction of π."""
     share = Fraction(angle / np.pi).limit_denominator(24)
-    if share == 0:
-        return "0"
-    sign, count = "−" if share < 0 else "", abs(share.numerator)
     over = f"/{share.denominator}" if share.denominator > 1 else ""
-    return f"{sign}{count if count > 1 else ''}π{over}"
+    return f"{'' if share.numerator == 1 else share.numerator}π{over}"
 
 
-def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> list[Any]:
-    """Draw a fixed frame, a moving frame on its body, and the position vector between them.
+def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
+    """Draw a fixed frame, a moving one on its body, and the vector between them (BK Fig. 1).
 
-    `names` and `poses`, shape (2, 4, 4), are those of the fixed frame and the moving one
-    (BK Fig. 1).
+    `names` and `poses`, shape (2, 4, 4), are those of the two frames.
     """
     d, R = poses[:, :3, 3], poses[:, :3, :3]
-    artists = [draw_box(ax, poses[1], np.array([1.4, 1.0, 0.7]))]
-    artists[0].set_alpha(0.5)
+    draw_box(ax, poses[1], np.array([1.4, 1.0, 0.7])).set_alpha(0.5)
     for name, origin, axes in zip(names, d, R, strict=True):
-        artists += draw_triad(ax, origin, axes, name)
+        draw_triad(ax, origin, axes, name)
         ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center", zorder=OVER)
-    vector = draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
+    draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
     ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
     ax.fit(d.min(axis=0) - 0.4, d.max(axis=0) + 1, zoom=1.3)
     ax.view_init(elev=20, azim=-60)
-    return [*artists, vector]
 
 
 def describe_moving_frame(names: Sequence[str], poses: Array) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from rbclassroom.figures import columns, vectors
 from rbcourse import Array, pose_from_components
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, Table
@@ -15,23 +16,18 @@ from rbcourse.draw.spheres import AZIMUTH, ELEVATION, draw_sphere
 
 def spin_table(t: Array, spins: Mapping[str, Array]) -> Table:
     """Return angular velocities over time, shape (times, 3), body frame, as a table."""
-    table = {"t [1]": t}
-    for name, w in spins.items():
-        table |= {f"{name} w{i + 1} [rad]": w[:, i] for i in range(3)}
-    return table
+    return {"t [1]": t} | columns("{} w{} [rad]", spins, "123")
 
 
-def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> list[Any]:
+def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> None:
     """Draw the components of angular velocities, shape (times, 3), over time, each on its axes."""
-    lines: list[Any] = []
     for ax, (name, w) in zip(axes, spins.items(), strict=True):
-        for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True)):
-            lines += ax.plot(t, w[:, i], color=COLOURS[axis], ls=dash, label=f"ω{'₁₂₃'[i]}")
-        ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]))
-        ax.set_xticks(np.linspace(t[0], t[-1], 5))
+        for axis, number, part, dash in zip("xyz", "₁₂₃", w.T, ("-", "--", "-."), strict=True):
+            ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"ω{number}")
+        times = np.linspace(t[0], t[-1], 5)
+        ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]), xticks=times)
     axes[0].set_ylabel("rad per unit time")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
-    return lines
 
 
 def describe_spins(spins: Mapping[str, Array]) -> str:
@@ -50,8 +46,8 @@ def describe_spins(spins: Mapping[str, Array]) -> str:
 def momentum_directions(moments: ArrayLike, w: Array) -> Array:
     """Return the directions of the angular momentum in the body frame, shape (paths, times, 3).
 
-    `moments` are the principal moments of inertia, the second one between the others, and w the
-    angular velocities in the body frame, shape (times, paths, 3).
+    `moments` are the principal moments of inertia, and w the angular velocities in the body frame,
+    shape (times, paths, 3).
     """
     momentum = np.swapaxes(w * np.asarray(moments), 0, 1)
     return momentum / np.linalg.norm(momentum, axis=-1, keepdims=True)
@@ -64,44 +60,41 @@ def momentum_table(directions: Array) -> Table:
     return {"path [1]": numbers, **columns}
 
 
-def draw_momenta(ax: Any, directions: Array) -> list[Any]:
+def draw_momenta(ax: Any, directions: Array) -> None:
     """Draw closed paths of the angular momentum through the body, on the unit sphere.
 
     A path has the colour of the axis that it goes round; black are those that pass close to the
-    middle one. Return a line for each.
+    middle one.
     """
     draw_sphere(ax)
-    lines: list[Any] = []
     for path in directions:
-        colour = COLOURS["xyz"[_goes_round(path)]]
-        if _comes_near_axis_2(path):
-            colour = COLOURS["optimum"]
-        lines += ax.plot(*path.T, color=colour, lw=2)
+        axis, near_axis_2 = _course(path)
+        look = "optimum" if near_axis_2 else "xyz"[axis]
+        ax.plot(*path.T, color=COLOURS[look], lw=2)
     for name, end in zip("123", 1.1 * np.eye(3), strict=True):
         for place in (end, -end):
             ax.text(*place, name, ha="center", va="center")
-    return lines
 
 
 def describe_momenta(directions: Array) -> str:
     """Return in words what `draw_momenta` shows."""
-    rounds = [_goes_round(path) for path in directions]
-    near = sum(_comes_near_axis_2(path) for path in directions)
+    rounds, near = zip(*map(_course, directions), strict=True)
     return (
         f"{len(rounds)} paths of the angular momentum on a sphere that is fixed in the body: "
         f"{rounds.count(0)} go round axis 1, {rounds.count(2)} round axis 3, "
-        f"{rounds.count(1) or 'none'} round axis 2. Black: the {near} that pass close to axis 2."
+        f"{rounds.count(1) or 'none'} round axis 2. "
+        f"Black: the {sum(near)} that pass close to axis 2."
     )
 
 
-def _comes_near_axis_2(path: Array) -> bool:
-    return bool(np.abs(path[:, 1]).max() > 0.99)
+def _course(path: Array) -> tuple[int, bool]:
+    """Return the axis that a path goes round, and whether it passes close to the middle one.
 
-
-def _goes_round(path: Array) -> int:
-    """Return the axis along which the component of a path keeps its sign, the farthest from 0."""
-    low, high = path.min(axis=0), path.max(axis=0)
-    return int(np.where(low * high > 0, np.abs(path).min(axis=0), 0).argmax())
+    It goes round the axis along which its component keeps its sign, the farthest from 0.
+    """
+    keeps_sign = path.min(axis=0) * path.max(axis=0) > 0
+    nearest, farthest = np.abs(path).min(axis=0), np.abs(path).max(axis=0)
+    return int(np.where(keeps_sign, nearest, 0).argmax()), bool(farthest[1] > 0.99)
 
 
 def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
@@ -151,25 +144,22 @@ CARRIED = {
 
 def carried_table(turned: Array) -> dict[str, Array]:
     """Return the ends of arrows that a body carries three ways, turned by these angles."""
-    data = {"turn [rad]": np.asarray(turned)}
-    for name, (_, share) in CARRIED.items():
-        angle = np.pi / 6 + share * np.asarray(turned)
-        data |= {f"{name} x [1]": np.cos(angle), f"{name} y [1]": np.sin(angle)}
-    return data
+    angles = {name: np.pi / 6 + share * turned for name, (_, share) in CARRIED.items()}
+    ends = {name: np.stack([np.cos(a), np.sin(a)], axis=-1) for name, a in angles.items()}
+    return {"turn [rad]": turned} | columns("{} {} [1]", ends)
 
 
-def draw_carried(axes: Sequence[Axes], turned: Array) -> list[Any]:
+def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
     """Draw a body that turns in the plane, and an arrow carried three ways: BK (9)."""
-    data = carried_table(turned)
-    arrows: list[Any] = []
+    ends = vectors("{} {} [1]", carried_table(turned), "xy")
     for k, (ax, angle) in enumerate(zip(axes, turned, strict=True)):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         corners = turn @ np.array([[-0.7, 0.7, 0.7, -0.7], [-0.4, -0.4, 0.4, 0.4]])
         ax.fill(*corners, facecolor="0.93", edgecolor="0.5")
         ax.plot(*turn @ [[0.55], [0.25]], "o", color="0.5")  # a mark on the body
         for name, (colour, _) in CARRIED.items():
-            x, y = data[f"{name} x [1]"][k], data[f"{name} y [1]"][k]
-            arrows += ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
+            x, y = ends[name][k]
+            ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
             head = (3, 0, np.degrees(np.arctan2(y, x)) - 90)
             ax.plot(x, y, marker=head, ms=12, color=COLOURS[colour])
         ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), aspect="equal")
@@ -177,7 +167,6 @@ def draw_carried(axes: Sequence[Axes], turned: Array) -> list[Any]:
         ax.set_axis_off()
     handles, labels = axes[0].get_legend_handles_labels()
     axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    return arrows
 
 
 def describe_carried(turned: Array) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rbclassroom.figures import columns
 from rbcourse import Array, Ends, angle_between, exp_so3, geodesic_so3
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import draw_sphere
@@ -19,22 +20,14 @@ _NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v"
 def casteljau_table(
     t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
 ) -> dict[str, Array]:
-    """Return the points of `moving_casteljau` as a table: level 0 the given ones, 3 the curve.
-
-    Examples
-    --------
-    >>> ends = np.eye(3), np.eye(3), [0, 0, 1], [0, 0, 1]
-    >>> table = casteljau_table(np.array([0.5]), [[0, 0], [1, 1], [2, 1], [3, 0]], ends, [1, 0, 0])
-    >>> float(table["plane level 3 point 0 y [1]"][0])
-    0.75
-    """
-    return {"t [1]": t} | {
-        f"{name} level {k} point {j} {axis} [1]": column
+    """Return the points of `moving_casteljau` as a table: level 0 the given ones, 3 the curve."""
+    constructed = {
+        f"{name} level {k} point {j}": level[:, j]
         for name, (levels, _) in _constructions(t, points, ends, v).items()
         for k, level in enumerate(levels)
-        for j, point in enumerate(np.moveaxis(level, 1, 0))
-        for axis, column in zip("xyz", point.T, strict=False)
+        for j in range(4 - k)
     }
+    return {"t [1]": t} | columns("{} {} [1]", constructed)
 
 
 def moving_casteljau(
@@ -55,12 +48,11 @@ def moving_casteljau(
     draw_sphere(sphere)
     sphere.set_title("on SO(3), images of v", pad=18)
     panels = []
-    for ax, (name, (levels, legs)) in zip(
-        axes, _constructions(t, points, ends, v).items(), strict=True
-    ):
+    constructions = _constructions(t, points, ends, v)
+    for ax, (name, (levels, legs)) in zip(axes, constructions.items(), strict=True):
         lines: list[Any] = []
-        for leg, (colour, width) in zip(legs, _LOOKS, strict=True):
-            style: Any = {"color": colour, "lw": width, "ms": 8, "zorder": 3 + len(lines)}
+        for k, (leg, (colour, width)) in enumerate(zip(legs, _LOOKS, strict=True)):
+            style: Any = {"color": colour, "lw": width, "ms": 8, "zorder": 3 + k}
             corners = [*range(0, leg.shape[1], len(_SHARES)), leg.shape[1] - 1]
             lines += ax.plot(*leg[0].T, "o-", markevery=corners, **style)
         given = levels[0][0]
@@ -107,9 +99,11 @@ def _controls(ends: Sequence[ArrayLike]) -> Array:
 def _constructions(
     t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
 ) -> dict[str, tuple[list[Array], list[Array]]]:
+    """Return levels and legs, as `_construct` does, by the names of `_NAMES`."""
+    plane = _construct(t, np.asarray(points), lambda a, b, t: a + t[:, None, None] * (b - a))
     levels, legs = _construct(t, _controls(ends), _on_geodesic)
-    images = [R @ np.asarray(v) for R in levels], [R @ np.asarray(v) for R in legs]
-    return {"plane": _construct(t, np.asarray(points), _on_line), "sphere": images}
+    v = np.asarray(v)
+    return {"plane": plane, "sphere": ([R @ v for R in levels], [R @ v for R in legs])}
 
 
 def _construct(
@@ -123,10 +117,6 @@ def _construct(
         legs.append(np.stack(all_along, axis=2).reshape(len(t), -1, *points.shape[1:]))
         levels.append(between(first, last, t))
     return levels, legs
-
-
-def _on_line(first: Array, last: Array, t: Array) -> Array:
-    return first + t[:, None, None] * (last - first)
 
 
 def _on_geodesic(first: Array, last: Array, t: Array) -> Array:

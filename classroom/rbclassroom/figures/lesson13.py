@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from rbclassroom.figures import columns, vectors
 from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, Table
 
@@ -15,56 +16,38 @@ LOOKS: dict[str, dict[str, Any]] = {
     "least torque": {"color": COLOURS["x"], "ls": "--"},
 }
 """Three laws by which a body is turned, and the lines that stand for them."""
-_SPEEDS: dict[str, dict[str, Any]] = {
-    "least jerk": {"color": COLOURS["optimum"], "ls": "-"},
-    "projected quintic": {"color": COLOURS["projection"], "ls": "--"},
-}
+_SPEEDS = {"least jerk": ("optimum", "-"), "projected quintic": ("projection", "--")}
 
 
 def torques(curve: Curve, inertia: Array, t: Array) -> Array:
-    """Return the torques G w' + w × G w at the times t, in body axes, shape (times, 3).
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3, geodesic_so3
-    >>> c = geodesic_so3(np.eye(3), exp_so3([1.0, 1.0, 0]))
-    >>> torques(c, np.diag([1.0, 2, 2.5]), np.array([0.5])).round(12) + 0.0
-    array([[0., 0., 1.]])
-    """
+    """Return the torques G w' + w × G w at the times t, in body axes, shape (times, 3)."""
     w = curve(t, 1)
-    torque: Array = curve(t, 2) @ inertia + np.cross(w, w @ inertia)
-    return torque
+    return curve(t, 2) @ inertia + np.cross(w, w @ inertia)
 
 
 def torque_table(t: Array, curves: Mapping[str, Curve], inertia: Array) -> dict[str, Array]:
     """Return times and the torques of curves in body axes as columns, with their laws."""
     found = {name: torques(curve, inertia, t) for name, curve in curves.items()}
-    return {"t [s]": t} | {
-        f"{name} {axis} [N m]": column
-        for name, torque in found.items()
-        for axis, column in zip("xyz", torque.T, strict=True)
-    }
+    return {"t [s]": t} | columns("{} {} [N m]", found)
 
 
-def draw_torques(axes: Sequence[Axes], data: Table) -> list[Any]:
+def draw_torques(axes: Sequence[Axes], data: Table) -> None:
     """Draw for each law of a `torque_table` the three components of its torque, and its norm."""
-    lines: list[Any] = []
-    for ax, (law, torque) in zip(axes, _laws(data).items(), strict=True):
-        t = np.asarray(data["t [s]"])
+    t, laws = data["t [s]"], vectors("{} {} [N m]", data)
+    for ax, (law, torque) in zip(axes, laws.items(), strict=True):
         ax.axhline(0, color="0.8", lw=1, zorder=0)
         for axis, column in zip("xyz", torque.T, strict=True):
-            lines += ax.plot(t, column, color=COLOURS[axis], label=f"about {axis}")
-        lines += ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="‖τ‖")
+            ax.plot(t, column, color=COLOURS[axis], label=f"about {axis}")
+        ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="‖τ‖")
         ax.set(title=law, xlabel="time (s)")
     axes[0].set_ylabel("torque in body axes (N m)")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
-    return lines
 
 
 def describe_torques(data: Table) -> str:
     """Return in words what `draw_torques` shows."""
     said = []
-    for law, torque in _laws(data).items():
+    for law, torque in vectors("{} {} [N m]", data).items():
         largest = np.linalg.norm(torque, axis=-1).max()
         each = ", ".join(f"{x:.2g}" for x in np.abs(torque).max(axis=0))
         said.append(f"{law}: at most {largest:.2g} N m, about x, y, z at most {each}")
@@ -77,28 +60,15 @@ def speed_table(t: Array, curves: Mapping[str, Curve]) -> dict[str, Array]:
     return {"t [1]": t} | {f"{name} [rad]": speed for name, speed in speeds.items()}
 
 
-def draw_speeds(ax: Axes, data: Table) -> list[Any]:
+def draw_speeds(ax: Axes, data: Table) -> None:
     """Draw the speeds of a `speed_table` of the "least jerk" and the "projected quintic"."""
-    t = np.asarray(data["t [1]"])
-    lines = [
-        ax.plot(t, np.asarray(data[f"{name} [rad]"]), label=name, **style)[0]
-        for name, style in _SPEEDS.items()
-    ]
+    for name, (colour, dash) in _SPEEDS.items():
+        ax.plot(data["t [1]"], data[f"{name} [rad]"], label=name, color=COLOURS[colour], ls=dash)
     ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
     ax.legend()
-    return lines
 
 
 def describe_speeds(data: Table) -> str:
     """Return in words what `draw_speeds` shows."""
     said = (f"{name} at most {np.max(data[f'{name} [rad]']):.1f}" for name in _SPEEDS)
     return f"Angular speeds over time, in rad per unit time: {', '.join(said)}."
-
-
-def _laws(data: Table) -> dict[str, Array]:
-    """Return the torques by the names of their laws, shape (times, 3)."""
-    names = list(dict.fromkeys(column[: -len(" x [N m]")] for column in list(data)[1:]))
-    return {
-        name: np.stack([np.asarray(data[f"{name} {axis} [N m]"]) for axis in "xyz"], axis=-1)
-        for name in names
-    }

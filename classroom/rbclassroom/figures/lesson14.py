@@ -1,21 +1,18 @@
 """Lesson 14: speeds and accelerations of a motion."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from rbcourse import Curve
+from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, Table, in_words
 
 RATES = {
     1: ("angular speed [rad/s]", "speed [m/s]"),
     2: ("angular acceleration [rad/s²]", "acceleration [m/s²]"),
 }
-
-
 _TIME = "t [s]"
 
 
@@ -23,50 +20,35 @@ def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
     """Return how fast a motion turns and moves over time, or how strongly it is accelerated.
 
     They are the norms of the two halves of ``motion(t, order)``, order 1 or 2, at even times in s.
-
-    Raises
-    ------
-    ValueError
-        If it is no single motion on SE(3).
-
-    Examples
-    --------
-    >>> from rbcourse import geodesic_se3, pose_from_coordinates
-    >>> c = geodesic_se3(np.eye(4), pose_from_coordinates([0, 0, 1, 3, 4, 0]))
-    >>> {name: x.round(9).tolist() for name, x in profile_table(c, 1, 2).items()}
-    {'t [s]': [0.0, 1.0], 'angular speed [rad/s]': [1.0, 1.0], 'speed [m/s]': [5.0, 5.0]}
+    It has to be a single motion on SE(3).
     """
     t = np.linspace(*motion.domain, samples)
     rates = motion(t, order)
     if rates.shape != (samples, 6):
         raise ValueError("motion: a single curve on SE(3) wanted")
-    halves = np.split(rates, 2, axis=-1)
-    norms = (np.linalg.norm(half, axis=-1) for half in halves)
+    norms = np.linalg.norm(np.split(rates, 2, axis=-1), axis=-1)
     return {_TIME: t, **dict(zip(RATES[order], norms, strict=True))}
 
 
-def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> list[Any]:
+def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> None:
     """Draw each column over time, on axes of its own, and a thin line at each of some times."""
-    t, lines = np.asarray(data[_TIME]), []
-    for ax, (name, values) in zip(axes, _profiles(data), strict=True):
+    t = np.asarray(data[_TIME])
+    for ax, (label, unit, values) in zip(axes, _profiles(data), strict=True):
         for knot in np.asarray(knots):
             ax.axvline(knot, color=COLOURS["reference"], lw=0.8, ls=":")
-        lines += ax.plot(t, values, color=COLOURS["path"])
-        label, unit = name.removesuffix("]").split(" [")
+        ax.plot(t, values, color=COLOURS["path"])
         ax.set(ylabel=f"{label}\n({unit})", xlim=(t[0], t[-1]))
-        low, high = 1.08 * min(np.min(values), 0), 1.08 * max(np.max(values), 0)
+        low, high = 1.08 * np.minimum(values.min(), 0), 1.08 * np.maximum(values.max(), 0)
         ax.set_ylim(low, high if high > low else 1)
     axes[-1].set_xlabel("time (s)")
     axes[0].figure.align_ylabels(axes)
-    return lines
 
 
 def describe_profiles(data: Table, knots: ArrayLike) -> str:
     """Say how large each column of such a drawing becomes, and when."""
     t = np.asarray(data[_TIME])
     parts, labels = [], []
-    for name, values in _profiles(data):
-        label, unit = name.removesuffix("]").split(" [")
+    for label, unit, values in _profiles(data):
         labels.append(f"{label} ({unit})")
         scale, largest = np.abs(values).max(), int(np.argmax(np.round(values, 9)))
         low = f"from {in_words(values.min(), scale)} " if values.min() < -0.01 * scale else ""
@@ -79,5 +61,9 @@ def describe_profiles(data: Table, knots: ArrayLike) -> str:
     )
 
 
-def _profiles(data: Table) -> list[tuple[str, Any]]:
-    return [(name, np.asarray(values)) for name, values in data.items() if name != _TIME]
+def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
+    """Give the label, the unit and the values of each column but the time."""
+    for name, values in data.items():
+        label, unit = name.removesuffix("]").split(" [")
+        if name != _TIME:
+            yield label, unit, np.asarray(values)

@@ -9,19 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse import (
-    Array,
-    Curve,
-    Ends,
-    ProjectedPolynomial,
-    angle_between,
-    exp_so3,
-    exponential_cubic_long_so3,
-    hat_so3,
-    log_so3,
-    normal_cubic_so3,
-    sample_rotation,
-)
+import rbcourse as rb
+from rbcourse import Array, Curve, Ends, exp_so3, sample_rotation
 from rbcourse.draw.save import FORMS
 from rbcourse.metrics import weight_from_inertia
 from rbcourse.sampling import Rng
@@ -39,11 +28,11 @@ NEAR_ZERO = 1e-4
 """What costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖² is not divided by."""
 
 
-def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> ProjectedPolynomial:
+def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> rb.ProjectedPolynomial:
     """Return the stack of `projected_cubic_so3`, without looking for its margins, which is slow."""
-    M = R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1)
+    M = R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1)
     ends = np.stack(np.broadcast_arrays(*M), axis=-3)
-    return ProjectedPolynomial(duration=np.ones(ends.shape[:-3]), ends=ends)
+    return rb.ProjectedPolynomial(duration=np.ones(ends.shape[:-3]), ends=ends)
 
 
 WAYS: dict[str, Maker] = {**FORMS, "projection": projection}
@@ -57,21 +46,13 @@ def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
     """
     if inertia is None:
         return WAYS
-    return WAYS | {
-        "weighted": partial(_weighted, inertia),
-        "normal": partial(_normal, inertia),
-    }
+    makers = {"weighted": _weighted, "normal": rb.normal_cubic_so3}
+    return WAYS | {way: partial(make, inertia=inertia) for way, make in makers.items()}
 
 
-def _weighted(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
-    W = weight_from_inertia(inertia)
-    W = 3 * W / np.trace(W)
-    cubic = projection(R0, R1, w0, w1)
-    return replace(cubic, ends=cubic.ends @ W)
-
-
-def _normal(inertia: ArrayLike, R0: Array, R1: Array, w0: Array, w1: Array) -> Curve:
-    return normal_cubic_so3(R0, R1, w0, w1, inertia)
+def _weighted(R0: Array, R1: Array, w0: Array, w1: Array, inertia: ArrayLike) -> Curve:
+    W, cubic = weight_from_inertia(inertia), projection(R0, R1, w0, w1)
+    return replace(cubic, ends=cubic.ends @ (3 * W / np.trace(W)))
 
 
 def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng = None) -> Ends:
@@ -100,20 +81,15 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
     frames, R0 = sample_rotation(count, rng=rng), sample_rotation(count, rng=rng)
     axis, first, second = np.moveaxis(frames, -1, 0)
 
-    def directions(spin: Array) -> Array:
-        ways = {
-            "along": axis,
-            "across": np.cos(spin)[:, None] * first + np.sin(spin)[:, None] * second,
-        }
+    velocities = []
+    for size, spin in zip((v * np.cos(share), v * np.sin(share)), spins, strict=True):
+        across = np.cos(spin)[:, None] * first + np.sin(spin)[:, None] * second
+        ways = {"along": axis, "across": across}
         if "any" in families:
             ways["any"] = sample_rotation(count, rng=rng)[..., 0]
-        return np.choose(family[:, None], [ways[name] for name in families])
-
-    w0, w1 = (
-        size[:, None] * directions(spin)
-        for size, spin in zip((v * np.cos(share), v * np.sin(share)), spins, strict=True)
-    )
-    return Ends(R0, R0 @ exp_so3(angle[:, None] * axis), w0, w1)
+        direction = np.choose(family[:, None], [ways[name] for name in families])
+        velocities.append(size[:, None] * direction)
+    return Ends(R0, R0 @ exp_so3(angle[:, None] * axis), *velocities)
 
 
 def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
@@ -150,7 +126,7 @@ def starts() -> dict[str, Maker]:
     round.
     """
     return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
-        "long way round": exponential_cubic_long_so3
+        "long way round": rb.exponential_cubic_long_so3
     }
 
 
@@ -170,7 +146,7 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
         "right": (R @ Q, make(R0 @ Q, R1 @ Q, w0 @ Q, w1 @ Q)),
         "reversed": (R[::-1], make(R1, R0, -w1, -w0)),
     }
-    return {name: float(angle_between(A, curve(t)).max()) for name, (A, curve) in pairs.items()}
+    return {name: float(rb.angle_between(A, curve(t)).max()) for name, (A, curve) in pairs.items()}
 
 
 def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> NDArray[np.bool_]:
@@ -179,7 +155,7 @@ def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> N
     ‖x‖² stands for ½ xᵀ G x; for a ball G = 2 I.
     """
     half = np.eye(3) if inertia is None else np.asarray(inertia) / 2
-    sigma = log_so3(ends.R0.mT @ ends.R1)
+    sigma = rb.log_so3(ends.R0.mT @ ends.R1)
     size = sum(np.sum(x * (x @ half), axis=-1) for x in (sigma, ends.w0, ends.w1))
     return optimum < NEAR_ZERO * size
 

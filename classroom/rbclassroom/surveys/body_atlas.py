@@ -9,24 +9,17 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from itertools import product
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest, quantile_test
 from tqdm import tqdm
 
-from rbclassroom.surveys.atlas import (
-    CELLS,
-    FASTEST,
-    Maker,
-    atlas_problems,
-    cell_table,
-    closed_forms,
-    excesses,
-    rounded,
-)
+from rbclassroom.surveys import atlas
+from rbclassroom.surveys.atlas import CELLS, FASTEST
 from rbclassroom.surveys.survey import processes, survey
 from rbcourse import Array, Ends, bezier_long_so3, minimum_acceleration_so3
 from rbcourse.draw.save import csv_text
@@ -48,30 +41,20 @@ CURVES = (*CLOSED_FORMS, "two Béziers", "three", "ball's optimum")
 these and "normal", and "ball's optimum" the optimum for a ball, which is no closed form."""
 DOMAINS = {"small": 2, "medium": 5, "all": CELLS}
 """So many steps of the displacement, from 0, and of the end velocity belong to a domain."""
-SEEDS = 31, 32, 33
-"""Of the problems; the maps are of the first."""
-DRAWS = 200
-"""Problems in each of the 10 × 10 cells: 20,000."""
+SEEDS, DRAWS = (31, 32, 33), 200
+"""Seeds of the problems, the maps are of the first; and problems in each of the 10 × 10 cells."""
 TABLES = Path(__file__).parent
 """Where the tables of the atlas are stored."""
 
-_CONFIDENCE = 0.95
-
 
 def body_problems(draws: int, seed: int) -> Ends:
-    """Return the problems of the atlas: end velocities in any direction.
-
-    Examples
-    --------
-    >>> len(body_problems(2, 31).w0)
-    200
-    """
-    return atlas_problems(draws, ["any"], rng=seed)
+    """Return the problems of the atlas, `atlas_problems`: end velocities in any direction."""
+    return atlas.atlas_problems(draws, ["any"], rng=seed)
 
 
-def curves_for(body: str) -> dict[str, Maker]:
+def curves_for(body: str) -> dict[str, atlas.Maker]:
     """Return the curves that a survey needs for the excesses of `CURVES`."""
-    compared = closed_forms(BODIES[body])
+    compared = atlas.closed_forms(BODIES[body])
     return {
         **{name: compared[name] for name in CLOSED_FORMS},
         "other way": bezier_long_so3,
@@ -87,13 +70,7 @@ def with_choices(excess: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def domain(name: str, draws: int) -> NDArray[np.bool_]:
-    """Return which of the `body_problems` belong to a domain.
-
-    Examples
-    --------
-    >>> int(domain("small", 200).sum())
-    800
-    """
+    """Return which of the `body_problems` belong to a domain."""
     turn, speed, _ = np.indices((CELLS, CELLS, draws)).reshape(3, -1)
     return (turn < DOMAINS[name]) & (speed < DOMAINS[name])
 
@@ -114,15 +91,11 @@ def maps(excess: Mapping[str, Mapping[str, Array]], draws: int) -> dict[str, Arr
     """Return the medians and the 90 % quantiles in each cell, for each body, as a table."""
     parts = []
     for body, of_body in excess.items():
-        tables = {
-            name: cell_table(of_body, draws, share, ["any"])
-            for name, share in (("median", 0.5), ("90 %", 0.9))
-        }
-        part: dict[str, Array] = {"body": np.full(CELLS**2, body)}
-        part |= {key: x for key, x in tables["median"].items() if "excess" not in key}
-        for name, table in tables.items():
-            part |= {f"{curve} {name} [1]": table[f"{curve} excess [1]"] for curve in CURVES}
-        del part["family"]
+        part = {"body": np.full(CELLS**2, body)}
+        for name, share in (("median", 0.5), ("90 %", 0.9)):
+            table = atlas.cell_table(of_body, draws, share, ["any"])
+            del table["family"]
+            part |= {key.replace("excess", name): x for key, x in table.items()}
         parts.append(part)
     return _joined(parts)
 
@@ -143,36 +116,30 @@ def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
     rows = []
     for name in DOMAINS:
         inside = domain(name, draws) & known
-        for curve in CURVES:
+        for k, curve in enumerate(CURVES):
             x = excess[curve][inside]
             row: dict[str, object] = {"domain": name, "curve": curve, "problems [1]": len(x)}
-            for words, share in (("median", 0.5), ("90 %", 0.9)):
-                row |= _with_ends(words, float(np.quantile(x, share)), *_around(x, share))
-            row |= _share("within a tenth", x < 0.1)
-            row |= _share(
-                "cheapest",
-                cheapest[inside] == CLOSED_FORMS.index(curve) if curve in CLOSED_FORMS else None,
-            )
+            closed = curve in CLOSED_FORMS
+            for words, values in {
+                "median": _quantile(x, 0.5),
+                "90 %": _quantile(x, 0.9),
+                "within a tenth": _share(x < 0.1),
+                "cheapest": _share(cheapest[inside] == k) if closed else [np.nan] * 3,
+            }.items():
+                keys = f"{words} [1]", f"{words} low [1]", f"{words} high [1]"
+                row |= dict(zip(keys, atlas.rounded(np.array(values)), strict=True))
             rows.append(row)
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
-def _around(x: Array, share: float) -> tuple[float, float]:
-    interval = quantile_test(x, p=share).confidence_interval(_CONFIDENCE)
-    return float(interval.low), float(interval.high)
+def _quantile(x: Array, share: float) -> list[float]:
+    interval = quantile_test(x, p=share).confidence_interval(0.95)
+    return [np.quantile(x, share), interval.low, interval.high]
 
 
-def _share(words: str, chosen: NDArray[np.bool_] | None) -> dict[str, float]:
-    if chosen is None:
-        return _with_ends(words, np.nan, np.nan, np.nan)
-    test = binomtest(int(chosen.sum()), len(chosen))
-    interval = test.proportion_ci(_CONFIDENCE)
-    return _with_ends(words, float(chosen.mean()), float(interval.low), float(interval.high))
-
-
-def _with_ends(words: str, value: float, low: float, high: float) -> dict[str, float]:
-    keys = f"{words} [1]", f"{words} low [1]", f"{words} high [1]"
-    return dict(zip(keys, rounded(np.array([value, low, high])).tolist(), strict=True))
+def _share(chosen: NDArray[np.bool_]) -> list[float]:
+    interval = binomtest(int(chosen.sum()), len(chosen)).proportion_ci(0.95)
+    return [chosen.mean(), interval.low, interval.high]
 
 
 def stored(table: str) -> dict[str, NDArray[Any]]:
@@ -189,64 +156,63 @@ def stored(table: str) -> dict[str, NDArray[Any]]:
         raise ValueError(f"table: 'maps' or 'intervals' wanted, got {table!r}")
     with (TABLES / f"atlas_{table}.csv").open(encoding="utf-8", newline="") as file:
         names, *rows = csv.reader(file)
-    columns = dict(zip(names, zip(*rows, strict=True), strict=True))
-    return {
-        name: np.array(column, float if name.endswith("]") else str)
-        for name, column in columns.items()
-    }
+    columns = zip(names, zip(*rows, strict=True), strict=True)
+    return {name: np.array(x, float if name.endswith("]") else str) for name, x in columns}
 
 
 def make_tables(
-    chunks: Path,
+    store: Path,
+    executor: Executor,
     tables: Path = TABLES,
     draws: int = DRAWS,
     seeds: Sequence[int] = SEEDS,
-    executor: Executor | None = None,
 ) -> None:
     """Compute the atlas, and write `maps` of the first seed and the `intervals` of each.
 
-    The costs of each body and seed are kept in a file of the folder `chunks`, so that a run that
-    was stopped goes on. The files are deleted when the `tables` are written.
+    The costs of each body and seed are kept in the file `store`, so that a run that was stopped
+    goes on. It is deleted when the `tables` are written.
     """
-    if executor is None:
-        with processes() as own:
-            return make_tables(chunks, tables, draws, seeds, own)
-    parts, first, kept = [], {}, []
-    for seed in seeds:
-        problems = body_problems(draws, seed)
-        for body, inertia in BODIES.items():
-            kept.append(chunks / f"{body}-{seed}-{draws}.npz")
-            costs = _kept_costs(kept[-1], problems, body, executor)
-            excess = with_choices(excesses(problems, costs, inertia))
-            if seed == seeds[0]:
-                first[body] = excess
-            table = intervals(excess, draws)
-            count = len(table["curve"])
-            parts.append({"seed [1]": np.full(count, seed), "body": np.full(count, body), **table})
+    kept: dict[str, Any] = {}
+    if store.exists():
+        with np.load(store) as file:
+            kept = dict(file)
+    parts, first = list[dict[str, Array]](), dict[str, dict[str, Array]]()
+    for seed, (body, inertia) in product(seeds, BODIES.items()):
+        problems, key = body_problems(draws, seed), f"{body}-{seed}-{draws}"
+        if key not in kept:
+            kept[key] = _costs(key, problems, body, executor)
+            _write(store, kept)
+        costs = dict(zip(["optimum", *curves_for(body)], kept[key], strict=True))
+        excess = with_choices(atlas.excesses(problems, costs, inertia))
+        first.setdefault(body, excess)
+        table = intervals(excess, draws)
+        named = {"seed [1]": seed, "body": body}
+        parts.append({k: np.full(len(table["curve"]), x) for k, x in named.items()} | table)
     for name, table in {"maps": maps(first, draws), "intervals": _joined(parts)}.items():
         text = csv_text(table)
         (tables / f"atlas_{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-    for path in kept:
-        path.unlink()
+    store.unlink()
 
 
-def _kept_costs(path: Path, problems: Ends, body: str, executor: Executor) -> dict[str, Array]:
-    """Return the costs of a file; where it is missing, compute them and write it."""
-    if path.exists():
-        return dict(np.load(path))
-    with tqdm(desc=path.stem, total=len(problems.w0), unit="problem") as bar:
+def _costs(key: str, problems: Ends, body: str, executor: Executor) -> Array:
+    """Survey a body, with a bar."""
+    with tqdm(desc=key, total=len(problems.w0), unit="problem") as bar:
 
         def report(done: int, total: int) -> None:
             bar.update(done - bar.n)
 
         inertia, ways = BODIES[body], curves_for(body)
-        costs = survey(problems, executor, inertia=inertia, ways=ways, report=report)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
+        found = survey(problems, executor, inertia=inertia, ways=ways, report=report)
+    return np.stack(list(found.values()))
+
+
+def _write(store: Path, kept: dict[str, Any]) -> None:
+    """Replace the file at once: it is never half written."""
+    store.parent.mkdir(parents=True, exist_ok=True)
+    part = store.with_suffix(".part")
     with part.open("wb") as file:
-        np.savez(file, **cast(dict[str, Any], costs))
-    part.replace(path)
-    return costs
+        np.savez(file, **kept)
+    part.replace(store)
 
 
 def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -255,6 +221,7 @@ def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 if __name__ == "__main__":
     own = Path(".atlas")
-    make_tables(own)
+    with processes() as pool:
+        make_tables(own / "costs.npz", pool)
     own.rmdir()
     print(f"{TABLES / 'atlas_maps.csv'} and atlas_intervals.csv are written.")

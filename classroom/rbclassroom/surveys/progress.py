@@ -4,30 +4,8 @@ import html
 from collections.abc import Callable
 from typing import Any
 
+from IPython import get_ipython
 from IPython.display import display
-
-
-class Stage:
-    """What the bar shows at one time.
-
-    Parameters
-    ----------
-    what : str
-        What is computed.
-    done, total : int
-        How much of it there is.
-    """
-
-    def __init__(self, what: str, done: int, total: int) -> None:
-        self.what, self.done, self.total = what, done, total
-
-    def __repr__(self) -> str:
-        """Return the stage as a line of text."""
-        return f"{self.what}: {self.done:,} of {self.total:,}"
-
-    def _repr_html_(self) -> str:
-        bar = f'<progress max="{self.total}" value="{self.done}"></progress> '
-        return f"<div>{bar if self.done < self.total else ''}{html.escape(repr(self))}</div>"
 
 
 def bar(what: str) -> Callable[[int, int], None]:
@@ -43,10 +21,14 @@ def bar(what: str) -> Callable[[int, int], None]:
 
     def report(done: int, total: int) -> None:
         nonlocal handle
-        stage = Stage(what, done, total)
-        if handle is None:
-            handle = display(stage, display_id=True)
+        line = f"{what}: {done:,} of {total:,}"
+        bar = f'<progress max="{total}" value="{done}"></progress> ' if done < total else ""
+        stage = {"text/plain": line, "text/html": f"<div>{bar}{html.escape(line)}</div>"}
+        if get_ipython() is None:
+            print(line)
+        elif handle is None:
+            handle = display(stage, raw=True, display_id=True)
         else:
-            handle.update(stage)
+            handle.update(stage, raw=True)
 
     return report

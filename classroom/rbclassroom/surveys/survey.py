@@ -6,9 +6,9 @@ import os
 import pickle
 import signal
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from inspect import signature
 from multiprocessing import get_context, parent_process
@@ -18,18 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
+import rbcourse as rb
 from rbclassroom.surveys.atlas import Maker, closed_forms, starts
-from rbcourse import (
-    Array,
-    Curve,
-    Ends,
-    acceleration_cost,
-    geodesic_so3,
-    minimum_acceleration_so3,
-    stationary_so3,
-)
+from rbcourse import Array, Ends
 
 Report = Callable[[int, int], object]
+Measures = Mapping[str, Callable[[Ends], Array]]
 
 CHUNK = 500
 """So many problems are computed together."""
@@ -54,12 +48,13 @@ def survey(
     executor : concurrent.futures.Executor, optional
         It computes the chunks of `CHUNK` problems: any executor whose workers can import
         `rbcourse`, for example ``Client(...).get_executor()`` of dask.distributed for a cluster. By
-        default `processes`, on all processors of this machine; a single chunk is computed in this
-        process.
+        default `processes`, on all processors of this machine, for which a script has to call this
+        function below ``if __name__ == "__main__":``; a single chunk is computed in this process.
     inertia : array_like, shape (3, 3), optional
         Of the body, in body axes. By default the body is a ball.
     ways : mapping of str to callable, optional
-        The curves that are compared, ``make(R0, R1, w0, w1)``; by default `closed_forms`.
+        The curves that are compared, ``make(R0, R1, w0, w1)``; by default `closed_forms`. Those
+        that are sent to other processes are functions of a module, or partials of these.
     report : callable, optional
         ``report(done, total)`` is called after each chunk with numbers of problems.
 
@@ -76,12 +71,6 @@ def survey(
         If `ways` cannot be sent to another process, if a way has no curve for one of the problems,
         or if an integral does not settle. The message names the way and the chunk.
 
-    Notes
-    -----
-    Ways that are sent to other processes have to be functions of a module, or partials of these;
-    functions of a notebook are not. A script has to call this function below
-    ``if __name__ == "__main__":``, as each new process imports the script.
-
     Examples
     --------
     >>> from rbclassroom.surveys.atlas import random_problems
@@ -90,18 +79,19 @@ def survey(
     True
     """
     if inertia is not None:
-        acceleration_cost(geodesic_so3(np.eye(3), np.eye(3)), inertia)  # raises if it is invalid
-        inertia = np.asarray(inertia, float)
-    ways = dict(closed_forms(inertia) if ways is None else ways)
+        rb.acceleration_cost(
+            rb.geodesic_so3(np.eye(3), np.eye(3)), inertia
+        )  # raises if it is invalid
+    ways = closed_forms(inertia) if ways is None else ways
     for name, make in ways.items():
-        if not callable(make):
-            raise ValueError(f"ways: {name!r} is no function")
-        if (asked := _not_given(make)) is not None:
-            raise ValueError(f"ways: {name!r} is called with R0, R1, w0, w1: {asked}")
-        if name == "optimum":
-            raise ValueError("ways: 'optimum' is the name of what all are compared with")
-    work = partial(_costs, inertia, tuple(ways.items()))
-    return _in_chunks(work, ["optimum", *ways], problems, executor, report)
+        try:
+            signature(make).bind(*Ends._fields)
+        except TypeError as error:
+            raise ValueError(f"ways: {name!r} is called with R0, R1, w0, w1: {error}") from error
+    if "optimum" in ways:
+        raise ValueError("ways: 'optimum' is the name of what all are compared with")
+    measures = {name: partial(costs, make, inertia=inertia) for name, make in ways.items()}
+    return _in_chunks({"optimum": partial(_least, inertia), **measures}, problems, executor, report)
 
 
 def several_starts(
@@ -113,7 +103,8 @@ def several_starts(
     `survey`. The curves are stationary; none is proven to be the best. NaN where none is found
     (BK (19)).
     """
-    return _in_chunks(_from_each_start, list(starts()), problems, executor, report)
+    measures = {name: partial(_stationary, make) for name, make in starts().items()}
+    return _in_chunks(measures, problems, executor, report)
 
 
 def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Array:
@@ -130,50 +121,65 @@ def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Arra
     >>> bool(np.allclose(costs(projected_cubic_so3, ends), exact, rtol=1e-6))
     True
     """
-    problems, curve = _checked(problems), make(*problems)
-    if (
-        not isinstance(curve, Curve)
-        or (curve.size, curve.domain) != (3, (0, 1))
-        or curve.batch_shape != problems.w0.shape[:-1]
-    ):
+    curve = make(*problems)
+    wanted = 3, (0, 1), problems.w0.shape[:-1]
+    if not isinstance(curve, rb.Curve) or (curve.size, curve.domain, curve.batch_shape) != wanted:
         raise ValueError(f"make: curves on SO(3) and [0, 1] are wanted, one each, got {curve!r}")
-    return acceleration_cost(curve, inertia, rtol=1e-6)
+    return rb.acceleration_cost(curve, inertia, rtol=1e-6)
 
 
-def _checked(problems: Ends) -> Ends:
-    problems = Ends(*problems)
-    if problems.w0.ndim != 2:
-        raise ValueError(f"problems: one batch axis is wanted, got {problems.w0.shape[:-1]}")
-    return problems
+def _least(inertia: ArrayLike | None, chunk: Ends) -> Array:
+    with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):  # there, NaN says it
+        return np.asarray(rb.minimum_acceleration_so3(*chunk, inertia).cost)
+
+
+def _stationary(make: Maker, chunk: Ends) -> Array:
+    return np.asarray(rb.stationary_so3(make(*chunk)).cost)
 
 
 def _in_chunks(
-    work: Callable[[Ends], Array],
-    names: Sequence[str],
+    measures: Measures,
     problems: Ends,
     executor: Executor | None,
     report: Report | None,
 ) -> dict[str, Array]:
-    """Return ``work(chunk)``, shape (len(names), n), of all chunks together, by name."""
-    problems = _checked(problems)
+    """Return the values of some functions of N problems, computed chunk by chunk."""
+    problems, work = Ends(*problems), partial(_of_chunk, measures)
+    if problems.w0.ndim != 2:
+        raise ValueError(f"problems: one batch axis is wanted, got {problems.w0.shape[:-1]}")
     total = len(problems.w0)
-    chunks = [problems.take(slice(k, k + CHUNK)) for k in range(0, total, CHUNK)]
-    if executor is None and len(chunks) > 1:
-        _check_that_it_can_be_sent(work)
-        with processes() as own:
-            return _in_chunks(work, names, problems, own, report)
-    alone, found = partial(_alone, os.getpid(), work), list[Array]([np.empty((len(names), 0))])
-    with threadpool_limits(1):
-        results = iter(map(alone, chunks) if executor is None else executor.map(alone, chunks))
-        for k in range(len(chunks)):
+    firsts = range(0, total, CHUNK)
+    chunks = [problems.take(slice(first, first + CHUNK)) for first in firsts]
+    parts: list[Array] = [np.empty((len(measures), 0))]
+    with ExitStack() as stack:
+        if executor is None and len(chunks) > 1:
             try:
-                found.append(next(results))
+                pickle.dumps(work)
+            except (pickle.PicklingError, AttributeError, TypeError) as error:
+                raise ValueError(
+                    "ways: functions of a module, or partials of these, are wanted, for they are "
+                    f"sent to other processes ({error})"
+                ) from error
+            executor = stack.enter_context(processes())
+        stack.enter_context(threadpool_limits(1))  # of threads, which share it, until all are done
+        compute = map if executor is None else executor.map
+        for part in compute(work, firsts, chunks):
+            parts.append(part)
+            if report:
+                report(min(total, (len(parts) - 1) * CHUNK), total)
+    return dict(zip(measures, np.concatenate(parts, axis=-1), strict=True))
+
+
+def _of_chunk(measures: Measures, first: int, chunk: Ends) -> Array:
+    with threadpool_limits(1):
+        rows = []
+        for name, measure in measures.items():
+            try:
+                rows.append(measure(chunk))
             except (ValueError, RuntimeError) as error:
                 kind = ValueError if isinstance(error, ValueError) else RuntimeError
-                raise kind(f"chunk {k}, from problem {k * CHUNK} on: {error}") from error
-            if report:
-                report(min(total, (k + 1) * CHUNK), total)
-    return dict(zip(names, np.concatenate(found, axis=-1), strict=True))
+                raise kind(f"chunk from problem {first} on: {name}: {error}") from error
+        return np.stack(rows)
 
 
 @contextmanager
@@ -184,12 +190,11 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     block, and when this process is killed. When an error or Ctrl-C ends the block, the chunks that
     have not begun are dropped.
     """
-    with ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def _end_with_parent() -> None:
@@ -203,49 +208,3 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     Thread(target=wait, daemon=True).start()
-
-
-def _check_that_it_can_be_sent(work: Callable[[Ends], Array]) -> None:
-    try:
-        pickle.dumps(work)
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise ValueError(
-            f"ways: functions of a module, or partials of these, are wanted, for they are sent to "
-            f"other processes ({error})"
-        ) from error
-
-
-def _alone(own: int, work: Callable[[Ends], Array], chunk: Ends) -> Array:
-    """Return ``work(chunk)``, with one BLAS thread in another process than `own`."""
-    if os.getpid() == own:  # where it is limited while the survey lasts
-        return work(chunk)
-    with threadpool_limits(1):
-        return work(chunk)
-
-
-def _not_given(make: Maker) -> str | None:
-    """Return why a function cannot be called with four arguments; None if it can."""
-    try:
-        signature(make).bind(*Ends._fields)
-    except TypeError as error:
-        return str(error)
-    except ValueError:  # of a function without a signature
-        return None
-    return None
-
-
-def _costs(inertia: Array | None, ways: Sequence[tuple[str, Maker]], chunk: Ends) -> Array:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # where none is found there is NaN
-        found = [np.asarray(minimum_acceleration_so3(*chunk, inertia).cost)]
-    for name, make in ways:
-        try:
-            found.append(costs(make, chunk, inertia))
-        except (ValueError, RuntimeError) as error:
-            kind = ValueError if isinstance(error, ValueError) else RuntimeError
-            raise kind(f"{name}: {error}") from error
-    return np.stack(found)
-
-
-def _from_each_start(chunk: Ends) -> Array:
-    return np.stack([stationary_so3(make(*chunk)).cost for make in starts().values()])

@@ -34,7 +34,7 @@ def show(home, page):
     with ExitStack() as stack:
 
         def shown(number, *further):
-            words = ["rbclassroom.course.lecture", number, "--no-browser", *further]
+            words = ["rbclassroom.course.show", number, "--no-browser", *further]
             address = r"(http://127\.0\.0\.1:\d+/\?token=\w+)"
             page.set_viewport_size({"width": 1024, "height": 768})
             page.goto(stack.enter_context(serving(words, course, env, address))[1])

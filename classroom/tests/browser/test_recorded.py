@@ -1,102 +1,126 @@
-"""The recorded explorers in Chromium, as files on a disk: no kernel and no server."""
+"""Players in Chromium, and recorded explorers of each kind: no kernel and no server."""
 
 import html
+import io
 import re
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.patches import Annulus
 from pixels import check_alike, shown
 
 from rbclassroom import explorers
 from rbclassroom.explorers import recorded
+from rbcourse.draw import animate
 
 FOLDER = Path(__file__).parents[3] / "figures" / "explorers"
 
 
-@pytest.fixture(params=sorted(recorded.MOVED))
-def opened(request, page):
-    """The name of an explorer, the explorer, and its page, open."""
+@plt.style.context(["default", "rbcourse.rbcourse"])
+def test_a_player_equals_the_drawing_plays_and_is_a_still_where_it_cannot_be_unpacked(page):
+    """Holes, dashes, corners, and lines that are cut at the edges of the axes."""
+    fig, ax = plt.subplots(figsize=(9, 4), dpi=80)
+    ax.set(xlim=(0, 9), ylim=(0, 4))
+    ring = ax.add_patch(Annulus((0, 2), 1.9, 1.2, fc="#0072B2", ec="black", lw=4))
+    (line,) = ax.plot([0, 2, 4, 9], [0, 4, 0, 30], color="#D55E00", ls=(0, (4, 2)), lw=12)
+
+    def update(i):
+        ring.center = i / 4, 2
+        line.set_xdata([i / 4, 2, 4, 9])
+        return [ring, line]
+
+    player = animate.animate(fig, "player", "what moves", update, 20, seconds=0.8, still=0)
+    page.clock.install()
+    page.set_viewport_size({"width": 1600, "height": 1000})
+    page.set_content(f"<!doctype html>{player._repr_html_()}")
+    button, slider = page.get_by_role("button", name="play or pause"), page.locator("input")
+    canvas = page.get_by_role("img", name="what moves").and_(page.locator("canvas"))
+    canvas.evaluate("(canvas) => canvas.style.width = 2 * parseFloat(canvas.style.width) + 'px'")
+    button.press("Enter")
+    page.clock.run_for(280)
+    button.press("Enter")
+    page.clock.run_for(1000)
+    assert slider.input_value() == "7"
+    for frame, share in ((7, "37 %"), (19, "100 %")):
+        slider.fill(str(frame))
+        assert slider.get_attribute("aria-valuetext") == share
+        for artist in update(frame):
+            artist.set_animated(False)
+        fig.savefig(full := io.BytesIO(), format="png", dpi=2 * fig.dpi)
+        check_alike(shown(canvas), full.getvalue(), player.background)
+    plt.close(fig)
+    button.press("Enter")
+    page.clock.run_for(40)
+    assert slider.input_value() == "0"
+    without = "<!doctype html><script>DecompressionStream = undefined</script>"
+    page.set_content(without + player._repr_html_())
+    assert page.locator("img").is_visible()
+    assert page.locator("button, img[data-read]").count() == 0
+
+
+@pytest.mark.parametrize("name", ["planar", "chain", "random", "minimum_acceleration", "cube"])
+def test_a_page_shows_what_the_explorer_shows_and_keys_and_mouse_move_it(name, page):
+    page.clock.install()
     page.set_viewport_size({"width": 1400, "height": 1000})
-    page.goto((FOLDER / f"{request.param}.html").as_uri())
-    page.locator("canvas").wait_for()
-    return request.param, getattr(explorers, f"{request.param}_explorer")(), page
-
-
-def test_the_canvas_shows_what_matplotlib_draws_and_the_text_what_the_explorer_says(opened):
-    """At random states."""
-    name, explorer, page = opened
-    moved, values = recorded.MOVED[name]
-    values = list(explorer.controls[moved].options) if values is None else values.tolist()
-    canvas, sliders = page.locator("canvas"), page.locator("input")
-    canvas.evaluate(
-        "(canvas) => { canvas.style.width = '1120px'; canvas.style.maxWidth = 'none'; }"
-    )
+    page.goto((FOLDER / f"{name}.html").as_uri())
+    explorer, (moved, values) = getattr(explorers, f"{name}_explorer")(), recorded.MOVED[name]
+    canvas, first, time = page.locator("canvas"), *map(page.locator("input").nth, (0, 1))
+    canvas.evaluate("(canvas) => { canvas.style = 'display: block; width: 1120px'; }")
     rng = np.random.default_rng(1)
-    for _ in range(4):
+    for _ in range(2):
         k, i = int(rng.integers(len(values))), int(rng.integers(len(explorer.steps)))
-        sliders.first.fill(str(k))
-        sliders.last.fill(str(i))
-        now = {moved: values[k], explorer.plays: explorer.steps[i]}
-        state = explorer.state(**now)
+        first.fill(str(k))
+        time.fill(str(i))
+        state = explorer.state(**{moved: values[k], explorer.plays: explorer.steps[i]})
         check_alike(shown(canvas), explorer.draw(state.shown, zoom=2), explorer.background)
         rows = page.locator("tr").evaluate_all(
             "(rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent))"
         )
-        assert rows == [list(pair) for pair in state.said.items()]
+        said, _, line = state.texts
+        assert rows == [list(pair) for pair in said]
         seen = page.locator(".rbcourse-view output").all_inner_texts()
-        assert canvas.get_attribute("aria-label") == " ".join([state.line, *seen])
-
-
-def test_keys_and_mouse_move_every_control(opened):
-    _, explorer, page = opened
-    canvas, sliders = page.locator("canvas"), page.locator("input")
-    assert sliders.count() == 2
-    labels = [slider.get_attribute("aria-label") for slider in sliders.all()]
-    assert labels[1] == explorer.time.description
-    for slider in reversed(sliders.all()):
+        assert canvas.get_attribute("aria-label") == " ".join([line, *seen])
+    for slider, name in ((time, explorer.plays), (first, moved)):
+        assert slider.get_attribute("aria-label") == explorer.controls[name].description
         box = slider.bounding_box()
         page.mouse.click(box["x"] + 1, box["y"] + box["height"] / 2)
         low = slider.get_attribute("aria-valuetext"), shown(canvas)
-        slider.focus()
         page.keyboard.press("End")
-        high = slider.get_attribute("aria-valuetext"), shown(canvas)
-        assert low[0] != high[0]
-        assert low[1] != high[1]
-        assert page.get_by_text(high[0], exact=True).count()
+        text = slider.get_attribute("aria-valuetext")
+        assert low[0] != text
+        assert low[1] != shown(canvas)
+        assert page.get_by_text(text, exact=True).count()
         slider.fill(str(round(0.6 * float(slider.get_attribute("max")))))  # where all is seen
-    page.locator("[role=status]").filter(has_text=canvas.get_attribute("aria-label")).wait_for()
-    play = page.get_by_role("button", name="play or pause")
-    sliders.last.fill("0")
-    play.press("Enter")
-    page.wait_for_function("[...document.querySelectorAll('input')].at(-1).value > 2")
-    play.press("Enter")
+    if explorer.display.rooms:
+        before = shown(canvas)
+        canvas.press("ArrowLeft")
+        assert shown(canvas) != before
+    page.clock.run_for(500)
+    assert page.locator("[role=status]").inner_text() in canvas.get_attribute("aria-label")
+    time.fill("0")
+    page.get_by_role("button", name="play or pause").press("Enter")
+    page.clock.run_for(3 * explorer.play.interval)
+    assert time.input_value() == "3"
 
 
-def test_who_wants_little_motion_sees_few_steps(page):
+def test_few_steps_are_shown_where_little_motion_is_wanted(page):
+    page.clock.install()
     page.emulate_media(reduced_motion="reduce")
     page.goto((FOLDER / "theta.html").as_uri())
-    page.locator("canvas").wait_for()
-    page.evaluate(
-        """() => {
-            window.seen = new Set();
-            const time = [...document.querySelectorAll("input")].at(-1);
-            const look = () => { seen.add(time.value); requestAnimationFrame(look); };
-            look();
-            document.querySelector("button[aria-label]").click();
-        }"""
-    )
-    page.wait_for_function("seen.size > 4")
-    assert page.evaluate("[...seen].map(Number)") == [0, 20, 40, 60, 80]
+    page.get_by_role("button", name="play or pause").click()
+    for step in (20, 40, 60, 80):
+        page.clock.run_for(800)
+        assert page.locator("input").last.input_value() == str(step)
 
 
-@pytest.mark.parametrize("name", sorted(recorded.MOVED))
-def test_without_scripts_a_page_is_its_still_and_says_what_is_missing(name, context):
-    content = (FOLDER / f"{name}.html").read_text(encoding="utf-8")
+def test_without_scripts_a_page_is_its_still_and_says_what_is_missing(context):
+    file = FOLDER / "theta.html"
     plain = context.browser.new_context(java_script_enabled=False)
     page = plain.new_page()
-    page.goto((FOLDER / f"{name}.html").as_uri())
-    alt = html.unescape(re.search(r'alt="([^"]*)"', content)[1])
+    page.goto(file.as_uri())
+    alt = html.unescape(re.search(r'alt="([^"]*)"', file.read_text(encoding="utf-8"))[1])
     assert page.get_by_role("img", name=alt, exact=True).is_visible()
     assert page.get_by_text("In the lesson, with Python, every control moves").is_visible()
     assert page.locator("input, button, canvas").count() == 0

@@ -10,7 +10,8 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from tiny import ask, lecture, lesson_at
 
-from rbclassroom.course.lecture import find_lesson, main, mark_sections
+from rbclassroom.course.lecture import find_lesson, mark_sections
+from rbclassroom.course.show import main
 
 
 def answer(text):

@@ -18,7 +18,7 @@ def checked(folder, monkeypatch):
     """Check the lesson of a folder; any program will do as the browser, it is not opened."""
     monkeypatch.setenv("BROWSER", sys.executable)
     return subprocess.run(
-        [*MODULE, "rbclassroom.course.lecture", "1", "--check"],
+        [*MODULE, "rbclassroom.course.show", "1", "--check"],
         cwd=folder,
         capture_output=True,
         text=True,

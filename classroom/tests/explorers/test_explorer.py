@@ -1,215 +1,163 @@
-"""What all explorers have in common, on a small one."""
+"""What all explorers have in common: the protocol on a small one, and each of them complete."""
 
 import io
 import json
+import re
 import warnings
+from pathlib import Path
 
 import ipywidgets
+import matplotlib as mpl
+import nbformat
 import numpy as np
 import pytest
 from ipywidgets.widgets.widget import _remove_buffers
+from matplotlib.text import Text
 from PIL import Image
-from sweeps import notice, tell
+from sweeps import made, notice, tell
 from traitlets import TraitError
 
+from rbclassroom import explorers
 from rbclassroom.course.agreement import polygons, split
-from rbclassroom.explorers.explorer import LABELS, Explorer, look, new_figure, new_line
+from rbclassroom.course.notebooks import lesson_paths
+from rbclassroom.explorers.explorer import LABELS, Explorer, new_figure, new_line
 from rbclassroom.explorers.widgets import choice, slider, stepped
 
 FAR, WARN = 9.0, 8.0
+FIRST = [[("place", "2.0\nlow")], "", "A dot. place: 2.0 low"]
 
 
-def show_in(line):
+@pytest.fixture
+def explorer():
+    with new_figure() as fig:
+        ax = fig.add_axes((0.1, 0.15, 0.8, 0.8))
+        ax.set(xlim=(0, 10), ylim=(-1, 2))
+        line = new_line(ax, marker="o", ls="", color="black")
+    controls = {"x": stepped("x (m)", 2.0, 0.0, 10.0, 0.5), "kind": choice("kind", ["low", "high"])}
+
     def show(x, kind):
         if x == FAR:
             raise ValueError("x: too <far>")
         if x == WARN:
             warnings.warn("nearly too far", stacklevel=1)
-        line.set_data([x], [0 if kind == "low" else 1])
+        line.set_data([x], [kind == "high"])
         return {"place": f"{x:.1f}\n{kind}"}
 
-    return show
+    def point(x, y):
+        if x < 100:
+            raise ValueError(f"click more to the right than {x:g}, {y:g}")
+        return {"x": 4.0, "kind": "high"}
 
-
-@pytest.fixture
-def explorer():
-    with look():
-        fig = new_figure()
-        ax = fig.add_axes((0.1, 0.15, 0.8, 0.8))
-        ax.set(xlim=(0, 10), ylim=(-1, 2))
-        line = new_line(ax, marker="o", ls="", color="black")
-    controls = {"x": stepped("x (m)", 2.0, 0.0, 10.0, 0.5), "kind": choice("kind", ["low", "high"])}
-    return Explorer("A dot", fig, {"dot": line}, controls, show_in(line), plays="x", point=place)
-
-
-def place(x, y):
-    if x < 100:
-        raise ValueError("click more to the right")
-    return {"x": 4.0, "kind": "high"}
+    return Explorer("A dot", fig, {"dot": line}, controls, show, plays="x", point=point)
 
 
 def sent(explorer):
-    """What the browser was sent last: the places of the dots, by state, and the texts."""
+    """The states that were sent last: of each the place of the dot, if there is one, and texts."""
     run = explorer.picture.run
     drawn = [polygons(state, run["styles"]) for state in split(run["states"])]
-    return [[places[0] for *_, places in state] for state in drawn], run["texts"]
+    return [[place for _, _, ((*place,),) in state] for state in drawn], run["texts"]
 
 
 def at(x, y):
     """Where the dot is in the picture, in pixels from the upper left."""
-    return 560 * (0.1 + 0.8 * x / 10), 380 * (1 - 0.15 - 0.8 * (y + 1) / 3)
+    return pytest.approx([560 * (0.1 + 0.08 * x), 380 * (0.85 - 0.8 * (y + 1) / 3)], abs=0.07)
 
 
-def test_it_shows_something_before_it_is_touched(explorer):
-    ((dots,), (texts,)) = sent(explorer)
-    assert dots[0] == pytest.approx(at(2, 0), abs=0.07)
-    assert texts == [[("place", "2.0\nlow")], "", "A dot. place: 2.0 low"]
+def test_the_picture_follows_the_controls_and_reset_brings_everything_back(explorer):
+    assert sent(explorer) == ([[at(2, 0)]], [FIRST])  # before it is touched
     assert explorer.picture.run["index"] == 4
-    assert not explorer.play.playing
-
-
-def test_the_picture_follows_each_control_with_its_figure_and_its_artist(explorer):
-    figure, dot = explorer._fig, explorer.artists["dot"]
-    explorer.put(x=7.0)
-    assert sent(explorer)[0][0] == [pytest.approx(at(7, 0), abs=0.07)]
+    assert (explorer.play.min, explorer.play.value, explorer.play.max) == (0, 4, 20)
+    assert explorer.play.interval == 4000 / 20
+    assert explorer.steps == [x / 2 for x in range(21)]
+    runs = []
+    explorer.picture.observe(lambda change: runs.append(change.new), "run")
+    explorer.controls["x"].value = 5.0
+    assert runs == []  # what plays asks by itself
     explorer.controls["kind"].value = "high"
-    assert sent(explorer)[0][0] == [pytest.approx(at(7, 1), abs=0.07)]
-    assert sent(explorer)[1][0][0] == [("place", "7.0\nhigh")]
-    assert explorer._fig is figure
-    assert list(figure.axes[0].lines) == [dot]
+    assert sent(explorer) == ([[at(5, 1)]], [[[("place", "5.0\nhigh")], "", repr(explorer)]])
+    explorer.put(x=7.0, kind="low")
+    assert sent(explorer)[0] == [[at(7, 0)]]
+    assert [run["index"] for run in runs] == [10, 14]  # once for each change
+    explorer.play.playing = True
+    explorer.reset.click()
+    assert explorer.values == {"x": 2.0, "kind": "low"}
+    assert sent(explorer) == ([[at(2, 0)]], [FIRST])
+    assert not explorer.play.playing
+    assert list(explorer._fig.axes[0].lines) == [explorer.artists["dot"]]
 
 
 def test_the_browser_is_sent_the_states_it_asks_for_one_after_the_other(explorer):
     version, known = explorer.picture.run["version"], 0
     while known < 21:
         tell(explorer, index=known)
-        assert explorer.picture.run["version"] == version
-        assert explorer.picture.run["index"] == known
-        dots, texts = sent(explorer)
+        run, (dots, texts) = explorer.picture.run, sent(explorer)
+        assert (run["version"], run["index"]) == (version, known)
         for dot, (rows, *_) in zip(dots, texts, strict=True):
             x = known / 2
             assert rows == ([] if x == FAR else [("place", f"{x:.1f}\nlow")])
-            assert dot == ([] if x == FAR else [pytest.approx(at(x, 0), abs=0.07)])
+            assert dot == ([] if x == FAR else [at(x, 0)])
             known += 1
+    for number in (1, 2):
+        tell(explorer, index=20)  # equal states are sent again
+        assert explorer.picture.run["number"] == run["number"] + number
     assert explorer.values == {"x": 2.0, "kind": "low"}
     explorer.controls["kind"].value = "high"
     assert explorer.picture.run["version"] > version
 
 
-@pytest.mark.parametrize(
-    ("act", "count"),
-    [
-        (lambda explorer: setattr(explorer.controls["x"], "value", 5.0), 0),  # it plays
-        (lambda explorer: setattr(explorer.controls["kind"], "value", "high"), 1),
-        (lambda explorer: explorer.put(x=5.0, kind="high"), 1),
-        (lambda explorer: [tell(explorer, index=20) for _ in "ab"], 2),  # though it is the same
-    ],
-)
-def test_each_change_is_sent_once_and_what_plays_asks_nothing(explorer, act, count):
-    runs = []
-    explorer.picture.observe(lambda change: runs.append(change.new), "run")
-    act(explorer)
-    assert len(runs) == count
-    if count == 1:
-        assert runs[0]["index"] == explorer.steps.index(explorer.values["x"])
-
-
-def test_reset_brings_everything_back_and_stops(explorer):
-    dots, texts = sent(explorer)
-    explorer.put(x=5.0, kind="high")
-    assert explorer.values == {"x": 5.0, "kind": "high"}
-    explorer.play.playing = True
-    explorer.reset.click()
-    assert explorer.values == {"x": 2.0, "kind": "low"}
-    assert np.array_equal(sent(explorer)[0], dots)
-    assert sent(explorer)[1] == texts
-    assert not explorer.play.playing
-
-
-def test_play_has_the_steps_of_the_slider_and_its_seconds(explorer):
-    assert (explorer.play.min, explorer.play.value, explorer.play.max) == (0, 4, 20)
-    assert explorer.play.interval == 4000 / 20
-    assert explorer.steps == [x / 2 for x in range(21)]
-
-
-def test_what_cannot_be_served_and_a_warning_are_said(explorer):
+def test_settings_that_fail_and_warnings_are_said(explorer):
     explorer.put(x=FAR)
     said = "Nothing to show here: x: too <far>"
     assert sent(explorer) == ([[]], [[[], said, f"A dot. {said}"]])
     for x, warned in ((3.0, ""), (WARN, "nearly too far")):
         explorer.put(x=x)
         assert notice(explorer) == warned
-        assert sent(explorer)[0][0] == [pytest.approx(at(x, 0), abs=0.07)]
-
-
-def test_other_errors_are_not_hidden(explorer):
+        assert sent(explorer)[0] == [[at(x, 0)]]
+    with pytest.raises(TraitError, match="Invalid selection"):
+        explorer.put(kind="nope", x=5.0)
+    assert explorer.values == {"x": 5.0, "kind": "low"}
+    assert sent(explorer)[1][0][0] == [("place", "5.0\nlow")]
     explorer._show = lambda **values: 1 / 0
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(ZeroDivisionError):  # other errors are not hidden
         explorer.controls["kind"].value = "high"
 
 
 def test_a_click_sets_controls_or_says_why_not(explorer):
     tell(explorer, place=[0.5, 0.5])
     assert explorer.values == {"x": 4.0, "kind": "high"}
-    version = explorer.picture.run["version"]
-    tell(explorer, place=[0.05, 0.5])
-    assert notice(explorer) == "click more to the right"
-    assert explorer.values == {"x": 4.0, "kind": "high"}
-    explorer.restart()
-    assert notice(explorer) == ""
-    tell(explorer, place=[0.05, 0.5])  # the same place again
-    assert notice(explorer) == "click more to the right"
-    assert explorer.picture.run["version"] > version
-    seen = []
-    explorer._point = lambda x, y: seen.append((x, y)) or {}
-    tell(explorer, place=[0.25, 0.1])
-    assert seen == [(0.25 * 560, 0.9 * 380)]  # pixels of the figure
+    for _ in range(2):  # the same place again
+        version = explorer.picture.run["version"]
+        tell(explorer, place=[0.125, 0.1])
+        assert explorer.picture.run["version"] > version
+        assert notice(explorer) == "click more to the right than 70, 342"  # pixels of the figure
+        assert explorer.values == {"x": 4.0, "kind": "high"}
+        explorer.put()
+        assert notice(explorer) == ""
+    shown = [each.picture.made["clickable"] for each in (explorer, made("arm"), made("theta"))]
+    assert shown == [True, True, False]
 
 
-def test_only_what_can_be_clicked_shows_it(explorer):
-    from rbclassroom.explorers import arm_explorer, theta_explorer
-
-    made = [explorer, arm_explorer(), theta_explorer()]
-    assert [each.picture.made["clickable"] for each in made] == [True, True, False]
-
-
-def test_a_wrong_setting_leaves_a_true_picture(explorer):
-    with pytest.raises(TraitError, match="Invalid selection"):
-        explorer.put(kind="nope", x=5.0)
-    assert explorer.values == {"x": 5.0, "kind": "low"}
-    assert sent(explorer)[1][0][0] == [("place", "5.0\nlow")]
-
-
-@pytest.mark.parametrize("zoom", [1, 2, 3])
-def test_it_is_drawn_as_fine_as_is_wanted_and_shows_the_same(explorer, zoom):
-    drawn = Image.open(io.BytesIO(explorer.draw(explorer.state(x=7.0).shown, zoom))).convert("L")
-    assert drawn.size == (560 * zoom, 380 * zoom)
-    rows, columns = np.nonzero(
-        np.asarray(drawn)[10 * zoom : 315 * zoom, 70 * zoom : 500 * zoom] < 50
-    )
-    found = columns.mean() / zoom + 70, rows.mean() / zoom + 10
-    assert found == pytest.approx(at(7, 0), abs=0.6)
+def test_a_drawing_shows_the_same_at_each_zoom_with_letters_of_18_pixels(explorer):
+    shown = explorer.state(x=7.0).shown
+    for zoom in (1, 2, 3):
+        drawn = np.asarray(Image.open(io.BytesIO(explorer.draw(shown, zoom))).convert("L"))
+        assert drawn.shape == (380 * zoom, 560 * zoom)
+        rows, columns = np.nonzero(drawn[10 * zoom : 315 * zoom, 70 * zoom : 500 * zoom] < 50)
+        found = columns.mean() / zoom + 70, rows.mean() / zoom + 10
+        assert found == pytest.approx(at(7, 0).expected, abs=0.6)
     assert explorer._fig.dpi == 100
-
-
-def test_letters_have_18_pixels_and_the_style_is_left_alone(explorer):
-    import matplotlib as mpl
-
+    labels = explorer._fig.axes[0].get_xticklabels()
+    assert {label.get_fontsize() for label in labels} == {LABELS}
     assert LABELS / 72 * 100 >= 18
-    ax = explorer._fig.axes[0]
-    assert {label.get_fontsize() for label in ax.get_xticklabels()} == {LABELS}
-    assert mpl.rcParams["xtick.labelsize"] == "medium"
+    assert mpl.rcParams["xtick.labelsize"] == "medium"  # the style is left alone
 
 
-def test_the_output_has_a_still_for_who_has_no_kernel(explorer):
+def test_the_output_has_a_still_for_readers_without_a_kernel_and_all_can_be_sent(explorer):
     bundle = explorer._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in bundle
     assert 'alt="A dot. place: 2.0 low"' in bundle["text/html"]
     assert "data:image/png;base64," in bundle["text/html"]
     assert bundle["text/plain"] == repr(explorer) == "A dot. place: 2.0 low"
-
-
-def test_the_state_can_be_sent(explorer):
     for widget in (explorer, explorer.picture, *explorer.controls.values(), explorer.play):
         state, _, parts = _remove_buffers(widget.get_state())
         json.dumps(state)
@@ -217,19 +165,55 @@ def test_the_state_can_be_sent(explorer):
     assert explorer.picture.made["background"].startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("step", "shown"), [(1.0, ".0f"), (0.25, ".2f"), (0.05, ".2f"), (5.0, ".0f")]
-)
-def test_readouts_have_the_digits_of_the_step_and_follow_while_dragged(step, shown):
-    control = slider("x (m)", 0.0, 0.0, 10.0, step)
-    assert control.readout_format == shown
-    assert control.continuous_update
-
-
-def test_what_plays_has_its_steps_and_nothing_between():
-    control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)
-    labels = ("−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3")
-    assert isinstance(control, ipywidgets.SelectionSlider)
-    assert control.continuous_update
-    assert control._options_labels == labels
+def test_readouts_have_the_digits_of_the_step():
+    for step, shown in ((1.0, ".0f"), (0.25, ".2f"), (0.05, ".2f"), (5.0, ".0f")):
+        assert slider("x (m)", 0.0, 0.0, 10.0, step).readout_format == shown
+    control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)  # steps and nothing between
+    assert control._options_labels == ("−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3")
     assert [value for _, value in control.options] == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]
+
+
+LESSONS = lesson_paths(Path(__file__).parents[3] / "notebooks")
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_the_cell_of_an_explorer_needs_no_other_cell_and_shows_something_at_once(path):
+    cells = nbformat.read(path, as_version=4).cells
+    (cell,) = [cell for cell in cells if re.search(r"^explorers\.\w+\(", cell.source, re.MULTILINE)]
+    *lines, last = cell.source.splitlines()
+    space = {}
+    exec("\n".join(lines), space)
+    explorer = eval(last, space)
+    assert isinstance(explorer, Explorer)
+    ((rows, notice, _),) = explorer.picture.run["texts"]
+    assert len(explorer.picture.run["states"]) > 100
+    assert len(rows) >= 2
+    assert notice == ""
+    assert not explorer.play.playing
+    (output,) = cell.outputs
+    assert "a still. Run this cell (Shift + Enter) to get its sliders" in output.data["text/html"]
+
+
+UNIT = r" \((°|°/s|cm|m|m/s|m/time|rad/time|s|0 to 1|1: paper's)\)$"
+WITHOUT_UNIT = "time t", "seed", "rotations", "y leans", "z leans", "z stretched", "× Bessel's ω, v"
+
+
+@pytest.mark.parametrize("name", explorers.__all__)
+def test_each_explorer_has_units_large_letters_its_artists_and_a_range_to_play(name):
+    explorer = made(name.removesuffix("_explorer"))
+    for control in explorer.controls.values():
+        if isinstance(control, ipywidgets.FloatSlider | ipywidgets.SelectionSlider):
+            assert control.continuous_update
+            assert re.search(UNIT, control.description) or control.description in WITHOUT_UNIT
+        else:
+            assert isinstance(control, ipywidgets.ToggleButtons | ipywidgets.Dropdown)
+    for text in explorer._fig.findobj(Text):
+        if text.get_visible() and text.get_text().strip():
+            assert text.get_fontsize() >= LABELS, text.get_text()
+    artists = list(explorer.artists.values())
+    assert len({id(artist) for artist in artists}) == len(artists)
+    assert all(artist.get_figure() is explorer._fig for artist in artists)
+    assert explorer.play.max == len(explorer.steps) - 1 >= 40
+    chosen = [explorer.steps[i] for i in np.linspace(0, explorer.play.max, 5).astype(int)]
+    states = [explorer.state(**{explorer.plays: value}) for value in chosen]
+    assert len({state.drawn.tobytes() for state in states}) >= 4

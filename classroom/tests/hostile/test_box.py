@@ -28,7 +28,7 @@ def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(
         config.write("c.BoxedExecute.seconds = 9\n")
     monkeypatch.setenv("TMPDIR", str(places))
     course.submit("ann", half="import time\nwhile True:\n    time.sleep(9)")
-    grade("ps0", tmp_path)
+    grade(["ps0"], tmp_path)
     why = "refused: Python ended in or before cell 5, answer of “A tiny set”, or 9 s were over"
     assert course.rows()["ann"]["remarks"].startswith(why)
     assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
@@ -39,7 +39,7 @@ def test_a_box_and_its_worker_end_with_the_process_that_grades(tmp_path, templat
     asleep = f"8{os.getpid():08d}"
     course.submit("ann", half=f"import subprocess\nsubprocess.run(['sleep', '{asleep}'])")
     code = "from pathlib import Path; from rbclassroom.assignments.grade import grade\n"
-    code += f"if __name__ == '__main__': grade('ps0', Path({str(tmp_path)!r}))\n"
+    code += f"if __name__ == '__main__': grade(['ps0'], Path({str(tmp_path)!r}))\n"
     (tmp_path / "begin.py").write_text(code)
     job = psutil.Popen([sys.executable, str(tmp_path / "begin.py")], cwd=ROOT)
     while not (begun := [p for p in psutil.process_iter(["cmdline"]) if asleep in str(p.info)]):

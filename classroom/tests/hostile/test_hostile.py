@@ -2,12 +2,11 @@
 
 import base64
 import builtins
+import codecs
 import html
 import os
 import re
 import socket
-import subprocess
-import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -16,13 +15,13 @@ import nbformat
 import psutil
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell
-from tiny_class import Class, cell, make_template
-from tiny_set import ANSWERS
+from tiny_class import Class, begun, make_template
+from tiny_set import ANSWERS, cell
 
 import rbcourse
 from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
-from rbclassroom.assignments.grade import grade, grade_all
+from rbclassroom.assignments.grade import grade
 
 SQUARE = ANSWERS["square-answer"]
 PIXEL = (
@@ -40,26 +39,22 @@ REFUSALS |= {
 
 # Each is the answer with the square, to which the right one is added, or only that with the half.
 HONEST = {
-    "interact": "from ipywidgets import interact\ninteract(lambda x: print(x), x=(0.0, 3.0));",
-    "widget of outputs": "from ipywidgets import Output\nout = Output()\nwith out:\n"
-    "    print('in')\n    display('it')\nout.clear_output()\nout",
-    "sliders": "from ipywidgets import FloatSlider, HBox, interactive_output\n"
-    "slider = FloatSlider()\nout = interactive_output(print, {'x': slider})\n"
-    "slider.value = 2\nHBox([slider, out])",
+    "widgets": "from ipywidgets import FloatSlider, HBox, Output, interact, interactive_output\n"
+    "interact(lambda x: print(x), x=(0.0, 3.0));\nout = Output()\nwith out:\n    print('in')\n"
+    "    display('it')\nout.clear_output()\nslider = FloatSlider()\n"
+    "out = interactive_output(print, {'x': slider})\nslider.value = 2\nHBox([slider, out])",
     "matplotlib": "%matplotlib inline\n%config InlineBackend.figure_formats = ['svg']\n"
+    "%load_ext autoreload\n%autoreload 2\n"
     "import matplotlib.pyplot as plt\nplt.plot([1, 2]); plt.show()",
     "tqdm": "from tqdm.auto import tqdm\nfor i in tqdm(range(99)): pass\n"
     "from tqdm import tqdm\nfor i in tqdm(range(99)): pass",
-    "threads": "import threading\nthread = threading.Thread(target=print, args=('done',))\n"
-    "thread.start()\nthread.join()",
-    "pools": "from concurrent.futures import ThreadPoolExecutor\n"
-    "print(list(ThreadPoolExecutor(4).map(abs, range(9))))",
-    "warns": "import warnings\nwarnings.warn('old')",
-    "asyncs": "import asyncio\nawait asyncio.sleep(0)\nprint(1)",
-    "pool": "from multiprocessing import Pool\nwith Pool(2) as pool:\n    pool.map(abs, range(9))",
+    "jobs": "import asyncio, threading, warnings\nfrom multiprocessing import Pool\n"
+    "from concurrent.futures import ThreadPoolExecutor\nwarnings.warn('old')\n"
+    "thread = threading.Thread(target=print, args=('done',))\nthread.start()\nthread.join()\n"
+    "print(list(ThreadPoolExecutor(4).map(abs, range(9))))\nawait asyncio.sleep(0)\nprint(1)\n"
+    "with Pool(2) as pool:\n    pool.map(abs, range(9))",
     "odd outputs": "odd = {'text/plain': {'a': 1}, 'application/x-odd': [float('inf')]}\n"
     "display(odd, raw=True)",
-    "reloads": "%load_ext autoreload\n%autoreload 2",
 }
 # What they try fails, and they say what they got; the points are those of their answers.
 SNEAKS = {
@@ -138,54 +133,11 @@ try:
 except OSError:
     pass
 """
-# Ways round the tests: graded by hand, for the reason that is told.
-TRICKS = {
-    "transforms": (
-        "import sys\nsys.modules['IPython'].get_ipython().input_transformers_post.append("
-        "lambda lines: [])",
-        "line 2 uses get_ipython",
-    ),
-    "transforms trees": ("x.ast_transformers.append(None)", "uses ast_transformers"),
-    "profile": ("import sys\nsys.setprofile(None)", "line 2 uses setprofile"),
-    "an alias": ("m = [math][0]\nm.isclose = print", "line 2 replaces m.isclose"),
-    "locals": ("locals()['math'] = None", "line 1 uses locals"),
-    "globals": ("globals()['math'] = None", "line 1 uses globals"),
-    "reads what was run": ("print(In[-1])", "line 1 uses In"),
-    "code in a text": ("exec('import math; math.isclose = print')", "line 1 uses exec"),
-    "import by name": ("__import__('builtins').abs = print", "line 1 uses __import__"),
-    "a module": ("import sys\nsys.modules['math'] = None", "line 2 uses modules"),
-    "setattr": ("setattr(math, 'isclose', print)", "line 1 uses setattr"),
-    "a computed name": ("getattr(math, 'is' + 'close')", "line 1 uses getattr(math"),
-    "frames": ("def f():\n    yield\nf().gi_frame.f_back", "line 3 uses f_back"),
-    "garbage": ("import gc", "line 1 imports gc"),
-    "a shell": ("!ls", "line 1 uses a magic or a shell"),
-}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def box():
-    assert sandbox.missing() == ""
-
-
-@pytest.fixture(scope="module")
-def template(tmp_path_factory):
-    return make_template(tmp_path_factory.mktemp("template"))
-
-
-def change_tests(notebook):
-    for name in ("square-test", "half-test"):
-        found = cell(notebook, name)
-        found.source, found.metadata.tags = "pass", ["skip-execution"]
-        found.metadata.nbgrader.points = 100
 
 
 def forge_remarks(notebook):
     cell(notebook, "half-test").metadata.nbgrader.points = "1\nann: graded, 6 of 6\x1b[2J" * 9**5
     cell(notebook, "title").source = "# \x1b[2J" + "x" * 9**5
-
-
-def drop_tests(notebook):
-    notebook.cells = notebook.cells[:3]
 
 
 def write_words(notebook):
@@ -199,8 +151,51 @@ def write_words(notebook):
     notebook.cells.append(new_markdown_cell("<svg onload=alert(10)>"))
 
 
-def loops(begin):
-    return f"{begin}\nwhile True: pass  # endless"
+def add_cell(notebook):
+    added = new_code_cell("mine = 1", metadata={"tags": ["raises-exception"]})
+    notebook.cells.insert(3, added)
+
+
+CELL_5 = "cell 5, answer of “A tiny set”"
+TRANSFORMS = "import sys\nsys.modules['IPython'].get_ipython().input_transformers_post.append(abs)"
+CHANGES = {"writes words": write_words, "adds a cell": add_cell, "forges remarks": forge_remarks}
+SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
+# Student, answer, points (none if it is refused), and how the remark, or the refusal, begins.
+OTHERS = [
+    *((student, "half = 0.5", "2 1", "") for student in ("tells", "writes words", "adds a cell")),
+    ("forges remarks", "half = 0.5", "2 1", "cell 1, locked cell of “A tiny set” was changed; it"),
+    ("raises", "half = 0.5", "0 1", ""),
+    ("returns points", "half = 1\n100.0", "2 0", ""),
+    ("=cmd|' -C calc'!A0", "half = 1", "2 0", ""),
+    ("loops", f"{begun()}\nwhile True: pass", "2 0", f"{CELL_5}: stopped after"),
+    # it is stopped when its time is over, or when the memory is full
+    ("floods", f"{begun()}\nwhile True: print('x' * 9**4)", "2 0", f"{CELL_5}: "),
+    ("takes memory", "bytearray(3 * 10**9)", "2 0", f"{CELL_5}: takes too much memory"),
+    ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
+    (
+        "ends itself",
+        "import os\nos.kill(os.getpid(), 9)",
+        " ",
+        f"Python ended in or before {CELL_5}",
+    ),
+    # test_forbidden.py has more ways round the tests
+    ("transforms", TRANSFORMS, " ", f"{CELL_5}, line 2 uses get_ipython: grade by hand"),
+    ("an alias", "m = [math][0]\nm.isclose = print", " ", f"{CELL_5}, line 2 replaces m.isclose"),
+    ("a shell", "!ls", " ", f"{CELL_5}, line 1 uses a magic or a shell"),
+    ("[ab]*", "half = 0.5", " ", "the name of the folder holds [, * or ?: give it another"),
+]
+FILES = [
+    ("crlf", lambda good: good.replace(b"\n", b"\r\n"), "2 1", ""),
+    ("bom", lambda good: codecs.BOM_UTF8 + good, " ", "ps0.ipynb is not plain UTF-8: collect it"),
+    ("utf-16", lambda good: good.decode().encode("utf-16"), " ", "ps0.ipynb is not plain UTF-8"),
+    ("half a file", lambda good: good[:999], " ", "ps0.ipynb is damaged or no notebook"),
+    ("deep", lambda good: b'{"cells": ' + b"[" * 10**5, " ", "ps0.ipynb is damaged or no notebook"),
+    ("long", lambda good: b" " * 31_000_000, " ", "ps0.ipynb has more than 30,000,000 bytes"),
+    ("more files", lambda good: good, " ", "there is more than ps0.ipynb: take away feedback.html"),
+]
+RESULTS = [(student, *result) for student, _, *result in OTHERS + FILES]
+RESULTS += [("a link", " ", "ps0.ipynb, or what is beside it, is a link")]
+RESULTS += [("prints", "2 1", f"{CELL_5}: the output is too large")]
 
 
 def hand_in_all(course, port):
@@ -212,35 +207,13 @@ def hand_in_all(course, port):
 
     for name, code in {**HONEST, **SNEAKS, **LOUD}.items():
         course.submit(name, half=placed(code) + "\nhalf = 0.5" * (name not in SNEAKS))
-    for name, (code, _) in TRICKS.items():
-        course.submit(name, half=f"{code}\nhalf = 1")
-    course.submit("tells", square=TELLS)
-    course.submit("writes words", write_words)
-    course.submit("forges remarks", forge_remarks)
-    course.submit("loops", half=loops(course.begin))
-    course.submit("floods", half=f"{course.begin}\nwhile True: print('x' * 9**4)  # endless")
-    course.submit("takes memory", half="x = bytearray(3 * 10**9)")
-    course.submit("exits", half="import os\nos._exit(0)")
-    course.submit("ends itself", half="import os, signal\nos.kill(os.getpid(), signal.SIGKILL)")
-    course.submit("raises", square="def square(x):\n    raise SystemExit")
-    course.submit("returns points", half="half = 1\n100.0")
-    course.submit("changes tests", change_tests, half="half = 1")
-    course.submit("drops tests", drop_tests, square="def square(x):\n    return 4")
-    course.submit("=cmd|' -C calc'!A0", half="half = 1")
-    plain = nbformat.reads(course.given.decode(), as_version=4)
-    for name, text in ANSWERS.items():
-        cell(plain, name).source = text
-    plain.cells.insert(3, new_code_cell("mine = 1", metadata={"tags": ["raises-exception"]}))
-    text = nbformat.writes(plain)
-    course.submit_bytes("crlf", text.replace("\n", "\r\n").encode())
-    course.submit_bytes("bom", text.encode("utf-8-sig"))
-    course.submit_bytes("utf-16", text.encode("utf-16"))
-    course.submit_bytes("pdf", b"%PDF-1.7")
-    course.submit_bytes("half a file", text.encode()[:999])
-    course.submit_bytes("deep", b'{"cells": ' + b"[" * 10**5)
-    course.submit_bytes("long", b" " * 31_000_000)
-    course.submit("[ab]*")
-    course.submit("more files")
+    for name, half, *_ in OTHERS:
+        square = SQUARES.get(name, ANSWERS["square-answer"])
+        course.submit(name, CHANGES.get(name), square=square, half=half)
+    course.submit("good")
+    good = (course.folder / "submitted" / "good" / "ps0" / "ps0.ipynb").read_bytes()
+    for name, change, *_ in FILES:
+        course.submit_bytes(name, change(good))
     course.submit_bytes("more files", b"<script>", "feedback.html")
     place = course.folder / "submitted" / "a link" / "ps0"
     place.mkdir(parents=True)
@@ -248,9 +221,14 @@ def hand_in_all(course, port):
 
 
 @pytest.fixture(scope="module")
-def course(tmp_path_factory, template, monkeypatch_module):
+def template(tmp_path_factory):
+    return make_template(tmp_path_factory.mktemp("template"))
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory, template):
     """All of them graded at once, while a server and a socket wait to be asked."""
-    monkeypatch_module.setenv("SECRET", SECRET)
+    assert sandbox.missing() == ""
     course = Class(tmp_path_factory.mktemp("course"), template)
     asked = []
     server, local = socket.create_server(("127.0.0.1", 0)), socket.socket(socket.AF_UNIX)
@@ -262,18 +240,13 @@ def course(tmp_path_factory, template, monkeypatch_module):
     hand_in_all(course, server.getsockname()[1])
     course.before = state(course.folder)
     places = Path(tempfile.mkdtemp())
-    monkeypatch_module.setenv("TMPDIR", str(places))
-    grade("ps0", course.folder)
-    monkeypatch_module.delenv("TMPDIR")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SECRET", SECRET)
+        patch.setenv("TMPDIR", str(places))
+        grade(["ps0"], course.folder)
     assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
     assert not asked
     return course
-
-
-@pytest.fixture(scope="module")
-def monkeypatch_module():
-    with pytest.MonkeyPatch.context() as patch:
-        yield patch
 
 
 @pytest.fixture(scope="module")
@@ -297,60 +270,26 @@ def test_honest_work_is_graded_without_a_remark(rows, student):
 
 
 @pytest.mark.parametrize("student", SNEAKS)
-def test_what_is_tried_outside_fails(course, rows, student):
+def test_attempts_to_get_out_of_the_box_fail(course, rows, student):
     assert points(rows[student]) == ("2", "0")
     answer = cell(nbformat.read(course.graded(student), as_version=4), "half-answer")
     assert {output.get("ename") for output in answer.outputs} & REFUSALS, answer.outputs
 
 
 @pytest.mark.parametrize("student", LOUD)
-def test_what_is_done_in_the_box_costs_nobody_points(rows, student):
+def test_noise_in_the_box_costs_nobody_points(rows, student):
     assert points(rows[student]) == ("2", "1")
 
 
-@pytest.mark.parametrize("student", TRICKS)
-def test_ways_round_the_tests_are_named(course, rows, student):
-    assert rows[student]["total"] == ""
-    assert rows[student]["remarks"].startswith("refused: cell 5, answer of “A tiny set”, line ")
-    assert TRICKS[student][1] in rows[student]["remarks"]
-    assert not course.graded(student).exists()
-
-
-@pytest.mark.parametrize(
-    ("student", "square", "half", "remark"),
-    [
-        ("tells", "2", "1", ""),
-        ("writes words", "2", "1", ""),
-        ("loops", "2", "0", "cell 5, answer of “A tiny set”: stopped after"),
-        ("floods", "2", "0", "cell 5, answer of “A tiny set”: stopped after"),
-        ("takes memory", "2", "0", "cell 5, answer of “A tiny set”: takes too much memory"),
-        ("prints", "2", "1", "cell 5, answer of “A tiny set”: the output is too large"),
-        ("raises", "0", "1", ""),
-        ("forges remarks", "2", "1", "cell 1, locked cell of “A tiny set” was changed; it is put"),
-        ("returns points", "2", "0", ""),
-        ("changes tests", "2", "0", "cell 4, test of “A tiny set” was changed and has other"),
-        ("drops tests", "0", "0", "cell 4, test of “A tiny set” was missing; it is put back"),
-        ("'=cmd|' -C calc'!A0", "2", "0", ""),
-        ("crlf", "2", "1", ""),
-        ("exits", "", "", "refused: Python ended in or before cell 5, answer of “A tiny set”"),
-        ("ends itself", "", "", "refused: Python ended in or before cell 5, answer"),
-        ("bom", "", "", "refused: ps0.ipynb is not plain UTF-8: collect it again, or save it"),
-        ("utf-16", "", "", "refused: ps0.ipynb is not plain UTF-8: collect it again, or save it"),
-        ("pdf", "", "", "refused: ps0.ipynb is no notebook, but a PDF"),
-        ("half a file", "", "", "refused: ps0.ipynb is damaged or no notebook"),
-        ("deep", "", "", "refused: ps0.ipynb is damaged or no notebook"),
-        ("long", "", "", "refused: ps0.ipynb has more than 30,000,000 bytes"),
-        ("a link", "", "", "refused: ps0.ipynb, or what is beside it, is a link"),
-        ("[ab]*", "", "", "refused: the name of the folder holds [, * or ?: give it another"),
-        ("more files", "", "", "refused: there is more than ps0.ipynb: take away feedback.html"),
-    ],
-)
-def test_each_has_its_points_and_a_clear_line(rows, student, square, half, remark):
-    assert points(rows[student]) == (square, half), rows[student]
-    assert rows[student]["remarks"].startswith(remark), rows[student]
-    assert bool(remark) == bool(rows[student]["remarks"])
-    assert rows[student]["remarks"].isprintable()
-    assert len(rows[student]["remarks"]) < 700
+@pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
+def test_each_submission_has_its_points_and_a_clear_line(course, rows, student, wanted, remark):
+    row = rows["'" * student.startswith("=") + student]
+    assert " ".join(points(row)) == wanted, row
+    assert row["remarks"].startswith("refused: " * (wanted == " ") + remark), row
+    assert bool(remark) == bool(row["remarks"])
+    assert row["remarks"].isprintable()
+    assert len(row["remarks"]) < 700
+    assert course.graded(student).exists() == (wanted != " ")
 
 
 def test_nothing_outside_is_changed(course, rows):
@@ -363,29 +302,28 @@ def test_nothing_is_left_running(course):
     assert not [job for job in psutil.process_iter(["cmdline"]) if SLEEP in str(job.info)]
 
 
+@pytest.fixture(scope="module")
 def pages(course):
     return {p.parts[-3]: p.read_text("utf-8") for p in course.folder.glob("feedback/*/ps0/*.html")}
 
 
-def test_pages_hold_nothing_of_students_that_runs_or_loads(course):
-    for student, page in pages(course).items():
+def test_pages_hold_nothing_of_students_that_runs_or_loads(pages):
+    for student, page in pages.items():
         body = page.split("<body>", 1)[1]
         assert "<script" not in body, student
         tags = " ".join(re.findall(r"<[a-zA-Z][^>]*>", body))
         assert not re.search(r"\son\w+\s*=|javascript:|evil\.example|<(iframe|form|svg)", tags)
         loaded = re.findall(r"\s(?:src|href)=\"([^\"]*)\"", tags)
         assert all(address.startswith(("data:image/", "#")) for address in loaded), student
-    assert ">A tiny set</h1>" in pages(course)["writes words"]
-    words = pages(course)["writes words"]
-    assert "$a &lt; b$" in words
-    assert PIXEL in words
-    assert r"$\text{https://evil.example}{x}$" in words
+    words = pages["writes words"]
+    for shown in (">A tiny set</h1>", "$a &lt; b$", PIXEL, r"$\text{https://evil.example}{x}$"):
+        assert shown in words
     assert r"\href" not in words
     assert "gone (attachment:b.png is missing)" in words
 
 
-def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(course):
-    for student, page in pages(course).items():
+def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(pages):
+    for student, page in pages.items():
         text = html.unescape(re.sub(r"<[^>]*>", "", page))
         for line in HIDDEN:
             codes = [base64.b64encode(b" " * n + line.encode())[4:-4].decode() for n in range(3)]
@@ -394,49 +332,45 @@ def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(course):
         assert SECRET not in page
 
 
-def test_without_a_box_it_is_said_or_refused(tmp_path, template, monkeypatch, capsys):
+def test_grading_without_a_box_is_announced_or_refused(tmp_path, template, monkeypatch, capsys):
     """As on macOS: then a submission can do what the teacher can."""
     why = "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
     monkeypatch.setattr(sandbox, "missing", lambda: why)
     course = Class(tmp_path, template)
-    with pytest.raises(ValueError, match=f"There is no box for submissions: {why}"):
-        grade_all(["ps0"], course.folder, require_box=True)
     course.submit("ann")
-    grade_all(["ps0"], course.folder)
+    with pytest.raises(ValueError, match=f"There is no box for submissions: {why}"):
+        grade(["ps0"], course.folder, require_box=True)
+    grade(["ps0"], course.folder)
     assert why in capsys.readouterr().out
     assert course.rows()["ann"]["boxed"] == "no"
 
 
-@pytest.mark.parametrize("who", ["ann", "bob"])
-def test_points_that_a_submission_writes_are_found(tmp_path, template, who, monkeypatch):
+@pytest.mark.parametrize(
+    ("who", "said"),
+    [
+        ("bob", "bob has .* points"),
+        ("ann", "The points of ann changed during the grading of bob"),
+    ],
+)
+def test_points_that_a_submission_writes_are_found(tmp_path, template, who, said, monkeypatch):
     """Its own are above the maximum, those of another have changed."""
     course = Class(tmp_path, template)
     course.submit("ann")
-    grade("ps0", course.folder)
-    book = course.folder / "gradebook.db"
-    script = tmp_path / "harm.py"
-    script.write_text(
-        "import sqlite3\n"
-        f"book = sqlite3.connect({str(book)!r}, timeout=60)\n"
-        "book.execute('update grade set manual_score = 56 where notebook_id in (select "
-        "submitted_notebook.id from submitted_notebook join submitted_assignment on "
-        "submitted_assignment.id = submitted_notebook.assignment_id where student_id in "
-        f'("{who}"))\')\nbook.commit()\n'
-    )
+    grade(["ps0"], course.folder)
     course.submit("bob")
     plain = grading.wait
 
     def harmed(works, **how):
         found = plain(works, **how)
-        if "bob" in [student for student, _ in works.values()]:
-            subprocess.run([sys.executable, str(script)], check=True)
+        if "bob" in [student for (_, student), _ in works.values()]:
+            with course.gradebook() as gradebook:
+                gradebook.find_grade("half-test", "ps0", "ps0", who).manual_score = 56
+                gradebook.db.commit()
         return found
 
     monkeypatch.setattr(grading, "WORKERS", 1)
     monkeypatch.setattr(grading, "wait", harmed)
-    changed = "The points of ann changed during the grading of bob"
-    said = "bob has .* points" if who == "bob" else changed
     with pytest.raises(ValueError, match=said):
-        grading.grade("ps0", course.folder)
+        grade(["ps0"], course.folder)
     assert "bob" not in course.rows()  # of the table before
     assert (course.folder / "gradebook.before-ps0.db").exists()

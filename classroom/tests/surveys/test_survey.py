@@ -1,81 +1,41 @@
 """Surveys: costs of curves, on any executor, and an atlas that goes on when it was stopped."""
 
-import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbclassroom.surveys import atlas, survey
-from rbclassroom.surveys.survey import costs, processes, several_starts
+from rbclassroom.surveys import atlas, body_atlas, progress, survey
+from rbclassroom.surveys.survey import costs, several_starts
 
 SOME = atlas.random_problems(60, 3, rng=2)
+# A turn from rest by a little less than 180°: the margin of the projection is 2 cos(89.9°).
+SHARP = atlas.Ends(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
+FEW = atlas.Ends(*map(np.concatenate, zip(SOME.take(slice(20)), SHARP, strict=True)))
 BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 
 
-@pytest.mark.source("BK (18)")
-@pytest.mark.parametrize("way", atlas.WAYS)
-def test_costs_are_the_integral(way):
-    make = atlas.WAYS[way]
-    found = costs(make, SOME.take(slice(20)))
-    for k in range(20):
-        exact = rb.acceleration_cost(make(*(x[k] for x in SOME)))
-        assert found[k] == pytest.approx(exact, rel=1e-6)
-
-
-@pytest.mark.source("beyond BK 1")
-@pytest.mark.parametrize("way", ["weighted", "normal", "Bézier"])
-def test_costs_of_a_body_are_the_integral(way):
-    make = atlas.closed_forms(BOOK)[way]
-    found = costs(make, SOME.take(slice(10)), BOOK)
-    for k in range(10):
-        exact = rb.acceleration_cost(make(*(x[k] for x in SOME)), BOOK)
-        assert found[k] == pytest.approx(exact, rel=1e-6)
-
-
-def test_a_projection_that_all_but_jumps_is_integrated_too():
-    """A turn from rest by a little less than 180°: the margin is 2 cos(89.9°)."""
-    turn, rest = np.radians([[0, 0, 179.8]]), np.zeros((1, 3))
-    ends = atlas.Ends(np.eye(3)[None], rb.exp_so3(turn), rest, rest)
-    curve = rb.projected_cubic_so3(*(x[0] for x in ends))
-    assert curve.margin < 0.004
-    found = costs(atlas.projection, ends)[0]
-    assert found == pytest.approx(rb.acceleration_cost(curve), rel=1e-6)
-
-
-def test_a_survey_has_the_optimum_and_every_way():
-    found = survey.survey(SOME)
-    assert list(found) == ["optimum", *atlas.WAYS]
-    assert np.array_equal(found["optimum"], rb.minimum_acceleration_so3(*SOME).cost)
-    for way, make in atlas.WAYS.items():
-        assert np.array_equal(found[way], costs(make, SOME))
-        assert np.all(found[way] > (1 - 1e-6) * found["optimum"])
-
-
-@pytest.mark.source("beyond BK 2")
-def test_a_survey_of_a_body_has_its_optimum_and_what_knows_the_body():
-    few = SOME.take(slice(20))
-    found = survey.survey(few, inertia=BOOK)
-    assert list(found) == ["optimum", *atlas.WAYS, "weighted", "normal"]
-    best = rb.minimum_acceleration_so3(*few, BOOK)  # not on one thread, as in a survey
-    assert found["optimum"] == pytest.approx(best.cost, rel=1e-12)
-    for way in atlas.WAYS:
-        assert np.array_equal(found[way], costs(atlas.WAYS[way], few, BOOK))
-
-
-def test_a_survey_tells_how_far_it_is():
-    told = []
-    few = atlas.random_problems(1100, 1, rng=1)
-    survey.survey(few, report=lambda *done: told.append(done), ways={})
-    assert sorted(total for _, total in told) == [1100] * 3
-    assert told[-1][0] == 1100
-    assert np.diff([0, *(done for done, _ in told)]).tolist().count(500) == 2
+@pytest.mark.source("BK (18)", "beyond BK 1", "beyond BK 2")
+@pytest.mark.parametrize("inertia", [None, BOOK], ids=["ball", "book"])
+def test_a_survey_has_the_optimum_and_the_integral_of_every_way(inertia):
+    assert rb.projected_cubic_so3(*SHARP).margin < 0.004
+    found = survey.survey(FEW, inertia=inertia)
+    best = rb.minimum_acceleration_so3(*FEW, inertia)  # not on one thread, as in a survey
+    assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
+    makers = dict(atlas.FORMS)
+    if inertia is not None:
+        makers["weighted"] = partial(rb.weighted_cubic_so3, inertia=inertia)
+        makers["normal"] = partial(rb.normal_cubic_so3, inertia=inertia)
+    assert list(found) == list(makers)
+    for way, make in makers.items():
+        exact = rb.acceleration_cost(make(*FEW), inertia)
+        assert found[way] == pytest.approx(exact, rel=1e-6), way
+        assert np.all(found[way] > (1 - 1e-6) * best.cost)
 
 
 def test_a_survey_of_nothing_is_empty():
@@ -84,12 +44,7 @@ def test_a_survey_of_nothing_is_empty():
         assert {cost.shape for cost in found.values()} == {(0,)}
 
 
-def test_a_single_problem_is_refused():
-    with pytest.raises(ValueError, match=r"^problems: one batch axis is wanted, got \(\)"):
-        survey.survey(SOME.take(0))
-
-
-def test_what_is_not_found_is_nan_and_silent():
+def test_an_optimum_that_is_not_found_is_nan_and_silent():
     w0, w1 = SOME.w0[:3].copy(), SOME.w1[:3].copy()
     w0[1], w1[1] = [1e3, 0, 0], [0, 1e3, 0]
     ends = atlas.Ends(SOME.R0[:3], SOME.R1[:3], w0, w1)
@@ -124,16 +79,16 @@ class Backwards(Executor):
         return future
 
 
-def test_every_executor_gives_the_same_bytes(monkeypatch):
+def test_every_executor_gives_the_same_bytes_and_tells_how_far_it_is(monkeypatch):
     monkeypatch.setattr(survey, "CHUNK", 20)
-    of_body = partial(survey.survey, SOME, inertia=BOOK, ways={"Bézier": rb.bezier_so3})
-    expected = of_body()
-    with processes(1) as one, ThreadPoolExecutor(3) as threads:
-        for executor in (one, threads, Backwards()):
-            found = of_body(executor)
-            assert {name: x.tobytes() for name, x in found.items()} == {
-                name: x.tobytes() for name, x in expected.items()
-            }
+    monkeypatch.setattr(survey, "processes", partial(survey.processes, 1))
+    known, told, found = {"inertia": BOOK, "ways": {"Bézier": rb.bezier_so3}}, [], []
+    with ThreadPoolExecutor(3) as threads:
+        for executor in (None, threads, Backwards()):
+            costs = survey.survey(SOME, executor, **known, report=lambda *done: told.append(done))
+            found.append({name: x.tobytes() for name, x in costs.items()})
+    assert found[0] == found[1] == found[2]
+    assert told == 3 * [(20, 60), (40, 60), (60, 60)]
 
 
 def test_a_cluster_gives_the_same_bytes(monkeypatch):
@@ -150,23 +105,25 @@ def refuses(*ends):
     raise ValueError("no curve")
 
 
-@pytest.mark.parametrize("chunk", [20, 60])
-def test_an_error_ends_a_survey_and_names_the_way(monkeypatch, chunk):
+@pytest.mark.parametrize(("chunk", "first"), [(20, "0|20|40"), (60, "0")])
+def test_an_error_ends_a_survey_and_names_the_way(monkeypatch, chunk, first):
     monkeypatch.setattr(survey, "CHUNK", chunk)
-    said = r"^chunk \d, from problem (0|20|40) on: none: no curve"
-    with pytest.raises(ValueError, match=said):
-        survey.survey(SOME, ways={"projection": atlas.projection, "none": refuses})
+    said = rf"^chunk from problem ({first}) on: none: no curve"
+    ways = {"projection": atlas.projection, "none": refuses}
+    with ThreadPoolExecutor(2) as threads, pytest.raises(ValueError, match=said):
+        survey.survey(SOME, threads if chunk < 60 else None, ways=ways)
 
 
 @pytest.mark.parametrize(
     ("bad", "said"),
     [
+        ({"problems": SOME.take(0)}, r"^problems: one batch axis is wanted, got \(\)"),
         ({"inertia": np.stack([BOOK, BOOK])}, r"^inertia"),
         ({"inertia": [1, 2, 3]}, r"^inertia"),
         ({"inertia": -BOOK}, r"^inertia is not positive definite"),
         ({"ways": {"optimum": rb.bezier_so3}}, r"^ways: 'optimum' is the name"),
         ({"ways": {"g": rb.geodesic_so3}}, r"^ways: 'g' is called with R0, R1, w0, w1: too many"),
-        ({"ways": {"five": 5}}, r"^ways: 'five' is no function"),
+        ({"ways": {"five": 5}}, r"^ways: 'five' is called with R0, R1, w0, w1: 5 is not"),
     ],
 )
 def test_bad_arguments_are_named_before_anything_is_computed(bad, said):
@@ -174,10 +131,10 @@ def test_bad_arguments_are_named_before_anything_is_computed(bad, said):
         raise AssertionError
 
     with pytest.raises(ValueError, match=said):
-        survey.survey(SOME, **bad, report=reported)
+        survey.survey(**{"problems": SOME, **bad}, report=reported)
 
 
-def test_what_cannot_be_sent_is_refused_and_stays_here(monkeypatch):
+def test_ways_that_cannot_be_sent_are_refused_and_computed_in_this_process(monkeypatch):
     ways = {"own": lambda *ends: atlas.projection(*ends)}
     found = survey.survey(SOME, ways=ways)
     assert np.array_equal(found["own"], costs(atlas.projection, SOME))
@@ -189,76 +146,94 @@ def test_what_cannot_be_sent_is_refused_and_stays_here(monkeypatch):
     assert again["own"] == pytest.approx(found["own"], rel=1e-12)
 
 
-REST = np.zeros(3)
-
-
 @pytest.mark.parametrize(
     "make",
     [
         lambda *ends: rb.retime(rb.exponential_cubic_so3(*ends), 2.0),
-        lambda R0, R1, *w: rb.geodesic_se3(*(rb.pose_from_components(R, REST) for R in (R0, R1))),
+        lambda R0, R1, *w: rb.geodesic_se3(
+            *(rb.pose_from_components(R, [0] * 3) for R in (R0, R1))
+        ),
         lambda *ends: rb.bezier_so3(*(x[0] for x in ends)),
         lambda *ends: None,
     ],
 )
-def test_what_is_no_curve_for_each_problem_is_refused(make):
+def test_curves_that_are_not_one_for_each_problem_are_refused(make):
     with pytest.raises(ValueError, match=r"^make: curves on SO\(3\) and \[0, 1\] are wanted"):
         costs(make, SOME)
 
 
-STOPPED = """
+KILLED = """
 import sys
-from rbclassroom.surveys import body_atlas, survey
-from pathlib import Path
+from rbclassroom.surveys.survey import processes
 if __name__ == "__main__":
-    survey.CHUNK = 50
-    with survey.processes(2) as pool:
-        body_atlas.make_tables(*map(Path, sys.argv[1:]), draws=1, seeds=[5, 6], executor=pool)
+    with processes(1) as pool:
+        pool.submit(print, "begun", flush=True).result()
+        sys.stdin.read()
 """
-TABLES = "atlas_maps.csv", "atlas_intervals.csv"
 
 
-def runs(process):
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state != "Z"
+def test_processes_end_when_their_parent_is_killed(tmp_path):
+    """They hold the pipe of its output open until they end."""
+    script = tmp_path / "parent.py"
+    script.write_text(KILLED)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, script], text=True, **pipes) as job:
+        assert job.stdout.readline() == "begun\n"
+        job.kill()
+        assert job.communicate(timeout=100)[0] == ""
 
 
-@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
-def test_an_atlas_that_was_killed_goes_on_and_gives_the_same_bytes(tmp_path):
-    script = tmp_path / "atlas.py"
-    script.write_text(STOPPED)
+def test_an_atlas_that_was_stopped_goes_on_and_gives_the_same_bytes(tmp_path, monkeypatch):
+    """It is stopped while it writes the costs of the second body and seed, of six."""
+    surveyed, savez = [], np.savez
 
-    def start(name):
-        (tmp_path / name).mkdir(exist_ok=True)
-        words = [sys.executable, str(script), str(tmp_path / f"chunks-{name}"), tmp_path / name]
-        return subprocess.Popen(words, stderr=subprocess.DEVNULL)
+    def made_up(problems, executor, *, inertia, ways, report):
+        surveyed.append((executor, problems.w0[0, 0], inertia[0, 0]))
+        report(len(problems.w0), len(problems.w0))
+        rng = np.random.default_rng(int(1e9 * inertia[0, 0] + abs(1e6 * problems.w0[0, 0])))
+        return {name: 1000 + rng.random(len(problems.w0)) for name in ["optimum", *ways]}
 
-    job, chunks = start("stopped"), tmp_path / "chunks-stopped"
-    while len(list(chunks.glob("*.npz"))) < 2:
-        assert job.poll() is None
-        time.sleep(0.01)
-    workers = Path(f"/proc/{job.pid}/task/{job.pid}/children").read_text().split()
-    assert len(workers) >= 2
-    job.send_signal(signal.SIGKILL)
-    job.wait()
-    done = {path: path.stat().st_mtime_ns for path in chunks.glob("*.npz")}
-    assert not list((tmp_path / "stopped").iterdir())
-    patience = time.monotonic() + 60
-    while any(map(runs, workers)):
-        assert time.monotonic() < patience
-        time.sleep(0.01)
-    job = start("stopped")
-    while len(now := list(chunks.glob("*.npz"))) <= len(done):
-        assert job.poll() is None
-        time.sleep(0.01)
-    assert {path: path.stat().st_mtime_ns for path in now if path in done} == done
-    assert job.wait() == 0
-    assert start("whole").wait() == 0
-    for table in TABLES:
-        assert (tmp_path / "stopped" / table).read_bytes() == (
-            tmp_path / "whole" / table
-        ).read_bytes()
-    assert not list(chunks.iterdir())
+    def interrupted(file, **kept):
+        if len(kept) == 2:
+            file.write(b"PK")
+            raise KeyboardInterrupt
+        savez(file, **kept)
+
+    def run(name):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        body_atlas.make_tables(folder / "kept" / "costs.npz", "executor", folder, 1, [5, 6])
+        assert not (folder / "kept" / "costs.npz").exists()
+        return {path.name: path.read_bytes() for path in folder.glob("*.csv")}
+
+    monkeypatch.setattr(body_atlas, "survey", made_up)
+    monkeypatch.setattr(body_atlas, "DOMAINS", {"all": 10})
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "savez", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            run("stopped")
+    assert not list(tmp_path.glob("stopped/*.csv"))
+    tables = run("stopped")
+    assert [len(surveyed), len(set(surveyed))] == [7, 6]  # once, but for the one that was lost
+    assert {executor for executor, *_ in surveyed} == {"executor"}
+    assert tables == run("whole")
+    assert sorted(tables) == ["atlas_intervals.csv", "atlas_maps.csv"]
+    monkeypatch.setattr(body_atlas, "TABLES", tmp_path / "whole")
+    assert len(body_atlas.stored("maps")["body"]) == 300  # of the first seed
+    assert body_atlas.stored("intervals")["seed [1]"].tolist() == [5] * 33 + [6] * 33
+
+
+def test_a_bar_grows_and_ends_as_a_line(monkeypatch):
+    stages = []
+    handle = SimpleNamespace(update=lambda stage, raw: stages.append(stage))
+    shown = {"display": lambda stage, **_: stages.append(stage) or handle, "get_ipython": object}
+    for name, function in shown.items():
+        monkeypatch.setattr(progress, name, function)
+    report = progress.bar("A < B")
+    report(5000, 20_000)
+    report(20_000, 20_000)
+    assert [stage["text/plain"] for stage in stages][1] == "A < B: 20,000 of 20,000"
+    assert [stage["text/html"] for stage in stages] == [
+        '<div><progress max="20000" value="5000"></progress> A &lt; B: 5,000 of 20,000</div>',
+        "<div>A &lt; B: 20,000 of 20,000</div>",
+    ]

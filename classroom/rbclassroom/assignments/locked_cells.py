@@ -1,7 +1,7 @@
-"""Read a problem set, and restore what a student must not change: cell by cell, as handed out.
+"""Read a problem set, and put back what a student must not change: cell by cell, as handed out.
 
-Students and graders use the same functions. Cells are told apart as nbgrader does, by their
-grade_id, but without it: students do not have it.
+Students and graders use the same functions. Cells are identified by their grade_id, as nbgrader
+does, but without nbgrader: students do not have it.
 """
 
 import copy
@@ -16,11 +16,11 @@ from nbformat import NotebookNode
 
 
 class Refused(ValueError):
-    """What cannot be graded by machine; the message says why."""
+    """A submission that cannot be graded by machine; the message says why."""
 
 
 def decode(content: bytes) -> str:
-    """Return the text of a file in UTF-8 or, with its mark at the beginning, in UTF-16."""
+    """Return the text of a file in UTF-8 or, with a byte order mark, in UTF-16."""
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     return content.decode("utf-16" if marked else "utf-8-sig")
 
@@ -38,7 +38,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
             nbformat.validate(notebook)
         if not notebook.cells:
             raise ValueError("it has no cells")
-    except Exception as error:  # whatever nbformat stumbles over
+    except Exception as error:  # nbformat raises many kinds
         why = (str(error).splitlines() or [type(error).__name__])[0][:80]
         cure = "take an earlier copy, or open it in JupyterLab and save it again"
         raise Refused(f"{name} is damaged or no notebook ({why}); {cure}") from error
@@ -48,7 +48,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
 
 
 def marks_of(cell: NotebookNode) -> dict[str, Any]:
-    """Return what nbgrader has written into a cell."""
+    """Return the metadata of nbgrader in a cell."""
     marks = cell.metadata.get("nbgrader")
     return marks if isinstance(marks, dict) else {}
 
@@ -106,12 +106,10 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
         cell.metadata = NotebookNode()
     above = -1
     for name, missing in wanted.items():
-        there = [grade_id(cell) for cell in cells]
-        if name not in there:
+        if name not in map(grade_id, cells):
             cells.insert(above + 1, copy.deepcopy(missing))
             remarks.append(f"{name_cell(cells, above + 1)} was missing; it is put back")
-            there.insert(above + 1, name)
-        above = there.index(name)
+        above = [grade_id(cell) for cell in cells].index(name)
     if [grade_id(cell) for cell in cells if grade_id(cell)] != list(wanted):
         remarks.append("cells are not in the order of the original; they are run in yours")
     used = {""}
@@ -127,16 +125,18 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
 
 def _put_back(cells: list[NotebookNode], at: int, wanted: NotebookNode) -> list[str]:
     cell, kept = cells[at], copy.deepcopy(wanted)
-    changes = [f"was made a {cell.cell_type} cell"] * (cell.cell_type != wanted.cell_type)
     own, given = ({**marks_of(c), "cell_type": ""} for c in (cell, wanted))
-    changes += ["has other points or marks"] * (own != given)
-    if any(cell.metadata.get(k) != wanted.metadata.get(k) for k in ("editable", "deletable")):
-        changes.append("was unlocked")
+    locks = [[c.metadata.get(key) for key in ("editable", "deletable")] for c in (cell, wanted)]
+    changes = {
+        "was changed": not is_answer(wanted) and cell.source != wanted.source,
+        f"was made a {cell.cell_type} cell": cell.cell_type != wanted.cell_type,
+        "has other points or marks": own != given,
+        "was unlocked": locks[0] != locks[1],
+    }
     if is_answer(wanted):
         kept.source = cell.source
         if cell.get("attachments") and kept.cell_type == "markdown":
             kept.attachments = cell.attachments
-    elif cell.source != wanted.source:
-        changes.insert(0, "was changed")
     cells[at] = kept
-    return [f"{name_cell(cells, at)} {' and '.join(changes)}; it is put back"] if changes else []
+    what = " and ".join(change for change, made in changes.items() if made)
+    return [f"{name_cell(cells, at)} {what}; it is put back"] if what else []

@@ -8,24 +8,20 @@ from typing import Any
 
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file, and the folder that it is in; whoever reads it sees the old or the new one."""
+    """Write a file and its folder; a reader sees the old content or the new one."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(f".{os.getpid()}.part")
     part.write_bytes(content)
-    part.replace(path)
-    return path
-
-
-def quoted(cell: str) -> str:
-    """Return a cell that no spreadsheet takes for a formula."""
-    return f"'{cell}" if cell.startswith(("=", "+", "-", "@", "\t", "\r")) else cell
+    return part.replace(path)
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write a table whose columns are the keys of its rows."""
-    columns = {key: None for row in sorted(rows, key=len, reverse=True) for key in row}
+    """Write a table for spreadsheets; its columns are the keys of the rows, and none a formula."""
+    columns = {key: "" for row in sorted(rows, key=len, reverse=True) for key in row}
     content = io.StringIO(newline="")
     table = csv.writer(content, lineterminator="\n")
-    table.writerow(columns)
-    table.writerows([quoted(str(row.get(key, ""))) for key in columns] for row in rows)
+    for row in (dict(zip(columns, columns, strict=True)), *rows):
+        cells = [str(row.get(key, "")) for key in columns]
+        formula = ("=", "+", "-", "@", "\t", "\r")
+        table.writerow(f"'{cell}" if cell.startswith(formula) else cell for cell in cells)
     write_whole(path, content.getvalue().encode("utf-8-sig"))  # as Excel wants it

@@ -13,9 +13,9 @@ from typing import Any
 from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
 
-from rbclassroom.assignments.restore import grade_id, is_answer
+from rbclassroom.assignments.locked_cells import grade_id, is_answer
 
-# each leads round what can be read in the code
+# each gives access to what cannot be read in the code
 NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
 NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # what was run, tests too
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
@@ -27,15 +27,13 @@ ATTRIBUTES |= {"attrgetter", "methodcaller"}
 MODULES = {"builtins", "ctypes", "gc", "importlib", "inspect", "IPython", "ipykernel", "pkgutil"}
 MODULES |= {"nbgrader", "pytest", "runpy", "unittest", "zmq", "jupyter_client", "pickle"}
 MODULES |= {"code", "codeop", "cProfile", "profile"}
-# magics and help that do no harm; of those that run code only their names are left out
-MAGICS = re.compile(
-    r"(^%%capture\b[ \w-]*$|^[ \t]*%%?time(?:it)?\b(?: +-[nr] *\d+)*)"
-    r"|^[ \t]*(?:%(?:matplotlib|precision|(?:load_ext +)?autoreload)\b[ \w.-]*"
+TIMED = re.compile(r"^%%capture\b[ \w-]*$|^[ \t]*%%?time(?:it)?\b(?: +-[nr] *\d+)*", re.MULTILINE)
+HARMLESS = re.compile(
+    r"^[ \t]*(?:%(?:matplotlib|precision|(?:load_ext +)?autoreload)\b[ \w.-]*"
     r"|%config +InlineBackend\.\w+ *=[\w'\"{}\[\], -]*|(?:\?{0,2}[\w.]+\?{1,2}|\?{1,2}[\w.]+) *)$",
     re.MULTILINE,
 )
-CUSTOMARY = {"np": "numpy", "plt": "matplotlib.pyplot", "mpl": "matplotlib", "sp": "scipy"}
-Said = Iterator[tuple[int, str]]  # the line, and what is done
+CUSTOMARY = {"np": "numpy", "plt": "pyplot", "mpl": "matplotlib", "sp": "scipy"}
 LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast.comprehension
 
 
@@ -44,24 +42,21 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
-    names = {_defines(node) for node in given}
+    names = {_defines(node) for node in given} - {""}
     attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
-    modules, found = set[str](), []  # modules and what is in them
+    modules = set[str]()  # and what is in them
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))
         elif isinstance(node, ast.Assign) and _root(node.value) in modules:
             modules |= {target.id for target in node.targets if isinstance(target, ast.Name)}
-    for at in own:
-        said = {*_rebound(trees[at], names), *_suspicious(trees[at], attributes, modules)}
-        found += [(at, *what) for what in sorted(said)]
-    return found
+    said = {(at, *what) for at in own for what in _overrides(trees[at], names, attributes, modules)}
+    return sorted(said)
 
 
 def _parsed(source: str) -> ast.Module:
     """Return the code; nothing if it is not Python, and so does not run."""
-    harmless = MAGICS.sub(lambda found: "" if found[1] else "pass", source)
-    for text in (harmless, source):
+    for text in (HARMLESS.sub("pass", TIMED.sub("", source)), source):
         try:
             tree = ast.parse(TransformerManager().transform_cell(text))
             return ast.increment_lineno(tree, len(text) - len(text.lstrip("\n")))
@@ -86,30 +81,31 @@ def _root(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def _rebound(tree: ast.Module, names: set[str]) -> Said:
-    """Yield where the notebook binds one of the names, except by customary imports."""
-    todo: list[Any] = [tree]
-    for node in todo:
-        todo += [] if isinstance(node, LOCAL) else ast.iter_child_nodes(node)
-    inner = (node for node in ast.walk(tree) if isinstance(node, ast.Global | ast.NamedExpr))
-    for node in {*todo, *inner}:
-        found = [getattr(node, "name", "")]  # of definitions, and in match
-        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
-            found = [node.id]
-        elif isinstance(node, ast.NamedExpr):
-            found = [node.target.id]
-        elif isinstance(node, ast.Global):
-            found = node.names
-        elif isinstance(node, ast.alias):
-            usual = CUSTOMARY.get(node.asname or "", node.asname or "").rpartition(".")[2]
-            found = [node.asname] * (usual != node.name.rpartition(".")[2])
-        for name in names.intersection(found) - {""}:
-            yield node.lineno, f"gives {name} another meaning"
+def _rebound(node: ast.AST, local: bool) -> list[str]:
+    """Return the names that a node binds in the notebook, except by customary imports."""
+    match node:
+        case ast.Global(names=names):
+            return names
+        case ast.NamedExpr(target=ast.Name(id=name)):
+            return [name]
+        case ast.Name(id=name, ctx=ast.Store() | ast.Del()) if not local:
+            return [name]
+        case ast.alias(name=name, asname=short) if not local:
+            usual = CUSTOMARY.get(short or "", short)
+            return [short] if short and usual != name.rpartition(".")[2] else []
+    return [] if local else [getattr(node, "name", "")]  # of definitions, and in match
 
 
-def _suspicious(tree: ast.Module, attributes: set[str], modules: set[str]) -> Said:
-    """Yield what leads round the tests."""
+def _overrides(
+    tree: ast.Module, names: set[str], attributes: set[str], modules: set[str]
+) -> Iterator[tuple[int, str]]:
+    """Yield the line and what is done where code leads round the tests."""
+    scopes = [node for node in ast.walk(tree) if isinstance(node, LOCAL)]
+    inner = {n for scope in scopes for part in ast.iter_child_nodes(scope) for n in ast.walk(part)}
+    node: Any
     for node in ast.walk(tree):
+        for name in names.intersection(_rebound(node, node in inner)):
+            yield node.lineno, f"gives {name} another meaning"
         match node:
             case ast.Name(id=name) if name in NAMES:
                 yield node.lineno, f"uses {'a magic or a shell' if name == 'get_ipython' else name}"

@@ -12,10 +12,9 @@ from traitlets import Integer
 from rbclassroom.course.notebooks import kernel_address
 
 CELL_SECONDS = 30  # for a cell, at home and in grading
-PRINTED, DISPLAYED = 100_000, 2_000_000  # characters of a cell: in print, and of pictures and pages
+ROOM = {"stream": 100_000, "data": 2_000_000}  # characters of a cell: print; pictures and pages
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
-SLOW = {"ename": "TimeoutError", "evalue": "the cell took too long", "traceback": []}
 CUT = "the output is too large; what is too much is left out"
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -23,8 +22,8 @@ WIDGET = "application/vnd.jupyter.widget-view+json"
 class BoundedClient(NotebookClient):
     """A client for a notebook whose cells may loop, flood or die.
 
-    Its kernel keeps what it keeps in `folder`, which is to be set before it starts. `slow` and
-    `cut` are the indices of the cells that took too long, and of which not all output is kept.
+    Its kernel keeps its files in `folder`, which is to be set before it starts. `slow` and `cut`
+    are the indices of the cells that took too long, and of those whose output is not complete.
     """
 
     timeout = Integer(CELL_SECONDS, help="a cell has so many seconds").tag(config=True)
@@ -34,14 +33,15 @@ class BoundedClient(NotebookClient):
     def __init__(self, *args: Any, **settings: Any) -> None:
         super().__init__(*args, **settings)
         self.allow_errors = self.interrupt_on_timeout = self.coalesce_streams = True
-        self.error_on_timeout, self.shutdown_kernel = SLOW, "immediate"
+        slow = {"ename": "TimeoutError", "evalue": "the cell took too long", "traceback": []}
+        self.error_on_timeout, self.shutdown_kernel = slow, "immediate"
         self.extra_arguments, self.record_timing = ["--log-level=CRITICAL"], False
 
     def reset_execution_trackers(self) -> None:
         """Begin to count."""
         super().reset_execution_trackers()
         self.slow, self.cut = list[int](), list[int]()
-        self._at, self._left, self._room = -1, ALL_OUTPUT, dict[str, int]()
+        self._at, self._left, self._room = -1, ALL_OUTPUT, dict(ROOM)
 
     def create_kernel_manager(self) -> Any:
         """Return a manager of a kernel that listens in the folder."""
@@ -58,17 +58,15 @@ class BoundedClient(NotebookClient):
     def process_message(self, msg: dict[str, Any], cell: NotebookNode, cell_index: int) -> Any:
         """Add an output to its cell, unless the cell has too many."""
         if cell_index != self._at:
-            self._at, self.raise_on_iopub_timeout = cell_index, False
-            self._room = {"stream": PRINTED, "data": DISPLAYED}
+            self._at, self.raise_on_iopub_timeout, self._room = cell_index, False, dict(ROOM)
         kind, content = msg["msg_type"], msg["content"]
         if kind == "error":
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
             if kind != "stream":  # a widget lives with its kernel
-                data = content["data"].items()
+                data, kind = content["data"].items(), "data"
                 content["data"] = {k: v for k, v in data if isinstance(v, str) and k != WIDGET}
-                kind = "data"
             size = len(content["text"] if kind == "stream" else json.dumps(content["data"]))
             room = min(self._room[kind], self._left)
             if size > room:
