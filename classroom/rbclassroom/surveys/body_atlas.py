@@ -41,7 +41,8 @@ CURVES = (*CLOSED_FORMS, "two Béziers", "three", "ball's optimum")
 these and "normal", and "ball's optimum" the optimum for a ball, which is no closed form."""
 DOMAINS = {"small": 2, "medium": 5, "all": CELLS}
 """So many steps of the displacement, from 0, and of the end velocity belong to a domain."""
-SEEDS, DRAWS = (31, 32, 33), 200
+SEEDS = 31, 32, 33
+DRAWS = 200
 """Seeds of the problems, the maps are of the first; and problems in each of the 10 × 10 cells."""
 TABLES = Path(__file__).parent
 """Where the tables of the atlas are stored."""
