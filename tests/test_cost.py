@@ -95,14 +95,14 @@ def test_sharp_turns_are_not_missed(margin):
     assert rb.acceleration_cost(cubic) == pytest.approx(27 / 8 * 4 * np.pi * k**3, rel=20 * margin)
 
 
-def late_line(when):
+def late_line(when, angle):
     """All of its acceleration is within a thousandth of the time."""
 
     def late(t, order):
         x = np.tanh(2000 * (t - when))
         return [(1 + x) / 2, 1000 * (1 - x * x), -4e6 * x * (1 - x * x)][order]
 
-    return rb.projected_line_so3(I3, about_z(1.0), late), [when]
+    return rb.projected_line_so3(I3, about_z(angle), late), [when]
 
 
 def cubic(when, off):
@@ -139,7 +139,7 @@ def cayleys_cubic(short_of):
 @pytest.mark.parametrize(
     ("make", "given"),
     [
-        (late_line, [0.37]),
+        *((late_line, [0.37, angle]) for angle in (1, 1e-8)),
         *((cubic, [when, off]) for when in (0.37, 0.61) for off in (1e-2, 1e-4, 1e-5)),
         *((cubic_of_quaternions, [margin]) for margin in (0.1, 1e-3)),
         *((cayleys_cubic, [short_of]) for short_of in (0.3, 1e-2, 1e-3, 1e-4)),

@@ -161,6 +161,8 @@ def test_a_jump_is_warned_of_and_its_time_is_refused(make):
         assert np.isfinite(stack.at_own_times(own, order)).all()
         with pytest.raises(ValueError, match=r"^t = 0\.5: the nearest rotation is not unique"):
             one([0.3, 0.5], order)
+        with pytest.raises(ValueError, match=r"^t = 1\.5: the nearest rotation is not unique"):
+            rb.retime(one, 3)(1.5, order)
         for k in (0, 999):
             times, late = (np.where(np.arange(1000) == k, 0.5, t).reshape(10, 100), own.copy())
             late[k, 0, 1] = 0.5
