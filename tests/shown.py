@@ -46,8 +46,9 @@ def columns(file):
 
 
 def numbers(name):
-    """The numbers of a committed figure, by the names of their columns."""
-    return {key: x.astype(float) for key, x in columns(FIGURES / f"{name}.csv").items()}
+    """The columns of a committed figure by their names; those that have no unit are words."""
+    table = columns(FIGURES / f"{name}.csv")
+    return {key: x.astype(float) if key.endswith("]") else x for key, x in table.items()}
 
 
 def record(folder):
@@ -58,10 +59,7 @@ def record(folder):
     save_figure, render, frames = save.save_figure, animate.render, {}
 
     def saved(fig, name, data, alt):
-        pools = defaultdict(list)
-        for key, values in [*frames.pop(fig, []), *by_names(fig.findobj())]:
-            pools[key].append(values)
-        pools = {key: np.unique(np.concatenate(values)) for key, values in pools.items()}
+        pools = pooled([*frames.pop(fig, []), *by_names(fig.findobj())])
         (Path(folder) / f"{name}.pickle").write_bytes(pickle.dumps(pools))
         picture = save_figure(fig, name, data, alt)
         check_looks(fig)
@@ -74,6 +72,14 @@ def record(folder):
     for module in (rbcourse.draw, save, animate):
         module.save_figure = saved
     animate.render = rendered
+
+
+def pooled(pairs):
+    """The different numbers under each name."""
+    pools = defaultdict(list)
+    for key, values in pairs:
+        pools[key].append(values)
+    return {key: np.unique(np.concatenate(values)) for key, values in pools.items()}
 
 
 def by_names(artists):
@@ -146,17 +152,23 @@ def not_shown(figures, shown):
     for file in sorted(figures.glob("*.csv")):
         if not file.with_suffix(".png").exists():
             continue  # a table beside figures
-        pools, table = pickle.loads((shown / f"{file.stem}.pickle").read_bytes()), columns(file)
-        rows = table.get("drawn [1]", np.array("1")) == "1"
-        for column, cells in table.items():
-            place = f"{file.stem}, {column}"
-            share = min((s for form, s in SHARES.items() if re.fullmatch(form, place)), default=1)
-            if share:
-                pool = pools[name_for(column, pools)]
-                values = np.unique(cells[rows].astype(float))
-                lost = [v for v in values if not (held(pool, v) or held(pool, np.degrees(v)))]
-                if len(lost) > (1 - share) * len(values):
-                    yield f"{place}: {len(lost)} of {len(values)} are not in the picture"
+        pools = pickle.loads((shown / f"{file.stem}.pickle").read_bytes())
+        yield from lost_columns(file, pools)
+
+
+def lost_columns(file, pools):
+    """The columns of a CSV file that are not among the numbers of a figure."""
+    table = columns(file)
+    rows = table.get("drawn [1]", np.array("1")) == "1"
+    for column, cells in table.items():
+        place = f"{file.stem}, {column}"
+        share = min((s for form, s in SHARES.items() if re.fullmatch(form, place)), default=1)
+        if share:
+            pool = pools[name_for(column, pools)]
+            values = np.unique(cells[rows].astype(float))
+            lost = [v for v in values if not (held(pool, v) or held(pool, np.degrees(v)))]
+            if len(lost) > (1 - share) * len(values):
+                yield f"{place}: {len(lost)} of {len(values)} are not in the picture"
 
 
 def name_for(column, pools):

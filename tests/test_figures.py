@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import oracles
 import pytest
-import shown
 from scipy.integrate import simpson, solve_ivp
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 from shown import FIGURES, numbers
@@ -17,11 +16,6 @@ from rbclassroom.surveys.survey import costs, survey
 from rbcourse.draw.save import UNITS
 
 TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # without pictures
-
-
-def words(name):
-    """The columns of a table, as words."""
-    return shown.columns(FIGURES / f"{name}.csv")
 
 
 def columns(data, form, keys="xyz"):
@@ -38,7 +32,7 @@ def matrices(data, form="R{} [1]"):
 )
 def test_every_figure_has_files_that_journals_take_units_and_letters_that_can_be_read(name):
     plain = "figure", "curve", "frame", "family", "body", "domain"
-    for column in words(name):
+    for column in numbers(name):
         assert column.endswith(tuple(f" [{unit}]" for unit in UNITS)) or column in plain, column
     files = {file.suffix for file in FIGURES.glob(f"{name}.*")}
     if name in TABLES:
@@ -136,9 +130,9 @@ def test_columns_are_formulas_of_the_share_of_the_time(place):
 
 @pytest.mark.source("BK Fig. 1")
 def test_the_data_of_paper_fig1():
-    frame, *values = words("paper_fig1").values()
-    places, R = np.split(np.array(values, dtype=float).T, [3], axis=1)
-    assert list(words("paper_fig1"))[1:4] == list(METRES)
+    frame, *values = numbers("paper_fig1").values()
+    places, R = np.split(np.transpose(values), [3], axis=1)
+    assert list(numbers("paper_fig1"))[1:4] == list(METRES)
     assert frame.tolist() == ["F", "M"]
     assert np.array_equal([*places[0], *R[0]], [0, 0, 0, *np.eye(3).ravel()])
     assert rb.is_so(R.reshape(2, 3, 3), 1e-11).all()
@@ -226,11 +220,11 @@ def test_the_data_of_paper_fig5():
     assert np.abs(numbers("paper_fig5a")["w1' [rad]"] - solution.sol(t)[7]).max() < 1e-8
     projected = rb.projected_cubic_so3(np.eye(3), rb.exp_so3(turn), w0, w1)(t)
     assert np.abs(drawn - projected).max() < 1e-11
-    table = words("paper_fig5_costs")
+    table = numbers("paper_fig5_costs")
     assert list(table) == ["figure", "curve", "rotation [rad²]", "translation [m²]"]
     figure, curve, *found = table.values()
     assert [*zip(figure, curve, strict=True)] == [("5a", "optimum"), ("5b", "projection")]
-    assert np.allclose(np.array(found, float).T, costs, rtol=1e-3)
+    assert np.allclose(np.transpose(found), costs, rtol=1e-3)
 
 
 @pytest.mark.source("BK 1", "BK 7", "beyond BK 6", "beyond BK 7")
@@ -301,7 +295,7 @@ def test_the_ways_and_the_order_of_turns_of_lesson_3():
     assert np.ptp([short, long], axis=1).max() < 1e-9
     assert (short + long).sum() == pytest.approx(2 * np.pi, abs=1e-8)
     assert short.sum() < blended.sum()
-    R = np.array([*words("lesson03_order").values()][4:], float).T.reshape(-1, 3, 3)
+    R = np.transpose([*numbers("lesson03_order").values()][4:]).reshape(-1, 3, 3)
     x, z = np.array([[[1, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 1]]])
     assert np.abs(R - [np.eye(3), z, x @ z, np.eye(3), x, z @ x]).max() < 1e-12
 
@@ -448,9 +442,9 @@ def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost():
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for name, place in (("median", 49), ("ninety", 89)):
-        data = words(f"lesson12_{name}_across")
+        data = numbers(f"lesson12_{name}_across")
         assert data.pop("family").tolist() == ["across"] * 100
-        data = {key: float(column[cell - 100]) for key, column in data.items()}
+        data = {key: column[cell - 100] for key, column in data.items()}
         assert list(data.values())[:3] == pytest.approx([np.radians(81), 4.95, 100])
         for way, make in atlas.FORMS.items():
             excess = np.sort(rb.acceleration_cost(make(*ends)) / best - 1)[place]
@@ -468,12 +462,12 @@ def test_near_a_geodesic_deviations_are_multiples_of_each_other():
     wanted = {way: (of_d * d, of_e * e) for way, (of_d, of_e) in shares.items()}
     for way, (of_d, of_e) in (wanted | {"exponential": (0 * t, -0.4 * d * (t + 2))}).items():
         assert np.abs(data[f"{way} d [1]"] - of_d).max() < 2e-5
-        assert np.abs(data[f"{way} e [1]"] - of_e).max() < (1e-4 if way[0] == "e" else 2e-5)
+        assert np.abs(data[f"{way} e [1]"] - of_e).max() < {"exponential": 1e-4}.get(way, 2e-5)
 
 
 def test_the_excess_of_a_projection_grows_with_the_third_power_of_the_margin():
-    family, *columns = words("lesson12_margins").values()
-    margin, excess = np.array(columns, float)[:2, family == "random"]
+    family, *columns = numbers("lesson12_margins").values()
+    margin, excess = np.array(columns)[:2, family == "random"]
     low = margin < 0.3
     slope, _ = np.polyfit(np.log(margin[low]), np.log(excess[low]), 1)
     assert low.sum() > 25
