@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import rbcourse as rb
-from rbcourse.draw import animate, bodies, spheres
+from rbcourse.draw import animate, bodies, space, spheres
 
 TIMES = np.linspace(0, 1, 12)
 POSES = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1]))(TIMES)
@@ -113,7 +113,8 @@ def test_the_player_starts_with_the_still_frame(still, count):
     before = fig.canvas
     player = animate.animate(fig, "cube", "", update, count, still=still)
     assert fig.canvas is before
-    assert all(artist.get_visible() and not artist.get_animated() for artist in update(0))
+    artists = [*space.scenes(fig), *update(0)]
+    assert all(artist.get_visible() and not artist.get_animated() for artist in artists)
     page = player._repr_html_()
     assert held(page)["controls"][0]["first"] == still % count
     first = re.search(r'src="data:image/png;base64,([^"]*)"', page)[1]

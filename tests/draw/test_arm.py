@@ -50,10 +50,13 @@ def test_a_posture_shows_links_frames_and_angles(axes, q):
     directions = 0.45 * np.exp(1j * np.repeat(headings, 2)) * [1, 1j, 1, 1j]
     assert off([(arrow.U[0], arrow.V[0]) for arrow in arrows], directions) < 1e-14
     arcs = [patch for patch in axes[0].patches if isinstance(patch, Arc)]
-    for arc, joint, before, angle in zip(arcs, joints[:-1], [0, q[0]], q, strict=True):
-        assert complex(*arc.center) == joint
+    for k, (arc, before, angle) in enumerate(zip(arcs, [0, q[0]], q, strict=True)):
+        assert complex(*arc.center) == joints[k]
         turned = sorted(np.degrees([before, before + angle]))
         assert [arc.theta1, arc.theta2] == pytest.approx(turned)
+        along, label = np.exp(1j * np.array([before, before + angle / 2]))
+        assert off(axes[0].lines[1 + k], joints[k] + [0, 0.9 * along]) < 1e-14
+        assert off(axes[0].texts[4 * k + 1].get_position(), joints[k] + 0.8 * label) < 1e-14
 
 
 @pytest.mark.source("RR 4")

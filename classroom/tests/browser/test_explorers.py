@@ -15,12 +15,13 @@ from rbclassroom.course.notebooks import KERNEL
 # place and its name; it changes the text; that of the last one is solved for each picture
 KINDS = {"theta": (1, "t"), "chain": (1, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
-# when keys go down, and when there is a new picture on the screen
+# when keys go down, and when the screen shows a new picture
 NOTE = """() => {
   window.keys = []; window.pictures = [];
+  let frame = null;
+  const show = () => { frame = null; pictures.push(performance.now()); };
   document.addEventListener("keydown", () => keys.push(performance.now()), true);
-  document.addEventListener("drawn", () =>
-    requestAnimationFrame(() => pictures.push(performance.now())));
+  document.addEventListener("drawn", () => { frame ??= requestAnimationFrame(show); });
 }"""
 WIDE = """async (canvas) => {
   const drawn = new Promise((done) => canvas.addEventListener("drawn", done));

@@ -43,7 +43,7 @@ def test_a_player_equals_the_drawing_plays_and_is_a_still_where_it_cannot_be_unp
     button.press("Enter")
     page.clock.run_for(1000)
     assert slider.input_value() == "7"
-    for frame, share in ((7, "37 %"), (19, "100 %")):
+    for frame, share in ((0, "0 %"), (19, "100 %")):
         slider.fill(str(frame))
         assert slider.get_attribute("aria-valuetext") == share
         for artist in update(frame):

@@ -109,6 +109,7 @@ def test_settings_that_fail_and_warnings_are_said(explorer):
     explorer.put(x=FAR)
     said = "Nothing to show here: x: too <far>"
     assert sent(explorer) == ([[]], [[[], said, f"A dot. {said}"]])
+    assert not explorer.artists["dot"].get_visible()
     for x, warned in ((3.0, ""), (WARN, "nearly too far")):
         explorer.put(x=x)
         assert notice(explorer) == warned

@@ -30,7 +30,7 @@ def test_every_explorer_is_recorded_and_together_they_are_small():
 
 @pytest.mark.parametrize("name", sorted(recorded.MOVED))
 def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
-    """At states of which those who recorded them knew nothing."""
+    """At random states."""
     explorer, (moved, values) = made(name), recorded.MOVED[name]
     explorer.restart()
     page = (FOLDER / f"{name}.html").read_text(encoding="utf-8")
@@ -76,8 +76,13 @@ def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
             assert np.abs(places - found).max() < 0.2  # pixels
 
 
-def test_the_same_explorer_gives_the_same_page_and_other_values_are_refused():
-    pages = [recorded.record(explorers.theta_explorer(), "theta", "angle", [120.0]) for _ in "ab"]
-    assert pages[0]._repr_html_() == pages[1]._repr_html_()
+def test_a_record_has_its_states_in_order_the_same_bytes_each_time_and_its_first_value():
+    theta = made("theta")
+    theta.restart()
+    one, other = (recorded.record(theta, "theta", "angle", [60.0, 120.0]) for _ in "ab")
+    assert one._repr_html_() == other._repr_html_()
+    for k, angle in enumerate((60.0, 120.0)):
+        assert one.texts[101 * k + 30] == theta.state(angle=angle, t=0.3).texts
+    assert "Here these stay" not in one.caption
     with pytest.raises(ValueError, match="120"):
-        recorded.record(explorers.theta_explorer(), "theta", "angle", [60.0])
+        recorded.record(theta, "theta", "angle", [60.0])
