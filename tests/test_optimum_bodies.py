@@ -44,6 +44,10 @@ KNOWN = {  # the rotation vector, velocities, and moments or accelerations; or a
     "jerk 0 0 -1.6796  .0478 -1.2536 7.2756  .7923 .2244 6.3072  "
     ".0926 -1.1733 13.5431  3.2645 -1.6836 -16.3042": "6350.394",  # with a turn less 34,447
 }
+SELDOM_FOUND = {  # least costs that are known of some of the fast problems of `best`
+    "acceleration": {60 + 9: 1251.1935149, 60 + 18: 842.5309036},
+    "torque": {60 + 16: 2919.2413078, 60 + 27: 2059.4960175},
+}
 TIMES = np.linspace(0, 1, 101)
 OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # ‖w‖ < 3π
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
@@ -65,7 +69,7 @@ def random_ends(rng, angle, speed, count):
 @pytest.fixture(scope="module")
 def best():
     """Many problems of each kind and their optima, in one stack."""
-    slow, fast = random_problems(60, 37), random_problems(40, 38, np.pi, 20.0)
+    slow, fast = random_problems(60, 37), some(random_problems(40, 38, np.pi, 20.0), slice(28))
     of_bodies = [np.concatenate(pair) for pair in zip(slow, fast, strict=True)]
     # Newton's method does not converge from the projected cubics of these two
     hard = vectors("-.1 2.5 -1.7  -7.1 7 4.1  -7.2 .4 8   .6 .4 -2.9  6 -2.5 8.6  -.2 7.1 -8.1")
@@ -84,6 +88,8 @@ def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
     assert curves.residual.max() < 1e-11
     assert np.abs(curves([0, 1]) - [R0, R1]).max() < 1e-11
     assert np.abs(curves([0, 1], 1) - [w0, w1]).max() < 1e-11
+    for i, cost in SELDOM_FOUND.get(what, {}).items():
+        assert curves.cost[i] == pytest.approx(cost, rel=1e-9)
     ends, every = [R0, R1, w0, w1], np.full(len(R0), True)
     slow = (np.linalg.norm([w0, w1], axis=-1) < 9.42).all(axis=0)
     others = [
@@ -138,7 +144,7 @@ def cost_about_an_axis(angle, k0, k1):
 @pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
 def test_fast_spins_about_one_axis_make_as_many_turns_as_cost_least(speed):
     """There p(t) is a cubic, to σ and any number of turns; the optimum costs no more."""
-    rng, count = np.random.default_rng(speed), 60 if speed < 40 else 15
+    rng, count = np.random.default_rng(speed), 60 if speed < 30 else 15
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
     turn, *rates = (x[:, None] * axis for x in (sigma, k0, k1))
@@ -210,7 +216,7 @@ def test_free_motions_cost_nothing(what):
         assert np.all(cost < 1e-18 * G[:2].max(axis=(1, 2)) ** 2)
 
 
-@every_optimum
+@pytest.mark.parametrize("what", ["acceleration", "torque", "jerk"])
 def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
     problems = random_problems(16, 84)
     problems[4][:] = bodies(16, 85)

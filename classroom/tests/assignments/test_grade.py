@@ -190,7 +190,7 @@ class Killed(ProcessPoolExecutor):
 
 LISTED = [
     ("refused", "Bob_1_assignsubmission_file_/ps0.ipynb", "it is empty"),
-    ("refused", "Eve_2_assignsubmission_file_/work.zip", "File is not a zip file"),
+    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "its cells are of no set"),
     ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "its cells are of no set"),
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "deletes, ps0", "Ann Ames"),
@@ -237,6 +237,8 @@ def test_grading_again_keeps_what_a_human_gave(again):
     changed = "words-answer is another answer than when it was graded before"
     assert rows["deletes"]["remarks"] == changed
     assert rows["nosy"]["remarks"].startswith("refused: ps0.ipynb is empty")
+    assert not again.graded("nosy").exists()
+    assert not (again.folder / "feedback" / "nosy" / "ps0").exists()
     with again.gradebook() as gradebook:
         assert gradebook.find_submission("ps0", "nosy").score == 2.5
 
@@ -253,7 +255,7 @@ def test_files_that_were_not_collected_have_a_line_in_the_table(again):
     graded = {"good one", "rewrites", "deletes", "nosy", "stuck"}
     assert {student: said for student, said in remarks.items() if student not in graded} == {
         LISTED[0][1]: "not collected: it is empty",
-        LISTED[1][1]: "not collected: File is not a zip file",
+        LISTED[1][1]: "not collected: its cells are of no set",
         "cid": "nothing was collected",
     }
 
