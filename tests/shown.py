@@ -52,7 +52,7 @@ def numbers(name):
 
 
 def record(folder):
-    """Let figures that are saved write what they show into a folder, and check how they look."""
+    """Make saved figures write their displayed data into a folder, and check their layout."""
     import rbcourse.draw
     from rbcourse.draw import animate, save
 

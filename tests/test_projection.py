@@ -282,7 +282,7 @@ KINDS |= {"noisy": U + 0.1 * NOISE, "hardly noisy": U + 1e-9 * NOISE, "general":
 
 
 def by_foam(M):
-    """Return R and what is right of `nearest_rotations`, for matrices (N, 3, 3)."""
+    """Return R and the flags of `nearest_rotations`, for matrices (N, 3, 3)."""
     R = np.full(M.shape, np.nan)
     right = nearest_rotations(M.transpose(1, 2, 0), R.transpose(1, 2, 0))
     return R, right

@@ -1,4 +1,4 @@
-"""The report's functions: its names, its examples, and what they show."""
+"""The report's functions: names, examples, and figures."""
 
 import inspect
 

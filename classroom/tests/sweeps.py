@@ -1,4 +1,4 @@
-"""Explorers at all settings of their controls, and what they show there."""
+"""The states of explorers at all settings of their controls."""
 
 import re
 from functools import cache
@@ -58,7 +58,7 @@ def points(artist):
 
 
 def read_off(explorer):
-    """The texts that are to be read, by name, with plain minus signs and spaces."""
+    """The displayed texts, by name, with plain minus signs and spaces."""
     ((rows, *_),) = explorer.picture.run["texts"]
     return {name: text.replace("−", "-").replace("\u2007", " ") for name, text in rows}
 

@@ -53,7 +53,7 @@ def make_template(folder):
 
 
 def begun():
-    """Return what a cell writes when its endless part begins; each has its own."""
+    """Return the text that a cell writes when its endless part begins; each has its own."""
     return f"open('begun-{uuid.uuid4().hex}', 'w').close()"
 
 

@@ -28,7 +28,7 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
         sys.stdout.reconfigure(errors="replace")
     try:
-        if known.task == "grade":  # what needs nbgrader takes a second to import
+        if known.task == "grade":  # nbgrader takes a second to import
             from rbclassroom.assignments.grade import grade
 
             grade(known.sets, assignments, known.require_box)

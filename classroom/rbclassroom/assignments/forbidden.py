@@ -1,7 +1,7 @@
-"""Find code in a submission that overrides what the tests rely on.
+"""Find code in a submission that overrides names and objects of the tests.
 
-This reads the code and does not run it: it finds what students write in earnest or in jest, not
-what an expert takes pains to hide.
+The code is read and not run. Accidents and simple tricks are found; code that an expert hides
+carefully is not.
 """
 
 import ast
@@ -15,9 +15,9 @@ from nbformat import NotebookNode
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
 
-# each gives access to what cannot be read in the code
+# each gives access to objects that do not appear in the code
 NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
-NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # what was run, tests too
+NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # executed code and tests
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
@@ -38,13 +38,13 @@ LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast
 
 
 def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
-    """Return where a student overrides what tests rely on: the cell, the line, what is done."""
+    """Return each place where a student overrides names of tests: index of cell, line, action."""
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
     names = {_defines(node) for node in given} - {""}
     attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
-    modules = set[str]()  # and what is in them
+    modules = set[str]()  # and names of their contents
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))
@@ -99,7 +99,7 @@ def _rebound(node: ast.AST, local: bool) -> list[str]:
 def _overrides(
     tree: ast.Module, names: set[str], attributes: set[str], modules: set[str]
 ) -> Iterator[tuple[int, str]]:
-    """Yield the line and what is done where code leads round the tests."""
+    """Yield the line and the action of code that bypasses the tests."""
     scopes = [node for node in ast.walk(tree) if isinstance(node, LOCAL)]
     inner = {n for scope in scopes for part in ast.iter_child_nodes(scope) for n in ast.walk(part)}
     node: Any

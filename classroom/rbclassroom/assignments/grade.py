@@ -43,8 +43,8 @@ Row = dict[str, Any]
 def grade(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:
     """Grade all submissions of some sets, or of all sets that there are submissions of.
 
-    A line is printed for each submission; feedback and a table for each set are written. What a
-    human has given points for is kept. A submission that is refused loses the points that a
+    A line is printed for each submission; feedback and a table for each set are written. Points
+    given by hand are kept. A submission that is refused loses the points that a
     machine gave it before, and its feedback. When points of one student change while another is
     graded, or exceed the maximum, a ValueError names them and no table is written;
     ``gradebook.before-NAME.db`` holds the gradebook as it was.

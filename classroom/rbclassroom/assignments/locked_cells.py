@@ -1,4 +1,4 @@
-"""Read a problem set, and put back what a student must not change: cell by cell, as handed out.
+"""Read a problem set, and restore the locked cells from the original.
 
 Students and graders use the same functions. Cells are identified by their grade_id, as nbgrader
 does, but without nbgrader: students do not have it.
@@ -26,7 +26,7 @@ def decode(content: bytes) -> str:
 
 
 def read_notebook(content: bytes, name: str) -> NotebookNode:
-    """Return the notebook in a file; the error says what the file is instead, and what helps."""
+    """Return the notebook in a file; the error describes the file and suggests a solution."""
     if not content.strip():
         raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start anew")
     if content.startswith((b"%PDF", b"PK")):
@@ -84,7 +84,7 @@ def name_cell(cells: list[NotebookNode], at: int) -> str:
 
 
 def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
-    """Put the locked cells of a notebook back as they were, and say what was changed.
+    """Restore the locked cells of a notebook, and return a remark for each change.
 
     The answers stay. Of several cells with a name the last one counts, and the others become
     cells of the student; these lose their metadata, which could keep them from being run.

@@ -31,9 +31,9 @@ class Mistake(NamedTuple):
 class Problem:
     """A function to be written, which returns numbers.
 
-    The `inputs` are so many, and so general, that no mistake agrees with the answer, or with
-    another mistake, on all of them. A result may be off by `accuracy`, in units of the largest
-    entry, or of 1; its entries with the indices `angles` count up to full turns.
+    The `inputs` distinguish every mistake from the answer and from the other mistakes. A result may
+    be off by `accuracy`, in units of the largest entry, or of 1; its entries with the indices
+    `angles` count up to full turns.
     """
 
     names: Sequence[str]  # of the arguments

@@ -33,7 +33,7 @@ class Sampler:
     uniforms: Callable[[Array], Rows]  # of stacked draws
     mistakes: Sequence[Mistake]
     allowed: Sequence[str] = ()  # as for a `Problem`
-    draws: int = 20_000  # so many are taken
+    draws: int = 20_000
 
     def accepts(self, function: Callable[..., Any], rng: Rng = None) -> bool:
         """Draw many times, one at a time, and compare their distributions with the right ones."""

@@ -15,7 +15,7 @@ CELL_SECONDS = 30  # for a cell, at home and in grading
 ROOM = {"stream": 100_000, "data": 2_000_000}  # characters of a cell: print; pictures and pages
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
-CUT = "the output is too large; what is too much is left out"
+CUT = "the output is too large; the rest is left out"
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
 
@@ -26,8 +26,8 @@ class BoundedClient(NotebookClient):
     are the indices of the cells that took too long, and of those whose output is not complete.
     """
 
-    timeout = Integer(CELL_SECONDS, help="a cell has so many seconds").tag(config=True)
-    iopub_timeout = Integer(20, help="an interrupted cell has so many seconds").tag(config=True)
+    timeout = Integer(CELL_SECONDS, help="seconds for a cell").tag(config=True)
+    iopub_timeout = Integer(20, help="seconds for an interrupted cell").tag(config=True)
     folder = Path()
 
     def __init__(self, *args: Any, **settings: Any) -> None:
@@ -52,7 +52,7 @@ class BoundedClient(NotebookClient):
 
     async def _async_handle_timeout(self, timeout: int, cell: NotebookNode | None = None) -> Any:
         self.slow.append(self._at)
-        self.raise_on_iopub_timeout = True  # what does not stop now cannot be stopped
+        self.raise_on_iopub_timeout = True  # a cell that does not stop now cannot be stopped
         return await super()._async_handle_timeout(timeout, cell)
 
     def process_message(self, msg: dict[str, Any], cell: NotebookNode, cell_index: int) -> Any:
@@ -79,9 +79,9 @@ class BoundedClient(NotebookClient):
         return super().process_message(msg, cell, cell_index)
 
     def handle_comm_msg(self, outs: Any, msg: dict[str, Any], cell_index: int) -> None:
-        """Follow no widget: what an Output holds stands in its cell, and nothing is sent back.
+        """Ignore messages of widgets; the outputs that a widget captures stay in the cell.
 
-        What nbclient sends back for an Output can keep it from seeing the reply of the cell.
+        The answers of nbclient to an Output widget can make it miss the reply of the cell.
         """
 
     def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:

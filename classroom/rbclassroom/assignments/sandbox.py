@@ -87,7 +87,7 @@ def box(folder: Path, seconds: int) -> list[str]:
     python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
-    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # until it becomes nobody
+    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # dropped when the user changes
     # it ends with this process, and after some seconds
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
     words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]

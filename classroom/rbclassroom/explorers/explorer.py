@@ -31,10 +31,11 @@ _STYLES: Any = ["default", "rbcourse.rbcourse", dict.fromkeys(_SIZED, LABELS)]
 class Canvas(anywidget.AnyWidget):
     """The picture in the browser, which draws the states that it is sent; see canvas.js.
 
-    ``made`` never changes. A ``run`` has consecutive states of what plays. All runs of one version
-    have the same values of the other controls; a notice, of a click perhaps, is with the first of a
-    version. The browser sends a message with the ``index`` of a state that it lacks, or with the
-    ``place`` of a click: the share of the width from the left, and of the height from the top.
+    ``made`` never changes. A ``run`` has consecutive states of the control that plays. All runs of
+    one version have the same values of the other controls; the first has the notice, if there is
+    one (after a click, for example). The browser sends a message with the ``index`` of a state that
+    it lacks, or with the ``place`` of a click: the share of the width from the left, and of the
+    height from the top.
     """
 
     _esm = ENGINE + Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
@@ -44,7 +45,7 @@ class Canvas(anywidget.AnyWidget):
 
 @dataclass(frozen=True)
 class State:
-    """The artists that an explorer shows, what they draw, and its texts for display.js."""
+    """The visible artists of an explorer, their drawing commands, and the texts for display.js."""
 
     shown: list[Any]
     drawn: NDArray[np.int16]
@@ -52,9 +53,9 @@ class State:
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
-    """A picture, its controls, and the values that are to be read.
+    """A picture, its controls, and the displayed values.
 
-    The background is drawn once. The browser draws what plays, and asks for the states that it
+    The background is drawn once. The browser plays recorded states, and asks for the states that it
     lacks; each change of another control is sent as one state. Where nothing can be shown, the
     panel says why, and nothing is drawn that moves.
 
@@ -65,8 +66,8 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     artists, controls : mapping of str
         The artists that move, in the order in which they are drawn; sliders and choices.
     show : callable
-        ``show(**values)`` moves the artists to the values of the controls, and returns texts that
-        are to be read, by name. It may raise a ValueError or a RuntimeError, or warn.
+        ``show(**values)`` moves the artists to the values of the controls, and returns the
+        displayed texts, by name. It may raise a ValueError or a RuntimeError, or warn.
     plays, seconds
         The control that the play button moves, made by `widgets.stepped`; and how long it plays.
     point : callable, optional
@@ -158,9 +159,9 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return State(shown, self.display.record(shown), [list(said.items()), notice, line])
 
     def draw(self, shown: Sequence[Any] | None, zoom: float = 1) -> bytes:
-        """Return these artists as a PNG over what does not move, `zoom` times as fine.
+        """Return these artists as a PNG over the background, `zoom` times as fine.
 
-        None: without what is in space, which may be turned.
+        None: without the rooms in space, which the reader can turn.
         """
         with plt.style.context(_STYLES):
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
@@ -198,7 +199,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         }
 
     def __repr__(self) -> str:
-        """Return the name, and all that is to be read."""
+        """Return the name, and all displayed texts."""
         return self.state().texts[-1]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def of(kind, rows):
 
 
 def files(course):
-    """The notebooks in the folders of students, and what the students wrote."""
+    """The notebooks in the folders of students, and the text of the students."""
     paths = (course / "submitted").glob("*/*/*.ipynb")
     notebooks = {path: nbformat.read(path, as_version=4) for path in paths}
     return {
@@ -246,7 +246,7 @@ def test_a_file_in_the_zip_of_a_student_is_theirs_whatever_its_name(course, inne
     for given in ({"all.zip": packed(theirs)}, theirs):
         collected(course, given)
         assert list(files(course)) == ["ann_ay/ps1"]
-        # what a student packs has the dates of the student's machine
+        # entries of a student's zip have the dates of the student's machine
         assert "2030" not in (course / "submitted/ann_ay/ps1/timestamp.txt").read_text()
 
 

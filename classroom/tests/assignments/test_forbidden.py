@@ -1,4 +1,4 @@
-"""Code that replaces what the tests use is found; what students write every day is not."""
+"""Code that replaces names of the tests is found; usual code of students is accepted."""
 
 import pytest
 from nbformat.v4 import new_code_cell
@@ -13,7 +13,7 @@ LOCKED = [
 
 
 def found(source, locked=LOCKED):
-    """What is said of a cell of a student below locked cells."""
+    """The remarks on a cell of a student below locked cells."""
     marks = {"grade_id": "locked", "locked": True}
     cells = [new_code_cell(text, metadata={"nbgrader": marks}) for text in locked]
     return [(line, what) for _, line, what in find_in_cells([*cells, new_code_cell(source)])]

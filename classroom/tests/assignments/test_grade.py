@@ -86,7 +86,7 @@ LOOP, DOUBLE = f"{begun()}\nwhile True: pass", "def square(x):\n    return 2 * x
 HUGE, DIES = "x = bytearray(2 * 10**9)", "import os\nos._exit(1)"
 SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tiny set”"
 TEST = "cell 4, test of “A tiny set”"
-# Student, change, answers, points (none if it is refused), and what the remarks hold.
+# Student, change, answers, points (none if it is refused), and words of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
     ("rewrites", rewrite_tests, {"half": "half = 3"}, "0 0", [f"{TEST} was changed", "and 2 more"]),

@@ -44,7 +44,7 @@ def compiled(text):
 
 
 def namespace(name, *further):
-    """What the notebook has after its answers, and further cells."""
+    """The names in the notebook after its answers and further cells."""
     sources = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
     answers = [text for key, text in sources.items() if key.endswith("-answer")]
     space = {"__name__": "__main__"}
@@ -73,7 +73,7 @@ def no_figure_stays():
 
 @problems
 def test_the_reference_passes_also_with_lists_and_the_stub_does_not(name, slug):
-    """An answer that passes what students see must not fail for its type where they do not see."""
+    """An answer that passes the visible tests must not fail the hidden ones for its type."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
     with pytest.raises(NotYet, match="Nothing is written here yet"):

@@ -72,7 +72,7 @@ def test_the_picture_follows_the_controls_and_reset_brings_everything_back(explo
     runs = []
     explorer.picture.observe(lambda change: runs.append(change.new), "run")
     explorer.controls["x"].value = 5.0
-    assert runs == []  # what plays asks by itself
+    assert runs == []  # the control that plays asks by itself
     explorer.controls["kind"].value = "high"
     assert sent(explorer) == ([[at(5, 1)]], [[[("place", "5.0\nhigh")], "", repr(explorer)]])
     explorer.put(x=7.0, kind="low")

@@ -84,7 +84,7 @@ def test_intervals_are_binomial_for_quantiles_and_clopper_and_pearsons_for_share
         x, n = np.sort(excess[curve][inside]), inside.sum()
         assert table["problems [1]"][k] == n
         for name, share in (("median", 0.5), ("90 %", 0.9)):
-            fewer = binom.cdf(np.arange(n), n, share)  # so many of n, or fewer, are below
+            fewer = binom.cdf(np.arange(n), n, share)  # at most this number of n are below
             ends = x[np.sum(fewer <= 0.025) - 1], np.quantile(x, share), x[np.sum(fewer < 0.975)]
             found = [table[f"{name}{end} [1]"][k] for end in (" low", "", " high")]
             assert found == pytest.approx(ends, rel=5e-4)
