@@ -9,61 +9,31 @@ import subprocess
 import sys
 import tempfile
 import webbrowser
+from collections import defaultdict
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from string import Template
+from typing import Any
 
 import nbformat
+from jinja2 import Environment, FileSystemLoader
 
 from rbclassroom.assignments.handout import pack, release
-from rbclassroom.book import reference
-from rbclassroom.book.code import code_page
-from rbclassroom.book.lessons import (
-    Figure,
-    Pictures,
-    cited_in,
-    figures_of,
-    living,
-    prepared,
-    with_buttons,
-    without_outputs,
-)
-from rbclassroom.book.places import MOVED, PAGES, relinked
+from rbclassroom.book import lessons, places, reference
+from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.course import ledger
 from rbclassroom.course.notebooks import lesson_paths
 
 HERE = Path(__file__).parent
-_TAKEN = [
-    "CHANGELOG.md",
-    "CITATION.cff",
-    "CONTRIBUTING.md",
-    "LICENSE",
-    "README.md",
-    "course.py",
-    "environment.txt",
-    "pyproject.toml",
-    "benchmarks/benchmarks.csv",
-    "classroom/pyproject.toml",
-    "docs/conventions.md",
-    "docs/ledger.md",
-    "docs/near_optimal.md",
-    "docs/near_optimal.py",
-    "notebooks/QUESTIONS.md",
-    "notebooks/REFERENCES.bib",
-    "rbcourse/leading_excess.csv",
-    "classroom/rbclassroom/surveys/atlas_intervals.csv",
-    "classroom/rbclassroom/surveys/atlas_maps.csv",
-]
-_KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|txt|typed)")
-_TO_READ = (
-    "*This page is for reading. Get the problem set as a zip from your teacher; teachers make it "
-    "with* `python3 course.py handout {name}`."
+TEMPLATES = Environment(
+    loader=FileSystemLoader(HERE / "pages"), trim_blocks=True, keep_trailing_newline=True
 )
-_TAKE = "(*Code*, *Download ZIP*, unpack; or `git clone`)"
-_REDIRECT = """<!doctype html>
-<meta charset="utf-8"><meta http-equiv="refresh" content="0; url={0}">
-<title>Moved</title><p>This page is now <a href="{0}">{0}</a>.</p>
+TEMPLATES.globals |= {"ledger": ledger, "places": places, "reference": reference}
+_KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|txt|typed)")
+_TO_READ = """
+*This page is for reading. Get the problem set as a zip from your teacher; teachers make it \
+with* `python3 course.py handout {name}`.
 """
 MADE = "made-by-course.txt"
 """A file in the book by which it is known as one."""
@@ -71,57 +41,56 @@ MADE = "made-by-course.txt"
 
 @dataclass
 class Sources:
-    """The sources of the pages, as they are written to a folder.
+    """Writes the sources of pages to `folder`, and to `extra` what is copied to the book.
 
-    Attributes
-    ----------
-    root, folder, extra : Path
-        The folder of the course, and those that are written to: one for the sources, one for what
-        is copied to the book.
-    repository : str
-        Where Binder finds the lessons on GitHub, ``owner/name``; empty if it does not.
-    shown : dict of str to str
-        What the pages in ``pages/`` show at their places.
+    `repository` is where Binder finds the lessons on GitHub, ``owner/name``, or empty; `shown` is
+    what the templates in ``pages/`` show.
     """
 
     root: Path
     folder: Path
     extra: Path
     repository: str = ""
-    shown: dict[str, str] = field(default_factory=dict)
+    shown: dict[str, Any] = field(default_factory=dict)
 
     def read(self, path: str) -> str:
         """Return a file of the course."""
         return (self.root / path).read_text(encoding="utf-8")
 
     def put(self, page: str, text: str) -> None:
-        """Write the source of a page."""
+        """Write the source of a page, and copy the files without a page that it links to."""
         _write(self.folder / page, text)
+        for name in re.findall(r"\]\((?:\.\./)*files/([^)#]+)", text):
+            target = self.folder / "files" / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(self.root / name, target)
 
-    def put_lessons(self) -> list[Figure]:
-        """Write the lessons and their run sheets; return the figures that they draw."""
-        pictures, figures = Pictures(self.root, self.extra / "lessons"), list[Figure]()
-        cited, lessons, sheets = {}, list[str](), list[str]()
+    def rendered(self, template: str, **further: Any) -> str:
+        """Return a template in ``pages/`` with what is shown."""
+        return TEMPLATES.get_template(template).render(
+            self.shown, repository=self.repository, **further
+        )
+
+    def put_lessons(self) -> None:
+        """Write the lessons and their run sheets."""
+        figures, works, shown = list[lessons.Figure](), defaultdict(list), []
+        pictures = sorted((self.root / "figures").glob("*.png"))
+        known = {path.read_bytes(): f"../figures/{path.name}" for path in pictures}
         for path in lesson_paths(self.root / "notebooks"):
             page, notebook = f"lessons/{path.name}", nbformat.read(path, as_version=4)
+            _write(self.extra / page, nbformat.writes(lessons.without_outputs(notebook)) + "\n")
             title = notebook.cells[0].source.splitlines()[0].removeprefix("# ")
-            short = f"{path.stem[:2]} {title.partition(':')[0]}"
-            if path.stem != "00_start_here":  # it is about the installation
-                lessons.append(f"{short} <lessons/{path.stem}>")
-            figures += figures_of(path.stem, notebook)
-            cited[path.stem] = cited_in(notebook)
-            shown, sheet = prepared(f"notebooks/{path.name}", page, self.root, pictures)
-            self.put(page, nbformat.writes(with_buttons(shown, path.name, self.repository)))
+            figures += lessons.figures_of(path.name, notebook)
+            for work in lessons.cited_in(notebook):
+                works[work].append(path.stem)
+            sheet = lessons.prepared(notebook, path.name, self.root, known, self.extra / "lessons")
+            lessons.add_buttons(notebook, path.name, self.repository)
+            self.put(page, nbformat.writes(notebook))
             if sheet:
-                sheets.append(f"{short} <{path.stem}>")
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
-            _write(self.extra / page, nbformat.writes(without_outputs(notebook)) + "\n")
-        self.shown |= {
-            "lessons": "\n".join(lessons),
-            "sheets": "\n".join(sheets),
-            "works": reference.works(cited),
-        }
-        return figures
+            short = f"{path.stem[:2]} {title.partition(':')[0]}"
+            shown.append({"stem": path.stem, "short": short, "sheet": sheet})
+        self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
 
     def put_problem_sets(self) -> None:
         """Write the problem sets as students get them."""
@@ -131,30 +100,28 @@ class Sources:
             released = release(name, assignments)[f"{name}.ipynb"].decode()
             notebook = nbformat.reads(released, as_version=4)
             title, _, rest = notebook.cells[0].source.partition("\n")
-            notebook.cells[0].source = f"{title}\n\n{_TO_READ.format(name=name)}\n{rest}"
+            notebook.cells[0].source = f"{title}\n{_TO_READ.format(name=name)}{rest}"
             self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
-        sets = [f"Problem set {name[2:]} <problems/{name}>" for name in names]
-        links = [f"- [](../problems/{name}.ipynb)" for name in names]
-        self.shown |= {"sets": "\n".join(sets), "set_links": "\n".join(links)}
+        self.shown["sets"] = names
 
-    def put_package(self, figures: list[Figure]) -> None:
+    def put_package(self) -> None:
         """Write the pages of modules and code, and the figures."""
-        groups = reference.modules(self.root)
-        for name in (name for names in groups.values() for name in names):
-            self.put(f"package/{name}.rst", reference.module_page(name, self.root))
+        modules = reference.modules(self.root)
+        for title, module in ((title, each) for title, some in modules.items() for each in some):
+            page = self.rendered("module.rst.j2", title=title, module=module)
+            self.put(f"package/{module['name']}.rst", page)
         for old, new in MOVED.items():
-            _write(self.extra / f"package/{old}.html", _REDIRECT.format(f"{new}.html"))
+            moved = self.rendered("moved.html.j2", page=f"{new}.html")
+            _write(self.extra / f"package/{old}.html", moved)
         for path in reference.shown_code(self.root):
-            name = path.relative_to(self.root).as_posix()
-            page = self.extra / "code" / name.replace(".py", ".html")
-            _write(page, code_page(name, self.root))
+            code, up = reference.coloured(self.read(path)), "../" * (path.count("/") + 1)
+            page = self.rendered("code.html.j2", path=path, up=up, code=code)
+            _write(self.extra / "code" / path.replace(".py", ".html"), page)
         explorers = shutil.ignore_patterns("explorers")
         shutil.copytree(self.root / "figures", self.extra / "figures", ignore=explorers)
-        self.shown |= {
-            "modules": reference.module_tables(groups, self.root),
-            "ledger": reference.ledger_tables(ledger.collect(self.root), figures),
-            "figures": reference.gallery(figures, self.root),
-        }
+        files = {path.name for path in (self.root / "figures").iterdir()}
+        found = ledger.collect(self.root)
+        self.shown |= {"modules": modules, "found": found, "files": files}
 
     def put_files(self) -> None:
         """Write the pages that are files of the course."""
@@ -163,12 +130,8 @@ class Sources:
             if path == "README.md":
                 rows = re.findall(r"^\| \[\d\d .*", text, re.MULTILINE)
                 self.shown["table"] = relinked("\n".join(rows), path, "lessons/index.md")
-                text = "# Install and run\n\n" + text[text.index("## Start") :]
-                take = '(<a href="course.zip">course.zip</a>, then unpack; '
-                take += "it has what `lab`, `lecture`, `check` and `figures` need"
-                if self.repository:
-                    take += f"; or `git clone https://github.com/{self.repository}`"
-                text = text.replace(_TAKE, f"{take})")
+                self.shown["run"] = relinked(text[text.index("## Start") :], path, page)
+                continue  # there is a template for the page
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             self.put(page, relinked(text, path, page))
@@ -182,7 +145,10 @@ class Sources:
         homes = "rbcourse", "classroom/rbclassroom"
         inside = (path for home in homes for path in (self.root / home).rglob("*.*"))
         package = [path.relative_to(self.root).as_posix() for path in inside]
-        names = [*_TAKEN, *(name for name in package if _KEPT.fullmatch(name) and "/." not in name)]
+        names = [
+            *CONTENTS["course"]["files"],
+            *(name for name in package if _KEPT.fullmatch(name) and "/." not in name),
+        ]
         files = {name: (self.root / name).read_bytes() for name in names}
         for path in (self.extra / "lessons").glob("*.ipynb"):
             files[f"notebooks/{path.name}"] = path.read_bytes()
@@ -191,19 +157,10 @@ class Sources:
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""
-        self.put("scene.html", living("cube", self.root))
+        self.put("scene.html", lessons.living("cube", self.root))
         for path in (HERE / "pages").rglob("*.md"):
-            text = Template(path.read_text(encoding="utf-8")).substitute(self.shown)
-            self.put(path.relative_to(HERE / "pages").as_posix(), text)
-
-    def put_linked(self) -> None:
-        """Copy the files without a page that pages link to."""
-        for page in [*self.folder.rglob("*.md"), *self.folder.rglob("*.ipynb")]:
-            text = page.read_text(encoding="utf-8")
-            for name in re.findall(r"\]\((?:\.\./)*files/([^)#]+)", text):
-                target = self.folder / "files" / name
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(self.root / name, target)
+            page = path.relative_to(HERE / "pages").as_posix()
+            self.put(page, self.rendered(page))
 
 
 def _write(path: Path, text: str) -> None:
@@ -214,13 +171,12 @@ def _write(path: Path, text: str) -> None:
 def write_sources(root: Path, folder: Path, extra: Path, repository: str = "") -> None:
     """Write all that the book is made of to two folders, see `Sources`."""
     sources = Sources(root, folder, extra, repository)
-    figures = sources.put_lessons()
+    sources.put_lessons()
     sources.put_problem_sets()
-    sources.put_package(figures)
+    sources.put_package()
     sources.put_files()
     sources.put_course()
     sources.put_fronts()
-    sources.put_linked()
 
 
 def build(root: Path, book: Path, repository: str = "") -> None:
@@ -251,10 +207,8 @@ def build(root: Path, book: Path, repository: str = "") -> None:
 
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
-    """Serves files and does not tell of each."""
-
     def log_message(self, *_: object) -> None:
-        pass
+        """Tell of no request."""
 
 
 def serve(book: Path) -> None:
@@ -264,10 +218,8 @@ def serve(book: Path) -> None:
         address = f"http://127.0.0.1:{server.server_port}/"
         print(f"The book is at {address}. Stop it here, with Ctrl-C.", flush=True)
         webbrowser.open(address)
-        try:
+        with suppress(KeyboardInterrupt):
             server.serve_forever()
-        except KeyboardInterrupt:
-            print()
 
 
 def main() -> None:

@@ -1,13 +1,12 @@
 """What Sphinx is to do with the sources of the book; it reads this file itself."""
 
 import os
-import re
 from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
 from rbclassroom.book import reference
-from rbclassroom.book.places import anchor, file_of
+from rbclassroom.book.places import anchor, file_of, fragment, to_tests
 from rbclassroom.course.ledger import KEY
 
 project = html_title = "Rigid-body motion"
@@ -38,7 +37,7 @@ def name_sections(_app: Any, doctree: Any) -> None:
     if Path(doctree["source"]).parent.name == "lessons":
         for section in doctree.findall(lambda node: node.tagname == "section"):
             if section.parent is not doctree:
-                section["ids"] = [reference.fragment(section.children[0].astext())]
+                section["ids"] = [fragment(section.children[0].astext())]
 
 
 def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
@@ -52,33 +51,26 @@ def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str
     """Link the keys of a docstring to the ledger, and add the tests of a function."""
     for i, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
-            lines[i] = KEY.sub(_as_link, line)
-    if what not in ("function", "class"):
-        return
-    if tests := reference.tests_of(name.partition(".")[2], app.config.tests):
-        links = [reference.to_test(test, "package/index.html") for test in tests]
-        lines += ["", ".. raw:: html", "", f"   {reference.folded('tests', links)}", ""]
-
-
-def _as_link(key: re.Match[str]) -> str:
-    return f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__"
+            lines[i] = KEY.sub(lambda key: f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__", line)
+    named = app.config.tests if what in ("function", "class") else {}
+    if named and (tests := reference.tests_of(name.partition(".")[2], named)):
+        lines += ["", ".. raw:: html", "", f"   {to_tests(tests, 'package/index.html')}", ""]
 
 
 def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
     """Return a link for a name that stands in another module."""
     from sphinx.util.nodes import make_refnode
 
-    kinds = ("class", "data", "exception", "function")
-    ending = f".{node['reftarget']}"
     found = [
         (name, entry.docname)
         for name, entry in env.domains["py"].objects.items()
-        if name.endswith(ending) and entry.objtype in kinds and ".textbook." not in name
+        if name.endswith(f".{node['reftarget']}") and ".textbook." not in name
+        if entry.objtype in ("class", "data", "exception", "function")
     ]
-    if len(found) != 1 or node["refdomain"] != "py":
-        return None
-    ((name, page),) = found
-    return make_refnode(app.builder, node["refdoc"], page, name, content)
+    if len(found) == 1 and node["refdomain"] == "py":
+        name, page = found[0]
+        return make_refnode(app.builder, node["refdoc"], page, name, content)
+    return None
 
 
 def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:

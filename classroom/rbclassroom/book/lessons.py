@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-import nbformat
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 
@@ -17,7 +16,7 @@ from rbclassroom.book.places import relinked, with_keys
 from rbclassroom.course.notebooks import lesson_paths
 
 SHEET = "## Run sheet for the lecturer"
-_PICTURE = re.compile(r'(?P<before><img\b[^>]*?) src="data:image/png;base64,(?P<content>[^"]+)"')
+_PICTURE = re.compile(r'(<img\b[^>]*?) src="data:image/png;base64,([^"]+)"')
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
 _APART = re.compile(r"(the lecturer's) (run sheets?) (is|are) at the end")
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
@@ -30,23 +29,12 @@ _EXPLORER = re.compile(r"explorers\.(\w+)_explorer\(\)")
 class Figure:
     """A figure of a lesson.
 
-    Attributes
-    ----------
-    name : str
-        Of its files, without ending.
-    lesson : str
-        Such as ``06_geodesics``.
-    section : str
-        The number of the section that draws it, or its heading.
-    lines : str
-        The cell that draws it.
-    text : str
-        What it shows.
+    Its files have its `name`. The lesson and the section that draw it are its `place`, such as
+    ``06_geodesics.ipynb, 3``, with these `lines`. The `text` describes it.
     """
 
     name: str
-    lesson: str
-    section: str
+    place: str
     lines: str
     text: str
 
@@ -57,13 +45,12 @@ def figures_of(lesson: str, notebook: NotebookNode) -> list[Figure]:
     for cell in notebook.cells:
         if heading := re.match(r"## (?:(\d+) ·|(.*))", cell.source):
             section = heading[1] or heading[2]
-        saved = _SAVED.search(cell.source) if cell.cell_type == "code" else None
-        if saved:
+        if cell.cell_type == "code" and (saved := _SAVED.search(cell.source)):
             name, texts = saved[1], [o.data["text/plain"] for o in cell.outputs if "data" in o]
             shown = [t.partition(": ")[2] for t in texts if t.startswith(f"{name}: ")]
             if not shown:
                 raise ValueError(f"{lesson}: {name} has no stored output")
-            found.append(Figure(name, lesson, section, cell.source, shown[0]))
+            found.append(Figure(name, f"{lesson}, {section}", cell.source, shown[0]))
     return found
 
 
@@ -109,49 +96,32 @@ def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
     return [*result, new_markdown_cell("</details>")] if inside else result
 
 
-class Pictures:
-    """Takes pictures out of pages: each becomes a file, which is loaded when it comes into sight.
+def with_picture_files(shown: str, known: dict[bytes, str], folder: Path) -> str:
+    """Return HTML whose pictures are files, loaded when they come into sight.
 
-    Parameters
-    ----------
-    root : Path
-        The folder of the course; what is among its figures is not written again.
-    lessons : Path
-        The folder of the pages; pictures are written to ``pictures`` in it.
+    Those that are not `known`, as addresses by contents, are written to ``pictures`` in a folder.
     """
 
-    def __init__(self, root: Path, lessons: Path) -> None:
-        figures = sorted((root / "figures").glob("*.png"))
-        self._known = {path.read_bytes(): f"../figures/{path.name}" for path in figures}
-        self._lessons = lessons
-
-    def taken_out(self, shown: str) -> str:
-        """Return HTML with addresses of pictures, and their shapes."""
-        return _PICTURE.sub(self._address, shown)
-
-    def _address(self, match: re.Match[str]) -> str:
-        content = base64.b64decode(match["content"])
-        if content not in self._known:
-            path = Path("pictures", f"{hashlib.sha256(content).hexdigest()[:16]}.png")
-            (self._lessons / "pictures").mkdir(parents=True, exist_ok=True)
-            (self._lessons / path).write_bytes(content)
-            self._known[content] = path.as_posix()
+    def put(match: re.Match[str]) -> str:
+        content = base64.b64decode(match[2])
+        if content not in known:
+            known[content] = f"pictures/{hashlib.sha256(content).hexdigest()[:16]}.png"
+            (folder / "pictures").mkdir(parents=True, exist_ok=True)
+            (folder / known[content]).write_bytes(content)
         width, height = struct.unpack(">II", content[16:24])
-        shape = f'style="aspect-ratio: {width}/{height}; '
-        before = match["before"].replace('style="', shape, 1)
-        return f'{before} loading="lazy" src="{self._known[content]}"'
+        before = match[1].replace('style="', f'style="aspect-ratio: {width}/{height}; ', 1)
+        return f'{before} loading="lazy" src="{known[content]}"'
+
+    return _PICTURE.sub(put, shown)
 
 
 def with_files(shown: str) -> str:
     """Return a figure whose caption links its files; a still leads to its picture in full size."""
 
     def put(caption: re.Match[str]) -> str:
-        endings = caption[2].split(", ")
-        files = [f"{caption[1] * (not i)}{ending}" for i, ending in enumerate(endings)]
-        linked = [
-            f'<a href="../figures/{caption[1]}{ending}">{text}</a>'
-            for ending, text in zip(endings, files, strict=True)
-        ]
+        name, endings = caption[1], caption[2].split(", ")
+        texts = zip(endings, [name + endings[0], *endings[1:]], strict=True)
+        linked = [f'<a href="../figures/{name}{ending}">{text}</a>' for ending, text in texts]
         return f"<small>{', '.join(linked)}</small>"
 
     if "<script" not in shown:
@@ -165,39 +135,43 @@ def living(name: str, root: Path) -> str:
     return page[page.index("<figure>") : page.index("</html>")]
 
 
-def prepared(path: str, page: str, root: Path, pictures: Pictures) -> tuple[NotebookNode, str]:
-    """Return a lesson as the book shows it, and its run sheet."""
-    notebook = nbformat.read(root / path, as_version=4)
-    cells, sheet = split_sheet(notebook)
+def prepared(
+    notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path
+) -> str:
+    """Make the notebook of a lesson what the book shows of it, and return its run sheet.
+
+    Its pictures become files, see `with_picture_files`.
+    """
+    path, page, sheet_page = f"notebooks/{name}", f"lessons/{name}", f"teach/{Path(name).stem}.md"
     names = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
 
     def to_lesson(match: re.Match[str]) -> str:
-        name = names.get(int(match[2] or -1))
-        return f"[{match[1]}]({name})" if name else match[0]
+        found = names.get(int(match[2] or -1))
+        return f"[{match[1]}]({found})" if found else match[0]
 
+    cells, sheet = split_sheet(notebook)
     for cell in cells:
         if cell.cell_type == "markdown":
             lines = cell.source.split("\n")
             keyed = [with_keys(x, page) if x.startswith("<small>") else x for x in lines]
-            text = _LESSON.sub(to_lesson, "\n".join(keyed))
-            text = relinked(text, path, page)
-            cell.source = _APART.sub(rf"\1 [\2](../teach/{Path(path).stem}.md) \3 apart", text)
+            text = relinked(_LESSON.sub(to_lesson, "\n".join(keyed)), path, page)
+            cell.source = _APART.sub(rf"\1 [\2](../{sheet_page}) \3 apart", text)
             continue
         explorer = _EXPLORER.search(cell.source)
-        for output in cell.outputs:
-            shown = output.get("data", {})
-            if explorer and "text/html" in shown:
+        for shown in (
+            output.data for output in cell.outputs if "text/html" in output.get("data", {})
+        ):
+            if explorer:
                 figure = living(explorer[1], root)
                 moved = " and ".join(f"<b>{label}</b>" for label in _CONTROL.findall(figure))
                 shown["text/html"] = f"<p>Of its controls these move here: {moved}.</p>{figure}"
-            if "text/html" in shown:
-                shown["text/html"] = with_files(pictures.taken_out(shown["text/html"]))
+            shown["text/html"] = with_files(with_picture_files(shown["text/html"], known, folder))
     notebook.cells = folded(cells)
-    return notebook, relinked(sheet, path, f"teach/{Path(path).stem}.md")
+    return relinked(sheet, path, sheet_page)
 
 
-def with_buttons(notebook: NotebookNode, name: str, repository: str) -> NotebookNode:
-    """Return a lesson with ways to run it below its title."""
+def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
+    """Put the number of a lesson before its title, and ways to run it below."""
     title, _, rest = notebook.cells[0].source.partition("\n")
     ways = [f'<a download href="{name}">Download the notebook</a>']
     if repository:
@@ -206,4 +180,3 @@ def with_buttons(notebook: NotebookNode, name: str, repository: str) -> Notebook
         ways.append(f'<a href="{binder}">Run it in Binder</a>')
     title = f"# {name[:2]} · {title.removeprefix('# ')}"
     notebook.cells[0].source = f'{title}\n\n<p class="buttons">{" ".join(ways)}</p>\n{rest}'
-    return notebook

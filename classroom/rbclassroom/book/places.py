@@ -1,49 +1,26 @@
 """Where in the book the files of the course are: its addresses stay as they are."""
 
 import re
+import tomllib
+from pathlib import Path
 from posixpath import dirname, join, normpath, relpath
+from typing import Any
 
 from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 
-PAGES = {
-    "README.md": "install.md",
-    "docs/conventions.md": "conventions.md",
-    "CONTRIBUTING.md": "contributing.md",
-    "CHANGELOG.md": "changelog.md",
-    "docs/near_optimal.md": "near_optimal.md",
-    "notebooks/QUESTIONS.md": "teach/questions.md",
-    "notebooks/assignments/README.md": "teach/problem_sets.md",
-}
-"""The sources of pages that are made of one file each."""
+CONTENTS: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("contents.toml").read_text(encoding="utf-8")
+)
+PAGES: dict[str, str] = CONTENTS["pages"]
+MOVED: dict[str, str] = CONTENTS["moved"]
 CLASSROOM = "explorers", "figures", "surveys", "course", "assignments", "book"
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
-MOVED = {
-    **{f"explore.{name}": f"explorers.{name}" for name in ("bodies", "curves", "explorer")},
-    **{f"explore.{name}": f"explorers.{name}" for name in ("optima", "paths", "plane")},
-    **{f"explore.{name}": f"explorers.{name}" for name in ("recorded", "rotations", "widgets")},
-    **{f"study.{name}": f"surveys.{name}" for name in ("atlas", "atlas_figures", "body_atlas")},
-    **{f"study.{name}": f"surveys.{name}" for name in ("progress", "survey")},
-    **{name: f"optimum.{name}" for name in ("functionals", "search", "shooting")},
-    "relaxation": "optimum.collocation",
-    "draw.casteljau": "../code/classroom/rbclassroom/figures/lesson11",
-    "draw.laws": "../code/classroom/rbclassroom/figures/lesson13",
-    "draw.plots": "../code/classroom/rbclassroom/figures/lesson06",
-    "draw.repairs": "../code/classroom/rbclassroom/figures/lesson04",
-}
-"""Modules whose pages have another address than before: the old page leads to the new one."""
 
 _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
 
 
 def source_of(path: str) -> str | None:
-    """Return the source of the page that shows a file of the course, None if no page does.
-
-    Examples
-    --------
-    >>> source_of("notebooks/06_geodesics.ipynb"), source_of("rbcourse/draw/save.py")
-    ('lessons/06_geodesics.ipynb', 'package/draw.save.rst')
-    >>> source_of("LICENSE")
-    """
+    """Return the source of the page that shows a file of the course, None if no page does."""
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
     if code := re.fullmatch(r"(rbcourse|classroom/rbclassroom)/([\w/]+)\.py", path):
@@ -52,15 +29,10 @@ def source_of(path: str) -> str | None:
     return {"docs/ledger.md": "ledger.md", **PAGES}.get(path)
 
 
-def package_of(module: str) -> str:
-    """Return the package that a module is in, from its name within it.
-
-    Examples
-    --------
-    >>> package_of("draw.save"), package_of("surveys.atlas")
-    ('rbcourse', 'rbclassroom')
-    """
-    return "rbclassroom" if module.split(".")[0] in CLASSROOM else "rbcourse"
+def full_name(module: str) -> str:
+    """Return the dotted name of a module or function, from that within its package."""
+    package = "rbclassroom" if module.split(".")[0] in CLASSROOM else "rbcourse"
+    return f"{package}.{module}"
 
 
 def file_of(module: str) -> str:
@@ -71,22 +43,12 @@ def file_of(module: str) -> str:
     >>> file_of("surveys.atlas"), file_of("optimum")
     ('classroom/rbclassroom/surveys/atlas.py', 'rbcourse/optimum/__init__.py')
     """
-    package = package_of(module)
-    home = f"classroom/{package}" if package == "rbclassroom" else package
-    path = module.replace(".", "/") + "/__init__" * (module == "optimum")
-    return f"{home}/{path}.py"
+    path = full_name(module).replace(".", "/") + "/__init__" * (module == "optimum")
+    return f"{'classroom/' * path.startswith('rbclassroom')}{path}.py"
 
 
 def has_page(module: str) -> bool:
-    """Tell whether a module has a page besides its code.
-
-    Private modules and the figures of one lesson have none.
-
-    Examples
-    --------
-    >>> has_page("draw.save"), has_page("_foam"), has_page("figures.lesson03")
-    (True, False, False)
-    """
+    """Tell whether a module has a page besides its code: no private one, nor lesson figures."""
     return not re.search(r"\b(_|conf$|figures\b)", module)
 
 
@@ -102,10 +64,18 @@ def anchor(key: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
 
 
-def address(source: str, fragment: str = "") -> str:
-    """Return the address of a page in the book, from that of its source."""
-    page = re.sub(r"\.(md|rst|ipynb)$", ".html", source)
-    return f"{page}#{fragment}" if fragment else page
+def fragment(heading: str) -> str:
+    """Return the part of an address that stands for a heading of a lesson, or for its number.
+
+    Examples
+    --------
+    >>> [fragment(x) for x in ("3", "3 · Angular velocity", "Exercise 2, on paper", "Recap")]
+    ['s3', 's3', 'exercise-2', 'recap']
+    """
+    if number := re.match(r"(\d+)(?: ·|$)", heading):
+        return f"s{number[1]}"
+    numbered = re.match(r"\w+ \d+\b", heading)
+    return re.sub(r"\W+", "-", (numbered[0] if numbered else heading).lower()).strip("-")
 
 
 def link(to: str, page: str, text: str) -> str:
@@ -113,7 +83,38 @@ def link(to: str, page: str, text: str) -> str:
     return f'<a href="{relpath(to, dirname(page) or ".")}">{text}</a>'
 
 
-def with_keys(text: str, page: str) -> str:
+def to_test(test: str, page: str = "ledger.md") -> str:
+    """Return a link to a test, from its name in the ledger."""
+    path, name = test.split(".py::")
+    home = "classroom/tests" if path.split("/")[0] in CLASSROOM else "tests"
+    return link(f"code/{home}/{path}.html#{name}", page, name.replace("_", "_<wbr>"))
+
+
+def to_tests(tests: list[str], page: str = "ledger.md") -> str:
+    """Return links to tests, shown when they are asked for; a single one as it is."""
+    links = "<br>".join(to_test(test, page) for test in tests)
+    more = f"<details><summary>{len(tests)} tests</summary>{links}</details>"
+    return more if len(tests) > 1 else links
+
+
+def to_function(name: str, page: str = "ledger.md") -> str:
+    """Return a link to a function: to its docstring, of what is private to its code."""
+    module, _, own = name.rpartition(".")
+    to = f"package/{module}.html#{full_name(name)}"
+    if not has_page(module):
+        to = f"code/{file_of(module).removesuffix('.py')}.html#{own}"
+    text = name.replace(".", ".<wbr>").replace("_", "_<wbr>")
+    return link(to, page, f"<code>{text}</code>")
+
+
+def to_section(place: str, page: str = "ledger.md") -> str:
+    """Return a link to a section of a lesson, from its name in the ledger."""
+    file, section = place.split(".ipynb, ", 1)
+    text = f"{file[:2]} {'§ ' * section.isdigit()}{section}"
+    return link(f"lessons/{file}.html#{fragment(section)}", page, text)
+
+
+def with_keys(text: str, page: str = "ledger.md") -> str:
     """Return a text with the keys of the two sources as links to their rows of the ledger."""
 
     def put(key: re.Match[str]) -> str:

@@ -22,10 +22,9 @@ from traitlets.config import Config
 from voila.app import Voila
 
 from rbclassroom.course.notebooks import lesson_paths
-from rbclassroom.course.votes import Lecturer, Phones, find_address
+from rbclassroom.course.votes import TEMPLATES, Lecturer, Phones, find_address
 
 HOST = "127.0.0.1"
-TEMPLATES = Path(__file__).with_name("lecture_view")
 # of the extensions of JupyterLab only those that draw widgets
 WIDGETS = [
     "@jupyter-widgets/jupyterlab-manager",
@@ -79,9 +78,7 @@ def _heading_level(cell: NotebookNode) -> int:
 def _heading_and_rest(cell: NotebookNode) -> list[NotebookNode]:
     heading, _, rest = cell.source.lstrip().partition("\n")
     first = NotebookNode({**cell, "source": heading})
-    if not rest.strip():
-        return [first]
-    return [first, nbformat.v4.new_markdown_cell(rest)]
+    return [first, *([nbformat.v4.new_markdown_cell(rest)] if rest.strip() else [])]
 
 
 def _prepare(votes: str, handler: Any, notebook: NotebookNode, cwd: str) -> NotebookNode:
@@ -90,8 +87,7 @@ def _prepare(votes: str, handler: Any, notebook: NotebookNode, cwd: str) -> Note
     if votes:
         code = segno.make(votes, micro=False).svg_inline(border=2, light="white", omitsize=True)
         notebook.metadata.lecture_votes = NotebookNode(address=votes, code=code)
-    title = re.search(r"^# (.*)", notebook.cells[0].source) if notebook.cells else None
-    if title:
+    if notebook.cells and (title := re.match(r"# (.*)", notebook.cells[0].source)):
         notebook.metadata.title = title[1]
     return notebook
 
@@ -172,8 +168,7 @@ def _set_environment(folder: Path) -> None:
 
 
 def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
+    with socket.create_server((HOST, 0)) as probe:
         port: int = probe.getsockname()[1]
         return port
 

@@ -30,20 +30,25 @@ GROUPS: dict[str, list[str]] = {
     for text, title in SOURCES["texts"].items()
 } | {"Beyond BK: real bodies, and jerk": list(SOURCES["beyond"])}
 """The entries by their headings."""
+_HEAD = """\
+# Ledger
+
+Which modules and which lessons belong to each equation, proposition,
+remark and figure of the two texts, and what is misprinted in our copies of them. Written
+by `python3 course.py ledger`, not by hand. The ledger of the book, which
+`python3 course.py book` makes, links functions, tests, sections and pictures, too."""
+_MISPRINTS = """\
+## Misprints
+
+The tests show that the one does not hold, and the other does. (21 only looks like one.)"""
 
 
 @dataclass
 class Entry:
     """Where one entry of the texts is to be found.
 
-    Attributes
-    ----------
-    functions : list of str
-        Such as ``so3.hat_so3``, within `rbcourse` or `rbclassroom`; constants too.
-    tests : list of str
-        Such as ``test_so3.py::test_hat``, within tests/ or classroom/tests/.
-    lessons : list of str
-        Such as ``06_geodesics.ipynb, 3``, within notebooks/.
+    Functions and constants, such as ``so3.hat_so3``, are named within their package, tests, such as
+    ``test_so3.py::test_hat``, and lessons, as ``06_geodesics.ipynb, 3``, within their folder.
     """
 
     functions: list[str] = field(default_factory=list)
@@ -115,37 +120,21 @@ def _headings(root: Path) -> Iterator[tuple[str, str]]:
 
 def render(found: dict[str, Entry]) -> str:
     """Return the ledger in short: the modules and the lessons of each entry."""
-    lines = [
-        "# Ledger",
-        "",
-        "Which modules and which lessons belong to each equation, proposition,",
-        "remark and figure of the two texts, and what is misprinted in our copies of them. Written",
-        "by `python3 course.py ledger`, not by hand. The ledger of the book, which",
-        "`python3 course.py book` makes, links functions, tests, sections and pictures, too.",
-    ]
+    parts = [_HEAD]
     for title, keys in GROUPS.items():
         rows = []
         for key in keys:
             places = dict.fromkeys(map(_place, found[key].functions))
             modules = sorted(places, key=lambda name: name.startswith("_"))  # these last
-            lessons = {lesson[:2]: None for lesson in found[key].lessons}
+            lessons = dict.fromkeys(lesson[:2] for lesson in found[key].lessons)
             rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
-        lines += ["", f"## {title}", ""]
-        lines += _table(("", "what", "modules", "lessons"), rows)
-    rows = [
+        parts.append(f"## {title}\n\n{_table(('', 'what', 'modules', 'lessons'), rows)}")
+    misprints = (
         (key.removeprefix("errata "), row["where"], row["printed"], row["holds"])
         for key, row in MISPRINTS.items()
-    ]
-    lines += [
-        "",
-        "## Misprints",
-        "",
-        "The tests show that the one does not hold, and the other does. (21 only looks like one.)",
-        "",
-    ]
-    lines += _table(("", "where", "as printed in our copy", "what holds"), rows)
-    lines.append("")
-    return "\n".join(lines)
+    )
+    head = ("", "where", "as printed in our copy", "what holds")
+    return "\n\n".join([*parts, _MISPRINTS, _table(head, misprints)]) + "\n"
 
 
 def _place(function: str) -> str:
@@ -154,8 +143,9 @@ def _place(function: str) -> str:
     return module if module.startswith("optimum") else module.split(".")[0]
 
 
-def _table(head: tuple[str, ...], rows: Iterable[Iterable[str]]) -> list[str]:
-    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    rule = ["---" for _ in head]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, rule, *rows))
 
 
 def main() -> None:

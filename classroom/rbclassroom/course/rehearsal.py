@@ -25,18 +25,10 @@ OUTSIDE = re.compile(r"(?:https?:|wss?:)?//[\w.-]+[^\s\"'<>)]*", re.IGNORECASE)
 
 
 class _Page(HTMLParser):
-    """What a page asks for, and what went wrong in it.
+    """Reads a page: the number of its `cells`, the last line of each error, the id of its kernel.
 
-    Attributes
-    ----------
-    outside : list of str
-        Addresses of other machines that scripts, styles, links of the head, and pictures name.
-    cells : int
-        How many cells there are.
-    errors : list of str
-        The last line of each error.
-    kernel : str
-        The id of the kernel.
+    `outside` has the addresses of other machines that scripts, styles, links of the head, and
+    pictures name.
     """
 
     def __init__(self) -> None:
@@ -63,8 +55,7 @@ class _Page(HTMLParser):
     def handle_endtag(self, tag: str) -> None:
         self._element = ""
         if tag == "div" and self._error:
-            lines = self._error.strip().splitlines() or ["an error"]
-            self.errors.append(lines[-1])
+            self.errors.append((self._error.strip() or "an error").splitlines()[-1])
             self._error = ""
 
     def handle_data(self, data: str) -> None:
@@ -79,24 +70,20 @@ class _Page(HTMLParser):
         if self._type == "application/vnd.voila.cell-output+json":
             for kind, content in json.loads(text).get("data", {}).items():
                 if kind in ("text/html", "image/svg+xml"):
-                    self._handle_output(content)
+                    inner = _Page()
+                    inner.feed(content)
+                    self.outside += inner.outside
         elif self._type == "application/json":
             self.kernel = json.loads(text).get("kernelId", self.kernel)
         elif self._type in ("", "text/javascript", "module"):
             self._note(text, re.compile(r"https?://(?!www\.w3\.org/)[^\s\"'`)]+").search)
-
-    def _handle_output(self, content: str) -> None:
-        inner = _Page()
-        inner.feed(content)
-        self.outside += inner.outside
 
     def _note_style(self, text: str) -> None:
         for called in re.findall(r"(?:url\(|@import)\s*[\"']?([^\s\"')]+)", text):
             self._note(called, OUTSIDE.match)
 
     def _note(self, text: str, find: Callable[[str], re.Match[str] | None]) -> None:
-        match = find(text.strip())
-        if match:
+        if match := find(text.strip()):
             self.outside.append(match[0])
 
 
@@ -122,10 +109,7 @@ def check(path: Path) -> list[str]:
 
     print("running every cell ", end="", flush=True)
     logging.disable()  # what the server has to say is found in the page
-    try:
-        serve(path, begin)
-    finally:
-        logging.disable(logging.NOTSET)
+    serve(path, begin)
     return [*missing, *_look_for_browser()]
 
 
@@ -158,37 +142,25 @@ def _read_page(netloc: str, target: str) -> _Page:
 
 
 def _look_for_token(netloc: str, kernel: str) -> list[str]:
-    kernel = kernel or "00000000-0000-0000-0000-000000000000"
-    upgrade = {
-        "Connection": "Upgrade",
-        "Upgrade": "websocket",
-        "Sec-WebSocket-Version": "13",
-        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
-    }
-    asked: list[tuple[str, dict[str, str]]] = [
-        ("/", {}),
-        (f"/api/kernels/{kernel}", {}),
-        (f"/api/kernels/{kernel}/channels", upgrade),
-    ]
-    answers = {target: _status(netloc, target, headers) for target, headers in asked}
+    here = f"/api/kernels/{kernel or '00000000-0000-0000-0000-000000000000'}"
+    targets = "/", here, f"{here}/channels"
     # 302 leads to a form that asks for the token
-    open_ = [target for target, status in answers.items() if status not in (302, 401, 403)]
+    open_ = [target for target in targets if _status(netloc, target) not in (302, 401, 403)]
     print(f"nobody gets in without the token: {'no' if open_ else 'yes'}", flush=True)
     return [f"{target} is open to everybody; update voila" for target in open_]
 
 
-def _status(netloc: str, target: str, headers: dict[str, str]) -> int:
+def _status(netloc: str, target: str) -> int:
     connection = http.client.HTTPConnection(netloc, timeout=30)
-    connection.request("GET", target, headers=headers)
+    connection.request("GET", target)
     status = connection.getresponse().status
     connection.close()
     return status
 
 
 def _look_outside(page: _Page) -> list[str]:
-    print(
-        f"nothing is asked for outside this machine: {'no' if page.outside else 'yes'}", flush=True
-    )
+    asked = "no" if page.outside else "yes"
+    print(f"nothing is asked for outside this machine: {asked}", flush=True)
     return [f"the page asks for {address}; store it in the lesson" for address in page.outside]
 
 
@@ -197,9 +169,8 @@ def _look_for_browser() -> list[str]:
         browser = webbrowser.get()
         name = getattr(browser, "name", type(browser).__name__)
     except webbrowser.Error:  # also where there is no screen
-        name = next(filter(shutil.which, BROWSERS), "")
-        if not name:
+        if not (found := next(filter(shutil.which, BROWSERS), "")):
             return ["no web browser is found; install one, or name it in the variable BROWSER"]
-        name += ", to be opened by hand"
+        name = f"{found}, to be opened by hand"
     print(f"browser: {name}", flush=True)
     return []

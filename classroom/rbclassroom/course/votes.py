@@ -22,22 +22,12 @@ MOST = 500
 class Ballot:
     """One vote at a time: opened, taken, closed, and then counted.
 
-    Attributes
-    ----------
-    key : str
-        A random name of the vote that was opened last.
-    poll : str
-        Its poll.
-    letters : str
-        Its options, ``"ABCD"``.
-    open : bool
-        Whether votes are taken.
+    Of the vote that was opened last, `key` is a random name, `poll` the poll, and `letters` are the
+    options, ``"ABCD"``. Votes are taken while it is `open`.
     """
 
     def __init__(self) -> None:
-        self.key = ""
-        self.poll = ""
-        self.letters = ""
+        self.key = self.poll = self.letters = ""
         self.open = False
         self._votes: dict[str, str] = {}
         self._counts: Counter[str] = Counter()
@@ -91,12 +81,16 @@ class Ballot:
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
 
 
-class Lecturer(APIHandler):
-    """Open, watch and close votes, with the token of the lecture."""
+class WithBallot(RequestHandler):
+    """A handler that is made with a ballot."""
 
     def initialize(self, ballot: Ballot) -> None:
         """Keep the ballot."""
         self.ballot = ballot
+
+
+class Lecturer(WithBallot, APIHandler):
+    """Open, watch and close votes, with the token of the lecture."""
 
     @authenticated
     def get(self) -> None:
@@ -114,15 +108,11 @@ class Lecturer(APIHandler):
         self.get()
 
 
-class Phone(RequestHandler):
+class Phone(WithBallot):
     """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
 
     A phone is known by a random number in a cookie, which is another one for each vote.
     """
-
-    def initialize(self, ballot: Ballot) -> None:
-        """Keep the ballot."""
-        self.ballot = ballot
 
     def set_default_headers(self) -> None:
         """Let the page ask this server only, and nobody store or frame it."""
@@ -157,12 +147,8 @@ class Phone(RequestHandler):
         self.redirect("/", status=303)
 
 
-class State(RequestHandler):
+class State(WithBallot):
     """Which vote is open: a page that was made for another one loads again."""
-
-    def initialize(self, ballot: Ballot) -> None:
-        """Keep the ballot."""
-        self.ballot = ballot
 
     def get(self) -> None:
         """Answer with the key of the vote, nothing if it is closed."""
@@ -180,13 +166,7 @@ class _Server(HTTPServer):
 
 
 def find_address() -> str:
-    """Return the address of this machine in its network, without sending anything.
-
-    Raises
-    ------
-    OSError
-        There is no network.
-    """
+    """Return the address of this machine in its network, or raise an OSError; nothing is sent."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.connect(("192.0.2.1", 9))  # an address that nobody has
         address: str = probe.getsockname()[0]
@@ -196,14 +176,8 @@ def find_address() -> str:
 class Phones:
     """The port at which phones vote, at one IPv4 address of this machine.
 
-    Port 8000 is taken, or another where that is in use.
-
-    Attributes
-    ----------
-    ballot : Ballot
-        The votes.
-    url : str
-        The address of the page.
+    Port 8000 is taken, or another where that is in use; `url` is the address of the page, and
+    `ballot` has the votes.
     """
 
     def __init__(self, address: str) -> None:

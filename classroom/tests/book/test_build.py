@@ -1,68 +1,90 @@
 """The sources of the book, and the folder that it is written to."""
 
 import json
+import re
+from collections import defaultdict
 from pathlib import Path
 from zipfile import ZipFile
 
+import nbformat
 import pytest
 
 from rbclassroom.assignments.handout import LEFTOVER
-from rbclassroom.book import build
+from rbclassroom.book import build, reference
+from rbclassroom.book.places import CONTENTS, MOVED
+from rbclassroom.course.ledger import MISPRINTS, WHAT
+from rbclassroom.course.notebooks import lesson_paths
 
 ROOT = Path(__file__).parents[3]
+LESSONS = lesson_paths(ROOT / "notebooks")
+FIGURES = ROOT / "figures"
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
+    """The folders of the sources, with the pages of two files of code only."""
     folder = tmp_path_factory.mktemp("book")
-    build.write_sources(ROOT, folder / "sources", folder / "extra", "us/course")
+    with pytest.MonkeyPatch.context() as patch:
+        code = ["rbcourse/so3.py", "tests/test_so3.py"]
+        patch.setattr(reference, "shown_code", lambda root: code)
+        build.write_sources(ROOT, folder / "sources", folder / "extra", "us/course")
     return folder
 
 
+@pytest.fixture(scope="module")
+def source(written):
+    """The source of a page: ``source("ledger.md")``."""
+    return lambda page: (written / "sources" / page).read_text("utf-8")
+
+
 def test_the_sources_have_all_parts(written):
-    pages = {p.relative_to(written / "sources").as_posix() for p in written.rglob("sources/**/*")}
+    sources, extra = (
+        {path.relative_to(written / place).as_posix() for path in (written / place).rglob("*")}
+        for place in ("sources", "extra")
+    )
     assert {
         *("index.md", "install.md", "ledger.md", "figures.md", "references.md", "conventions.md"),
         *("changelog.md", "contributing.md", "lessons/index.md", "lessons/06_geodesics.ipynb"),
         *("teach/06_geodesics.md", "teach/questions.md", "teach/problem_sets.md"),
-        *("problems/ps1.ipynb", "package/index.md", "package/draw.save.rst", "files/LICENSE"),
-    } <= pages
-    extra = {path.relative_to(written / "extra").as_posix() for path in written.rglob("extra/**/*")}
-    assert {"figures/paper_fig5a.csv", "lessons/06_geodesics.ipynb"} <= extra
-    assert "code/tests/test_so3.html" in extra
+        *("problems/ps1.ipynb", "package/index.md", "package/draw.save.rst"),
+        "files/LICENSE",
+    } <= sources
+    assert {"figures/paper_fig5a.csv", "code/tests/test_so3.html"} <= extra
+    assert {f"package/{name}.html" for name in MOVED} <= extra
+    assert {f"lessons/{path.name}" for path in LESSONS} <= extra
     assert "figures/explorers" not in extra
 
 
-def test_problem_sets_come_without_solutions(written):
-    source = (ROOT / "notebooks/assignments/source/ps1/ps1.ipynb").read_text("utf-8")
-    assert "BEGIN SOLUTION" in source
-    for path in (written / "sources/problems").iterdir():
-        text = path.read_text("utf-8")
+def test_problem_sets_come_without_solutions(source):
+    original = (ROOT / "notebooks/assignments/source/ps1/ps1.ipynb").read_text("utf-8")
+    assert "BEGIN SOLUTION" in original
+    for number in range(1, 7):
+        text = source(f"problems/ps{number}.ipynb")
         assert "YOUR CODE HERE" in text
         assert "SOLUTION" not in text
         assert "HIDDEN" not in text
         assert not LEFTOVER.search(text)
 
 
-def test_the_course_comes_along_without_the_notebooks_of_teachers(written):
+def test_the_course_comes_along_without_outputs_and_the_notebooks_of_teachers(written, source):
     with ZipFile(written / "extra/course.zip") as archive:
         names = {name.removeprefix("rbcourse/") for name in archive.namelist()}
         lesson = json.loads(archive.read("rbcourse/notebooks/06_geodesics.ipynb"))
-    assert {"course.py", "environment.txt", "pyproject.toml", "LICENSE", "README.md"} <= names
-    assert {"rbcourse/so3.py", "rbcourse/py.typed", "benchmarks/benchmarks.csv"} <= names
+    assert set(CONTENTS["course"]["files"]) <= names
+    assert {"rbcourse/py.typed", "classroom/rbclassroom/book/pages/index.md"} <= names
     assert not any(name.startswith(("notebooks/assignments", "tests", "figures")) for name in names)
     assert all(cell.get("outputs", []) == [] for cell in lesson["cells"])
-    install = (written / "sources/install.md").read_text("utf-8")
+    install = source("install.md")
     assert '<a href="course.zip">' in install
     assert "git clone https://github.com/us/course" in install
-    assert "green button" not in install
+    assert "Download ZIP" not in install
 
 
-def test_what_lies_about_is_not_taken_along(tmp_path):
+def test_stray_files_are_not_taken_along(tmp_path):
     root, extra = tmp_path / "course", tmp_path / "extra"
     stray = ["grades.csv", "notebooks/ps1.ipynb", "rbcourse/a.py~", "rbcourse/.b/c.py"]
     stray += ["rbcourse/.d.py", "rbcourse/__pycache__/a.cpython-311.pyc", "rbcourse/grades.csv"]
-    wanted = [*build._TAKEN, "rbcourse/a.py", "rbcourse/static/b.css"]
+    wanted = [*CONTENTS["course"]["files"], "rbcourse/a.py", "rbcourse/static/b.css"]
     for name in [*stray, *wanted]:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text("x")
@@ -70,11 +92,6 @@ def test_what_lies_about_is_not_taken_along(tmp_path):
     build.Sources(root, tmp_path / "sources", extra).put_course()
     with ZipFile(extra / "course.zip") as archive:
         assert set(archive.namelist()) == {f"rbcourse/{name}" for name in wanted}
-
-
-def test_with_a_repository_lessons_open_in_binder(written):
-    lesson = (written / "sources/lessons/01_plane.ipynb").read_text("utf-8")
-    assert "mybinder.org/v2/gh/us/course" in lesson
 
 
 @pytest.mark.parametrize("name", ["https://github.com/us/course", "us", "us/a b"])
@@ -90,3 +107,102 @@ def test_a_folder_that_is_no_book_is_left_alone(tmp_path):
     with pytest.raises(ValueError, match="is no book that was made here"):
         build.build(ROOT, tmp_path)
     assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_the_page_of_a_lesson_has_all_of_it_but_its_run_sheet(path, source):
+    stored = nbformat.read(path, as_version=4).cells
+    cells = nbformat.reads(source(f"lessons/{path.name}"), as_version=4).cells
+    code, page_code = (
+        [x.source for x in some if x.cell_type == "code"] for some in (stored, cells)
+    )
+    assert page_code == code
+    text = "\n".join(cell.source for cell in cells)
+    assert "Run sheet for the lecturer" not in text
+    assert "at the end |" not in text
+    assert text.count("<details") == text.count("</details>")
+    answers = sum("### Answer to" in cell.source for cell in stored)
+    assert text.count('class="answer"') == answers
+    assert "mybinder.org/v2/gh/us/course" in text
+    if path.stem != "00_start_here":
+        assert re.search(rf"\[run sheets?\]\(\.\./teach/{path.stem}\.md\) (is|are) apart", text)
+        sheet = source(f"teach/{path.stem}.md")
+        assert sheet.startswith("# Run sheet: ")
+        assert stored[-1].source.split()[-1] in sheet
+
+
+def test_lessons_that_are_named_are_linked_and_explorers_live(source):
+    text = source("lessons/06_geodesics.ipynb")
+    assert "([lesson 3](03_rotations_in_space.ipynb))" in text
+    assert "On to [lesson 1](01_plane.ipynb)" in source("lessons/00_start_here.ipynb")
+    cells = nbformat.reads(text, as_version=4).cells
+    (explorer,) = [cell for cell in cells if "explorers.theta_explorer()" in cell.source]
+    shown = explorer.outputs[0].data["text/html"]
+    assert shown.startswith("<p>Of its controls these move here: <b>")
+    assert shown.rstrip().endswith("</figure>")
+
+
+def test_the_ledger_has_a_row_for_every_key(source):
+    page = source("ledger.md")
+    assert page.count('class="row"') == len(WHAT) + len(MISPRINTS)
+    cells = row(page, "bk-eq-16")
+    assert "package/projected_line.html#rbcourse.projected_line.theta" in cells[2]
+    assert "code/tests/test_projected_line.html#" in cells[3]
+    assert "lessons/06_geodesics.html#s6" in cells[4]
+    assert "figures.html#lesson06_chord" in cells[5]
+    # the figures of the texts are their own pictures
+    for key, names in {
+        "bk-fig-4": ["paper_fig4a", "paper_fig4b", "paper_fig4c"],
+        "bk-fig-5": ["paper_fig5a", "paper_fig5b"],
+        "rr-fig-6": ["report_fig6"],
+    }.items():
+        assert sorted(re.findall(r"figures\.html#(\w+)", row(page, key)[5])) == names
+    assert "code/tests/" in row(page, "misprint-9")[4]
+
+
+def row(page, anchor):
+    """The cells of a row of the ledger."""
+    cells = page[page.index(f'id="{anchor}"') :].split("\n* - ")[0]
+    return re.split(r"\n  - ", cells)
+
+
+def test_the_gallery_has_all_figures_with_their_files(source):
+    page = source("figures.md")
+    assert page.count("<img ") == len(list(FIGURES.glob("*.png")))
+    for path in FIGURES.glob("*.*"):
+        assert f'href="figures/{path.name}"' in page
+    headings = "### Paper, Figure 1: paper_fig1", "### Report, Figure 4: report_fig4"
+    places = [page.index(f"{heading}\n") for heading in (*headings, "### lesson00_cubes")]
+    assert places == sorted(places)
+
+
+def test_works_are_listed_once_with_all_their_lessons(source):
+    listed = dict(re.findall(r"^- (.*?) Lesson (<a.*)\.$", source("references.md"), re.MULTILINE))
+    cited = defaultdict(str)
+    for path in LESSONS:
+        for cell in nbformat.read(path, as_version=4).cells:
+            if cell.source.startswith("## References"):
+                for work in re.findall("^- (.*)", cell.source, re.MULTILINE):
+                    link = f'<a href="lessons/{path.stem}.html#references">{path.stem[:2]}</a>'
+                    cited[work] += ", " * bool(cited[work]) + link
+    assert listed == cited
+
+
+def test_answers_of_questions_are_folded(source):
+    answers = (ROOT / "notebooks/QUESTIONS.md").read_text("utf-8").count("#### Answers")
+    page = source("teach/questions.md")
+    assert page.count("<details") == page.count("</details>") == answers > 50
+    assert not re.search(
+        r"^#", page[page.index("<details") : page.index("</details>")], re.MULTILINE
+    )
+
+
+def test_the_index_of_the_package_has_modules_with_their_summaries(source):
+    page = source("package/index.md")
+    assert "| [so3](so3.rst) | " in page
+    assert "```{toctree}\n:hidden:\n\nso3\nquaternion\n" in page
+    assert "\nbook.build\n" not in page
+    assert ":orphan:\n:nosearch:\n" in source("package/book.build.rst")
+    so3 = source("package/so3.rst")
+    assert '<a href="#rbcourse.so3.exp_so3"><code>exp_so3</code></a>' in so3
+    assert ".. automodule:: rbcourse.so3\n" in so3

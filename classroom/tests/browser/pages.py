@@ -1,13 +1,13 @@
-"""What a person does on the pages: scroll through them, press keys, look."""
+"""What a person does on the pages: open them, press keys, look."""
 
 import re
+from contextlib import contextmanager
 
+from pixels import shown
 from playwright.sync_api import expect
 
-SCROLLER = ".jp-NotebookPanel .jp-WindowedPanel-outer"
 IDLE = re.compile(r"\| Idle$")
-
-# all pictures and players that are on the page now, and whether something is wrong with them
+# what is wrong with the pictures and players that are on the page
 SEEN = """() => {
   const faults = [], parts = ":is(.jp-Cell figure, .rbcourse-explorer) :is(img, canvas)";
   for (const picture of document.querySelectorAll(parts)) {
@@ -30,47 +30,26 @@ SEEN = """() => {
   return faults;
 }"""
 
-# what the page notes: when keys go down, and when explorers have a new picture on the screen
-NOTE = """() => {
-  window.keys = []; window.pictures = [];
-  document.addEventListener("keydown", () => keys.push(performance.now()), true);
-  document.addEventListener("drawn", () =>
-    requestAnimationFrame(() => pictures.push(performance.now())));
-}"""
+FRAMES = "async (count) => { while (count--) await new Promise(requestAnimationFrame); }"
 
 
-PICTURES = """() => [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")]
-    .filter((picture) => picture.complete ?? true)
-    .map((picture) => picture.alt ?? picture.ariaLabel.replace(/ Seen from azimuth .*/, ""))"""
-LOADED = """() => !document.body.innerText.includes("Loading widget")
-    && !document.querySelector("img[data-read]")"""  # a player that has not unpacked its states
-STARRED = """() => [...document.querySelectorAll(".jp-InputPrompt")]
-    .some((prompt) => prompt.textContent.includes("[*]"))"""
-
-
-def walk(page):
-    """Scroll a notebook to its end, a large screen at a time.
-
-    Return what is wrong, and the descriptions of the pictures.
-    """
-    faults, seen = set(), set()
-    page.set_viewport_size({"width": 1280, "height": 6000})
-    page.evaluate(f"document.querySelector('{SCROLLER}').scrollTop = 0")
-    while True:
-        page.wait_for_timeout(150)  # so that pictures are drawn
-        page.wait_for_function(LOADED)
-        faults.update(page.evaluate(SEEN))
-        seen.update(page.evaluate(PICTURES))
-        at_end = page.evaluate(
-            f"""() => {{
-                const box = document.querySelector('{SCROLLER}'), before = box.scrollTop;
-                box.scrollTop += 0.8 * box.clientHeight;
-                return box.scrollTop === before;
-            }}"""
-        )
-        if at_end:
-            page.set_viewport_size({"width": 1280, "height": 800})
-            return faults, seen
+@contextmanager
+def watched(context):
+    """A page that must ask nobody outside this machine, and log no error."""
+    page, faults = context.new_page(), []
+    page.set_viewport_size({"width": 1280, "height": 800})
+    local = ("http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:", "file:///")
+    page.on("request", lambda r: r.url.startswith(local) or faults.append(f"asked {r.url}"))
+    # JupyterLab shows why it cannot save, and then throws it
+    meant = "is an original, and is not saved"
+    page.on("pageerror", lambda error: meant in str(error) or faults.append(f"error {error}"))
+    # Voila asks to end the kernel of a page that is left, and is refused: 403; and widgets say
+    # that they cannot send what their sliders are to a kernel that has ended
+    known = re.compile("^(?!error)|403|Could not send widget sync message")
+    page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
+    yield page
+    page.close()
+    assert faults == []
 
 
 def open_in_lab(page, address):
@@ -82,29 +61,7 @@ def open_in_lab(page, address):
 def run_all(page):
     """Run all cells and wait until the last of them is done."""
     page.get_by_text(IDLE).wait_for()
-    page.evaluate(
-        f"""() => {{
-            window.started = false;
-            const look = () => {{ window.started ||= ({STARRED})(); }};
-            new MutationObserver(look).observe(document.body, {{ childList: true, subtree: true }});
-        }}"""
-    )
-    page.get_by_role("menuitem", name="Run", exact=True).click()
-    page.get_by_text("Run All Cells", exact=True).click()
-    page.wait_for_function("window.started")
-    page.wait_for_function(f"() => !({STARRED})()")
-    page.get_by_text(IDLE).wait_for()
-
-
-def explorer_in_lab(page):
-    """Scroll a notebook to its explorer, which is made when it comes into sight."""
-    explorer = page.locator(".rbcourse-explorer")
-    page.evaluate(f"document.querySelector('{SCROLLER}').scrollTop = 0")
-    while not explorer.count():
-        page.evaluate(f"document.querySelector('{SCROLLER}').scrollTop += 300")
-        page.wait_for_timeout(100)
-    centre(explorer)
-    return wait_for(explorer)
+    page.evaluate("jupyterapp.commands.execute('notebook:run-all-cells')")
 
 
 def wait_for(explorer):
@@ -120,22 +77,13 @@ def centre(explorer):
     explorer.evaluate("(explorer) => explorer.scrollIntoView({ block: 'center' })")
 
 
-def read(explorer):
-    """What an explorer shows: its picture, and what is to be read."""
-    return explorer.evaluate(
-        """(explorer) => ({
-            picture: explorer.querySelector("canvas").toDataURL(),
-            said: explorer.querySelector("table").innerText,
-        })"""
-    )
-
-
 def move_every_control(explorer):
     """Move each slider by a key and by the mouse, and choose by both; time is moved first.
 
     Numbers follow at once, and then picture and text.
     """
-    before, sliders = read(explorer), explorer.locator(".widget-slider").all()
+    table, sliders = explorer.locator("table"), explorer.locator(".widget-slider").all()
+    said, picture = table.inner_text(), shown(explorer.locator("canvas"))
     for slider in [sliders[-1], *sliders[:-1]]:
         handle, number = slider.locator(".noUi-handle"), slider.locator(".widget-readout")
         if handle.evaluate("(handle) => Boolean(handle.closest('[disabled]'))"):
@@ -161,5 +109,5 @@ def move_every_control(explorer):
         expect(menu).not_to_have_value(now)
         menu.select_option(now)
         expect(menu).to_have_value(now)
-    expect(explorer.locator("table")).not_to_have_text(before["said"], use_inner_text=True)
-    assert read(explorer)["picture"] != before["picture"]
+    expect(table).not_to_have_text(said, use_inner_text=True)
+    assert shown(explorer.locator("canvas")) != picture

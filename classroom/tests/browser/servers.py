@@ -3,27 +3,34 @@
 import re
 import subprocess
 import sys
-import time
 from contextlib import contextmanager, suppress
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from threading import Thread
 
 import psutil
 
 
 @contextmanager
 def serving(words, folder, env, pattern):
-    """Run a module of Python that prints an address; return the match, and print what it said."""
-    with TemporaryDirectory(ignore_cleanup_errors=True) as place:
-        log = Path(place, "log")
-        with log.open("w") as said:
-            words = [sys.executable, "-m", *words]
-            job = subprocess.Popen(words, cwd=folder, env=env, stdout=said, stderr=said)
+    """Run a module of Python that prints an address; return the match, and print its output."""
+    words = [sys.executable, "-m", *words]
+    output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    lines = []
+    with subprocess.Popen(words, cwd=folder, env=env, text=True, errors="replace", **output) as job:
+        rest = Thread(target=lambda: lines.extend(job.stdout))
         try:
-            yield _address(job, log, pattern)
+            for line in job.stdout:
+                lines.append(line)
+                if found := re.search(pattern, line):
+                    break
+            else:
+                raise RuntimeError(f"{' '.join(words)} has ended: {''.join(lines)}")
+            rest.start()
+            yield found
         finally:
             _end(job)
-            print(log.read_text("utf-8", "replace")[-5000:])  # for a test that fails
+            if rest.ident:
+                rest.join()
+            print("".join(lines)[-5000:])  # for a test that fails
 
 
 def _end(job):
@@ -35,15 +42,3 @@ def _end(job):
             process.terminate()
     for process in psutil.wait_procs(family, 60)[1]:
         process.kill()
-    job.wait()
-
-
-def _address(job, log, pattern):
-    while True:
-        ended = job.poll() is not None
-        text = log.read_text(encoding="utf-8", errors="replace")
-        if found := re.search(pattern, text):
-            return found
-        if ended:
-            raise RuntimeError(f"{' '.join(job.args)} has ended: {text}")
-        time.sleep(0.05)

@@ -10,28 +10,17 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from tiny import ask, lecture, lesson_at
 
+from rbclassroom.course import rehearsal
 from rbclassroom.course.lecture import find_lesson, mark_sections
 from rbclassroom.course.show import main
 
 
-def answer(text):
-    return new_markdown_cell(text, metadata={"jp-MarkdownHeadingCollapsed": True})
-
-
-def test_a_lesson_is_found_by_its_number(tmp_path):
+def test_a_lesson_is_found_by_its_number(tmp_path, monkeypatch):
     path = lesson_at(tmp_path)
     assert find_lesson("01", path.parent) == find_lesson("1", path.parent) == path
-
-
-@pytest.mark.parametrize("number", ["2", "11", "plane", ""])
-def test_an_unknown_lesson_is_answered_with_those_that_exist(tmp_path, number):
-    path = lesson_at(tmp_path)
-    with pytest.raises(ValueError, match=f"no lesson {number}; there are: 01"):
-        find_lesson(number, path.parent)
-
-
-def test_an_unknown_lesson_is_one_line_on_the_terminal(tmp_path, monkeypatch):
-    lesson_at(tmp_path)
+    for number in ("2", "11", "plane", ""):
+        with pytest.raises(ValueError, match=f"no lesson {number}; there are: 01"):
+            find_lesson(number, path.parent)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["lecture", "7"])
     with pytest.raises(SystemExit, match=r"^There is no lesson 7; there are: 01\.$"):
@@ -44,6 +33,10 @@ def sections(*cells):
     mark_sections(notebook)
     marks = [(cell.source, cell.metadata.lecture) for cell in notebook.cells]
     return " ".join("{" * m.opens + source + "}" * m.closes for source, m in marks)
+
+
+def answer(text):
+    return new_markdown_cell(text, metadata={"jp-MarkdownHeadingCollapsed": True})
 
 
 def test_a_folded_section_reaches_to_the_next_heading_of_its_level_or_a_higher_one():
@@ -60,7 +53,7 @@ def test_a_folded_section_reaches_to_the_next_heading_of_its_level_or_a_higher_o
     assert sections(new_markdown_cell("### a"), text) == "### a text"
 
 
-def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
+def test_with_the_token_the_lesson_is_seen_folded_and_without_it_nothing(tmp_path):
     lesson_at(
         tmp_path,
         new_markdown_cell("# Tiny"),
@@ -69,18 +62,22 @@ def test_who_has_the_token_sees_the_lesson_folded_and_nobody_else(tmp_path):
         new_markdown_cell("## After"),
         new_markdown_cell("## Run sheet"),
     )
+    refused = (302, 401, 403)
     with lecture(tmp_path) as (address, server):
         assert address.startswith("http://127.0.0.1:")
         status, text, _ = ask(address.split("?")[0])
-        assert status in (302, 401, 403)
+        assert status in refused
         assert "Tiny" not in text
-        assert ask(re.sub("token=.", "token=!", address))[0] in (302, 401, 403)
+        assert ask(re.sub("token=.", "token=!", address))[0] in refused
         status, text, _ = ask(address)
         assert status == 200
-        kernel = re.search(r'"kernelId": "([\w-]+)"', text)[1]
-        for what in ("", "/channels"):
-            kernels = address.split("?")[0] + f"api/kernels/{kernel}{what}"
-            assert ask(kernels)[0] in (401, 403)
+        page = rehearsal._Page()
+        page.feed(text)
+        assert (page.errors, page.outside) == ([], [])
+        assert page.cells >= 5
+        for channels in ("", "/channels"):
+            kernels = address.split("?")[0] + f"api/kernels/{page.kernel}{channels}"
+            assert ask(kernels)[0] in refused
         server.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
         server.wait()
     folded = text[text.index('<details class="lecture-answer">') : text.index(">After")]

@@ -8,7 +8,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_markdown_cell, new_notebook
 
-from rbclassroom.book.places import package_of
+from rbclassroom.book.places import full_name
 from rbclassroom.course import ledger
 
 ROOT = Path(__file__).parents[3]
@@ -21,11 +21,8 @@ def found():
     return ledger.collect(ROOT)
 
 
-def test_the_stored_ledger_is_fresh(found):
+def test_the_stored_ledger_is_fresh_and_legible(found):
     assert ledger.render(found) == PAGE
-
-
-def test_its_lines_can_be_read():
     entries = PAGE.partition("## Misprints")[0].splitlines()
     assert max(map(len, entries)) <= 160
     assert "| BK (16) | the angle θ(t) | projected_line, explorers | 06 |" in entries
@@ -33,18 +30,9 @@ def test_its_lines_can_be_read():
 
 def test_every_entry_has_function_test_and_lesson(found):
     assert {key: lacks for key in ENTRIES if (lacks := found[key].lacks())} == {}
-
-
-def test_what_is_beyond_the_texts_has_function_and_test(found):
-    wanted = [f"beyond BK {i}" for i in range(1, 12)]
-    assert list(ledger.SOURCES["beyond"]) == wanted
-    for key in wanted:
-        assert found[key].functions
-        assert found[key].tests
-    assert ledger.KEY.findall("beyond BK 3, BK 3") == ["beyond BK 3", "BK 3"]
-
-
-def test_every_misprint_has_a_test(found):
+    beyond = [f"beyond BK {i}" for i in range(1, 12)]
+    assert list(ledger.SOURCES["beyond"]) == beyond
+    assert [key for key in beyond if not (found[key].functions and found[key].tests)] == []
     assert [key for key in ledger.MISPRINTS if not found[key].tests] == []
     assert len(ledger.MISPRINTS) == 22
 
@@ -52,31 +40,19 @@ def test_every_misprint_has_a_test(found):
 def test_all_of_both_texts_is_listed():
     """Equations, propositions, corollaries, remarks, figures and sections, by their numbers."""
     counts = {
-        "BK ({})": 21,
-        "BK Prop. {}": 7,
-        "BK Cor. {}": 2,
-        "BK Remark {}": 7,
-        "BK Fig. {}": 5,
-        "BK 2.{}": 6,
-        "BK 3.{}": 2,
-        "BK 6.{}": 3,
-        "RR ({})": 23,
-        "RR Fig. {}": 9,
-        "RR 1.{}": 6,
-        "RR 2.{}": 2,
-        "RR 3.{}": 3,
-        "RR 4.{}": 3,
+        **{"BK ({})": 21, "BK Prop. {}": 7, "BK Cor. {}": 2, "BK Remark {}": 7, "BK Fig. {}": 5},
+        **{"BK 2.{}": 6, "BK 3.{}": 2, "BK 6.{}": 3, "RR ({})": 23, "RR Fig. {}": 9},
+        **{"RR 1.{}": 6, "RR 2.{}": 2, "RR 3.{}": 3, "RR 4.{}": 3},
     }
     wanted = {form.format(i) for form, count in counts.items() for i in range(1, count + 1)}
     assert wanted <= set(ENTRIES)
     assert set(ENTRIES) - wanted == {"BK 1", "BK 3", "BK 4", "BK 5", "BK 6", "BK 7", "RR 2", "RR 4"}
 
 
-def test_every_name_in_it_resolves(found):
+def test_every_name_resolves(found):
     for name in {name for entry in found.values() for name in entry.functions}:
         module, function = name.rsplit(".", 1)
-        full = f"{package_of(module)}.{module}"
-        assert hasattr(importlib.import_module(full), function), name
+        assert hasattr(importlib.import_module(full_name(module)), function), name
     for name in {name for entry in found.values() for name in entry.tests}:
         file, function = name.split("::")
         paths = [ROOT / folder / file for folder in ("tests", "classroom/tests")]
@@ -84,44 +60,56 @@ def test_every_name_in_it_resolves(found):
         assert len(re.findall(rf"^def {function}\(", source, re.MULTILINE)) == 1, name
 
 
-@pytest.fixture
-def course(tmp_path):
-    """A course with one function, one test and one lesson."""
+CODE = '''
+def turn():
+    """Turn.
+
+    Source: BK (2),
+    RR 2.
+
+    Notes
+    -----
+    BK (3)
+    """
+
+BASIS = 1
+"""Three turns (BK (2))."""
+'''
+TESTS = """
+@pytest.mark.source("BK (2)", "errata 1")
+@pytest.mark.parametrize("key", ["BK (3)"])
+def test_turn():
+    pass
+
+@pytest.mark.source("BK (3)")
+def not_a_test():
+    pass
+"""
+
+
+def test_keys_are_collected_and_an_unknown_one_is_named(tmp_path):
+    """Of one function, one test and one lesson."""
     for folder in ("rbcourse", "tests", "notebooks"):
         (tmp_path / folder).mkdir()
-    docstring = "Turn.\n\n    Source: BK (2),\n    RR 2.\n\n    Notes\n    -----\n    BK (3)\n"
-    code = f'def turn():\n    """{docstring}"""\n\nBASIS = 1\n"""Three turns (BK (2))."""\n'
-    (tmp_path / "rbcourse/so3.py").write_text(code, "utf-8")
-    mark = '@pytest.mark.source("BK (2)", "errata 1")'
-    test = mark + '\n@pytest.mark.parametrize("key", ["BK (3)"])\ndef test_turn():\n    pass\n'
-    test += '@pytest.mark.source("BK (3)")\ndef not_a_test():\n    pass\n'
-    (tmp_path / "tests/test_so3.py").write_text(test, "utf-8")
-    cells = [
-        new_markdown_cell("## 3 · Turns\n\n<small>BK (2)</small>\n\nBK (3)"),
-        new_markdown_cell("BK (4)"),
-    ]
-    nbformat.write(new_notebook(cells=cells), tmp_path / "notebooks/03_turns.ipynb")
-    return tmp_path
-
-
-def test_what_is_collected(course):
-    found = ledger.collect(course)
-    assert found["BK (2)"].functions == ["so3.turn", "so3.BASIS"]
-    assert found["BK (2)"].tests == ["test_so3.py::test_turn"]
-    assert found["BK (2)"].lessons == ["03_turns.ipynb, 3"]
+    (tmp_path / "rbcourse/so3.py").write_text(CODE, "utf-8")
+    (tmp_path / "tests/test_so3.py").write_text(TESTS, "utf-8")
+    texts = "## 3 · Turns\n\n<small>BK (2)</small>\n\nBK (3)", "BK (4)"
+    lesson = new_notebook(cells=[new_markdown_cell(text) for text in texts])
+    nbformat.write(lesson, tmp_path / "notebooks/03_turns.ipynb")
+    found = ledger.collect(tmp_path)
+    functions, tests = ["so3.turn", "so3.BASIS"], ["test_so3.py::test_turn"]
+    assert found["BK (2)"] == ledger.Entry(functions, tests, ["03_turns.ipynb, 3"])
     assert found["BK (2)"].lacks() == []
-    assert found["RR 2"].functions == ["so3.turn"]
+    assert found["RR 2"].functions == functions[:1]
     assert found["RR 2"].lacks() == ["tests", "lessons"]
-    assert found["errata 1"].tests == ["test_so3.py::test_turn"]
+    assert found["errata 1"].tests == tests
     for key in ("BK (3)", "BK (4)", "BK 1"):
         assert found[key].lacks() == ["functions", "tests", "lessons"]
-
-
-def test_an_unknown_key_is_named(course):
-    cell = new_markdown_cell("## 1 · Turns\n\n<small>BK (99)</small>")
-    nbformat.write(new_notebook(cells=[cell]), course / "notebooks/03_turns.ipynb")
+    lesson.cells[0].source = "## 1 · Turns\n\n<small>BK (99)</small>"
+    nbformat.write(lesson, tmp_path / "notebooks/03_turns.ipynb")
     with pytest.raises(ValueError, match=r"03_turns\.ipynb, 1: BK \(99\) is no entry"):
-        ledger.collect(course)
+        ledger.collect(tmp_path)
+    assert ledger.KEY.findall("beyond BK 3, BK 3, BK 6.1.2") == ["beyond BK 3", "BK 3"]
 
 
 @pytest.mark.source("errata 4")
