@@ -49,12 +49,12 @@ LIBRARIES = {
     "rbclassroom": set(),
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "rbclassroom.figures": {"matplotlib"},
-    "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl", "tqdm"},
+    "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl"},
     "rbclassroom.course": {"PIL", "jupyter_server", "jupyterlab", "nbclient", "nbformat"}
     | {"segno", "tornado", "traitlets", "voila"},
     "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
     | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
-    "rbclassroom.book": {"nbformat", "pygments", "sphinx"},
+    "rbclassroom.book": {"jinja2", "nbformat", "pygments", "sphinx"},
 }
 
 

@@ -1,7 +1,6 @@
 """The atlas of real bodies, lesson 13: which curve is near the optimum, for which body.
 
-``course.py atlas`` calls this module. It takes some minutes, shows how far it is, and goes on where
-it was stopped.
+``course.py atlas`` calls this module. It takes some minutes and shows its progress.
 """
 
 from __future__ import annotations
@@ -16,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest, quantile_test
-from tqdm import tqdm
 
 from rbclassroom.surveys import atlas
 from rbclassroom.surveys.atlas import CELLS, FASTEST
+from rbclassroom.surveys.progress import bar
 from rbclassroom.surveys.survey import processes, survey
 from rbcourse import Array, Ends, bezier_long_so3, minimum_acceleration_so3
 from rbcourse.draw.save import csv_text
@@ -162,29 +161,18 @@ def stored(table: str) -> dict[str, NDArray[Any]]:
 
 
 def make_tables(
-    store: Path,
     executor: Executor,
     tables: Path = TABLES,
     draws: int = DRAWS,
     seeds: Sequence[int] = SEEDS,
 ) -> None:
-    """Compute the atlas, and write `maps` of the first seed and the `intervals` of each.
-
-    The costs of each body and seed are kept in the file `store`, so that a run that was stopped
-    goes on. It is deleted when the `tables` are written.
-    """
-    kept: dict[str, Any] = {}
-    if store.exists():
-        with np.load(store) as file:
-            kept = dict(file)
+    """Compute the atlas, and write `maps` of the first seed and the `intervals` of each."""
     parts, first = list[dict[str, Array]](), dict[str, dict[str, Array]]()
     for seed, (body, inertia) in product(seeds, BODIES.items()):
-        problems, key = body_problems(draws, seed), f"{body}-{seed}-{draws}"
-        if key not in kept:
-            kept[key] = _costs(key, problems, body, executor)
-            _write(store, kept)
-        costs = dict(zip(["optimum", *curves_for(body)], kept[key], strict=True))
-        excess = with_choices(atlas.excesses(problems, costs, inertia))
+        problems = body_problems(draws, seed)
+        ways, report = curves_for(body), bar(f"{body}, seed {seed}")
+        found = survey(problems, executor, inertia=inertia, ways=ways, report=report)
+        excess = with_choices(atlas.excesses(problems, found, inertia))
         first.setdefault(body, excess)
         table = intervals(excess, draws)
         named = {"seed [1]": seed, "body": body}
@@ -192,28 +180,6 @@ def make_tables(
     for name, table in {"maps": maps(first, draws), "intervals": _joined(parts)}.items():
         text = csv_text(table)
         (tables / f"atlas_{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-    store.unlink()
-
-
-def _costs(key: str, problems: Ends, body: str, executor: Executor) -> Array:
-    """Survey a body, with a bar."""
-    with tqdm(desc=key, total=len(problems.w0), unit="problem") as bar:
-
-        def report(done: int, total: int) -> None:
-            bar.update(done - bar.n)
-
-        inertia, ways = BODIES[body], curves_for(body)
-        found = survey(problems, executor, inertia=inertia, ways=ways, report=report)
-    return np.stack(list(found.values()))
-
-
-def _write(store: Path, kept: dict[str, Any]) -> None:
-    """Replace the file at once: it is never half written."""
-    store.parent.mkdir(parents=True, exist_ok=True)
-    part = store.with_suffix(".part")
-    with part.open("wb") as file:
-        np.savez(file, **kept)
-    part.replace(store)
 
 
 def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
@@ -221,8 +187,6 @@ def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 
 if __name__ == "__main__":
-    own = Path(".atlas")
     with processes() as pool:
-        make_tables(own / "costs.npz", pool)
-    own.rmdir()
+        make_tables(pool)
     print(f"{TABLES / 'atlas_maps.csv'} and atlas_intervals.csv are written.")

@@ -9,7 +9,7 @@ from IPython.display import display
 
 
 def bar(what: str) -> Callable[[int, int], None]:
-    """Return a function that shows how much is done: a bar; outside of notebooks, lines.
+    """Return a function that shows how much is done: a bar; outside of notebooks, a line.
 
     Examples
     --------
@@ -25,7 +25,7 @@ def bar(what: str) -> Callable[[int, int], None]:
         bar = f'<progress max="{total}" value="{done}"></progress> ' if done < total else ""
         stage = {"text/plain": line, "text/html": f"<div>{bar}{html.escape(line)}</div>"}
         if get_ipython() is None:
-            print(line)
+            print(line, end="\r" if done < total else "\n", flush=True)
         elif handle is None:
             handle = display(stage, raw=True, display_id=True)
         else:

@@ -46,8 +46,6 @@ HONEST = {
     "matplotlib": "%matplotlib inline\n%config InlineBackend.figure_formats = ['svg']\n"
     "%load_ext autoreload\n%autoreload 2\n"
     "import matplotlib.pyplot as plt\nplt.plot([1, 2]); plt.show()",
-    "tqdm": "from tqdm.auto import tqdm\nfor i in tqdm(range(99)): pass\n"
-    "from tqdm import tqdm\nfor i in tqdm(range(99)): pass",
     "jobs": "import asyncio, threading, warnings\nfrom multiprocessing import Pool\n"
     "from concurrent.futures import ThreadPoolExecutor\nwarnings.warn('old')\n"
     "thread = threading.Thread(target=print, args=('done',))\nthread.start()\nthread.join()\n"

@@ -184,42 +184,21 @@ def test_processes_end_when_their_parent_is_killed(tmp_path):
         assert job.communicate(timeout=600)[0] == ""
 
 
-def test_an_atlas_that_was_stopped_goes_on_and_gives_the_same_bytes(tmp_path, monkeypatch):
-    """It is stopped while it writes the costs of the second body and seed, of six."""
-    surveyed, savez = [], np.savez
+def test_the_tables_of_the_atlas_are_those_of_the_first_seed_and_of_all(tmp_path, monkeypatch):
+    surveyed = []
 
     def made_up(problems, executor, *, inertia, ways, report):
         surveyed.append((executor, problems.w0[0, 0], inertia[0, 0]))
         report(len(problems.w0), len(problems.w0))
-        rng = np.random.default_rng(int(1e9 * inertia[0, 0] + abs(1e6 * problems.w0[0, 0])))
+        rng = np.random.default_rng(len(surveyed))
         return {name: 1000 + rng.random(len(problems.w0)) for name in ["optimum", *ways]}
-
-    def interrupted(file, **kept):
-        if len(kept) == 2:
-            file.write(b"PK")
-            raise KeyboardInterrupt
-        savez(file, **kept)
-
-    def run(name):
-        folder = tmp_path / name
-        folder.mkdir(exist_ok=True)
-        body_atlas.make_tables(folder / "kept" / "costs.npz", "executor", folder, 1, [5, 6])
-        assert not (folder / "kept" / "costs.npz").exists()
-        return {path.name: path.read_bytes() for path in folder.glob("*.csv")}
 
     monkeypatch.setattr(body_atlas, "survey", made_up)
     monkeypatch.setattr(body_atlas, "DOMAINS", {"all": 10})
-    with monkeypatch.context() as patch:
-        patch.setattr(np, "savez", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            run("stopped")
-    assert not list(tmp_path.glob("stopped/*.csv"))
-    tables = run("stopped")
-    assert [len(surveyed), len(set(surveyed))] == [7, 6]  # once, but for the one that was lost
+    monkeypatch.setattr(body_atlas, "TABLES", tmp_path)
+    body_atlas.make_tables("executor", tmp_path, 1, [5, 6])
+    assert len(set(surveyed)) == 6
     assert {executor for executor, *_ in surveyed} == {"executor"}
-    assert tables == run("whole")
-    assert sorted(tables) == ["atlas_intervals.csv", "atlas_maps.csv"]
-    monkeypatch.setattr(body_atlas, "TABLES", tmp_path / "whole")
     assert len(body_atlas.stored("maps")["body"]) == 300  # of the first seed
     assert body_atlas.stored("intervals")["seed [1]"].tolist() == [5] * 33 + [6] * 33
 
