@@ -58,7 +58,20 @@ from rbcourse.optimum import (
     stationary_so3,
 )
 from rbcourse.optimum.shooting import shoot_minimum_acceleration_so3
-from rbcourse.paths import Chain, bessel_velocities, chain
+from rbcourse.optimum.splines import (
+    OptimalChain,
+    minimum_acceleration_spline_se3,
+    minimum_acceleration_spline_so3,
+    minimum_jerk_spline_so3,
+    minimum_torque_spline_so3,
+)
+from rbcourse.paths import (
+    Chain,
+    chain,
+    projected_spline_se3,
+    projected_spline_so3,
+    quaternion_spline_so3,
+)
 from rbcourse.projected_cubic import (
     ProjectedPolynomial,
     projected_cubic_so3,
@@ -107,8 +120,9 @@ from rbcourse.so3 import (
     right_jacobian_so3,
     vee_so3,
 )
+from rbcourse.velocities import bessel_velocities, spline_velocities
 
-__version__ = "0.27.0"
+__version__ = "0.28.0"
 
 __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # rotations
@@ -206,7 +220,16 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "retime",
     "chain",
     "Chain",
+    "spline_velocities",
     "bessel_velocities",
+    "projected_spline_so3",
+    "projected_spline_se3",
+    "quaternion_spline_so3",
+    "minimum_acceleration_spline_so3",
+    "minimum_acceleration_spline_se3",
+    "minimum_torque_spline_so3",
+    "minimum_jerk_spline_so3",
+    "OptimalChain",
     "read_path",
     "write_path",
     # for annotations

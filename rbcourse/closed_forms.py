@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array, matvec
 from rbcourse._quaternion_curve import QuaternionCurve, other_way, polynomial_jet
@@ -134,8 +134,15 @@ def quaternion_cubic_so3(
     >>> c(1, 1).round(12) + 0.0, float(c.margin.round(3))
     (array([0., 1., 0.]), 0.933)
     """
-    ends, T = Ends(R0, R1, w0, w1).over(duration)
+    return quaternion_cubic(*Ends(R0, R1, w0, w1).over(duration))
+
+
+def quaternion_cubic(
+    ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
+) -> QuaternionCubic:
+    """Return the quaternion cubic of checked ends, or where `long` is True that to −q1."""
     turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
+    turn = np.where(np.expand_dims(long, -1), -turn, turn)
     return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
 
 

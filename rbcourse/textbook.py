@@ -20,6 +20,7 @@ __all__ = [
     "cubic_coefficients",
     "geodesic_so3",
     "minimum_acceleration_so3",
+    "minimum_acceleration_spline_so3",
     "minimum_torque_so3",
     "polynomial",
     "project_so",
@@ -27,6 +28,7 @@ __all__ = [
     "sample_quaternion",
     "sample_rotation",
     "show",
+    "spline_velocities",
 ]
 
 
@@ -253,3 +255,78 @@ def minimum_acceleration_so3(
         raise RuntimeError(solution.message)
     sigma, w, acceleration, _ = np.moveaxis(solution.sol(t).reshape(4, 3, -1), -1, 1)
     return R0 @ exp_so3(sigma), w, acceleration
+
+
+def spline_velocities(times: Array, R: Array) -> Array:
+    """Return the velocities at rotations R, shape (N, 3, 3), for which w' is continuous.
+
+    With s = vee skew Q, Q = R_iᵀ R_{i+1}, and B = ½ (tr Q I − Qᵀ), a projected cubic of duration h
+    has h² w'(0) = 6 s − 4 h w_i − 2 h B w_{i+1} and h² w'(1) = −6 s + 2 h Bᵀ w_i + 4 h w_{i+1}.
+    At both ends of the path w' = 0.
+    Source: beyond BK 13.
+
+    Examples
+    --------
+    >>> spline_velocities(np.array([0.0, 2]), exp_so3([[0, 0, 0], [0, 0, 1]])).round(4) + 0.0
+    array([[0.    , 0.    , 0.4969],
+           [0.    , 0.    , 0.4969]])
+    """
+    H, b = np.zeros((len(R), 3, len(R), 3)), np.zeros((len(R), 3))
+    for i, h in enumerate(np.diff(times)):
+        Q = R[i].T @ R[i + 1]
+        s, B = vee_so3((Q - Q.T) / 2), (np.trace(Q) * np.eye(3) - Q.T) / 2
+        H[i, :, i] += 4 / h * np.eye(3)
+        H[i, :, i + 1] += 2 / h * B
+        H[i + 1, :, i] += 2 / h * B.T
+        H[i + 1, :, i + 1] += 4 / h * np.eye(3)
+        b[i] += 6 * s / h**2
+        b[i + 1] += 6 * s / h**2
+    return np.linalg.solve(H.reshape(b.size, b.size), b.ravel()).reshape(b.shape)
+
+
+def minimum_acceleration_spline_so3(
+    times: Array, R: Array, ends: tuple[Array, Array] | None = None, tol: float = 1e-10
+) -> tuple[Array, Array]:
+    """Return w and w' at rotations R of the optimum through them, by SciPy's `solve_bvp`.
+
+    All legs at once, each in its own time from 0 to 1: the equations are those of
+    `minimum_acceleration_so3`. At the inner rotations w and w' are continuous; at both ends w is
+    given, or w' = 0. If it fails, a RuntimeError says why.
+    Source: beyond BK 12.
+
+    Examples
+    --------
+    >>> w, a = minimum_acceleration_spline_so3(np.array([0.0, 2]), exp_so3([[0, 0, 0], [0, 0, 1]]))
+    >>> w.round(9) + 0.0
+    array([[0. , 0. , 0.5],
+           [0. , 0. , 0.5]])
+    """
+    from scipy.integrate import solve_bvp
+
+    h, goals = np.diff(times)[:, None], log_so3(R[:-1].mT @ R[1:])
+    count = len(h)
+
+    def rates(_: Array, y: Array) -> Array:
+        sigma, w, a, b = y.reshape(4, 3, count, -1)
+        J = right_jacobian_inverse_so3(np.moveaxis(sigma, 0, -1))
+        sigma_rate = np.einsum("nmij,jnm->inm", J, w)
+        return np.stack([sigma_rate, a, b, np.cross(b, w, axis=0)]).reshape(y.shape)
+
+    def misses(start: Array, end: Array) -> Array:
+        (sigma0, w0, a0, _), (sigma1, w1, a1, _) = (
+            np.swapaxes(x.reshape(4, 3, count), 1, 2) for x in (start, end)
+        )
+        w0, w1, a0, a1 = w0 / h, w1 / h, a0 / h**2, a1 / h**2
+        at_ends = (a0[0], a1[-1]) if ends is None else (w0[0] - ends[0], w1[-1] - ends[1])
+        joints = w1[:-1] - w0[1:], a1[:-1] - a0[1:]
+        return np.concatenate([np.ravel(x) for x in (sigma0, sigma1 - goals, *joints, *at_ends)])
+
+    nodes = np.linspace(0, 1, 11)
+    guess = np.zeros((4, 3, count, 11))
+    guess[0], guess[1] = goals.T[..., None] * nodes, goals.T[..., None]
+    solution = solve_bvp(rates, misses, nodes, guess.reshape(-1, 11), tol=tol, max_nodes=100_000)
+    if not solution.success:
+        raise RuntimeError(solution.message)
+    _, w, a, _ = np.moveaxis(solution.sol([0.0, 1.0]).reshape(4, 3, count, 2), 1, -1)
+    w, a = w / h[..., None], a / h[..., None] ** 2
+    return np.append(w[:, 0], w[-1:, 1], axis=0), np.append(a[:, 0], a[-1:, 1], axis=0)

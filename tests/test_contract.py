@@ -46,7 +46,11 @@ FUNCTIONS = rb.CLOSED_FORMS | {
     for name in rb.__all__
     if inspect.isfunction(function := getattr(rb, name)) and returns_a_curve(function)
 }
-NO_STACKS = {"chain"}
+NO_STACKS = {  # curves through many poses, see test_paths.py and test_splines.py
+    name
+    for name, function in FUNCTIONS.items()
+    if issubclass(typing.get_type_hints(function)["return"], rb.Chain)
+}
 bezier, cubic = rb.bezier_so3, rb.projected_cubic_so3
 MAKERS = {
     **{name: of(function) for name, function in FUNCTIONS.items() if name not in NO_STACKS},

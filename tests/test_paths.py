@@ -124,18 +124,16 @@ def test_quintics_between_uneven_times_are_the_nearest_rotations(ratio):
 
 
 @both_groups
-def test_without_velocities_it_has_bessels_but_rests_at_its_ends(poses):
-    """The quintic bends as their parabolas do."""
-    c, chosen = rb.chain(TIMES, poses), rb.bessel_velocities(TIMES, poses)
-    assert np.abs(c(TIMES[1:-1], 1) - chosen[1:-1]).max() < 400 * EPS
-    assert not c(TIMES[[0, -1]], 1).round(14).any()
+def test_without_velocities_it_is_the_spline_that_rests_at_its_ends(poses):
+    """Its accelerations are continuous, and those of its quintics."""
+    rest = np.zeros(3 if poses is ROTATIONS else 6)
+    c, chosen = rb.chain(TIMES, poses), rb.spline_velocities(TIMES, poses, (rest, rest))
+    assert np.abs(c(TIMES, 1) - chosen).max() < 400 * EPS
+    assert np.abs(c.jumps(2)).max() < 1e-12
     assert not c.velocities[[0, -1]].any()
-    c = rb.chain(TIMES, POSES, leg=rb.projected_quintic_so3)
-    for i in range(1, N - 1):
-        near = slice(i - 1, i + 2)
-        bend = 2 * np.polyfit(TIMES[near] - TIMES[i], POSES[near, :3, 3], 2)[0]
-        assert np.abs(c(TIMES[i], 2)[3:] - ROTATIONS[i].T @ bend).max() < 1e-12
-    assert np.abs(c(TIMES[[0, -1]], 2)).max() < 1e-12
+    quintic = rb.chain(TIMES, poses, leg=rb.projected_quintic_so3)
+    assert np.abs(quintic(TIMES[1:-1], 2) - c(TIMES[1:-1], 2)).max() < 1e-12
+    assert np.abs(quintic(TIMES[[0, -1]], 2)).max() < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -319,7 +317,7 @@ def test_far_from_the_origin_it_is_the_same_motion():
     far = here.copy()
     far[:, :3, 3] += [5e5, 5.3e6, 100]
     c, other = rb.chain(t, far), rb.chain(t, here)
-    assert np.abs(c.velocities[1:-1, [2, 3]] / 4e-3 - 1).max() < 1e-3
+    assert np.abs(c.velocities[10:-10, [2, 3]] / 4e-3 - 1).max() < 1e-3
     assert np.abs(c.velocities - other.velocities).max() < 1e-5
     assert np.abs(c.jumps(1)).max() < 1e-12
     turning, same = (rb.acceleration_cost_parts(one)[0] for one in (c, other))
@@ -339,7 +337,7 @@ def test_a_dwell_is_a_rest_wherever_it_is_seen_from_and_near_neighbours_are_none
         assert not rb.chain(range(4), seen).velocities[1:3].any()
     near_half_turn = np.pi + 1e-6 - 1e-5
     R = rb.exp_so3(np.outer([0, 1e-6, 2e-6, near_half_turn], [0, 0, 1]))
-    assert np.abs(rb.chain(range(3), R[:3]).velocities[1] - [0, 0, 1e-6]).max() < 1e-12
+    assert np.abs(rb.chain(range(3), R[:3]).velocities[1] - [0, 0, 1.5e-6]).max() < 1e-12
     assert np.abs(rb.log_so3(rb.chain([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -225,7 +226,8 @@ def stationary_so3(guess: Curve) -> Optimum:
     task = ball(Ends(R0, R1, w0, w1))
     R = np.moveaxis(unit(grid(LIMITS.nodes).t).reshape(LIMITS.nodes, -1, 3, 3), 0, 1)
     with np.errstate(over="ignore", invalid="ignore"):
-        return _optimum(task, task.solver(task.equations, R), guess.duration)
+        found = task.solver(task.equations, R)
+        return optimum_of(task.functional, task.equations.ends, found, guess.duration)
 
 
 class ConvergenceError(RuntimeError):
@@ -340,14 +342,20 @@ def solve(task: Task, duration: Array) -> Optimum:
     solutions = cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
-    curve = _optimum(task, solutions, duration)
+    T = np.broadcast_to(duration, task.batch)
+    curve = optimum_of(task.functional, task.equations.ends, solutions, T)
     _warn_if_not_converged(curve)
     return curve
 
 
-def _optimum(task: Task, solutions: list[Solution | Failure], duration: Array) -> Optimum:
-    """Return the curves of solutions."""
-    functional, ends, batch = task.functional, task.equations.ends, task.batch
+def optimum_of(
+    functional: Functional,
+    ends: Array,
+    solutions: Sequence[Solution | Failure],
+    duration: Array,
+) -> Optimum:
+    """Return the curves of solutions, with the batch shape of their durations."""
+    batch = duration.shape
     found, c = np.zeros(len(solutions), _FOUND), np.full((len(solutions), 3), np.nan)
     for i, one in enumerate(solutions):
         found[i] = False, 0, one.iterations, np.nan, one.residual
@@ -358,7 +366,7 @@ def _optimum(task: Task, solutions: list[Solution | Failure], duration: Array) -
     c *= np.reshape(functional.unit, (-1, 1))
     series = _series(ends, solutions, found["nodes"])
     return Optimum(
-        duration=np.broadcast_to(duration, batch),
+        duration=duration,
         functional=functional,
         series=series.reshape(*batch, *series.shape[1:]),
         constant=c.reshape(*batch, 3),
@@ -366,7 +374,7 @@ def _optimum(task: Task, solutions: list[Solution | Failure], duration: Array) -
     )
 
 
-def _series(ends: Array, solutions: list[Solution | Failure], nodes: Array) -> Array:
+def _series(ends: Array, solutions: Sequence[Solution | Failure], nodes: Array) -> Array:
     """Return the Chebyshev series of R, w, w', …, shape (count, n, 9 + 3 + …).
 
     Series of fewer nodes are padded with zeros. Where no solution was found they are NaN.
@@ -375,7 +383,7 @@ def _series(ends: Array, solutions: list[Solution | Failure], nodes: Array) -> A
     series = np.zeros((len(nodes), nodes.max(initial=1) + m, 12 + 3 * m))
     for n in np.unique(nodes[nodes > 0]):
         index = np.flatnonzero(nodes == n)
-        R, k = (np.stack([solutions[i][part] for i in index]) for part in (0, 1))
+        R, k = (np.stack([solutions[i][part] for i in index.tolist()]) for part in (0, 1))
         by = primitives(n, m)
         series[index, :n, :9] = along(grid(n).series, R).reshape(len(index), n, 9)
         for order, (E, K) in enumerate(zip(by.series_from_ends, by.series_from_k, strict=True)):

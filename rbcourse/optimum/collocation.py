@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._numerics import Array, blocks, matvec, scaled
+from rbcourse._numerics import Array, blocks, scaled
 from rbcourse.optimum.chebyshev import along, grid, interpolation, primitives, tails
 from rbcourse.optimum.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
@@ -58,6 +58,7 @@ class Equations(Protocol):
 
     R0: Array
     R1: Array
+    ends: Array  # w0, w1 (and a0, a1), shape (N, m, 3)
     together: int  # problems that are solved together: as many as fit into the cache
 
     def take(self, index: Any) -> Self:
@@ -72,8 +73,17 @@ class Equations(Protocol):
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest error of each problem, and what a step is made from."""
 
-    def step(self, unknowns: Arrays, parts: Arrays) -> tuple[Array, Arrays]:
-        """Return the turns of the nodes, in the fixed frame, and the changes of the others."""
+    def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
+        """Return the turns of the nodes, in the fixed frame, and the changes of the others.
+
+        In the last axis: those of a step, and if asked for of a unit of each end value.
+        """
+
+    def bend(self, unknowns: Arrays) -> Array:
+        """Return k at the nodes."""
+
+    def bend_by(self, unknowns: Arrays, responses: Arrays) -> Array:
+        """Return the changes of k that belong to the `responses`."""
 
     def tails(self, unknowns: Arrays) -> Array:
         """Return what the nodes do not carry."""
@@ -177,7 +187,7 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
             break
         active = active[going]
         now, parts = (tuple(x[going] for x in arrays) for arrays in (now, parts))
-        turn, changes = some.take(going).step(now, parts)
+        turn, *changes = (x[..., 0] for x in some.take(going).responses(now, parts))
         size[active] = np.linalg.norm(turn, axis=-1).max(axis=1)
         share = LONGEST_STEP / np.maximum(size[active], LONGEST_STEP)
         R[active] = cayley(share[:, None, None] * turn) @ now[0]
@@ -287,35 +297,51 @@ class Stationary:
         left = np.abs(E).max(axis=(1, 2, 3)), np.abs(lacking).max(axis=(1, 2)) / (SHARE * size)
         return np.maximum(*left), (E, W, lacking, *rates)
 
-    def step(self, unknowns: Arrays, parts: Arrays) -> tuple[Array, Arrays]:
+    def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the changes of k and c.
 
         With K the integrals that give w, w', … from k, and P the derivatives of p by them,
 
             p + Σ Pᵢ Kᵢ δk = Rᵀ(c + ĉ ε + δc),    ε = d + ∫ R K₀ δk dt,    ε(1) = 0.
 
-        With the second put into the first these are 3 n + 3 equations for δk and δc.
+        With the second put into the first these are 3 n + 3 equations for δk and δc. A change of
+        the end values adds to d and p.
         """
         (R, _, c), (E, W, lacking, *rates) = unknowns, parts
-        d, (count, n) = mending_turns(R, E, W), R.shape[:2]
-        by = primitives(n, self.ends.shape[1])
+        count, n = R.shape[:2]
+        by, P = primitives(n, self.ends.shape[1]), self.functional.p_by(*rates)
+        known, lacking = mending_turns(R, E, W)[..., None], lacking[..., None]
+        if by_ends:
+            effects = sum(_by_ends(F, x) for F, x in zip(by.from_ends, P, strict=True))
+            known = np.concatenate([known, _turns_by_ends(R, by.from_ends[0])], axis=-1)
+            lacking = np.concatenate([lacking, effects], axis=-1)
         turned_by_k = _integrals(R, by.from_k[0])
         pull = R.mT @ hat(c)[:, None]
-        system = np.zeros((count, 3 * n + 3, 3 * n + 4))
+        system = np.zeros((count, 3 * n + 3, 3 * n + 3 + known.shape[-1]))
         by_k = -(pull @ turned_by_k).reshape(count, n, 3, n, 3)
-        for P, K in zip(self.functional.p_by(*rates), by.from_k, strict=True):
+        for Pi, K in zip(P, by.from_k, strict=True):
             if K is not by.from_k[-1]:
-                by_k += P[:, :, :, None, :] * K[:, None, :, None]
+                by_k += Pi[:, :, :, None, :] * K[:, None, :, None]
             else:  # the identity
                 each = np.arange(n)
-                by_k[:, each, :, each, :] += P.swapaxes(0, 1)
+                by_k[:, each, :, each, :] += Pi.swapaxes(0, 1)
+        split, columns = 3 * n + 3, known.shape[-1]
         system[:, : 3 * n, : 3 * n] = by_k.reshape(count, 3 * n, 3 * n)
-        system[:, : 3 * n, 3 * n : -1] = -R.mT.reshape(count, 3 * n, 3)
-        system[:, : 3 * n, -1] = (matvec(pull, d) - lacking).reshape(count, 3 * n)
-        system[:, 3 * n :, : 3 * n], system[:, 3 * n :, -1] = turned_by_k[:, -1], -d[:, -1]
-        x = np.linalg.solve(system[:, :, :-1], system[:, :, -1:])
-        turn = d + (turned_by_k.reshape(count, 3 * n, 3 * n) @ x[:, : 3 * n]).reshape(d.shape)
-        return turn, (x[:, : 3 * n].reshape(count, n, 3), x[:, 3 * n :, 0])
+        system[:, : 3 * n, 3 * n : split] = -R.mT.reshape(count, 3 * n, 3)
+        system[:, : 3 * n, split:] = (pull @ known - lacking).reshape(count, 3 * n, columns)
+        system[:, 3 * n :, : 3 * n], system[:, 3 * n :, split:] = turned_by_k[:, -1], -known[:, -1]
+        x = np.linalg.solve(system[:, :, :split], system[:, :, split:])
+        by_x = turned_by_k.reshape(count, 3 * n, 3 * n) @ x[:, : 3 * n]
+        turn = known + by_x.reshape(known.shape)
+        return turn, x[:, : 3 * n].reshape(count, n, 3, columns), x[:, 3 * n :]
+
+    def bend(self, unknowns: Arrays) -> Array:
+        """Return k."""
+        return unknowns[1]
+
+    def bend_by(self, unknowns: Arrays, responses: Arrays) -> Array:
+        """Return the changes of k."""
+        return responses[1]
 
     def tails(self, unknowns: Arrays) -> Array:
         """Return the last coefficients of R, or of k over its size."""
@@ -326,6 +352,17 @@ class Stationary:
         """Return k, c and the cost."""
         _, k, c = unknowns
         return k, c, costs(self.functional, self.ends, k)
+
+
+def _by_ends(from_ends: Array, matrices: Array) -> Array:
+    """Return matrices (N, n, 3, 3) times the rates of a unit of each end value, (N, n, 3, 3 m)."""
+    products = matrices[..., None, :] * from_ends[:, None, :, None]
+    return products.reshape(*products.shape[:3], -1)
+
+
+def _turns_by_ends(R: Array, from_ends: Array) -> Array:
+    """Return ∫ R δw dt at the nodes for a unit of each end value."""
+    return along(grid(R.shape[1]).integral, _by_ends(from_ends, R))
 
 
 def _integrals(R: Array, K: Array) -> Array:
@@ -374,7 +411,7 @@ class BallStationary:
         E, W = kinematic_error(self.R0, R, w)
         return np.abs(E).max(axis=(1, 2, 3)), (E, W)
 
-    def step(self, unknowns: Arrays, parts: Arrays) -> tuple[Array, Arrays]:
+    def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the change of c.
 
         With w'' = Rᵀc, so w = (1 − t) w0 + t w1 + K Rᵀc, the unknowns are R and c. When ε turns R,
@@ -383,19 +420,33 @@ class BallStationary:
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
         It is solved for ĉ ε on the `coarse` nodes; the integrals smooth so much that the right
-        side, worked out on all nodes, is as good as a solution on all of them.
+        side, worked out on all nodes, is as good as a solution on all of them. A change of the end
+        values adds to d.
         """
         R, c = unknowns
         stride = (R.shape[1] - 1) // (self.coarse - 1)
-        nodes, twice = grid(R.shape[1]), primitives(R.shape[1], 2).from_k[0]
-        Rt, defect = np.ascontiguousarray(R.mT), mending_turns(R, *parts)
-        coarse = _coarse_causes(R[:, ::stride], c, defect[:, ::stride])
+        nodes, by = grid(R.shape[1]), primitives(R.shape[1], 2)
+        Rt, known = np.ascontiguousarray(R.mT), mending_turns(R, *parts)[..., None]
+        if by_ends:
+            known = np.concatenate([known, _turns_by_ends(R, by.from_ends[0])], axis=-1)
+        columns = known.shape[-1]
+        coarse = _coarse_causes(R[:, ::stride], c, known[:, ::stride])
         causes = along(interpolation(coarse.shape[1], len(nodes.t)), coarse)
-        causes[..., 1:] += np.eye(3)
-        effects = along(nodes.integral, R @ along(twice, Rt @ causes))
-        effects[..., 0] += defect
-        dc = -np.linalg.solve(effects[:, -1, :, 1:], effects[:, -1, :, :1])[..., 0]
-        return effects[..., 0] + (effects[..., 1:] @ dc[:, None, :, None])[..., 0], (dc,)
+        causes[..., columns:] += np.eye(3)
+        effects = along(nodes.integral, R @ along(by.from_k[0], Rt @ causes))
+        effects[..., :columns] += known
+        end = effects[:, -1]
+        dc = -np.linalg.solve(end[..., columns:], end[..., :columns])
+        return effects[..., :columns] + effects[..., columns:] @ dc[:, None], dc
+
+    def bend(self, unknowns: Arrays) -> Array:
+        """Return w'' = Rᵀc."""
+        return in_body(*unknowns)
+
+    def bend_by(self, unknowns: Arrays, responses: Arrays) -> Array:
+        """Return Rᵀ(ĉ ε + δc)."""
+        (R, c), (turn, dc) = unknowns, responses
+        return R.mT @ (hat(c)[:, None] @ turn + dc[:, None])
 
     def tails(self, unknowns: Arrays) -> Array:
         """Return the last coefficients of R."""
@@ -408,8 +459,8 @@ class BallStationary:
         return k, c, costs(BallAcceleration(), self.ends, k)
 
 
-def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
-    """Return ĉ ε that comes from d and from each unit of δc, at the nodes, shape (N, n, 3, 4).
+def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
+    """Return ĉ ε that comes from each d, and from each unit of δc, at the nodes.
 
     Only the two components of ε across c count: a linear system for each problem, for these.
     """
@@ -420,9 +471,10 @@ def _coarse_causes(R: Array, c: Array, defect: Array) -> Array:
     system = along(nodes.integral, between.reshape(count, n, -1)).reshape(count, 2 * n, 2 * n)
     np.einsum("...ii->...i", system)[...] += 1
     by_c = along(nodes.integral, R @ along(twice, R.mT))
-    right = across[:, None] @ np.concatenate([defect[..., None], by_c], axis=-1)
-    x = np.linalg.solve(system, right.reshape(count, 2 * n, 4)).reshape(count, n, 2, 4)
-    return ahead[:, None] @ x
+    right = across[:, None] @ np.concatenate([known, by_c], axis=-1)
+    columns = right.shape[-1]
+    x = np.linalg.solve(system, right.reshape(count, 2 * n, columns))
+    return ahead[:, None] @ x.reshape(count, n, 2, columns)
 
 
 def _across(c: Array) -> tuple[Array, Array]:

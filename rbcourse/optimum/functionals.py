@@ -63,6 +63,14 @@ class Functional(Protocol):
         """The function that returns the derivatives of u."""
 
     @property
+    def momenta(self) -> Callable[..., tuple[Array, list[Array]]]:
+        """The function of w, w', … that returns the momenta, and their derivatives.
+
+        They have the shape (N, n, 3), for the jerk (N, n, 6): along an optimum a change of the end
+        values changes ∫ ‖u‖² dt by [momenta · change] from 0 to 1.
+        """
+
+    @property
     def p(self) -> Callable[..., Array]:
         """The function of w, w', … that returns p."""
 
@@ -94,6 +102,10 @@ class BallAcceleration:
         """Return the derivatives of w' by w and w'."""
         zero = np.zeros((*w.shape, 3))
         return [zero, zero + np.eye(3)]
+
+    def momenta(self, w: Array, a: Array) -> tuple[Array, list[Array]]:
+        """Return 2 w'."""
+        return 2 * a, [2 * x for x in self.deviation_by(w, a)]
 
     def p(self, w: Array, a: Array, b: Array) -> Array:
         """Return w''."""
@@ -161,6 +173,12 @@ class Effort:
         T0 = hat(w) @ G - hat(matvec(G, w))
         return [root @ T0, np.broadcast_to(root @ G, T0.shape)]
 
+    def momenta(self, w: Array, a: Array) -> tuple[Array, list[Array]]:
+        """Return 2 G M τ."""
+        pull = 2 * (self.root @ self.G).mT[:, None]
+        by = [pull @ x for x in self.deviation_by(w, a)]
+        return matvec(pull, self.deviation(w, a)), by
+
     def p(self, w: Array, a: Array, b: Array) -> Array:
         """Return G (v' + w × v) − h × v, v = M τ."""
         G, M = self.G[:, None], self.M[:, None]
@@ -204,6 +222,17 @@ class Jerk:
         """Return the derivatives of j by w, w' and w''."""
         W = hat(w)
         return [-hat(a) / 2, W / 2, np.broadcast_to(np.eye(3), W.shape)]
+
+    def momenta(self, w: Array, a: Array, b: Array, d: Array) -> tuple[Array, list[Array]]:
+        """Return −2 j' − w × j of w, and 2 j of w'."""
+        j, j_rate = self.deviation(w, a, b), d + cross(w, b) / 2
+        W, one = hat(w), np.broadcast_to(np.eye(3), (*w.shape, 3))
+        by_j = [-hat(a) / 2, W / 2, one, 0 * one]
+        by_rate = [-hat(b) / 2, 0 * one, W / 2, one]
+        by = [-2 * y - W @ x for x, y in zip(by_j, by_rate, strict=True)]
+        by[0] = by[0] + hat(j)
+        both = [np.concatenate([y, 2 * x], axis=-2) for x, y in zip(by_j, by, strict=True)]
+        return np.concatenate([-2 * j_rate - cross(w, j), 2 * j], axis=-1), both
 
     def p(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> Array:
         """Return j'' + ½ w × j' + w' × j; d and e are the third and fourth derivatives of w."""

@@ -210,14 +210,14 @@ def _best_change(functional: Functional, R: Array) -> Array:
     nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order)
     rates = rates_of(R, order)
     root, u = np.sqrt(nodes.integral[-1])[:, None], functional.deviation(*rates)
-    D = np.stack(_by_eta(functional.deviation_by(*rates), rates), axis=-2)
+    D = np.stack(by_eta(functional.deviation_by(*rates), rates), axis=-2)
     J = np.stack(bump, axis=-1)[:, None] @ (root[..., None, None] * D)
     J = J.reshape(len(R), 3 * len(root), 3 * bumps)
     x = np.linalg.solve(J.mT @ J, -(J.mT @ (root * u).reshape(len(R), 3 * len(root), 1)))
     return bump[0] @ x.reshape(len(R), bumps, 3)
 
 
-def _by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
+def by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
     """Return D₀, D₁, … of `lowered`, from the derivatives of u by w and its derivatives.
 
     By Leibniz's rule δw⁽ⁱ⁾ = η⁽ⁱ⁺¹⁾ + Σ (i over j) w⁽ⁱ⁻ʲ⁾ × η⁽ʲ⁾.

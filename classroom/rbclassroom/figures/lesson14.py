@@ -1,11 +1,16 @@
-"""Lesson 14: speeds and accelerations of a motion."""
+"""Lesson 14: speeds and accelerations of a motion, and what curves through rotations cost."""
 
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
+from scipy.integrate import quad_vec
+from scipy.spatial.transform import Rotation, RotationSpline
 
+import rbcourse as rb
 from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, Table, in_words
 
@@ -14,6 +19,13 @@ RATES = {
     2: ("angular acceleration [rad/s²]", "acceleration [m/s²]"),
 }
 _TIME = "t [s]"
+EXCESSES: dict[str, dict[str, Any]] = {
+    "parabolas": {"color": COLOURS["z"], "ls": "-."},
+    "projected spline": {"color": COLOURS["projection"], "ls": "-"},
+    "quaternion spline": {"color": COLOURS["x"], "ls": "--"},
+    "SciPy's spline": {"color": COLOURS["reference"], "ls": ":"},
+}
+"""The curves of `excess_table`, and how they are drawn."""
 
 
 def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
@@ -67,3 +79,62 @@ def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
         label, unit = name.removesuffix("]").split(" [")
         if name != _TIME:
             yield label, unit, np.asarray(values)
+
+
+def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
+    """Return by how much curves through ten rotations exceed the optimum, medians, as a table.
+
+    Each leg turns by so many degrees about a random axis. The curves, and their optimum, have the
+    end velocities of Bessel's parabolas; those of SciPy's spline and its optimum are its own.
+    """
+    draw, times = np.random.default_rng(rng), np.arange(10.0)
+    medians = []
+    for degree in degrees:
+        rows = []
+        for _ in range(paths):
+            axes = draw.standard_normal((9, 3))
+            turns = rb.exp_so3(np.radians(degree) * axes / np.linalg.norm(axes, axis=1)[:, None])
+            R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
+            w = rb.bessel_velocities(times, R)
+            ends, scipys = (w[0], w[-1]), RotationSpline(times, Rotation.from_matrix(R))
+            curves = (
+                rb.chain(times, R, w),
+                rb.projected_spline_so3(times, R, ends),
+                rb.quaternion_spline_so3(times, R, ends),
+            )
+            best, other = (
+                rb.minimum_acceleration_spline_so3(times, R, x).cost
+                for x in (ends, scipys([0, 9], 1))
+            )
+            cost = 2 * quad_vec(lambda t, s=scipys: np.sum(s(t, 2) ** 2), 0, 9, points=times)[0]
+            rows.append([*(rb.acceleration_cost(c) / best for c in curves), cost / other])
+        medians.append(np.median(rows, axis=0) - 1)
+    columns = (f"{name} [1]" for name in EXCESSES)
+    digits = np.vectorize(lambda x: float(f"{x:.3g}"))(np.transpose(medians))
+    return {"leg [rad]": np.radians(degrees), **dict(zip(columns, digits, strict=True))}
+
+
+def draw_excesses(ax: Axes, data: Table) -> None:
+    """Draw `excess_table`, both axes logarithmic."""
+    legs, *columns = data.values()
+    ticks = np.degrees(legs).round(9)
+    for (name, look), values in zip(EXCESSES.items(), columns, strict=True):
+        ax.loglog(ticks, values, label=name, **look)
+    ax.set(xlabel="turn of a leg (°)", ylabel="excess over the optimum")
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
+    ax.minorticks_off()
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+
+
+def describe_excesses(data: Table) -> str:
+    """Return in words what `draw_excesses` shows."""
+    legs, *columns = (np.asarray(x) for x in data.values())
+    legs = np.degrees(legs)
+    said = (
+        f"{name} {100 * x[0]:.2g} % to {100 * x[-1]:.2g} %"
+        for name, x in zip(EXCESSES, columns, strict=True)
+    )
+    return (
+        "The excess over the cheapest curve through ten rotations, over the turn of a leg, both "
+        f"axes logarithmic. From {legs[0]:.0f} to {legs[-1]:.0f} degrees: {'; '.join(said)}."
+    )

@@ -1,0 +1,612 @@
+"""Optima through many poses: all legs at once, by Newton's method on the values at the poses.
+
+Vary a curve R(t) to R exp(η̂), with η = 0 at the poses. On each leg R p = c as for two poses, see
+`rbcourse.optimum.functionals`. What is left of the variation of ∫ ‖u‖² dt is, at each end of each
+leg, the product of the momenta and the change of the end values: for a ball 4 w' · δw. So at an
+optimum the momenta are the same on both sides of each inner pose, and 0 at natural ends.
+
+In a step of Newton's method each leg is solved to first order for a unit of each of its end values
+(`collocation`). The changes of its momenta are a symmetric element of the system for the values at
+the poses, `rbcourse.velocities.KnotSystem`, whose matrix is the second derivative of the cost.
+
+Certificate, for the acceleration of a ball. With ε = R η and ε' = R δw a leg of duration 1 has the
+second variation ¼ δ²J = ∫ ‖δw'‖² − c · (ε' × ε) dt. For δw = 0 at both ends ∫ ‖δw'‖² ≥ π² ∫ ‖ε'‖²,
+and ε is a closed curve, of a length L with L² ≤ ∫ ‖ε'‖² dt: by the isoperimetric inequality
+|∫ c · (ε' × ε) dt| ≤ 2 ‖c‖ L²/4π. So the leg is a strict minimum if ‖c‖ < 2π³; and the whole
+spline is one if the second derivative by the values at the poses is positive definite, too.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._checks import as_finite, as_inertia, as_positive, as_single
+from rbcourse._hermite import hermite
+from rbcourse._numerics import Array, blocks, matvec
+from rbcourse.closed_forms import quaternion_cubic
+from rbcourse.curves import Ends
+from rbcourse.motions import RigidMotion, rigid_motion
+from rbcourse.optimum import ConvergenceError, Optimum, optimum_of
+from rbcourse.optimum.chebyshev import along, chebyshev, grid, interpolation, primitives
+from rbcourse.optimum.collocation import (
+    EXACT,
+    LONGEST_STEP,
+    Arrays,
+    BallStationary,
+    Equations,
+    Failure,
+    Solution,
+    Stationary,
+    cayley,
+    orthogonal,
+    rates_at_nodes,
+)
+from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.optimum.guesses import by_eta, cost_at_nodes, rates_of
+from rbcourse.paths import Chain
+from rbcourse.projection import nearest
+from rbcourse.velocities import (
+    KnotSystem,
+    PathEnds,
+    as_ends,
+    checked_path,
+    is_periodic,
+    path_system,
+    quaternion_system,
+)
+
+ISOLATED = 2 * np.pi**3
+NODES = 17, 25, 33, 49, 65, 97, 129
+START = 33  # nodes that carry the curve from which Newton's method starts
+STEPS = 20
+BUMPS, DESCENT_STEPS = 8, 150
+DESCENTS = 1e-2, 1e-4, 1e-6
+"""Where Newton's method finds no minimum, its start is lowered until a step takes less than this
+share of the cost away; one after the other."""
+
+
+def minimum_acceleration_spline_so3(
+    times: ArrayLike,
+    rotations: ArrayLike,
+    ends: PathEnds = "natural",
+    *,
+    inertia: ArrayLike | None = None,
+    long: ArrayLike = False,
+) -> OptimalChain:
+    """Return the curve of least acceleration through many rotations, of a ball or of any body.
+
+    A local minimum among the curves whose legs turn the short way, or the way that is asked for.
+    Source: BK (18); beyond BK 12, beyond BK 15.
+
+    Parameters
+    ----------
+    times, rotations, ends
+        As for `projected_spline_so3`.
+    inertia : array_like, shape (3, 3), optional
+        As for `minimum_acceleration_so3`.
+    long : array_like of bool, shape (N − 1,), optional
+        Which legs start from a turn the other way round, by 2π minus the angle between the two
+        rotations.
+
+    Returns
+    -------
+    OptimalChain
+        A `Chain` of `Optimum` legs with the least `acceleration_cost` that Newton's method finds
+        from `quaternion_spline_so3`. w' is continuous, for a body the torque; 0 at natural ends.
+
+    Raises
+    ------
+    ConvergenceError
+        If no minimum is found.
+
+    Notes
+    -----
+    With given velocities at both ends a curve of least acceleration exists. With natural or
+    periodic ends it need not: rotations by 0, 1 and 0.3 rad about one axis at 0, 1 and 1 + √2 have
+    the cost 5.6; with more full turns for the legs it becomes as small as one likes. So the result
+    is the minimum in a class. A leg that is short beside its neighbours may spin: put poses
+    between. Singular set: rotations a half-turn apart are refused.
+
+    Examples
+    --------
+    >>> from rbcourse import acceleration_cost, exp_so3, projected_spline_so3
+    >>> path = [0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]])
+    >>> c = minimum_acceleration_spline_so3(*path)
+    >>> c.certified, bool(np.abs(c.jumps(2)).max() < 1e-9)
+    (True, True)
+    >>> round(float(acceleration_cost(projected_spline_so3(*path)) / c.cost) - 1, 3)
+    0.201
+    """
+    G = None if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
+    return _spline(times, rotations, ends, G, "acceleration", long)
+
+
+def minimum_torque_spline_so3(
+    times: ArrayLike,
+    rotations: ArrayLike,
+    ends: PathEnds = "natural",
+    *,
+    inertia: ArrayLike,
+    long: ArrayLike = False,
+) -> OptimalChain:
+    """Return the curve through many rotations that takes a body there with least squared torque.
+
+    Source: beyond BK 4, beyond BK 12.
+
+    Parameters
+    ----------
+    times, rotations, ends, inertia, long
+        As for `minimum_acceleration_spline_so3`.
+
+    Returns
+    -------
+    OptimalChain
+        With the least `torque_cost`; the torque is continuous, and 0 at natural ends.
+
+    Notes
+    -----
+    Errors, domain and singular set: as for `minimum_acceleration_spline_so3`.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> turns, book = exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]), np.diag([1.0, 2.22, 3.18])
+    >>> minimum_torque_spline_so3([0, 1, 3], turns, inertia=book).definite
+    True
+    """
+    G = as_inertia("inertia", as_single("inertia", inertia, 3, 3))
+    return _spline(times, rotations, ends, G, "torque", long)
+
+
+def minimum_jerk_spline_so3(
+    times: ArrayLike, rotations: ArrayLike, ends: PathEnds = "natural", *, long: ArrayLike = False
+) -> OptimalChain:
+    """Return the curve of least jerk through many rotations.
+
+    Source: beyond BK 5, beyond BK 12.
+
+    Parameters
+    ----------
+    times, rotations, long
+        As for `minimum_acceleration_spline_so3`.
+    ends : {"natural", "periodic"} or pair of array_like, optional
+        As there; velocities are followed by accelerations: arrays of shape (6,).
+
+    Returns
+    -------
+    OptimalChain
+        With the least `jerk_cost`; w, w', w'' and w''' are continuous, and at natural ends the
+        covariant jerk and its rate are 0.
+
+    Notes
+    -----
+    Errors, domain and singular set: as for `minimum_acceleration_spline_so3`.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> c = minimum_jerk_spline_so3([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
+    >>> c.jumps(3).round(8) + 0.0
+    array([[0., 0., 0.]])
+    """
+    return _spline(times, rotations, ends, None, "jerk", long)
+
+
+def minimum_acceleration_spline_se3(
+    times: ArrayLike,
+    poses: ArrayLike,
+    ends: PathEnds = "natural",
+    *,
+    inertia: ArrayLike | None = None,
+    mass: float = 1.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    long: ArrayLike = False,
+) -> OptimalChain:
+    """Return the motion of least acceleration through many poses, of a ball or of any body.
+
+    Source: BK 6.3; beyond BK 12.
+
+    Parameters
+    ----------
+    times, poses, ends
+        As for `spline_velocities`.
+    inertia, mass, centre
+        As for `minimum_acceleration_se3`.
+    long
+        As for `minimum_acceleration_spline_so3`.
+
+    Returns
+    -------
+    OptimalChain
+        Of `RigidMotion` legs: the rotation is `minimum_acceleration_spline_so3`, and the centre of
+        mass moves on a cubic spline.
+
+    Notes
+    -----
+    Errors, domain and singular set: as for `minimum_acceleration_spline_so3`.
+
+    Examples
+    --------
+    >>> from rbcourse import pose_from_coordinates
+    >>> poses = pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0], [0, 0, 2, 2, 2, 0]])
+    >>> c = minimum_acceleration_spline_se3([0, 2, 3], poses)
+    >>> c(2)[:3, 3].round(12), c([0, 3], 2).round(9) + 0.0
+    (array([2., 0., 0.]), array([[0., 0., 0., 0., 0., 0.],
+           [0., 0., 0., 0., 0., 0.]]))
+    """
+    r = as_single("centre", centre, 3)
+    as_positive("mass", mass)
+    times, poses, _ = checked_path(times, as_finite("poses", poses, "N", 4, 4))
+    G = None if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
+    fixed, given = as_ends(ends, len(poses), 6)
+    pair: PathEnds = ends
+    if not isinstance(ends, str):
+        pair = tuple(given[i, :3] if fixed[i] else None for i in (0, -1))  # type: ignore[assignment]
+    turning = _spline(times, poses[:, :3, :3], pair, G, "acceleration", long)
+    moved = poses.copy()
+    moved[:, :3, 3] += poses[:, :3, :3] @ r
+    w, own = turning.velocities, given[:, 3:] + np.cross(given[:, :3], r)
+    assert w is not None
+    v = path_system(times, moved).solve(fixed, np.where(fixed[:, None], own, 0), is_periodic(ends))
+    d, rate = moved[:, :3, 3], matvec(poses[:, :3, :3], v)
+    legs = rigid_motion(RigidMotion, turning.legs, d[:-1], d[1:], rate[:-1], rate[1:], centre=r)
+    h = np.diff(times)[:, None]
+    start, end = (
+        hermite([d[:-1], d[1:], h * rate[:-1], h * rate[1:]], np.array(t), 2) for t in (0.0, 1.0)
+    )
+    moving = np.sum((start**2 + start * end + end**2) / 3 / h**3)  # d'' is linear
+    return replace(
+        turning,
+        legs=legs,
+        velocities=np.concatenate([w, v - np.cross(w, r)], axis=1),
+        cost=turning.cost + mass * float(moving),
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class OptimalChain(Chain):
+    """A `Chain` of optimal legs that is optimal as a whole, or stationary.
+
+    Attributes
+    ----------
+    cost : float
+        The `acceleration_cost`, `torque_cost` or `jerk_cost`.
+    definite : bool
+        Whether the second derivative of the cost by the values at the poses is positive definite.
+    certified : bool
+        Whether the curve is proven to be a strict local minimum: it is `definite`, and no leg has
+        a conjugate point, as ‖c‖ h³ < 2π³. Only for the acceleration of a ball.
+    """
+
+    cost: float
+    definite: bool
+
+    @property
+    def rotation(self) -> Optimum:
+        """The rotations of the legs."""
+        legs: Any = self.legs
+        return legs if isinstance(legs, Optimum) else legs.rotation
+
+    @property
+    def c(self) -> Array:
+        """R p of each leg, constant, fixed frame, shape (N − 1, 3)."""
+        return self.rotation.c
+
+    @property
+    def residual(self) -> float:
+        """The largest residual of the legs."""
+        return float(np.max(self.rotation.residual))
+
+    @property
+    def iterations(self) -> int:
+        """How many steps Newton's method took."""
+        return int(np.max(self.rotation.iterations))
+
+    @property
+    def converged(self) -> bool:
+        """Whether a solution was found: always, or there is an error."""
+        return bool(np.all(self.rotation.converged))
+
+    @property
+    def certified(self) -> bool:
+        """Whether it is proven to be a strict local minimum."""
+        of_ball = isinstance(self.rotation.functional, BallAcceleration)
+        size = np.linalg.norm(self.rotation.constant, axis=-1).max()
+        return of_ball and self.definite and bool(size < ISOLATED)
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the chain with another duration, and the same first time."""
+        start, end = self.domain
+        share = float(duration) / (end - start)
+        power = self.rotation.functional.ends + 1
+        return replace(super().lasting(duration), cost=self.cost / share**power)
+
+
+class _Problem(NamedTuple):
+    """Rotations, durations of mean 1, which values at the rotations are given, what is least."""
+
+    R: Array
+    h: Array
+    fixed: NDArray[np.bool_]
+    given: Array
+    periodic: bool
+    functional: Functional
+
+    @property
+    def scale(self) -> Array:
+        """The powers of h for values at the rotations, in the time of a leg, (N, 3 m/2)."""
+        orders = np.arange(1, 1 + self.functional.ends // 2)
+        return np.repeat(self.h[:, None] ** orders, 3, axis=1)
+
+    @property
+    def weight(self) -> Array:
+        """What ∫ ‖u‖² dt of a leg in its own time counts in the cost."""
+        weight: Array = self.functional.scale * self.h ** -(self.functional.ends + 1.0)
+        return weight
+
+    def cost(self, R: Array) -> float:
+        """Return the cost of curves given by R at the nodes."""
+        return float(np.sum(cost_at_nodes(self.functional, R) * self.weight))
+
+    def ends_of_legs(self, knots: Array) -> Array:
+        """Return w0, w1 (and a0, a1) of the legs, each in its own time, shape (N, m, 3)."""
+        both = np.stack([self.scale * knots[:-1], self.scale * knots[1:]], axis=1)
+        parts = both.reshape(len(both), 2, -1, 3).swapaxes(1, 2)
+        return parts.reshape(len(both), -1, 3)
+
+    def equations(self, ends: Array, n: int) -> BallStationary | Stationary:
+        """Return R p = c for the legs, on n nodes."""
+        parts = self.R[:-1], self.R[1:], ends
+        if isinstance(self.functional, BallAcceleration):
+            return BallStationary(*parts, coarse=9 if n < 33 else 17)
+        return Stationary(self.functional, *parts)
+
+    def on_nodes(self, R: Array, n: int) -> Array:
+        """Return rotations at nodes on n nodes, the given ones at the ends of the legs."""
+        return self.with_ends(along(interpolation(R.shape[1], n), R))
+
+    def with_ends(self, R: Array) -> Array:
+        """Return rotations without their rounding, the given ones at the ends of the legs."""
+        R = orthogonal(R)
+        R[:, 0], R[:, -1] = self.R[:-1], self.R[1:]
+        return R
+
+    def solve(self, system: KnotSystem) -> tuple[Array, bool]:
+        """Return changes of the values at the rotations, and whether the system is definite.
+
+        One that is not positive definite is shifted until it is.
+        """
+        sizes = np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0)
+        for shift in (0.0, *(4.0**k for k in range(-3, 10))):
+            more = shift * np.diag(sizes)
+            shifted = system._replace(A=system.A + more, D=system.D + more)
+            with suppress(np.linalg.LinAlgError):
+                change = shifted.solve(self.fixed, np.zeros_like(self.given), self.periodic)
+                return change, shift == 0
+        raise np.linalg.LinAlgError("the system of a step is singular")
+
+
+class _Curve(NamedTuple):
+    """A curve: rotations at the nodes of the legs, and values at the poses."""
+
+    R: Array
+    knots: Array
+
+
+class _Found(NamedTuple):
+    """What Newton's method found: solutions of the legs, and whether they are a minimum."""
+
+    curve: _Curve
+    legs: list[Solution]
+    cost: float
+    definite: bool
+
+
+def _spline(
+    times: ArrayLike, R: ArrayLike, ends: PathEnds, G: Array | None, what: str, long: ArrayLike
+) -> OptimalChain:
+    times, R, _ = checked_path(times, as_finite("rotations", R, "N", 3, 3))
+    T, R, size = np.diff(times), nearest(R)[0], 6 if what == "jerk" else 3
+    unit, way = T.mean(), as_finite("long", long, stacked=True).astype(bool)
+    fixed, given = as_ends(ends, len(R), size)
+    given = given * np.repeat(unit ** np.arange(1, 1 + size // 3), 3)
+    periodic = is_periodic(ends)
+    problem = _Problem(R, T / unit, fixed, given[:, :3], periodic, BallAcceleration())
+    start = _quaternion_spline(problem, np.broadcast_to(way, len(T)))
+    if what == "jerk":
+        problem = problem._replace(given=given, functional=Jerk())
+        bends = rates_of(start.R, 2)[1] / problem.h[:, None, None] ** 2
+        knots = np.append(start.knots, np.append(bends[:, 0], bends[-1:, -1], axis=0), axis=1)
+        start = start._replace(knots=np.where(fixed[:, None], given, knots))
+    elif G is not None:
+        of_ball = _found(problem, start)
+        start = of_ball.curve if isinstance(of_ball, _Found) else start
+        effort = Effort(np.broadcast_to(G, (len(T), 3, 3)), of_torque=what == "torque")
+        problem = problem._replace(functional=effort)
+    found = _found(problem, start)
+    if isinstance(found, Failure):
+        raise ConvergenceError(*found)
+    own = problem.ends_of_legs(found.curve.knots)
+    legs = optimum_of(problem.functional, own, found.legs, T)
+    return OptimalChain(
+        duration=np.array(times[-1] - times[0]),
+        times=times,
+        legs=legs,
+        velocities=found.curve.knots[:, :3] / unit,
+        cost=float(np.sum(legs.cost)),
+        definite=found.definite,
+    )
+
+
+def _quaternion_spline(problem: _Problem, long: NDArray[np.bool_]) -> _Curve:
+    R, h, times = problem.R, problem.h, np.append(0.0, np.cumsum(problem.h))
+    w = quaternion_system(times, R, long).solve(problem.fixed, problem.given, problem.periodic)
+    ends = Ends(R[:-1], R[1:], h[:, None] * w[:-1], h[:, None] * w[1:])
+    legs = quaternion_cubic(ends, np.ones(len(h)), long)
+    return _Curve(np.ascontiguousarray(legs(grid(START).t).swapaxes(0, 1)), w)
+
+
+def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
+    """Return a minimum: by Newton's method, and where that fails from lower curves."""
+    found, bound = _newton(problem, start, NODES[0]), problem.cost(start.R)
+    for worthwhile in DESCENTS if problem.functional.ends == 2 else ():
+        if isinstance(found, _Found) and found.definite and found.cost < bound * (1 + 1e-4):
+            return found
+        start, bound = _lowered(problem, start, worthwhile)
+        found = _newton(problem, start, START)
+    if isinstance(found, _Found) and not found.definite:
+        return Failure(max(one.residual for one in found.legs), found.legs[0].iterations)
+    return found
+
+
+def _newton(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
+    """Return what Newton's method finds from a curve."""
+    try:
+        with np.errstate(over="raise", invalid="raise", divide="raise"):
+            return _iterated(problem, start, n)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return Failure(np.inf, STEPS)
+
+
+def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
+    knots, R, last, definite = start.knots, problem.on_nodes(start.R, n), np.inf, True
+    legs = problem.equations(problem.ends_of_legs(knots), n)
+    unknowns: Arrays = R, *legs.first(R)
+    for step in range(STEPS):
+        while True:  # on more nodes where these do not carry the curve
+            legs = problem.equations(problem.ends_of_legs(knots), n)
+            left, parts = legs.errors(unknowns)
+            tail = legs.tails(unknowns).max()
+            if tail < EXACT or last > 1e3 * tail:
+                break
+            if n == NODES[-1]:
+                return Failure(float(left.max()), step)
+            few, n = n, NODES[NODES.index(n) + 1]
+            R, *others = unknowns
+            more = (interpolation(few, n) @ x if x.ndim == 3 else x for x in others)
+            unknowns = problem.on_nodes(R, n), *more
+        exact = max(left.max(), tail) < EXACT and last < 1e-5
+        if exact and _balanced(problem, legs, unknowns):
+            k, c, costs = legs.solution(unknowns)
+            each = zip(unknowns[0], k, c, costs.tolist(), left.tolist(), strict=True)
+            solutions = [Solution(*one, iterations=step) for one in each]
+            curve = _Curve(unknowns[0], knots)
+            return _Found(curve, solutions, float(np.sum(costs * problem.weight)), definite)
+        system, responses = _linearised(problem, legs, unknowns, parts)
+        change, definite = problem.solve(system)
+        own = problem.ends_of_legs(change).reshape(len(change) - 1, -1)
+        x = np.append(np.ones((len(own), 1)), own, axis=1)
+        turn, *changes = (np.einsum("i...j,ij->i...", y, x) for y in responses)
+        last = float(np.linalg.norm(turn, axis=-1).max())
+        share = LONGEST_STEP / max(LONGEST_STEP, last)
+        R = problem.with_ends(cayley(share * turn) @ unknowns[0])
+        others = [y + share * dy for y, dy in zip(unknowns[1:], changes, strict=True)]
+        unknowns, knots = (R, *others), knots + share * change
+    return Failure(float(left.max()), STEPS)
+
+
+def _momenta(problem: _Problem, legs: Equations, unknowns: Arrays) -> tuple[Array, list[Array]]:
+    """Return the momenta at both ends of the legs, in their own times, and their derivatives."""
+    rates = rates_at_nodes(legs.ends, legs.bend(unknowns))[: problem.functional.ends]
+    return problem.functional.momenta(*(x[:, [0, -1]] for x in rates))
+
+
+def _balanced(problem: _Problem, legs: Equations, unknowns: Arrays) -> bool:
+    """Tell whether the momenta are the same on both sides of each pose where none is given."""
+    weight = problem.weight[:, None] * problem.scale
+    found = weight[:, None] * _momenta(problem, legs, unknowns)[0]
+    jump = np.zeros_like(problem.given)
+    jump[:-1] -= found[:, 0]
+    jump[1:] += found[:, 1]
+    if problem.periodic:
+        jump[0] = jump[-1] = jump[0] + jump[-1]
+    rounding = weight * np.abs(legs.ends).max(axis=(1, 2))[:, None]
+    allowed = 1e-10 * np.abs(found).max(axis=(0, 1)) + 1e-13 * rounding.max(axis=0)
+    return bool(np.all(np.abs(jump[~problem.fixed]) <= allowed))
+
+
+def _linearised(
+    problem: _Problem, legs: Equations, unknowns: Arrays, parts: Arrays
+) -> tuple[KnotSystem, Arrays]:
+    """Return the system of a step, and how the unknowns of the legs respond."""
+    m, count = problem.functional.ends, len(problem.h)
+    made = []
+    for some in blocks(count, legs.together):
+        own = (tuple(x[some] for x in arrays) for arrays in (unknowns, parts))
+        made.append(legs.take(some).responses(next(own), next(own), by_ends=True))
+    responses = tuple(np.concatenate(x) for x in zip(*made, strict=True))
+    by, bends = primitives(unknowns[0].shape[1], m), legs.bend_by(unknowns, responses)
+    found, slopes = _momenta(problem, legs, unknowns)
+    change = np.zeros((*found.shape, 1 + 3 * m))
+    for E, K, D in zip(by.from_ends, by.from_k, slopes, strict=False):
+        rate = along(K[[0, -1]], bends)
+        rate[..., 1:] += np.kron(E[[0, -1]][:, None], np.eye(3)).reshape(2, 3, 3 * m)
+        change += D @ rate
+    # by the values at the two rotations: (leg, end, momentum, rotation, value)
+    by_knots = change[..., 1:].reshape(count, 2, -1, m // 2, 2, 3).swapaxes(3, 4)
+    by_knots = by_knots.reshape(count, 2, -1, 2, 3 * (m // 2)) * problem.scale[:, None, None, None]
+    weight = (problem.weight[:, None] * problem.scale)[:, None]
+    H, value = weight[..., None, None] * by_knots, weight * (found + change[..., 0])
+    A, D = -H[:, 0, :, 0], H[:, 1, :, 1]
+    B = (H[:, 1, :, 0].mT - H[:, 0, :, 1]) / 2
+    return KnotSystem((A + A.mT) / 2, B, (D + D.mT) / 2, value[:, 0], -value[:, 1]), responses
+
+
+def _lowered(problem: _Problem, start: _Curve, worthwhile: float) -> tuple[_Curve, float]:
+    """Return a curve after steps of Gauss and Newton, whose cost never rises, and the cost.
+
+    For R exp(η̂), η = 0 at the poses, u changes to first order by D₀ η + D₁ η' + D₂ η'', see
+    `guesses.lowered`. A step takes the η for which the integral of its square is least, of cubics
+    with any η' at the poses and `BUMPS` polynomials t² (1 − t)² p(t) more for each leg. These are
+    eliminated leg by leg.
+    """
+    functional, h, R = problem.functional, problem.h[:, None], start.R
+    cost, count, n = problem.cost(R), len(h), R.shape[1]
+    shapes, root = _shapes(n), np.sqrt(grid(n).integral[-1])[:, None]
+    for _ in range(DESCENT_STEPS):
+        rates = rates_of(R, 2)
+        u, by = functional.deviation(*rates), by_eta(functional.deviation_by(*rates), rates)
+        J = sum(f[:, None, :, None] * D[:, :, :, None] for f, D in zip(shapes, by, strict=True))
+        J = (root[..., None, None] * J).reshape(count, 3 * n, -1)
+        r = (root * u).reshape(count, 3 * n, 1)
+        M = problem.weight[:, None, None] * (J.mT @ np.concatenate([J, r], axis=2))
+        outer = np.delete(M, np.s_[6:-1], axis=2)
+        inner = np.linalg.solve(M[:, 6:, 6:-1], outer[:, 6:])
+        E = outer[:, :6] - M[:, :6, 6:-1] @ inner
+        H, b = h[..., None] ** 2 * E[..., :6], -h * E[..., 6]
+        system = KnotSystem(H[:, :3, :3], H[:, :3, 3:], H[:, 3:, 3:], b[:, :3], b[:, 3:])
+        change, _ = problem.solve(system)
+        x = np.append(h * change[:-1], h * change[1:], axis=1)
+        z = -matvec(inner[..., :6], x) - inner[..., 6]
+        eta = shapes[0] @ np.append(x, z, axis=1).reshape(count, -1, 3)
+        tried = [R @ cayley(share * eta) for share in (1, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)]
+        costs = [problem.cost(one) for one in tried]
+        best = int(np.nanargmin(costs))
+        if not costs[best] < cost:
+            break
+        before, cost, R = cost, costs[best], tried[best]
+        if cost > (1 - worthwhile) * before:
+            break
+    w = rates_of(R, 1)[0] / h[:, None]
+    knots = np.append(w[:, 0], w[-1:, -1], axis=0)
+    if problem.periodic:
+        knots[[0, -1]] = (knots[0] + knots[-1]) / 2
+    return _Curve(R, np.where(problem.fixed[:, None], problem.given, knots)), cost
+
+
+@lru_cache
+def _shapes(n: int) -> list[Array]:
+    """Return η at the nodes, and two derivatives: cubics of η' = 1 at an end, and bumps."""
+    nodes = grid(n)
+    t = nodes.t[:, None]
+    cubics = t * (1 - t) ** 2, -(t**2) * (1 - t)
+    shapes = [np.concatenate([*cubics, (t * (1 - t)) ** 2 * chebyshev(nodes.t, BUMPS)], axis=1)]
+    for _ in range(2):
+        shapes.append(nodes.derivative @ shapes[-1])
+    return shapes

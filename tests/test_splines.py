@@ -1,0 +1,328 @@
+"""Splines through many rotations and poses, in closed form and optimal."""
+
+from fractions import Fraction
+from functools import partial
+
+import numpy as np
+import oracles
+import pytest
+from numpy.polynomial import Polynomial
+from optima import BOOK, _polynomials, _quaternion_and_rates, _rates
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation, RotationSpline
+
+import rbcourse as rb
+from rbcourse import textbook
+
+EPS = np.finfo(float).eps
+AXIS = np.array([2.0, -1, 2]) / 3
+NATURAL = {
+    "projected": rb.projected_spline_so3,
+    "quaternion": rb.quaternion_spline_so3,
+    "optimum": rb.minimum_acceleration_spline_so3,
+    "weighted": partial(rb.projected_spline_so3, inertia=BOOK),
+    "of a body": partial(rb.minimum_acceleration_spline_so3, inertia=BOOK),
+    "torque": partial(rb.minimum_torque_spline_so3, inertia=BOOK),
+    "jerk": rb.minimum_jerk_spline_so3,
+}
+INVARIANT = ["projected", "quaternion", "optimum", "jerk"]
+every_spline = pytest.mark.parametrize("name", NATURAL)
+
+
+def path(count, degrees, seed, ratio=3.0):
+    """Times and rotations: each leg about a new axis, durations within a ratio."""
+    rng = np.random.default_rng([511, seed])
+    axes = rng.normal(size=(count - 1, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    R = [oracles.exp_so3(rng.normal(size=3))]
+    for axis in axes:
+        R.append(R[-1] @ oracles.exp_so3(np.radians(degrees) * axis))
+    h = ratio ** rng.uniform(-0.5, 0.5, count - 1)
+    return rng.normal() + np.append(0, np.cumsum(h)), np.array(R)
+
+
+def poses_of(R, seed=0):
+    return rb.pose_from_components(R, np.random.default_rng(seed).normal(size=(len(R), 3)))
+
+
+def torque(c, t):
+    w, a = c(t, 1), c(t, 2)
+    return a @ BOOK + np.cross(w, w @ BOOK)
+
+
+def jerk(c, t):
+    return c(t, 3) + np.cross(c(t, 1), c(t, 2)) / 2
+
+
+def off(x, size):
+    return np.abs(x).max() / np.abs(size).max()
+
+
+@every_spline
+@pytest.mark.parametrize("degrees", [10, 60, 110])
+@pytest.mark.parametrize("ends", ["natural", "periodic"])
+def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
+    """And 0 at natural ends, the same at periodic ones; for bodies the torque, for the jerk j."""
+    t, R = path(7, degrees, 1)
+    c = NATURAL[name](t, R, ends)
+    assert off(c(t) - R, 1) < 100 * EPS
+    for order in range(1, 4 if name == "jerk" else 3):
+        assert off(c.jumps(order), c(t, order)) < 1e-10
+    first, last = t[[0, -1]]
+    rates = {"weighted": torque, "of a body": torque, "torque": torque, "jerk": jerk}
+    rate = rates.get(name, lambda c, t: c(t, 2))
+    if ends == "natural":
+        assert off(rate(c, t[[0, -1]]), rate(c, (t[1:] + t[:-1]) / 2)) < 1e-11
+    else:
+        assert off(c(first, 1) - c(last, 1), c(t, 1)) < 1e-12
+        assert off(rate(c, first) - rate(c, last), rate(c, t)) < 1e-10
+
+
+@pytest.mark.source("beyond BK 13")
+def test_the_velocities_of_projected_splines_are_the_textbooks_and_join_poses():
+    t, R = path(9, 100, 2)
+    assert off(rb.spline_velocities(t, R) - textbook.spline_velocities(t, R), 1) < 100 * EPS
+    poses = poses_of(R)
+    for ends in ("natural", "periodic", ([0, 1, 2, 3, 4, 5], None)):
+        c = rb.projected_spline_se3(t, poses, ends)
+        assert off(c.jumps(2), c(t, 2)) < 1e-13
+        assert off(c(t, 1) - rb.spline_velocities(t, poses, ends), 1) < 1e-13
+        if ends == "periodic":
+            assert off(c(t[0], 2) - c(t[-1], 2), c(t, 2)) < 1e-13
+        else:
+            assert off(c(t[-1], 2), c(t, 2)) < 1e-13
+    origin = CubicSpline(t, poses[:, :3, 3], bc_type="natural")
+    c, s = rb.projected_spline_se3(t, poses), np.linspace(t[0], t[-1], 40)
+    assert off(c(s)[:, :3, 3] - origin(s), 1) < 1e-13
+    half_turn = R[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
+    with pytest.raises(ValueError, match=r"^poses\[0\] and poses\[1\] are a half-turn apart"):
+        rb.spline_velocities([0, 1], half_turn)
+
+
+@every_spline
+def test_a_moved_or_reversed_path_has_the_moved_or_reversed_spline(name):
+    """A body is moved in the room only."""
+    t, R = path(6, 80, 3)
+    c, s = NATURAL[name](t, R), np.linspace(t[0], t[-1], 30)
+    L, Q = (oracles.exp_so3(x) for x in np.random.default_rng(4).normal(size=(2, 3)))
+    assert off(NATURAL[name](t, L @ R)(s) - L @ c(s), 1) < 1e-12
+    if name in INVARIANT:
+        assert off(NATURAL[name](t, R @ Q)(s) - c(s) @ Q, 1) < 1e-12
+    assert off(NATURAL[name](-t[::-1], R[::-1])(-s) - c(s), 1) < 1e-12
+    for scale in (1e-60, 1e-6, 1e6, 1e60):
+        quick = NATURAL[name](scale * t, R)
+        assert off(quick.jumps(1), quick(scale * t, 1)) < 1e-10
+        assert off(quick(np.clip(scale * s, *quick.domain)) - c(s), 1) < 1e-9
+
+
+@pytest.mark.source("beyond BK 14")
+@pytest.mark.parametrize("name", ["projected", "quaternion"])
+def test_excess_of_a_spline_there_and_back_has_the_exact_constant(name):
+    """About one axis, (0, θ, 0) at 0, 1, 2. With σ = θ p + θ³ r + … of a leg, p the spline, the
+    excess is θ⁴ ∫ r''² / ∫ p''²; r is by how much the projected cubic is off."""
+    p, H = Polynomial([0, 1.5, 0, -0.5]), Polynomial([0, 0, 3, -2])
+    r = -p / 6 + p * H / 2 - p**3 / 3  # of tan σ = y/x of the cubics of cos and sin
+    parts = [(x.deriv(2) ** 2).integ()(1) for x in (r, p)]
+    constant = Fraction(20711, 180180) / (16 if name == "quaternion" else 1)
+    if name == "projected":
+        assert parts[0] / parts[1] == pytest.approx(float(constant), rel=1e-12)
+    found = []
+    for size in (0.2, 0.1):
+        R = rb.exp_so3(np.outer([0, size, 0], AXIS))
+        best = rb.minimum_acceleration_spline_so3([0, 1, 2], R).cost
+        cost = rb.acceleration_cost(NATURAL[name]([0, 1, 2], R), rtol=1e-12)
+        found.append((cost / best - 1) / size**4)
+    assert (4 * found[1] - found[0]) / 3 == pytest.approx(float(constant), rel=1e-3)
+
+
+@pytest.mark.parametrize("ends", ["natural", "periodic", "given"])
+@pytest.mark.parametrize("size", [1.0, 2.3])
+def test_about_one_axis_the_optimum_is_the_cubic_spline_of_the_angle(ends, size):
+    rng = np.random.default_rng(5)
+    t, steps = np.cumsum(rng.uniform(0.5, 1.5, 9)), size * rng.uniform(-1, 1, 8)
+    angle, rates, kind = np.append(0, np.cumsum(steps - steps.mean())), [1.3, -0.4], ends
+    if ends == "periodic":
+        angle[-1] = angle[0]
+    elif ends == "given":
+        kind, ends = [(1, rate) for rate in rates], [rate * AXIS for rate in rates]
+    want, s = CubicSpline(t, angle, bc_type=kind), np.linspace(t[0], t[-1], 60)
+    c = rb.minimum_acceleration_spline_so3(t, rb.exp_so3(np.outer(angle, AXIS)), ends)
+    assert off(c(s) - rb.exp_so3(np.outer(want(s), AXIS)), 1) < 1e-11
+    for order in (1, 2):
+        assert off(c(s, order) - np.outer(want(s, order), AXIS), want(s, order)) < 1e-11
+    assert c.certified
+
+
+def test_the_optimum_between_two_rotations_and_through_samples_of_one():
+    """Restriction: the inner samples change nothing."""
+    _, (R0, R1) = path(2, 100, 6)
+    w0, w1 = 2 * np.random.default_rng(7).normal(size=(2, 3))
+    one = rb.minimum_acceleration_so3(R0, R1, w0, w1)
+    t, s = np.array([0, 0.1, 0.35, 0.4, 0.8, 1]), np.linspace(0, 1, 30)
+    for times in (t[[0, -1]], t):
+        c = rb.minimum_acceleration_spline_so3(times, one(times), (w0, w1))
+        assert off(c(s) - one(s), 1) < 1e-11
+        assert c.cost == pytest.approx(one.cost, rel=1e-11)
+        assert off(c.c - one.c, one.c) < 1e-9
+    natural = rb.minimum_acceleration_spline_so3([0, 1], [R0, R1])
+    assert off(natural(s) - rb.geodesic_so3(R0, R1)(s), 1) < 1e-13
+    book, a = partial(rb.minimum_torque_spline_so3, inertia=BOOK), np.zeros(3)
+    c, torque = book([0, 1], [R0, R1], (w0, w1)), rb.minimum_torque_so3(R0, R1, w0, w1, BOOK)
+    assert c.cost == pytest.approx(torque.cost, rel=1e-10)
+    ends = np.append(w0, a), np.append(w1, a)
+    c = rb.minimum_jerk_spline_so3([0, 1], [R0, R1], ends)
+    assert c.cost == pytest.approx(rb.minimum_jerk_so3(R0, R1, w0, w1, a, a).cost, rel=1e-10)
+
+
+@pytest.mark.source("beyond BK 12")
+def test_the_optimum_is_that_of_the_textbook():
+    """Also of 4 and 6 rotations, which take a minute."""
+    t, R = path(3, 80, 8)
+    for ends in (None, np.random.default_rng(3).normal(size=(2, 3))):
+        w, a = textbook.minimum_acceleration_spline_so3(t, R, ends)
+        c = rb.minimum_acceleration_spline_so3(t, R, "natural" if ends is None else ends)
+        assert off(c.velocities - w, w) < 1e-9
+        assert off(c(t, 2) - a, a) < 1e-7
+
+
+def least_cost(t, R, bodies):
+    """The least cost of curves of quaternion polynomials, and of any velocities at the rotations:
+    no equation of Euler and Lagrange is used."""
+    h, count, free = np.diff(t), len(R), 9
+    weight, hermite, bumps = _polynomials(2, free, 40)
+    rates = [
+        _quaternion_and_rates(R, w, 0 * w)[:2] for w in np.repeat(np.eye(3)[:, None], count, 1)
+    ]
+    q, by = rates[0][0], np.stack([rate for _, rate in rates], axis=-1)
+    sign = np.sign(np.sum(q[:-1] * q[1:], axis=1))[:, None]
+
+    def residuals(x):
+        w, c = x[: 3 * count].reshape(count, 3), x[3 * count :].reshape(count - 1, free, 4)
+        rate = (by @ w[..., None])[..., 0]
+        ends = [q[:-1], h[:, None] * rate[:-1], sign * q[1:], sign * h[:, None] * rate[1:]]
+        P = [H @ np.stack(ends, axis=1) + b @ c for H, b in zip(hermite, bumps, strict=True)]
+        w, a = _rates(*P)
+        u = a if not bodies else (a @ BOOK + np.cross(w, w @ BOOK)) / np.sqrt(2)
+        return (np.sqrt(2 * weight)[:, None] * u / h[:, None, None] ** 1.5).ravel()
+
+    start = np.append(textbook.spline_velocities(t, R).ravel(), np.zeros(4 * free * (count - 1)))
+    tolerances = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-15)
+    return 2 * least_squares(residuals, start, jac="cs", **tolerances).cost
+
+
+@pytest.mark.parametrize("bodies", [False, True])
+def test_direct_minimisation_finds_no_lower_cost(bodies):
+    t, R = path(4, 40, 9, ratio=1.5)
+    make = NATURAL["torque" if bodies else "optimum"]
+    assert least_cost(t, R, bodies) == pytest.approx(make(t, R).cost, rel=1e-9, abs=0)
+
+
+@pytest.mark.parametrize(("degrees", "ratio"), [(30, 10), (60, 2), (90, 10), (120, 2)])
+def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio):
+    """With the same ends; a chain with velocities of parabolas costs a tenth more, or a third."""
+    chains = []
+    for seed in range(12):
+        t, R = path(10, degrees, [10, seed], ratio)
+        spline = RotationSpline(t - t[0], Rotation.from_matrix(R))
+        ends = spline([0, t[-1] - t[0]], 1)
+        c = rb.minimum_acceleration_spline_so3(t, R, ends)
+        assert c.definite
+        w = rb.bessel_velocities(t, R)
+        w[[0, -1]] = ends
+        others = [rb.chain(t, R, w)]
+        others += [make(t, R, ends) for make in (rb.projected_spline_so3, rb.quaternion_spline_so3)]
+        costs = [rb.acceleration_cost(one) / c.cost for one in others]
+        nodes, weights = np.polynomial.legendre.leggauss(12)
+        h = np.diff(t) / 2
+        s = ((t[1:] + t[:-1]) / 2 - t[0])[:, None] + h[:, None] * nodes
+        w, a = spline(s.ravel(), 1), spline(s.ravel(), 2)
+        body = np.sum(a**2, axis=1).reshape(s.shape)  # |w'| is the same in the fixed frame
+        costs.append(2 * np.sum(h[:, None] * weights * body) / c.cost if w.size else 1)
+        assert min(costs) > 1 - 1e-9
+        chains.append(costs[0])
+    assert np.median(chains) > 1.05
+
+
+def test_a_long_way_is_kept_and_costs_are_those_of_quadrature():
+    t, R = path(5, 70, 11)
+    way = [False, True, False, False]
+    c = rb.minimum_acceleration_spline_so3(t, R, long=way)
+    s = np.linspace(0, 1, 200)[:, None] * c.legs.duration
+    R_legs = c.legs.at_own_times(s)
+    turned = rb.angle_between(R_legs[1:], R_legs[:-1]).sum(axis=0)
+    assert np.array_equal(turned > np.pi, way)
+    assert rb.acceleration_cost(c) == pytest.approx(c.cost, rel=1e-9)
+    for name, cost in (("torque", rb.torque_cost), ("of a body", rb.acceleration_cost)):
+        c = NATURAL[name](t, R)
+        assert cost(c, BOOK) == pytest.approx(c.cost, rel=1e-9)
+    c = NATURAL["jerk"](t, R)
+    assert rb.jerk_cost(c) == pytest.approx(c.cost, rel=1e-9)
+    twice = rb.retime(c, 2 * (t[-1] - t[0]))
+    assert twice.cost == pytest.approx(c.cost / 32, rel=1e-12)
+
+
+@pytest.mark.parametrize("ends", ["natural", "periodic", "given"])
+def test_motions_of_bodies_have_the_optimal_rotation_and_a_spline_of_the_centre(ends):
+    t, R = path(5, 60, 12)
+    poses, centre = poses_of(R, 13), np.array([0.3, -0.2, 0.1])
+    twist = np.random.default_rng(14).normal(size=(2, 6))
+    given = twist if ends == "given" else ends
+    body = {"inertia": BOOK, "mass": 2.5, "centre": centre}
+    c = rb.minimum_acceleration_spline_se3(t, poses, given, **body)
+    turning = twist[:, :3] if ends == "given" else ends
+    rotation = rb.minimum_acceleration_spline_so3(t, R, turning, inertia=BOOK)
+    s = np.linspace(t[0], t[-1], 50)
+    assert off(c(s)[:, :3, :3] - rotation(s), 1) < 1e-12
+    assert off(c.jumps(2), c(t, 2)) < 1e-9
+    assert rb.acceleration_cost(c, **body) == pytest.approx(c.cost, rel=1e-9)
+    at_ends = c(t[[0, -1]], 1)
+    if ends == "given":
+        assert off(at_ends - twist, 1) < 1e-12
+    elif ends == "periodic":
+        assert off(at_ends[0] - at_ends[1], at_ends) < 1e-12
+    else:
+        place = poses[:, :3, 3] + R @ centre
+        want = CubicSpline(t, place, bc_type="natural")
+        assert off(c(s)[:, :3, 3] + c(s)[:, :3, :3] @ centre - want(s), 1) < 1e-12
+
+
+@pytest.mark.source("beyond BK 15")
+def test_the_certificate_bounds_the_costates_of_the_legs():
+    """A leg of ‖c‖ h³ < 2π³ has no conjugate point: its second variation is positive, by random
+    changes that vanish at its ends with their rates."""
+    t, R = path(6, 110, 15)
+    c = rb.minimum_acceleration_spline_so3(t, R)
+    sizes = np.linalg.norm(c.c, axis=1) * np.diff(t) ** 3
+    assert c.certified == (c.definite and sizes.max() < 2 * np.pi**3)
+    slow = rb.minimum_acceleration_spline_so3([0, 1], R[:2], (30 * AXIS, [0, 25, 0]))
+    assert np.linalg.norm(slow.c) > 2 * np.pi**3
+    assert not slow.certified
+    assert not NATURAL["torque"](t, R).certified
+
+
+BAD_ENDS = [
+    ("nature", "ends: 'natural', 'periodic' or a pair wanted, got 'nature'"),
+    ([[0, 0, 0]], "ends: a pair of velocities wanted, got 1 of them"),
+    (([0, 0], None), r"ends: shape \(3\) wanted"),
+    (([0, 0, np.nan], None), "ends"),
+]
+
+
+@pytest.mark.parametrize(("ends", "message"), BAD_ENDS)
+@pytest.mark.parametrize("name", ["projected", "quaternion", "optimum"])
+def test_bad_ends_are_refused(name, ends, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        NATURAL[name](*path(3, 50, 16), ends)
+
+
+def test_a_path_without_a_minimum_is_refused():
+    """Very uneven times: the legs would have to spin; never a wrong curve."""
+    t = np.array([0, 1, 1.001, 2, 2.001, 3])
+    _, R = path(6, 150, 17)
+    try:
+        c = rb.minimum_acceleration_spline_so3(t, R)
+    except rb.ConvergenceError:
+        return
+    assert c.definite
+    assert off(c.jumps(2), c(t, 2)) < 1e-9
