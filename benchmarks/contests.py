@@ -4,6 +4,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from functools import partial
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -176,6 +177,29 @@ def chain_of_poses(n, rng, legs, poses=1000):
     return methods, None
 
 
+def splines(n, rng):
+    """Compare how curves of n legs, each of 30°, are made; the costs are named."""
+    axes, t = rng.normal(size=(n, 3)), np.cumsum(rng.uniform(0.5, 1.5, n + 1))
+    turns = rb.exp_so3(np.pi / 6 * axes / np.linalg.norm(axes, axis=1)[:, None])
+    R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
+    rotations, best = Rotation.from_matrix(R), rb.minimum_acceleration_spline_so3
+
+    def closed(make):
+        more = rb.acceleration_cost(make(t, R)) / best(t, R).cost - 1
+        return Method(f"{make.__name__}, cost {100 * more:.2g} % more", partial(make, t, R), None)
+
+    methods = {
+        OURS: Method(best.__name__, partial(best, t, R), None),
+        "rbcourse, quaternions": closed(rb.quaternion_spline_so3),
+        "rbcourse, projected cubics": closed(rb.projected_spline_so3),
+        "rbcourse, their velocities": Method("", partial(rb.spline_velocities, t, R), None),
+        "SciPy, another curve": Method(
+            "RotationSpline", lambda: RotationSpline(t, rotations), None
+        ),
+    }
+    return methods, None
+
+
 def one_optimum(n, rng, case):
     """Compare one problem of BK, from its ends to 101 rotations on the optimum."""
     matrices, vectors = oracles.rotation_of_quaternions, textbook.minimum_acceleration_so3
@@ -309,6 +333,7 @@ CONTESTS = [
     Contest("closed forms at N times", "", SOME, None, closed_forms, (1,)),
     Contest("closed forms with derivatives", "", SOME, None, closed_forms, (3,)),
     *(Contest("chain at N times", legs, SOME, None, chain_of_poses, (legs,)) for legs in LEGS),
+    Contest("spline of N legs", "30°", (10, 1000), None, splines),
     *(Contest("optimum, one problem", case, (1,), 1e-10, one_optimum, (case,)) for case in CASES),
     Contest("optimum, stacked", "random", (1000,), 1e-10, stacked_optima, ("acceleration",)),
     *(Contest(f"{BODY}, one problem", case, (1,), 1e-10, one_body, (case,)) for case in CASES),

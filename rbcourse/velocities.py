@@ -17,7 +17,6 @@ Q W and −Qᵀ W: the torque is continuous. For the path of the origin, in the 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +33,7 @@ PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
 """How a path begins and ends: "natural", "periodic", or a pair of velocities."""
 
 _SHORTEST, _LONGEST = 1e-100, 1e100  # of a duration
-_HALF_TURN = math.pi - 1e-6
+_NEAR_HALF_TURN = 1e-6
 _EQUAL = 1e-12
 
 
@@ -160,17 +159,14 @@ def _band(on: Array, above: Array) -> Array:
 def rotation_system(times: Array, R: Array, G: Array | None = None) -> KnotSystem:
     """Return the system of the angular velocities, in the metric G."""
     k, Q = 1 / np.diff(times)[:, None, None], R[:-1].mT @ R[1:]
-    B: Array
-    W: Array
     if G is None:
-        G, W = np.eye(3), np.eye(3) / 2
-        B = (np.trace(Q, axis1=1, axis2=2)[:, None, None] * np.eye(3) - Q.mT) / 2
-    else:
-        W = weight_of("inertia", G)
-        B = np.stack([_skew(Q @ unit @ W) for unit in hat(np.eye(3))], axis=-1)
-    same = 4 * k * G
+        same, load = 4 * k * np.eye(3), 3 * k[:, 0] ** 2 * _skew(Q)
+        twice_B = np.trace(Q, axis1=1, axis2=2)[:, None, None] * np.eye(3) - Q.mT
+        return KnotSystem(same, k * twice_B, same, load, load)
+    W = weight_of("inertia", G)
+    B = np.stack([_skew(Q @ unit @ W) for unit in hat(np.eye(3))], axis=-1)
     loads = (6 * k[:, 0] ** 2 * _skew(x) for x in (Q @ W, -Q.mT @ W))
-    return KnotSystem(same, 2 * k * B, same, *loads)
+    return KnotSystem(4 * k * G, 2 * k * B, 4 * k * G, *loads)
 
 
 def quaternion_system(times: Array, R: Array, long: NDArray[np.bool_]) -> KnotSystem:
@@ -279,7 +275,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """
     times, poses, _ = checked_path(times, poses)
     h, R, d = np.diff(times)[:, None], poses[:, :3, :3], poses[:, :3, 3:]
-    turns = _turns(R)
+    turns = log_so3(R[:-1].mT @ R[1:])
     w = _slopes_of_parabolas(h, turns / h)
     for end, turn in ((0, -turns[0]), (-1, turns[-1])):
         w[end] = right_jacobian_so3(turn) @ w[end]  # coordinates about the neighbour
@@ -311,7 +307,8 @@ def checked_path(
     if odd.any():
         i = np.argmax(odd)
         raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too near, or too far")
-    far = np.linalg.norm(_turns(poses[:, :3, :3]), axis=-1) > _HALF_TURN
+    R = poses[:, :3, :3]
+    far = np.sum(R[:-1] * R[1:], axis=(1, 2)) + 1 < _NEAR_HALF_TURN**2  # 2 + 2 cos of the angle
     if far.any():
         i = np.argmax(far)
         raise ValueError(
@@ -319,8 +316,3 @@ def checked_path(
             "to tell which way to turn"
         )
     return times, poses, velocities
-
-
-def _turns(R: Array) -> Array:
-    """Return the rotation vectors from each rotation to the next, body frame."""
-    return log_so3(R[:-1].mT @ R[1:])

@@ -187,26 +187,28 @@ def test_the_optimum_is_that_of_the_textbook():
 
 
 def least_cost(t, R, bodies):
-    """The least cost of curves of quaternion polynomials, and of any velocities at the rotations:
-    no equation of Euler and Lagrange is used."""
+    """The least cost of quaternions (p, v)/‖(p, v)‖, with p the cubic of the ends and v of a higher
+    degree, and of any velocities at the rotations: no equation of Euler and Lagrange is used."""
     h, count, free = np.diff(t), len(R), 9
-    weight, hermite, bumps = _polynomials(2, free, 40)
-    rates = [
-        _quaternion_and_rates(R, w, 0 * w)[:2] for w in np.repeat(np.eye(3)[:, None], count, 1)
-    ]
-    q, by = rates[0][0], np.stack([rate for _, rate in rates], axis=-1)
-    sign = np.sign(np.sum(q[:-1] * q[1:], axis=1))[:, None]
+    weight, hermite, bumps = _polynomials(2, free, 30)
+    turns = R[:-1].mT @ R[1:]
+    units = np.repeat(np.eye(3)[:, None], count - 1, axis=1)
+    first, last = (
+        [_quaternion_and_rates(Q, w, 0 * w)[:2] for w in units]
+        for Q in (0 * turns + np.eye(3), turns)
+    )
+    by_w = [np.stack([rate for _, rate in x], axis=-1) * h[:, None, None] for x in (first, last)]
 
     def residuals(x):
-        w, c = x[: 3 * count].reshape(count, 3), x[3 * count :].reshape(count - 1, free, 4)
-        rate = (by @ w[..., None])[..., 0]
-        ends = [q[:-1], h[:, None] * rate[:-1], sign * q[1:], sign * h[:, None] * rate[1:]]
-        P = [H @ np.stack(ends, axis=1) + b @ c for H, b in zip(hermite, bumps, strict=True)]
-        w, a = _rates(*P)
-        u = a if not bodies else (a @ BOOK + np.cross(w, w @ BOOK)) / np.sqrt(2)
+        w, v = x[: 3 * count].reshape(count, 3), x[3 * count :].reshape(count - 1, free, 3)
+        rates = [(by @ y[..., None])[..., 0] for by, y in zip(by_w, (w[:-1], w[1:]), strict=True)]
+        ends = np.stack([first[0][0], rates[0], last[0][0], rates[1]], axis=1)
+        c = np.insert(v, 0, 0, axis=-1)
+        w, a = _rates(*(H @ ends + b @ c for H, b in zip(hermite, bumps, strict=True)))
+        u = (a @ BOOK + np.cross(w, w @ BOOK)) / np.sqrt(2) if bodies else a
         return (np.sqrt(2 * weight)[:, None] * u / h[:, None, None] ** 1.5).ravel()
 
-    start = np.append(textbook.spline_velocities(t, R).ravel(), np.zeros(4 * free * (count - 1)))
+    start = np.append(textbook.spline_velocities(t, R).ravel(), np.zeros(3 * free * (count - 1)))
     tolerances = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-15)
     return 2 * least_squares(residuals, start, jac="cs", **tolerances).cost
 

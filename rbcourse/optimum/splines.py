@@ -63,7 +63,7 @@ from rbcourse.velocities import (
 
 ISOLATED = 2 * np.pi**3
 NODES = 17, 25, 33, 49, 65, 97, 129
-START = 33  # nodes that carry the curve from which Newton's method starts
+LOWERED = 33  # nodes that carry a curve that is lowered
 STEPS = 20
 BUMPS, DESCENT_STEPS = 8, 150
 DESCENTS = 1e-2, 1e-4, 1e-6
@@ -449,7 +449,7 @@ def _quaternion_spline(problem: _Problem, long: NDArray[np.bool_]) -> _Curve:
     w = quaternion_system(times, R, long).solve(problem.fixed, problem.given, problem.periodic)
     ends = Ends(R[:-1], R[1:], h[:, None] * w[:-1], h[:, None] * w[1:])
     legs = quaternion_cubic(ends, np.ones(len(h)), long)
-    return _Curve(np.ascontiguousarray(legs(grid(START).t).swapaxes(0, 1)), w)
+    return _Curve(np.ascontiguousarray(legs(grid(NODES[0]).t).swapaxes(0, 1)), w)
 
 
 def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
@@ -458,8 +458,9 @@ def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
     for worthwhile in DESCENTS if problem.functional.ends == 2 else ():
         if isinstance(found, _Found) and found.definite and found.cost < bound * (1 + 1e-4):
             return found
+        start = start._replace(R=problem.on_nodes(start.R, LOWERED))
         start, bound = _lowered(problem, start, worthwhile)
-        found = _newton(problem, start, START)
+        found = _newton(problem, start, LOWERED)
     if isinstance(found, _Found) and not found.definite:
         return Failure(max(one.residual for one in found.legs), found.legs[0].iterations)
     return found
