@@ -13,6 +13,11 @@ one solution, whatever the poses are. For unit quaternions q = (cos ½θ, x) of 
 same with B = cos ½θ I + x̂ and loads 12 x/h². For a body with the weight W, K = Rᵀ M'' W has
 vee(K − Kᵀ) = τ = G w' + w × G w, with G in place of I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and loads of
 Q W and −Qᵀ W: the torque is continuous. For the path of the origin, in the body frame, B = Q.
+
+Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
+a continuous acceleration of nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
+`RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. A linear
+system for the velocities was not found in the literature.
 """
 
 from __future__ import annotations
@@ -138,7 +143,7 @@ class KnotSystem(NamedTuple):
         else:
             first = first + above[0] + above[0].mT
             by_first, alone = np.zeros((0, len(load))), np.zeros(0)
-        np.linalg.cholesky((first + first.mT) / 2)  # raises where it is not positive definite
+        np.linalg.cholesky((first + first.mT) / 2)  # LinAlgError if it is not positive definite
         end = np.linalg.solve(first, load)
         between = (alone - by_first @ end).reshape(-1, len(end))
         return np.concatenate([end[None], between, end[None]])

@@ -318,6 +318,12 @@ def test_bad_ends_are_refused(name, ends, message):
         NATURAL[name](*path(3, 50, 16), ends)
 
 
+@pytest.mark.parametrize("long", [[True], 1, ["yes", "no"]])
+def test_bad_ways_are_refused(long):
+    with pytest.raises(ValueError, match=r"^long: a bool for each of 2 legs wanted, got"):
+        rb.minimum_acceleration_spline_so3(*path(3, 50, 16), long=long)
+
+
 def test_a_path_without_a_minimum_is_refused():
     """Very uneven times: the legs would have to spin; never a wrong curve."""
     t = np.array([0, 1, 1.001, 2, 2.001, 3])

@@ -1,7 +1,7 @@
 """Optima through many poses: all legs at once, by Newton's method on the values at the poses.
 
 Vary a curve R(t) to R exp(η̂), with η = 0 at the poses. On each leg R p = c as for two poses, see
-`rbcourse.optimum.functionals`. What is left of the variation of ∫ ‖u‖² dt is, at each end of each
+`rbcourse.optimum.functionals`. The rest of the variation of ∫ ‖u‖² dt is, at each end of each
 leg, the product of the momenta and the change of the end values: for a ball 4 w' · δw. So at an
 optimum the momenta are the same on both sides of each inner pose, and 0 at natural ends.
 
@@ -329,7 +329,7 @@ class OptimalChain(Chain):
 
 
 class _Problem(NamedTuple):
-    """Rotations, durations of mean 1, which values at the rotations are given, what is least."""
+    """Rotations, durations of mean 1, the values given at the rotations, and the functional."""
 
     R: Array
     h: Array
@@ -413,7 +413,9 @@ def _spline(
 ) -> OptimalChain:
     times, R, _ = checked_path(times, as_finite("rotations", R, "N", 3, 3))
     T, R, size = np.diff(times), nearest(R)[0], 6 if what == "jerk" else 3
-    unit, way = T.mean(), as_finite("long", long, stacked=True).astype(bool)
+    unit, way = T.mean(), np.asarray(long)
+    if way.dtype != bool or way.shape not in ((), T.shape):
+        raise ValueError(f"long: a bool for each of {len(T)} legs wanted, got {long!r}")
     fixed, given = as_ends(ends, len(R), size)
     given = given * np.repeat(unit ** np.arange(1, 1 + size // 3), 3)
     periodic = is_periodic(ends)
@@ -453,17 +455,22 @@ def _quaternion_spline(problem: _Problem, long: NDArray[np.bool_]) -> _Curve:
 
 
 def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
-    """Return a minimum: by Newton's method, and where that fails from lower curves."""
+    """Return a minimum: by Newton's method, and where that fails from lower curves.
+
+    It costs no more than its start; the start of a jerk does not have all values at its ends.
+    """
     found, bound = _newton(problem, start, NODES[0]), problem.cost(start.R)
-    for worthwhile in DESCENTS if problem.functional.ends == 2 else ():
+    if problem.functional.ends > 2:
+        bound = np.inf
+    for worthwhile in (*DESCENTS, None):
         if isinstance(found, _Found) and found.definite and found.cost < bound * (1 + 1e-4):
             return found
+        if worthwhile is None or bound == np.inf:
+            break
         start = start._replace(R=problem.on_nodes(start.R, LOWERED))
         start, bound = _lowered(problem, start, worthwhile)
         found = _newton(problem, start, LOWERED)
-    if isinstance(found, _Found) and not found.definite:
-        return Failure(max(one.residual for one in found.legs), found.legs[0].iterations)
-    return found
+    return found if isinstance(found, Failure) else Failure(found.legs[0].residual, STEPS)
 
 
 def _newton(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:

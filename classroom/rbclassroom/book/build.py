@@ -41,10 +41,10 @@ MADE = "made-by-course.txt"
 
 @dataclass
 class Sources:
-    """Writes the sources of pages to `folder`, and to `extra` what is copied to the book.
+    """Writes the sources of pages to `folder`, and files that are copied to the book to `extra`.
 
     `repository` is where Binder finds the lessons on GitHub, ``owner/name``, or empty; `shown` is
-    what the templates in ``pages/`` show.
+    the data of the templates in ``pages/``.
     """
 
     root: Path
@@ -66,7 +66,7 @@ class Sources:
             shutil.copyfile(self.root / name, target)
 
     def rendered(self, template: str, **further: Any) -> str:
-        """Return a template in ``pages/`` with what is shown."""
+        """Return a template in ``pages/`` with its data."""
         return TEMPLATES.get_template(template).render(
             self.shown, repository=self.repository, **further
         )

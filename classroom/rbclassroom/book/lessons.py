@@ -138,7 +138,7 @@ def living(name: str, root: Path) -> str:
 def prepared(
     notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path
 ) -> str:
-    """Make the notebook of a lesson what the book shows of it, and return its run sheet.
+    """Prepare the notebook of a lesson for the book, and return its run sheet.
 
     Its pictures become files, see `with_picture_files`.
     """

@@ -98,7 +98,7 @@ def to_tests(tests: list[str], page: str = "ledger.md") -> str:
 
 
 def to_function(name: str, page: str = "ledger.md") -> str:
-    """Return a link to a function: to its docstring, of what is private to its code."""
+    """Return a link to a function: to its docstring; to its code if it is private."""
     module, _, own = name.rpartition(".")
     to = f"package/{module}.html#{full_name(name)}"
     if not has_page(module):

@@ -1,4 +1,4 @@
-"""What the pages about the package, its tests, its figures and the ledger show."""
+"""The contents of the pages about the package, its tests, its figures and the ledger."""
 
 import ast
 import re
@@ -31,7 +31,7 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def module(name: str, root: Path) -> dict[str, Any]:
-    """Return a module's names, what it is about, and its public functions and classes."""
+    """Return a module's names, its summary, and its public functions and classes."""
     tree = ast.parse((root / file_of(name)).read_text(encoding="utf-8"))
     kinds = ast.FunctionDef | ast.ClassDef
     public = [node.name for node in tree.body if isinstance(node, kinds) and node.name[0] != "_"]

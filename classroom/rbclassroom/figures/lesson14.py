@@ -84,7 +84,7 @@ def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
 def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
     """Return by how much curves through ten rotations exceed the optimum, medians, as a table.
 
-    Each leg turns by so many degrees about a random axis. The curves, and their optimum, have the
+    Each leg turns by the same angle about a random axis. The curves, and their optimum, have the
     end velocities of Bessel's parabolas; those of SciPy's spline and its optimum are its own.
     """
     draw, times = np.random.default_rng(rng), np.arange(10.0)

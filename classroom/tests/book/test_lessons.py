@@ -1,4 +1,4 @@
-"""Lessons as pages: what is folded, taken out and put in."""
+"""Lessons as pages: folded, removed and added parts."""
 
 import base64
 import io

@@ -1,4 +1,4 @@
-"""What a person does on the pages: open them, press keys, look."""
+"""Actions of a person on the pages: open them, press keys, look."""
 
 import re
 from contextlib import contextmanager
@@ -7,7 +7,7 @@ from pixels import shown
 from playwright.sync_api import expect
 
 IDLE = re.compile(r"\| Idle$")
-# what is wrong with the pictures and players that are on the page
+# faults of the pictures and players on the page
 SEEN = """() => {
   const faults = [], parts = ":is(.jp-Cell figure, .rbcourse-explorer) :is(img, canvas)";
   for (const picture of document.querySelectorAll(parts)) {
@@ -35,7 +35,7 @@ FRAMES = "async (count) => { while (count--) await new Promise(requestAnimationF
 
 @contextmanager
 def watched(context):
-    """A page that must ask nobody outside this machine, and log no error."""
+    """A page that must send no request to another machine, and log no error."""
     page, faults = context.new_page(), []
     page.set_viewport_size({"width": 1280, "height": 800})
     local = ("http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:", "file:///")

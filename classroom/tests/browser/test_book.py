@@ -26,7 +26,7 @@ KINDS = [
 
 
 class Page(HTMLParser):
-    """The anchors of a page, where it points to, what it loads, its formulas, and its faults."""
+    """The anchors of a page, its links, the files that it loads, its formulas, and its faults."""
 
     def __init__(self, name):
         super().__init__()

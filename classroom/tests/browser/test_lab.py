@@ -92,7 +92,7 @@ def test_a_stored_lesson_is_whole_and_its_explorer_lives_as_long_as_its_kernel(o
 
 
 def settled(page, text):
-    """What a text is when the kernel has nothing more to do and pictures come no more."""
+    """A text when the kernel is idle and no more pictures come."""
     now = None
     while now != (now := text.inner_text()):
         page.get_by_text(IDLE).wait_for()
@@ -131,7 +131,7 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(opened, page):
     canvas.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
     refused = explorer.get_by_role("alert").get_by_text("from the base wanted")
     refused.wait_for()
-    assert "wanted" in settled(page, refused)  # when what plays has been prepared
+    assert "wanted" in settled(page, refused)  # when the player has been prepared
     assert page.evaluate(SEEN) == []
 
 

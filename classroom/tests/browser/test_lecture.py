@@ -9,7 +9,7 @@ from pages import SEEN, move_every_control, wait_for, watched
 from playwright.sync_api import expect
 from servers import serving
 
-# text that is smaller than so many pixels; code and panels may have 5/6 of it
+# text that is smaller than `least` pixels; code and panels may have 5/6 of it
 SMALL = """(least) => {
   const found = [];
   const walker = document.createTreeWalker(document.querySelector("#rendered_cells"), 4);
@@ -26,7 +26,7 @@ SMALL = """(least) => {
 }"""
 TYPESET = """() => ![...document.querySelectorAll("#rendered_cells .jp-MarkdownOutput")]
     .some((cell) => /\\$[^$]+\\$/.test(cell.innerText))"""
-# what was whole on no page so far; a table that is larger than a page is cut between its rows
+# parts that were whole on no page so far; a table larger than a page is cut between its rows
 UNSEEN = """() => {
   const top = document.querySelector(".lecture-above").getBoundingClientRect().bottom;
   const bottom = document.querySelector(".lecture-below").getBoundingClientRect().top;
@@ -252,7 +252,7 @@ def test_every_question_stands_with_its_explorer_on_one_screen(context, home, tm
                 assert 0 <= each["x"] <= each["x"] + each["width"] <= 1024
                 assert 0 <= each["y"] <= each["y"] + each["height"] <= 768
             assert box["width"] == pytest.approx(560, abs=1)  # so that letters have 18 px
-            if view.count():  # what is in space is turned by buttons that come with the pointer
+            if view.count():  # a picture in space has buttons that appear with the pointer
                 page.mouse.move(1020, 400)
                 expect(view).to_have_css("opacity", "0")
                 canvas.hover()

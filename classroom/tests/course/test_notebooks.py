@@ -148,7 +148,7 @@ def test_copies_are_trusted_and_assignments_left_out(folders):
 @pytest.mark.parametrize("damaged", [None, b"", b"[]", b"{", b"\xff\xfe", b"null"])
 @pytest.mark.parametrize("run", [False, True])
 def test_a_new_version_replaces_a_copy_that_was_left_alone_or_only_run(folders, damaged, run):
-    """A damaged record of what was copied is no record."""
+    """A damaged record of copies is ignored."""
     notebooks.copy_lessons(*folders)
     copy = folders[1] / "01_plane.ipynb"
     if damaged is not None:
