@@ -237,11 +237,9 @@ def resting_spline(times: Array, poses: Array) -> tuple[Array, Array, Array, Arr
 
 
 def _accelerations(system: KnotSystem, x: Array) -> Array:
-    """Return the accelerations at the starts of the legs, and at the end of the last."""
-    A, B, D, b0, b1 = system
-    start = b0 - matvec(A, x[:-1]) - matvec(B, x[1:])
-    end = matvec(B[-1].mT, x[-2]) + matvec(D[-1], x[-1]) - b1[-1]
-    return np.append(start, end[None], axis=0)
+    """Return the accelerations at the starts of the legs, and 0 at the end of the last."""
+    starts = system.b0 - matvec(system.A, x[:-1]) - matvec(system.B, x[1:])
+    return np.append(starts, np.zeros((1, 3)), axis=0)
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
