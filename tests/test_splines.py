@@ -246,6 +246,20 @@ def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio)
     assert np.median(chains) > 1.05
 
 
+@pytest.mark.parametrize("seed", [2, 3, 9])
+@pytest.mark.parametrize("ends", ["natural", "periodic"])
+def test_large_turns_in_uneven_times_are_found_from_lower_curves(ends, seed):
+    """Where plain Newton's method meets systems that are not positive definite."""
+    t, R = path(10, 120, [10, seed], ratio=10)
+    for name, make in (("optimum", None), ("torque", torque)):
+        c = NATURAL[name](t, R, ends)
+        assert c.definite
+        s = t[1:-1]
+        rate = make or (lambda c, s: c(s, 2))
+        before = rate(c, np.nextafter(s, -9))
+        assert off(rate(c, s) - before, before) < 1e-9
+
+
 def test_a_long_way_is_kept_and_costs_are_those_of_quadrature():
     t, R = path(5, 70, 11)
     way = [False, True, False, False]
