@@ -12,8 +12,8 @@ the poses, `rbcourse.velocities.KnotSystem`, whose matrix is the second derivati
 Certificate, for the acceleration of a ball. With ε = R η and ε' = R δw a leg of duration 1 has the
 second variation ¼ δ²J = ∫ ‖δw'‖² − c · (ε' × ε) dt. For δw = 0 at both ends ∫ ‖δw'‖² ≥ π² ∫ ‖ε'‖²,
 and ε is a closed curve, of a length L with L² ≤ ∫ ‖ε'‖² dt: by the isoperimetric inequality
-|∫ c · (ε' × ε) dt| ≤ 2 ‖c‖ L²/4π. So the leg is a strict minimum if ‖c‖ < 2π³; and the whole
-spline is one if the second derivative by the values at the poses is positive definite, too.
+∫ c · (ε' × ε) dt is at most 2 ‖c‖ L²/4π. So the leg is a strict minimum if ‖c‖ < 2π³; and the
+whole spline is one if the second derivative by the values at the poses is positive definite, too.
 """
 
 from __future__ import annotations
