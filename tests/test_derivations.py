@@ -7,42 +7,11 @@ import sympy as sp
 
 import rbcourse as rb
 
-A, T = sp.symbols("a t", positive=True)
-
-
-def vector(name):
-    return sp.Matrix(sp.symbols(f"{name}:3"))
-
-
-def hat(x):
-    return sp.Matrix(3, 3, lambda i, j: sum(sp.LeviCivita(i, k, j) * x[k] for k in range(3)))
+T = sp.Symbol("t", positive=True)
 
 
 def integral(p):
     return sp.integrate(sp.expand(p), (T, 0, 1))
-
-
-@pytest.mark.source("BK (8)", "BK (9)")
-def test_a_velocity_changes_by_its_components_alone_in_a_bi_invariant_metric():
-    """Koszul's formula for G = 2 I gives ∇_x y = x × y/2, and that is 0 for y = x."""
-    x, y, z = vector("x"), vector("y"), vector("z")
-    koszul = x.cross(y).dot(z) - y.cross(z).dot(x) + z.cross(x).dot(y)
-    assert sp.expand(koszul - x.cross(y).dot(z)) == 0  # half of it, for 2 ⟨∇_x y, z⟩
-
-
-@pytest.mark.source("BK (10)")
-def test_the_form_10_does_not_change_along_screws():
-    """⟨[S, X], Y⟩ + ⟨X, [S, Y]⟩ = 0 for twists, so ∇_S S = 0: a constant twist is a geodesic."""
-    alpha, beta = sp.symbols("alpha beta")
-
-    def bracket(a, b):
-        return a[0].cross(b[0]), a[0].cross(b[1]) - b[0].cross(a[1])
-
-    def form(a, b):
-        return alpha * a[0].dot(b[0]) + beta * (a[0].dot(b[1]) + a[1].dot(b[0]))
-
-    S, X, Y = ((vector(f"{name}w"), vector(f"{name}v")) for name in "sxy")
-    assert sp.expand(form(bracket(S, X), Y) + form(X, bracket(S, Y))) == 0
 
 
 @pytest.mark.source("BK (18)", "BK (19)", "BK Prop. 7")
@@ -52,60 +21,6 @@ def test_the_first_variation_of_the_acceleration():
     eta = T**2 * (1 - T) ** 2 * sp.Matrix([1 + T, T**2 - 2, 3 * T])
     change = w.diff(T).dot((eta.diff(T) + w.cross(eta)).diff(T))
     assert integral(change - eta.dot(w.diff(T, 3) + w.cross(w.diff(T, 2)))) == 0
-
-
-@pytest.mark.source("BK (19)")
-def test_the_rate_of_a_rotation_changes_by_its_variation_and_the_turning_of_the_frame():
-    """(R e^η̂)ᵀ(R e^η̂)' = ŵ + the hat of η' + w × η, to first order in η."""
-    w, eta, rate = vector("w"), vector("e"), vector("r")
-    small = sp.Symbol("s")
-    changed = (sp.eye(3) - small * hat(eta)) * (
-        hat(w) * (sp.eye(3) + small * hat(eta)) + small * hat(rate)
-    )
-    assert sp.expand(changed.diff(small).subs(small, 0) - hat(rate + w.cross(eta))) == sp.zeros(3)
-
-
-@pytest.mark.source("BK (19)")
-def test_what_is_constant_along_an_optimum():
-    """With w''' = −w × w'': R w'' by its rate in the body, and the number w·w'' − ‖w'‖²/2."""
-    w = sp.Matrix([sp.Function(f"w{i}")(T) for i in range(3)])
-    R = sp.Matrix(3, 3, lambda i, j: sp.Function(f"r{i}{j}")(T))
-    b = w.diff(T, 2)
-    third = dict(zip(w.diff(T, 3), -w.cross(b), strict=True))
-    rates = dict(zip(R.diff(T), R * hat(w), strict=True))
-    assert sp.expand((R * b).diff(T).subs(third).subs(rates)) == sp.zeros(3, 1)
-    number = w.dot(b) - w.diff(T).dot(w.diff(T)) / 2
-    assert sp.expand(number.diff(T).subs(third)) == 0
-
-
-@pytest.mark.source("RR 2.1")
-def test_the_law_of_the_angle_of_a_uniform_rotation():
-    """A layer of the sphere in four dimensions, over half of its area, 2π²/2."""
-    density = 4 * sp.pi * sp.sin(A / 2) ** 2 / 2 / sp.pi**2
-    assert sp.simplify(density - (1 - sp.cos(A)) / sp.pi) == 0
-    assert sp.integrate(density, (A, 0, sp.pi)) == 1
-
-
-@pytest.mark.source("RR (7)", "RR (8)", "RR 2.1")
-def test_where_three_angles_carry_e1_and_e3_and_what_makes_them_uniform():
-    """The heights, and the volume |cos β| dα dβ dγ, uniform in sin β."""
-    alpha, beta, gamma = angles = sp.symbols("alpha beta gamma", real=True)
-    R = sp.rot_ccw_axis3(alpha) * sp.rot_ccw_axis2(beta) * sp.rot_ccw_axis1(gamma)
-    assert sp.simplify(R[2, 0] + sp.sin(beta)) == 0
-    assert sp.simplify(R[2, 2] - sp.cos(beta) * sp.cos(gamma)) == 0
-    rates = []
-    for angle in angles:
-        W = sp.simplify(R.T * R.diff(angle))
-        rates.append([W[2, 1], W[0, 2], W[1, 0]])
-    assert sp.simplify(sp.Matrix(rates).det() ** 2 - sp.cos(beta) ** 2) == 0
-
-
-@pytest.mark.source("BK Prop. 6", "BK (16)")
-def test_the_middle_of_the_chord_bisects():
-    half = (1 + sp.exp(sp.I * A)) / 2
-    bisector = sp.cos(A / 2) * sp.exp(sp.I * A / 2)
-    assert sp.simplify((half - bisector).rewrite(sp.cos).expand(trig=True)) == 0
-    assert sp.simplify(sp.expand_complex(half - bisector)) == 0
 
 
 @pytest.mark.source("BK Cor. 1", "BK 6.1", "BK (17)")
