@@ -271,14 +271,6 @@ def test_a_steady_turn_in_legs_has_no_jerk_in_any_unit_of_time(leg, unit):
     assert rb.jerk_cost(chain) * unit**5 < 1e-20
 
 
-def test_the_breakpoints_of_a_chain_have_its_joints():
-    t = np.array([-1.0, 0, 2, 3, 7])
-    chain = rb.chain(t, rb.exp_so3(np.outer(t, [0.1, 0.2, 0])))
-    shares = (t - t[0]) / (t[-1] - t[0])
-    assert np.abs(chain.breakpoints[:, None] - shares).min(axis=0).max() < 1e-15
-    assert len(chain.breakpoints) >= 4 * 16
-
-
 @pytest.mark.parametrize("size", [1e-12, 1e-8, 1.0, 1e8])
 def test_the_unit_of_inertia_does_not_matter(size):
     G, w0 = size * np.diag([1.0, 2, 2.9]), np.array([0.8, 0.1, 1.2])

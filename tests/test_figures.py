@@ -82,6 +82,22 @@ def report_fig9(t):
     return [far * np.interp(3 * t, range(4), way) for way in ways]
 
 
+GOAL, TURNED, CORNER = 5 + 1j, np.exp(150j * D), -1 - 0.5j
+
+
+def straight(t):
+    """Of the centre when the corner of the body runs straight."""
+    turn = np.exp(150j * D * t)
+    centre = CORNER + t * (GOAL + TURNED * CORNER - CORNER) - turn * CORNER
+    return centre.real, centre.imag, 150 * D * t
+
+
+def screwed(t):
+    """On a circle about the one point that stays where it is."""
+    centre = GOAL / (1 - TURNED) * (1 - np.exp(150j * D * t))
+    return centre.real, centre.imag, 150 * D * t
+
+
 ROUTE, JOINTS = ("x [m]", "y [m]", "theta [rad]"), ("theta0 [rad]", "theta1 [rad]")
 FLAT = "x [1]", "y [1]"
 METRES = "x [m]", "y [m]", "z [m]"
@@ -93,6 +109,10 @@ FORMULAS = {
     "report_fig7": (ROUTE, report_fig7),
     "lesson01_ways,as the numbers say ": (ROUTE, lambda t: (6 - 6 * t, 0, (170 - 340 * t) * D)),
     "lesson01_ways,the short way ": (ROUTE, lambda t: (6 - 6 * t, 0, (170 + 20 * t) * D)),
+    "lesson01_straight,blended by the centre ": (ROUTE, lambda t: (5 * t, t, 150 * D * t)),
+    "lesson01_straight,blended by the corner ": (ROUTE, straight),
+    "lesson01_straight,screw by the centre ": (ROUTE, screwed),
+    "lesson01_straight,screw by the corner ": (ROUTE, screwed),
     "lesson01_frames,world ": (ROUTE, lambda t: (W * t, 0, W * t)),
     "lesson01_frames,body ": (ROUTE, lambda t: (*circle(W * t, 1), W * t)),
     "lesson02_posture": (JOINTS, lambda t: (30 * D, 45 * D + 0 * t)),
@@ -310,34 +330,6 @@ def test_the_data_of_the_spins_of_the_book_and_of_the_momenta():
     assert np.abs(energy / energy[:, :1] - 1).max() < 1e-10
     back = np.linalg.norm(L[:, 40:] - L[:, :1], axis=-1).min(axis=1)
     assert back.max() < 0.1  # all paths are closed, within a step
-
-
-SCREW = "screw by the corner"
-
-
-@pytest.mark.source("RR 3.1")
-def test_the_data_of_what_is_straight():
-    """By the corner: the corner runs straight. The screw: every point keeps its distance from one
-    centre, found here from the start and the goal alone."""
-    data, t = numbers("lesson01_straight"), np.linspace(0, 1, 41)
-    goal, centres, corners = np.array([5, 1, np.radians(150)]), {}, {}
-    for way in ("blended by the centre", "blended by the corner", "screw by the centre", SCREW):
-        path = columns(data, f"{way} {{}}", ROUTE)
-        assert np.abs(path[[0, -1]] - [[0, 0, 0], goal]).max() < 1e-10
-        assert np.abs(path[:, 2] - t * goal[2]).max() < 1e-10
-        centres[way] = path[:, :2] @ [1, 1j]
-        corners[way] = centres[way] + np.exp(1j * path[:, 2]) * (-1 - 0.5j)
-    blended, by_corner, screw, _ = centres.values()
-    assert np.abs(blended - t * (5 + 1j)).max() < 1e-10
-    straight = corners["blended by the corner"]
-    assert np.abs(straight - (straight[0] + t * (straight[-1] - straight[0]))).max() < 1e-10
-    centre = (5 + 1j) / (1 - np.exp(1j * goal[2]))
-    for points in (screw, corners[SCREW]):
-        turned = centre + np.exp(1j * t * goal[2]) * (points[0] - centre)
-        assert np.abs(points - turned).max() < 1e-10
-    assert np.abs(screw - centres[SCREW]).max() < 1e-10
-    apart = np.abs(blended - by_corner).max()
-    assert apart == pytest.approx(abs(-1 - 0.5j) * (1 - np.cos(goal[2] / 2)), abs=1e-3)
 
 
 @pytest.mark.source("RR 4", "RR 4.1", "RR Fig. 8", "RR Fig. 9")

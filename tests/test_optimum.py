@@ -304,13 +304,10 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
     assert found[0] == found[1]
 
 
-def test_a_guess_is_followed():
+def test_a_guess_is_followed_and_one_that_is_not_a_curve_on_so3_is_refused():
     ends = random_problems(6, 42, 2.0, 4.0)[:4]
     found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
-
-
-def test_a_guess_that_is_not_a_curve_on_so3_is_refused():
     motion = rb.geodesic_se3(np.eye(4), np.eye(4))
     for guess in (I3, motion, rb.chain([1, 2], [I3] * 2)):
         with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) from t = 0 on is wanted"):

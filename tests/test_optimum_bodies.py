@@ -6,18 +6,7 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from optima import (
-    BOOK,
-    COSTS,
-    I3,
-    OPTIMA,
-    REST,
-    SOLVERS,
-    bodies,
-    deviation,
-    random_problems,
-    some,
-)
+from optima import BOOK, COSTS, I3, OPTIMA, REST, SOLVERS, bodies, deviation, random_problems, some
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb

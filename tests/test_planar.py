@@ -131,15 +131,6 @@ def test_a_command_adds_in_the_world_and_is_a_constant_twist_in_the_body():
     assert path[:, 2] == pytest.approx(np.array(added)[:, 2])
 
 
-def test_in_the_body_many_small_steps_come_to_the_same():
-    velocity, duration, count = np.array([1.2, -0.4, 2.5]), 3.0, 100_000
-    theta = 0.3 + velocity[2] * duration * np.arange(count) / count
-    steps = np.exp(1j * theta) * (velocity[:2] @ [1, 1j]) * duration / count
-    path = planar.propagate_planar([1, 2, 0.3], [(velocity, duration)], frame="body")
-    bound = np.hypot(*velocity[:2]) * velocity[2] * duration**2 / (2 * count)
-    assert abs(path[-1, :2] @ [1, 1j] - (1 + 2j + steps.sum())) < bound < 1.5e-4
-
-
 @pytest.mark.source("RR 3.2")
 @both_frames
 def test_stacks_follow_a_plan_and_the_plan_undone_leads_back(frame):

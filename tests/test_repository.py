@@ -411,10 +411,7 @@ TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # what is installed, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
-    "rbclassroom": (
-        [*DRAW, *CLASSROOM["dependencies"]],
-        [*NEEDS_LECTURE, *NEEDS_GRADING, "book"],
-    ),
+    "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_LECTURE, *NEEDS_GRADING, "book"]),
     "rbclassroom[lecture,grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], []),
 }
 
