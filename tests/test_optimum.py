@@ -149,31 +149,18 @@ def test_least_jerk_from_rest_to_rest_is_the_geodesic(angle):
 
 
 @every_optimum
-def test_moved_or_reversed_ends_and_another_unit_change_nothing_else(what):
+def test_reversed_ends_and_another_unit_change_nothing_else(what):
     size = (100, 36, np.pi, 12.0) if what == "ball" else (12, 36, 2.5, 5.0)
     R0, R1, w0, w1, G, a0, a1 = problems = random_problems(*size)
-    L, Q = Rotation.random(2, rng=4).as_matrix()
-    curves, (v0, v1, b0, b1) = OPTIMA[what](*problems), np.stack([w0, w1, a0, a1]) @ Q
+    curves, back = OPTIMA[what](*problems), OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
     R = curves(TIMES)
-    moved = OPTIMA[what](L @ R0 @ Q, L @ R1 @ Q, v0, v1, Q.T @ G @ Q, b0, b1)
-    back = OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
-    for other, want in ((moved, L @ R @ Q), (back, R[::-1])):
-        assert other.cost == pytest.approx(curves.cost, rel=1e-10)
-        assert np.abs(other(TIMES) - want).max() < 1e-8
+    assert back.cost == pytest.approx(curves.cost, rel=1e-10)
+    assert np.abs(back(TIMES) - R[::-1]).max() < 1e-8
     tripled = OPTIMA[what](R0, R1, w0, w1, 3 * G, a0, a1)
     factor = {"acceleration": 3, "torque": 9}.get(what, 1)
     assert tripled.cost == pytest.approx(factor * curves.cost, rel=1e-12)
     assert np.abs(tripled(TIMES) - R).max() < 1e-11
     assert tripled.c == pytest.approx(factor * curves.c, rel=1e-9)
-
-
-def test_the_numbers_that_other_programs_found():
-    *ends, _, _, _ = of_paper("4c")
-    G = np.diag([1, 2, 2.9])
-    assert rb.minimum_acceleration_so3(*ends, G).cost == pytest.approx(98.454424335438, rel=1e-12)
-    assert rb.minimum_torque_so3(*ends, G).cost == pytest.approx(101.909358271737, rel=1e-12)
-    jerk = rb.minimum_jerk_so3(*ends, REST, REST)
-    assert jerk.cost == pytest.approx(2 * 4550.04139829186, rel=1e-12)
 
 
 @pytest.mark.source("BK 6.2")

@@ -1,4 +1,3 @@
-import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
 import awkward
@@ -252,15 +251,6 @@ def test_arrays_of_any_kind_and_layout_are_read_and_left_alone(n):
     assert not np.shares_memory(R, M)
     off = rb.project_so(np.broadcast_to(M[0, 0], (20, n, n))) - R[0, 0]
     assert np.abs(off).max() < 4 * n * EPS * (1 + condition(M[0, 0], R[0, 0]))
-
-
-def test_at_most_three_times_the_memory_of_matrices_and_projections_is_taken():
-    M = np.random.default_rng(11).normal(size=(60_000, 3, 3))
-    tracemalloc.start()
-    R = rb.project_so(M)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert M.nbytes + peak < 3 * (M.nbytes + R.nbytes)
 
 
 RNG, N = np.random.default_rng(1002), 24
