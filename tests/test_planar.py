@@ -114,8 +114,6 @@ def test_the_short_way_turns_by_half_a_turn_at_most():
     assert np.array_equal(short(start, goal)[1], np.broadcast_to(goal, (200, 200, 3)))
     for angle in (1, -1, np.pi, -np.pi):
         assert short([0, 0, 0], [1, 2, angle])[-1, 2] == angle
-    with pytest.raises(ValueError, match=r"broadcast: start \(2,\), goal \(3,\)"):
-        short(np.zeros((2, 3)), np.zeros((3, 3)))
 
 
 @pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
