@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 import rbcourse as rb
 from rbcourse import _taylor as jets
 from rbcourse._hermite import hermite
-from rbcourse.bezier import nearest_turn
 
 EPS = np.finfo(float).eps
 MAKERS = {
@@ -293,14 +292,6 @@ def test_backwards_in_time_three_are_the_same_and_three_are_not(make):
         want = (-1) ** order * curve(t, order)
         off = np.abs(back(1 - t, order) - want).max(axis=others)
         assert np.all(off < 400 * EPS * np.abs(want).max(axis=others, initial=1) * worse)
-
-
-def test_the_logarithm_of_the_correction_is_the_one_nearest_to_the_sum_of_legs():
-    turn, way = np.random.default_rng(6).normal(size=(2, 200, 3)) * [[[1]], [[6]]]
-    full_turns = 2 * np.pi * np.arange(-4, 5)[:, None, None]
-    others = turn + full_turns * turn / np.linalg.norm(turn, axis=1, keepdims=True)
-    nearest = np.linalg.norm(others - way, axis=2).argmin(axis=0)
-    assert np.abs(nearest_turn(turn, way) - others[nearest, np.arange(200)]).max() < 40 * EPS
 
 
 def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_before():

@@ -253,7 +253,14 @@ def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
     for cost in (rb.jerk_cost, lambda curve: rb.torque_cost(curve, BOOK)):
         assert cost(chain) == pytest.approx(cost(legs).sum(), rel=1e-10)
     cubics = rb.chain([0, 1, 3], R, velocities=w, leg=rb.bezier_so3)
-    assert rb.torque_cost(cubics, BOOK) > 0
+    two = rb.bezier_so3(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
+    assert rb.torque_cost(cubics, BOOK) == pytest.approx(rb.torque_cost(two, BOOK).sum(), rel=1e-9)
+    poses = rb.pose_from_components(R, np.array(a) - w)
+    motion = rb.chain([0, 1, 3], poses)
+    parts = [sum(x) for x in zip(*map(rb.acceleration_cost_parts, motion.legs), strict=True)]
+    assert rb.acceleration_cost_parts(motion) == pytest.approx(parts, rel=1e-9)
+    twice = rb.acceleration_cost(rb.retime(motion, 6))
+    assert twice == pytest.approx(sum(parts) / 8, rel=1e-9)
     with pytest.raises(RuntimeError, match=r"^jerk cost: an acceleration jumps at a joint, by"):
         rb.jerk_cost(cubics)
     with pytest.raises(RuntimeError, match=r"^torque cost: a velocity jumps at a joint, by"):

@@ -274,19 +274,6 @@ def test_retimed_chains_are_run_through_evenly(duration):
     assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
 
 
-def test_costs_of_chains_and_retimed_curves():
-    """Squared accelerations by Gauss's rule on each half of each leg."""
-    c = rb.chain(TIMES, POSES)
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    cuts = np.sort(np.append(TIMES, TIMES[:-1] + H / 2))
-    halves = np.diff(cuts)[:, None] / 2
-    squares = c(cuts[:-1, None] + halves * (1 + nodes), 2) ** 2
-    found = np.einsum("i,j,ijk->k", halves[:, 0], weights, squares).reshape(2, 3).sum(axis=1)
-    assert rb.acceleration_cost_parts(c) == pytest.approx(found * [2, 1], rel=1e-9)
-    twice = rb.retime(c, 2 * (TIMES[-1] - TIMES[0]))
-    assert rb.acceleration_cost(twice) == pytest.approx(rb.acceleration_cost(c) / 8, rel=1e-12)
-
-
 def test_a_chain_whose_velocity_jumps_has_no_cost():
     """Also by little, in the turning alone, beside fast motion."""
 
