@@ -342,29 +342,6 @@ def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost():
             assert data[f"{way} excess [1]"] == pytest.approx(excess, rel=1e-3, abs=1e-8), way
 
 
-@pytest.mark.source("beyond BK 10")
-def test_near_a_geodesic_deviations_are_multiples_of_each_other():
-    """Across the axis: t²(1 − t)²/12 and −t²(1 − t)² u/10 of the projection, as derived."""
-    data = numbers("lesson12_deviations")
-    t = data["t [1]"]
-    d = (t * (1 - t)) ** 2 / 12
-    e = -1.2 * d * (2 * t - 1)
-    shares = {"projection": (1, 1), "quaternion": (1 / 4, -1 / 4), "Bézier": (1 / 9, -1 / 9)}
-    wanted = {way: (of_d * d, of_e * e) for way, (of_d, of_e) in shares.items()}
-    for way, (of_d, of_e) in (wanted | {"exponential": (0 * t, -0.4 * d * (t + 2))}).items():
-        assert np.abs(data[f"{way} d [1]"] - of_d).max() < 2e-5
-        assert np.abs(data[f"{way} e [1]"] - of_e).max() < {"exponential": 1e-4}.get(way, 2e-5)
-
-
-def test_the_excess_of_a_projection_grows_with_the_third_power_of_the_margin():
-    family, *columns = numbers("lesson12_margins").values()
-    margin, excess = np.array(columns)[:2, family == "random"]
-    low = margin < 0.3
-    slope, _ = np.polyfit(np.log(margin[low]), np.log(excess[low]), 1)
-    assert low.sum() > 25
-    assert slope == pytest.approx(-3, abs=0.3)
-
-
 @pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize("body", body_atlas.BODIES)
 def test_a_cell_of_the_atlas_of_bodies_is_what_its_problems_cost(body):
@@ -412,10 +389,3 @@ def test_the_book_of_lesson_13_is_turned_by_its_torques():
         end = solve_ivp(euler, (0, 1), start, args=torque, rtol=1e-10, atol=1e-12).y[:, -1]
         for R in (diagonal, matrices(poses, f"{law} R{{}} [1]")[-1]):
             assert np.abs(end - [*R.ravel(), *rest]).max() < 1e-6, law
-
-
-@pytest.mark.source("beyond BK 5")
-def test_the_projected_quintic_of_lesson_13_goes_the_whole_way():
-    data = numbers("lesson13_jerk")
-    way = simpson(data["projected quintic [rad]"], x=data["t [1]"])
-    assert way == pytest.approx(LONG, abs=1e-6)

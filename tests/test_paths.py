@@ -209,6 +209,7 @@ PATHS = [
     (([0, 1], [-np.eye(3)] * 2), "poses[0] is no rotation (project_so gives"),
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
+SCREWS = partial(rb.chain, leg=rb.screw_se3)
 LATE = rb.chain([1e9, 2e9], ROTATIONS[:2])
 UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
 
@@ -220,11 +221,7 @@ UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
         *((rb.bessel_velocities, *path) for path in PATHS),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) wanted, got (2"),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 wanted, one a pose, got 3"),
-        (
-            partial(rb.chain, leg=rb.screw_se3),
-            (TIMES, POSES, TWISTS),
-            "velocities: the legs ask fo",
-        ),
+        (SCREWS, (TIMES, POSES, TWISTS), "velocities: the legs ask fo"),
         (LATE, (3.5,), "t is 3.5, a time in [1000000000, 2000000000] is"),
         (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
         (rb.retime, (np.sin, 1), "curve: a Curve wanted, got"),
