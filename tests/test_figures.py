@@ -265,39 +265,6 @@ def test_the_data_of_random_rotations(sample, kind):
             assert np.abs(drawn - R @ v).max() < 1e-11
 
 
-EDGES = np.array([0.20, 0.13, 0.03])
-MOMENTS = 0.5 / 12 * (EDGES @ EDGES - EDGES**2)
-
-
-def euler(start, t):
-    """Euler's equation by SciPy, for the book of lesson 8."""
-    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "t_eval": t}
-    return solve_ivp(
-        lambda _, w: np.cross(MOMENTS * w, w) / MOMENTS, (0, t[-1]), start, **tight
-    ).y.T
-
-
-@pytest.mark.source("BK (8)")
-def test_the_data_of_the_spins_of_the_book_and_of_the_momenta():
-    """The book turns, at first nearly about its middle axis; the momentum is up and stays."""
-    data = numbers("lesson08_spins")
-    for k in range(3):
-        start = np.where(np.arange(3) == k, 4, 0.2)
-        w = columns(data, f"axis {k + 1} w{{}} [rad]", "123")
-        assert np.abs(w - euler(start, data["t [1]"])).max() < 1e-8
-    data, start = numbers("lesson08_book"), np.array([0.2, 4, 0.2])
-    R, size = matrices(data), np.linalg.norm(MOMENTS * start)
-    assert rb.is_so(R, 1e-11).all()
-    momentum = np.einsum("tij,tj->ti", R, MOMENTS * euler(start, data["t [1]"]))
-    assert np.abs(momentum - [0, 0, size]).max() < 1e-9 * size
-    assert data["R32 [1]"][0] > 0.99
-    assert (data["R32 [1]"] < -0.99).any()
-    L = columns(numbers("lesson08_momenta"), "{} [1]").reshape(24, -1, 3)
-    assert np.abs(np.linalg.norm(L, axis=-1) - 1).max() < 1e-11
-    energy = (L**2 / MOMENTS).sum(axis=-1)
-    assert np.abs(energy / energy[:, :1] - 1).max() < 1e-10
-
-
 @pytest.mark.source("RR 4", "RR 4.1", "RR Fig. 8", "RR Fig. 9")
 def test_arms_end_where_their_angles_say():
     """And go along a line or along three arcs, or touch the circle."""

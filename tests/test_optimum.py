@@ -211,8 +211,7 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
-    assert not curve.converged.any()
-    for values in (curve(TIMES), curve(TIMES, 1), curve(TIMES, 2), curve.c, curve.cost):
+    for values in (*(curve(TIMES, order) for order in range(3)), curve.c, curve.cost):
         assert np.isnan(values).all()
     with pytest.raises(ValueError, match=r"^guess: a curve is NaN, it did not converge"):
         rb.stationary_so3(curve)
@@ -222,17 +221,16 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
         assert isinstance(failed.value, RuntimeError)
         assert failed.value.residual > 1e-11
         assert failed.value.iterations >= 0
-    poses, rates = rb.pose_from_components([I3, R], np.eye(2, 3)), np.ones((4, 3, 3))
-    rates[:2, 2] = w
-    with pytest.warns(RuntimeWarning, match=r"^1 of 3 problems .* \[2\]:"):
+    poses, rates = rb.pose_from_components([I3, R], np.eye(2, 3)), np.ones((4, 2, 3))
+    rates[:2, 1] = w
+    with pytest.warns(RuntimeWarning, match=r"^1 of 2 problems .* \[1\]:"):
         broken = rb.minimum_acceleration_se3(*poses, *rates)
-    motion = rb.minimum_acceleration_se3(*poses, *rates[:, :2])
-    assert np.array_equal(broken.rotation.converged, [True, True, False])
-    assert np.isnan(broken(TIMES)[:, 2, :3, :3]).all()
+    motion = rb.minimum_acceleration_se3(*poses, *rates[:, 0])
+    assert np.array_equal(broken.rotation.converged, [True, False])
+    assert np.isnan(broken(TIMES)[:, 1, :3, :3]).all()
     for order in range(3):
-        values = broken(TIMES, order)
-        assert np.isnan(values[:, 2]).any(axis=tuple(range(1, values.ndim - 1))).all()
-        assert np.abs(values[:, :2] - motion(TIMES, order)).max() < 1e-10
+        assert np.isnan(broken(TIMES, order)[:, 1]).reshape(101, -1).any(axis=1).all()
+        assert np.abs(broken(TIMES, order)[:, 0] - motion(TIMES, order)).max() < 1e-10
 
 
 def test_the_search_tells_where_newtons_method_fails_from_the_cheapest_start(monkeypatch):

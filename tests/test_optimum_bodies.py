@@ -159,9 +159,8 @@ def test_near_half_turns_converge(short_of):
     assert curves.cost == pytest.approx(np.full(5, 24 * (np.pi - short_of) ** 2), rel=1e-9)
     tumbling = rb.minimum_acceleration_so3(I3, R1, [1, 2, 3], [-3, 0, 1])
     assert tumbling.residual.max() < 1e-11
-    for i, R in enumerate(R1):
-        alone = rb.minimum_acceleration_so3(I3, R, [1, 2, 3], [-3, 0, 1])
-        assert np.abs(tumbling(TIMES)[:, i] - alone(TIMES)).max() < 1e-10
+    alone = rb.minimum_acceleration_so3(I3, R1[1], [1, 2, 3], [-3, 0, 1])
+    assert np.abs(tumbling[1](TIMES) - alone(TIMES)).max() < 1e-10
 
 
 @pytest.mark.parametrize("seed", [None, 1])
