@@ -17,7 +17,7 @@ STORED = report.README.with_name("benchmarks.csv")
 class Clock:
     """A clock that goes on when a call takes its time, on a machine whose load may grow."""
 
-    now, load, calls = 0.0, 1.0, 0
+    now, load = 0.0, 1.0
 
     def __call__(self):
         return self.now
@@ -25,18 +25,6 @@ class Clock:
     def take(self, seconds, grows=1):
         self.now += seconds * self.load
         self.load *= grows
-        self.calls += 1
-
-
-def test_the_rounds_take_the_time_there_is_within_bounds_and_short_calls_are_repeated():
-    for total, rounds in ((0, 2), (35, 3), (1000, 5)):
-        clock = Clock()
-        calls = [partial(clock.take, 10), partial(clock.take, 1)]
-        assert len(timing.in_turn(calls, 0.1, total, 2, 5, clock)) == rounds
-    clock = Clock()
-    times = timing.in_turn([partial(clock.take, 0.001)], 0.02, 0, 2, 2, clock)
-    assert clock.calls == 2 + 2 * 20
-    assert times == pytest.approx(np.full((2, 1), 0.001))
 
 
 def test_times_are_of_one_item_and_ratios_of_turns_under_the_same_load():

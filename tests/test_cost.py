@@ -253,7 +253,14 @@ def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
     for cost in (rb.jerk_cost, lambda curve: rb.torque_cost(curve, BOOK)):
         assert cost(chain) == pytest.approx(cost(legs).sum(), rel=1e-10)
     cubics = rb.chain([0, 1, 3], R, velocities=w, leg=rb.bezier_so3)
-    assert rb.torque_cost(cubics, BOOK) > 0
+    two = rb.bezier_so3(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
+    assert rb.torque_cost(cubics, BOOK) == pytest.approx(rb.torque_cost(two, BOOK).sum(), rel=1e-9)
+    poses = rb.pose_from_components(R, np.array(a) - w)
+    motion = rb.chain([0, 1, 3], poses)
+    parts = [sum(x) for x in zip(*map(rb.acceleration_cost_parts, motion.legs), strict=True)]
+    assert rb.acceleration_cost_parts(motion) == pytest.approx(parts, rel=1e-9)
+    twice = rb.acceleration_cost(rb.retime(motion, 6))
+    assert twice == pytest.approx(sum(parts) / 8, rel=1e-9)
     with pytest.raises(RuntimeError, match=r"^jerk cost: an acceleration jumps at a joint, by"):
         rb.jerk_cost(cubics)
     with pytest.raises(RuntimeError, match=r"^torque cost: a velocity jumps at a joint, by"):
@@ -269,14 +276,6 @@ def test_a_steady_turn_in_legs_has_no_jerk_in_any_unit_of_time(leg, unit):
     t, w = np.array([0, 1, 2.5, 3]), 0.7 * np.array([0.6, 0, 0.8])
     chain = rb.chain(unit * t, rb.exp_so3(np.outer(t, w)), [w / unit] * 4, leg=leg)
     assert rb.jerk_cost(chain) * unit**5 < 1e-20
-
-
-def test_the_breakpoints_of_a_chain_have_its_joints():
-    t = np.array([-1.0, 0, 2, 3, 7])
-    chain = rb.chain(t, rb.exp_so3(np.outer(t, [0.1, 0.2, 0])))
-    shares = (t - t[0]) / (t[-1] - t[0])
-    assert np.abs(chain.breakpoints[:, None] - shares).min(axis=0).max() < 1e-15
-    assert len(chain.breakpoints) >= 4 * 16
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-8, 1.0, 1e8])
@@ -310,18 +309,13 @@ def test_bad_arguments_are_named():
     acceleration, jerk, torque = rb.acceleration_cost, rb.jerk_cost, rb.torque_cost
     for cost, given, message in (
         (partial(acceleration, mass=0), motion, "^mass is 0.0"),
-        (partial(acceleration, mass=True), motion, "^mass is True"),
         (partial(acceleration, centre=[0, 1]), motion, r"^centre: shape \(3\)"),
         (partial(acceleration, mass=2.5), line, "^mass, centre: a curve on SO.3. has none of them"),
         (acceleration, None, "^curve: a Curve wanted, got None"),
         (jerk, None, "^curve: a Curve wanted, got None"),
         (jerk, motion, "^curve: one on SO.3. is wanted, got <Rigid"),
-        (partial(torque, inertia=BOOK), None, "^curve: a Curve wanted, got None"),
         (partial(torque, inertia=BOOK), motion, "^curve: one on SO.3. is wanted, got <Rigid"),
-        *(
-            (partial(jerk, rtol=x), line, "^rtol")
-            for x in (0, -1e-6, 1e-13, 0.2, np.nan, [1e-6] * 2)
-        ),
+        *((partial(jerk, rtol=x), line, "^rtol") for x in (0, 1e-13, 0.2, np.nan, [1e-6] * 2)),
     ):
         with pytest.raises(ValueError, match=message):
             cost(given)

@@ -1,5 +1,4 @@
 import importlib.util
-import itertools
 import re
 from functools import cache, partial
 from pathlib import Path
@@ -9,7 +8,6 @@ import pytest
 
 import rbcourse as rb
 from rbclassroom.surveys.atlas import random_problems
-from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 
 ROOT = Path(__file__).parents[1]
@@ -28,7 +26,6 @@ def bent(*ends, bend):
 
 TABULATED = [name for name in rb.CLOSED_FORMS if name != "corrected_bezier_so3"]
 CURVES = rb.CLOSED_FORMS | {f"bent by {x}": partial(bent, bend=x) for x in (0.3, 3.0)}
-pytestmark = pytest.mark.source("beyond BK 10")
 
 
 @cache
@@ -90,20 +87,7 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
         assert found == factor * ss**2, name
 
 
-def test_the_deviation_in_the_package_is_the_derived_one():
-    """Exactly, with fractions, as polynomials in t."""
-    numbers = np.random.default_rng(5).integers(-9, 9, (3, 3))
-    vectors = np.array([[Q(int(n), 3) for n in row] for row in numbers])
-    u, bump = exact.RING(2) * exact.t - 1, exact.t**2 * (1 - exact.t) ** 2
-    pairs = itertools.combinations_with_replacement(vectors, 2)
-    symbols = exact.ss, exact.se, exact.sd, exact.ee, exact.ed, exact.dd
-    inner = [(s, x @ y) for s, (x, y) in zip(symbols, pairs, strict=True)]
-    theirs = [share.subs(inner) for share in exact.deviations()["bezier_so3"]]
-    for i in range(3):
-        ours = sum(c[i] * u**k for k, c in enumerate(bezier_deviation(*vectors)))
-        assert sum(v[i] * share for share, v in zip(theirs, vectors, strict=True)) == bump * ours
-
-
+@pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("name", TABULATED)
 def test_power_and_leading_term_against_the_solver(name):
     """Its relative error falls with the next power: the second, for the cumulative the first."""

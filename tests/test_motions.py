@@ -3,7 +3,6 @@
 import numpy as np
 import oracles
 import pytest
-from numpy.polynomial import chebyshev
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
@@ -79,34 +78,6 @@ def test_the_centre_of_mass_of_a_body_runs_along_a_cubic():
     assert np.abs(rate - a).max() < 1e-10
 
 
-@pytest.mark.source("beyond BK 9")
-def test_no_motion_nearby_costs_a_body_less():
-    """Perturbed by R exp(η̂) and d + ξ, η and ξ polynomials that vanish at the ends, twice."""
-    motion, G, m, r = OFF_CENTRE[0], *BODY.values()
-    x, weights = np.polynomial.legendre.leggauss(60)
-    nodes, rng = chebyshev.chebpts1(51), np.random.default_rng(9)
-    bump = ((1 - nodes**2) ** 2)[:, None] / 16
-
-    def cost(size, eta, xi):
-        A = motion((1 + nodes) / 2)
-        R = A[:, :3, :3] @ rb.exp_so3(size * bump * eta)
-        centre = A[:, :3, 3] + R @ r + size * bump * xi
-        series = chebyshev.chebfit(nodes, np.hstack([R.reshape(-1, 9), centre]), 50)
-        jets = [chebyshev.chebval(x, chebyshev.chebder(series, k, 2)).T for k in range(3)]
-        R, R1, R2 = (x[:, :9].reshape(-1, 3, 3) for x in jets)
-        w, a = (rb.vee_so3((R.mT @ X - X.mT @ R) / 2) for X in (R1, R2))
-        torque = a @ G + np.cross(w, w @ G)
-        squares = np.sum(torque * (torque @ np.linalg.inv(G)), axis=-1)
-        return (squares + m * np.sum(jets[2][:, 9:] ** 2, axis=-1)) @ weights / 2
-
-    for eta, xi in rng.normal(size=(3, 2, 3)):
-        less, same, more = (cost(size, eta, xi) for size in (-0.3, 0.0, 0.3))
-        assert same == pytest.approx(rb.acceleration_cost(motion, **BODY), rel=1e-8)
-        assert min(less, more) > same
-        slope = cost(1e-3, eta, xi) - cost(-1e-3, eta, xi)
-        assert abs(slope) < 1e-5 * (less + more - 2 * same)
-
-
 @pytest.mark.source("BK 2.6", "errata 15")
 def test_each_definition_holds_of_screws_and_not_of_geodesics():
     """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, A' a left-invariant field. As
@@ -177,19 +148,3 @@ def test_displacements_that_do_not_turn_or_by_rounding_only_slide():
         assert np.abs(screw.axis - [0, 0.6, 0.8]).max() < off
         assert screw.slide == pytest.approx(size, rel=off)
         assert np.all(screw.pitch == np.inf)
-
-
-@pytest.mark.source("BK (10)", "BK (14)")
-def test_every_point_of_the_body_runs_on_a_helix_of_one_axis():
-    """The distance to the axis does not change, the height grows evenly; so it is for no geodesic
-    of metric (14) that turns and moves across its axis."""
-    screw, found = rb.screw_from_pose(A1 @ rb.inverse_se3(A0)), []
-    for curve in (SCREWS, GEODESICS):
-        A = curve(TIMES)
-        x = A[..., :3, :3] @ np.array([0.3, -1.0, 0.5]) + A[..., :3, 3] - screw.point
-        height = np.vecdot(x, screw.axis)
-        found.append([np.linalg.norm(x - height[..., None] * screw.axis, axis=-1), height])
-    (distance, height), (other, _) = found
-    assert np.abs(distance - distance[0]).max() < 1e-13
-    assert np.abs(np.diff(height, 2, axis=0)).max() < 1e-13
-    assert np.ptp(other, axis=0).min() > 1e-3

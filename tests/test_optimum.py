@@ -94,7 +94,11 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
     size = 1 + np.abs(p).max(axis=(0, 2))[:, None]
     assert np.all(np.abs(times(curves(t), p) - curves.c) < 1e-11 * size)
     assert np.abs(curves[3].costate(0.3) - curves.costate(0.3)[3]).max() < 1e-11 * size[3]
-    assert what != "ball" or np.array_equal(p, curves(t, 3))
+    if what == "ball":
+        w, a, b = (curves(t, order) for order in (1, 2, 3))
+        number = np.vecdot(w, b) - np.vecdot(a, a) / 2
+        assert np.array_equal(p, b)
+        assert np.all(np.abs(number - number[0]) < 1e-10 * np.abs(number).max(axis=0))
 
 
 @of_forces
@@ -145,31 +149,18 @@ def test_least_jerk_from_rest_to_rest_is_the_geodesic(angle):
 
 
 @every_optimum
-def test_moved_or_reversed_ends_and_another_unit_change_nothing_else(what):
+def test_reversed_ends_and_another_unit_change_nothing_else(what):
     size = (100, 36, np.pi, 12.0) if what == "ball" else (12, 36, 2.5, 5.0)
     R0, R1, w0, w1, G, a0, a1 = problems = random_problems(*size)
-    L, Q = Rotation.random(2, rng=4).as_matrix()
-    curves, (v0, v1, b0, b1) = OPTIMA[what](*problems), np.stack([w0, w1, a0, a1]) @ Q
+    curves, back = OPTIMA[what](*problems), OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
     R = curves(TIMES)
-    moved = OPTIMA[what](L @ R0 @ Q, L @ R1 @ Q, v0, v1, Q.T @ G @ Q, b0, b1)
-    back = OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
-    for other, want in ((moved, L @ R @ Q), (back, R[::-1])):
-        assert other.cost == pytest.approx(curves.cost, rel=1e-10)
-        assert np.abs(other(TIMES) - want).max() < 1e-8
+    assert back.cost == pytest.approx(curves.cost, rel=1e-10)
+    assert np.abs(back(TIMES) - R[::-1]).max() < 1e-8
     tripled = OPTIMA[what](R0, R1, w0, w1, 3 * G, a0, a1)
     factor = {"acceleration": 3, "torque": 9}.get(what, 1)
     assert tripled.cost == pytest.approx(factor * curves.cost, rel=1e-12)
     assert np.abs(tripled(TIMES) - R).max() < 1e-11
     assert tripled.c == pytest.approx(factor * curves.c, rel=1e-9)
-
-
-def test_the_numbers_that_other_programs_found():
-    *ends, _, _, _ = of_paper("4c")
-    G = np.diag([1, 2, 2.9])
-    assert rb.minimum_acceleration_so3(*ends, G).cost == pytest.approx(98.454424335438, rel=1e-12)
-    assert rb.minimum_torque_so3(*ends, G).cost == pytest.approx(101.909358271737, rel=1e-12)
-    jerk = rb.minimum_jerk_so3(*ends, REST, REST)
-    assert jerk.cost == pytest.approx(2 * 4550.04139829186, rel=1e-12)
 
 
 @pytest.mark.source("BK 6.2")
@@ -179,10 +170,8 @@ def test_a_stack_of_which_one_body_is_round_is_what_each_is_alone(what):
     problems[4][2] = 0.7 * I3
     stack = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
     alone = [OPTIMA[what](*some(problems, i)) for i in range(6)]
-    for said in (stack.converged, stack.residual, stack.cost, stack.iterations, stack.nodes):
-        assert said.shape == (2, 3)
-    assert stack.converged.dtype == bool
     assert all(type(one.cost) is float and one.converged is True for one in alone)
+    assert stack.iterations.shape == (2, 3)
     assert stack.cost == pytest.approx(np.reshape([one.cost for one in alone], (2, 3)), rel=1e-10)
     R = stack(TIMES)
     assert np.abs(R.mT @ R - I3).max() < 20 * np.finfo(float).eps
@@ -190,9 +179,6 @@ def test_a_stack_of_which_one_body_is_round_is_what_each_is_alone(what):
         values = stack(TIMES, order)
         want = np.stack([one(TIMES, order) for one in alone], axis=1).reshape(values.shape)
         assert np.abs(values - want).max() < 1e-10 * (1 + np.abs(values).max())
-    assert stack.costate([0.1, 0.2]).shape == (2, 2, 3, 3)
-    off = stack[1, 0].costate(0.3) - stack.costate(0.3)[1, 0]
-    assert np.abs(off).max() < 1e-12 * (1 + np.abs(stack.c[1, 0]).max())
 
 
 @pytest.mark.parametrize(("what", "speed"), [*((what, 1e160) for what in OPTIMA), ("ball", 1e3)])
@@ -225,8 +211,7 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
-    assert not curve.converged.any()
-    for values in (curve(TIMES), curve(TIMES, 1), curve(TIMES, 2), curve.c, curve.cost):
+    for values in (*(curve(TIMES, order) for order in range(3)), curve.c, curve.cost):
         assert np.isnan(values).all()
     with pytest.raises(ValueError, match=r"^guess: a curve is NaN, it did not converge"):
         rb.stationary_so3(curve)
@@ -236,17 +221,16 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
         assert isinstance(failed.value, RuntimeError)
         assert failed.value.residual > 1e-11
         assert failed.value.iterations >= 0
-    poses, rates = rb.pose_from_components([I3, R], np.eye(2, 3)), np.ones((4, 3, 3))
-    rates[:2, 2] = w
-    with pytest.warns(RuntimeWarning, match=r"^1 of 3 problems .* \[2\]:"):
+    poses, rates = rb.pose_from_components([I3, R], np.eye(2, 3)), np.ones((4, 2, 3))
+    rates[:2, 1] = w
+    with pytest.warns(RuntimeWarning, match=r"^1 of 2 problems .* \[1\]:"):
         broken = rb.minimum_acceleration_se3(*poses, *rates)
-    motion = rb.minimum_acceleration_se3(*poses, *rates[:, :2])
-    assert np.array_equal(broken.rotation.converged, [True, True, False])
-    assert np.isnan(broken(TIMES)[:, 2, :3, :3]).all()
+    motion = rb.minimum_acceleration_se3(*poses, *rates[:, 0])
+    assert np.array_equal(broken.rotation.converged, [True, False])
+    assert np.isnan(broken(TIMES)[:, 1, :3, :3]).all()
     for order in range(3):
-        values = broken(TIMES, order)
-        assert np.isnan(values[:, 2]).any(axis=tuple(range(1, values.ndim - 1))).all()
-        assert np.abs(values[:, :2] - motion(TIMES, order)).max() < 1e-10
+        assert np.isnan(broken(TIMES, order)[:, 1]).reshape(101, -1).any(axis=1).all()
+        assert np.abs(broken(TIMES, order)[:, 0] - motion(TIMES, order)).max() < 1e-10
 
 
 def test_the_search_tells_where_newtons_method_fails_from_the_cheapest_start(monkeypatch):
@@ -300,13 +284,10 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
     assert found[0] == found[1]
 
 
-def test_a_guess_is_followed():
+def test_a_guess_is_followed_and_one_that_is_not_a_curve_on_so3_is_refused():
     ends = random_problems(6, 42, 2.0, 4.0)[:4]
     found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
-
-
-def test_a_guess_that_is_not_a_curve_on_so3_is_refused():
     motion = rb.geodesic_se3(np.eye(4), np.eye(4))
     for guess in (I3, motion, rb.chain([1, 2], [I3] * 2)):
         with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) from t = 0 on is wanted"):

@@ -1,27 +1,16 @@
 """The search for the cheapest optimum, against closed forms, another optimiser and known costs."""
 
 import warnings
+from functools import partial
 
 import numpy as np
+import oracles
 import pytest
-from optima import (
-    BOOK,
-    COSTS,
-    I3,
-    OPTIMA,
-    REST,
-    SOLVERS,
-    bodies,
-    deviation,
-    least_costs,
-    random_problems,
-    some,
-)
+from optima import BOOK, COSTS, I3, OPTIMA, REST, SOLVERS, bodies, deviation, random_problems, some
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse._hermite import hermite
-from rbcourse.closed_forms import CLOSED_FORMS
 from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.collocation import cost_of, relax_ball
@@ -73,9 +62,9 @@ def best():
     of_bodies = [np.concatenate(pair) for pair in zip(slow, fast, strict=True)]
     # Newton's method does not converge from the projected cubics of these two
     hard = vectors("-.1 2.5 -1.7  -7.1 7 4.1  -7.2 .4 8   .6 .4 -2.9  6 -2.5 8.6  -.2 7.1 -8.1")
-    many = random_ends(np.random.default_rng(12), np.pi, 12, 400)
+    many = random_ends(np.random.default_rng(12), np.pi, 12, 150)
     turn, *w = np.hstack([many, hard.reshape(2, 3, 3).swapaxes(0, 1)])
-    of_balls = [np.stack([I3] * 402), rb.exp_so3(turn), *w, None, REST, REST]
+    of_balls = [np.stack([I3] * 152), rb.exp_so3(turn), *w, None, REST, REST]
     problems = {"ball": of_balls, "acceleration": of_bodies, "torque": of_bodies, "jerk": slow}
     return {what: (some, OPTIMA[what](*some)) for what, some in problems.items()}
 
@@ -92,18 +81,15 @@ def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
         assert curves.cost[i] == pytest.approx(cost, rel=1e-9)
     ends, every = [R0, R1, w0, w1], np.full(len(R0), True)
     slow = (np.linalg.norm([w0, w1], axis=-1) < 9.42).all(axis=0)
-    others = [
-        (make, ends, slow if make in OF_SLOW_ENDS else every) for make in CLOSED_FORMS.values()
-    ]
+    forms = rb.CLOSED_FORMS.values()
+    others = [(make, ends, slow if make in OF_SLOW_ENDS else every) for make in forms]
     if what == "jerk":
         quintics = rb.projected_quintic_so3, rb.exponential_quintic_so3
         others = [(make, [*ends, a0, a1], every) for make in quintics]
     elif what != "ball":
         real = np.linalg.eigvalsh(G) @ [1, 1, -1] > 0
-        others += [
-            (rb.weighted_cubic_so3, [*ends, G], real),
-            (rb.normal_cubic_so3, [*ends, G], every),
-        ]
+        of_bodies = (rb.weighted_cubic_so3, real), (rb.normal_cubic_so3, every)
+        others += [(make, [*ends, G], those) for make, those in of_bodies]
         of_balls = COSTS[what](rb.minimum_acceleration_so3(*ends), G)
         assert np.all(of_balls > curves.cost * (1 - 1e-9))
     t = np.linspace(0, 1, 401)
@@ -112,10 +98,10 @@ def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
             warnings.filterwarnings("ignore", "margin < 1e-6", RuntimeWarning)
             other = make(*some(given, those))
         rates = (np.moveaxis(other(t, k), 0, 1) for k in (1, 2, 3)[: 3 if what == "jerk" else 2])
-        squares = np.sum(
-            deviation(what, None if G is None else G[those][:, None], *rates) ** 2, axis=-1
-        )
-        assert np.all(np.trapezoid(squares, t) > curves.cost[those] * (1 - 1e-3))  # roughly
+        u = deviation(what, None if G is None else G[those][:, None], *rates)
+        assert np.all(
+            np.trapezoid(np.sum(u**2, axis=-1), t) > curves.cost[those] * (1 - 1e-3)
+        )  # roughly
 
 
 @pytest.mark.source("BK 6.2")
@@ -144,7 +130,7 @@ def cost_about_an_axis(angle, k0, k1):
 @pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
 def test_fast_spins_about_one_axis_make_as_many_turns_as_cost_least(speed):
     """There p(t) is a cubic, to σ and any number of turns; the optimum costs no more."""
-    rng, count = np.random.default_rng(speed), 60 if speed < 30 else 15
+    rng, count = np.random.default_rng(speed), 30 if speed < 30 else 8
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
     turn, *rates = (x[:, None] * axis for x in (sigma, k0, k1))
@@ -173,12 +159,11 @@ def test_near_half_turns_converge(short_of):
     assert curves.cost == pytest.approx(np.full(5, 24 * (np.pi - short_of) ** 2), rel=1e-9)
     tumbling = rb.minimum_acceleration_so3(I3, R1, [1, 2, 3], [-3, 0, 1])
     assert tumbling.residual.max() < 1e-11
-    for i, R in enumerate(R1):
-        alone = rb.minimum_acceleration_so3(I3, R, [1, 2, 3], [-3, 0, 1])
-        assert np.abs(tumbling(TIMES)[:, i] - alone(TIMES)).max() < 1e-10
+    alone = rb.minimum_acceleration_so3(I3, R1[1], [1, 2, 3], [-3, 0, 1])
+    assert np.abs(tumbling[1](TIMES) - alone(TIMES)).max() < 1e-10
 
 
-@pytest.mark.parametrize("seed", [None, 1, 2])
+@pytest.mark.parametrize("seed", [None, 1])
 def test_along_a_path_of_goals_the_cost_has_no_jump(seed):
     """Where two families cross it bends; a step then is no larger than its neighbours."""
     ends = random_ends(np.random.default_rng(seed), np.pi, 12, 1)[:, 0]
@@ -203,9 +188,9 @@ def test_tiny_motions_cost_what_their_cubic_costs(power):
 def test_free_motions_cost_nothing(what):
     """Euler's equations, by SciPy; the ends of the motion lead back to it, at speeds up to 16."""
     rng, few = np.random.default_rng(16), [np.diag([1.0, 2, 2.9]), BOOK]
-    w = rng.normal(size=(40, 3))
-    w *= rng.uniform(3, 16, (40, 1)) / np.linalg.norm(w, axis=1, keepdims=True)
-    w, G = (np.vstack([[[0.8, 0.1, 1.2], [1, 2, 0.3]], w]), np.concatenate([few, bodies(40, 17)]))
+    w = rng.normal(size=(12, 3))
+    w *= rng.uniform(3, 16, (12, 1)) / np.linalg.norm(w, axis=1, keepdims=True)
+    w, G = (np.vstack([[[0.8, 0.1, 1.2], [1, 2, 0.3]], w]), np.concatenate([few, bodies(12, 17)]))
     A, rates = rb.geodesic_flow(G, I3, w, [0.0, 0.5, 1.0])
     curves = OPTIMA[what](I3, A[2], w, rates[2], G)
     assert np.all(curves.cost < 1e-15)
@@ -216,12 +201,30 @@ def test_free_motions_cost_nothing(what):
         assert np.all(cost < 1e-18 * G[:2].max(axis=(1, 2)) ** 2)
 
 
+def wandering(R0, R1, rng):
+    """A random curve, which turns either way round."""
+    turn = rb.log_so3(R0.T @ R1)
+    turn *= 1 - 2 * np.pi * rng.integers(2) / np.linalg.norm(turn)
+    bends = np.exp(rng.uniform(np.log(0.1), np.log(2))) * rng.normal(size=(2, 3))
+    return lambda t: (
+        R0 @ rb.exp_so3(np.outer(t, turn) + np.sin(np.pi * np.outer(t, [1, 2])) @ bends)
+    )
+
+
 @pytest.mark.parametrize("what", ["acceleration", "torque", "jerk"])
 def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
-    problems = random_problems(16, 84)
-    problems[4][:] = bodies(16, 85)
-    least = least_costs(what, problems, 8, seed=86)
-    assert np.all(OPTIMA[what](*problems).cost < least * (1 + 1e-6))
+    """It finds most of ours."""
+    problems, rng = random_problems(6, 84), np.random.default_rng(86)
+    problems[4][:] = bodies(6, 85)
+    best, least = OPTIMA[what](*problems).cost, np.full(6, np.inf)
+    for i, _ in np.ndindex(6, 4):
+        *ends, G, a0, a1 = some(problems, i)
+        u, more = partial(deviation, what, G), [a0, a1] * (what == "jerk")
+        near = wandering(*ends[:2], rng)
+        _, cost = oracles.least_directly(u, [*ends, *more], near, terms=8, nodes=40)
+        least[i] = min(least[i], cost)
+    assert np.all(best < least * (1 + 1e-6))
+    assert np.mean(least < 1.01 * best) > 0.6
 
 
 @pytest.mark.parametrize("case", KNOWN)
@@ -278,17 +281,15 @@ def is_the_same_however_rounded(make, R1, rng, count):
     return first
 
 
-@pytest.mark.parametrize("turn", [110, 120, 140, 170])
+@pytest.mark.parametrize("turn", [110, 140])
 @pytest.mark.parametrize("frame", [I3, rb.exp_so3([0.3, -0.5, 0.2])])
 def test_of_two_best_curves_rounding_does_not_choose(turn, frame):
     """From rest about the axis of the largest moment: a half-turn about it carries one into the
     other."""
     G, axis = frame @ BOOK @ frame.T, frame[:, 2]
+    goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(
-        lambda R1: rb.minimum_torque_so3(I3, R1, REST, REST, G),
-        rb.exp_so3(np.radians(turn) * axis),
-        turn,
-        4,
+        lambda R1: rb.minimum_torque_so3(I3, R1, REST, REST, G), goal, turn, 4
     )
     assert np.abs(np.cross(w, axis)).max() > 0.1  # it leaves the axis
 

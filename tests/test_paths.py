@@ -95,24 +95,22 @@ def test_equal_neighbours_are_a_rest(leg):
     assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
 
 
-@pytest.mark.parametrize("ratio", [1, 10, 100, 1e4])
-@pytest.mark.parametrize("leg", [rb.projected_cubic_so3, rb.projected_quintic_so3])
-def test_uneven_steps_cost_no_digits(leg, ratio):
-    """At the poses, just before them, and in the joints; a rate to eps of ‖w‖ and ‖w‖² + ‖w'‖."""
+@pytest.mark.parametrize("ratio", [1, 100, 1e4])
+def test_uneven_steps_cost_no_digits_and_their_quintics_are_the_nearest_rotations(ratio):
+    """At the poses, just before them, and in the joints; a rate to eps of ‖w‖ and ‖w‖² + ‖w'‖.
+
+    Against 60 digits: the rounding of M, however large, over its two least eigenvalues.
+    """
     steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
     times = np.append(0, np.cumsum(steps))
-    c = rb.chain(times, POSES, leg=leg)
-    assert np.abs(c(times) - POSES).max() < 8 * EPS
-    assert np.abs(c.legs.at_own_times(steps) - POSES[1:]).max() < 8 * EPS
-    speed = np.abs(c(times, 1)).max()
-    scales = 1, speed, speed**2 + np.abs(c(times, 2)).max()
-    for order in range(3 if leg is rb.projected_quintic_so3 else 2):
-        assert np.abs(c.jumps(order)).max() < 20 * EPS * scales[order]
-
-
-@pytest.mark.parametrize("ratio", [1, 100, 1e4])
-def test_quintics_between_uneven_times_are_the_nearest_rotations(ratio):
-    """Against 60 digits; the rounding of M, however large, over its two least eigenvalues."""
+    for leg, smooth in ((rb.projected_cubic_so3, 1), (rb.projected_quintic_so3, 2)):
+        c = rb.chain(times, POSES, leg=leg)
+        assert np.abs(c(times) - POSES).max() < 8 * EPS
+        assert np.abs(c.legs.at_own_times(steps) - POSES[1:]).max() < 8 * EPS
+        speed = np.abs(c(times, 1)).max()
+        scales = 1, speed, speed**2 + np.abs(c(times, 2)).max()
+        for order in range(smooth + 1):
+            assert np.abs(c.jumps(order)).max() < 20 * EPS * scales[order]
     times = np.append(0, np.cumsum([1, ratio, 1, ratio, ratio, 1, 1, ratio]))
     legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic_so3).legs
     for i, share in zip(range(N - 1), [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9, 0.3, 0.6, 0.9], strict=True):
@@ -136,22 +134,18 @@ def test_without_velocities_it_is_the_spline_that_rests_at_its_ends(poses):
     assert np.abs(quintic(TIMES[[0, -1]], 2)).max() < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("leg", "other"),
-    [
-        (lambda R0, R1, a0, a1, **T: rb.geodesic_so3(R0, R1, **T), rb.projected_quintic_so3),
-        (lambda R0, R1, w0, **T: rb.geodesic_so3(R0, R1, **T), rb.projected_cubic_so3),
-    ],
-)
-def test_the_origin_has_as_many_ends_as_legs_ask_for(leg, other):
-    """Of legs that ask for accelerations a quintic, for one velocity a cubic."""
-    t = np.linspace(*TIMES[[0, -1]], 50)
-    path, same = (rb.chain(TIMES, POSES, leg=one)(t)[:, :3, 3] for one in (leg, other))
-    assert np.abs(path - same).max() < 1e-13
-
-
 def test_own_functions_make_legs():
-    """Also partial ones, and those whose curves are many paths and one rotation."""
+    """Also partial ones, and those whose curves are many paths and one rotation.
+
+    The origin has as many ends as they ask for: with an acceleration a quintic, else a cubic.
+    """
+    t = np.linspace(*TIMES[[0, -1]], 50)
+    for same, turn in (
+        (rb.projected_quintic_so3, lambda R0, R1, a1, **T: rb.geodesic_so3(R0, R1, **T)),
+        (rb.projected_cubic_so3, lambda R0, R1, w0, **T: rb.geodesic_so3(R0, R1, **T)),
+    ):
+        path, want = (rb.chain(TIMES, POSES, leg=leg)(t)[:, :3, 3] for leg in (turn, same))
+        assert np.abs(path - want).max() < 1e-13
 
     def slow(R0, R1, duration=1):
         rest = np.zeros(3)
@@ -168,7 +162,6 @@ def test_own_functions_make_legs():
     assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
     places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
     c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))
-    t = np.linspace(*c.domain, 50)
     for order in range(3):
         assert np.abs(c(t, order) - other(t, order)).max() < 1e-12
 
@@ -214,6 +207,7 @@ PATHS = [
     (([0, 1], [-np.eye(3)] * 2), "poses[0] is no rotation (project_so gives"),
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
+SCREWS = partial(rb.chain, leg=rb.screw_se3)
 LATE = rb.chain([1e9, 2e9], ROTATIONS[:2])
 UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
 
@@ -225,11 +219,7 @@ UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
         *((rb.bessel_velocities, *path) for path in PATHS),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) wanted, got (2"),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 wanted, one a pose, got 3"),
-        (
-            partial(rb.chain, leg=rb.screw_se3),
-            (TIMES, POSES, TWISTS),
-            "velocities: the legs ask fo",
-        ),
+        (SCREWS, (TIMES, POSES, TWISTS), "velocities: the legs ask fo"),
         (LATE, (3.5,), "t is 3.5, a time in [1000000000, 2000000000] is"),
         (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
         (rb.retime, (np.sin, 1), "curve: a Curve wanted, got"),
@@ -277,22 +267,6 @@ def test_retimed_chains_are_run_through_evenly(duration):
     assert np.abs(again.legs.duration / H * np.ptp(TIMES) / 1e-3 - 1).max() < 1e-5
     assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
     assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
-
-
-def test_costs_of_chains_and_retimed_curves():
-    """Squared accelerations by Gauss's rule on each half of each leg."""
-    c = rb.chain(TIMES, POSES)
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    cuts = np.sort(np.append(TIMES, TIMES[:-1] + H / 2))
-    halves = np.diff(cuts)[:, None] / 2
-    squares = c(cuts[:-1, None] + halves * (1 + nodes), 2) ** 2
-    found = np.einsum("i,j,ijk->k", halves[:, 0], weights, squares).reshape(2, 3).sum(axis=1)
-    assert rb.acceleration_cost_parts(c) == pytest.approx(found * [2, 1], rel=1e-9)
-    twice = rb.retime(c, 2 * (TIMES[-1] - TIMES[0]))
-    assert rb.acceleration_cost(twice) == pytest.approx(rb.acceleration_cost(c) / 8, rel=1e-12)
-    stack = rb.projected_cubic_so3(ROTATIONS[:-1], ROTATIONS[1:], TWISTS[1:, :3], TWISTS[1:, 3:])
-    third = rb.acceleration_cost(rb.retime(stack, 1 / 3))
-    assert np.allclose(third, 27 * rb.acceleration_cost(stack), rtol=1e-12, atol=0)
 
 
 def test_a_chain_whose_velocity_jumps_has_no_cost():

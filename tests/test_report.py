@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 import rbcourse as rb
 from rbcourse import report as rr
-from rbcourse.draw.save import COLOURS
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(9)
@@ -122,14 +121,9 @@ def strokes_of(figure):
     return np.transpose(strokes.get_data_3d()).reshape(-1, 3, 3)[:, :2]
 
 
-def is_saved_small(animation, folder):
-    animation.save(folder / "shown.gif")
-    return (folder / "shown.gif").stat().st_size < 500_000
-
-
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize("quaternion", [True, False])
-def test_random_rotations_are_those_of_the_samplers_and_are_shown(quaternion, tmp_path):
+def test_random_rotations_are_those_of_the_samplers_and_are_shown(quaternion):
     one = rr.random_quaternion if quaternion else rr.random_rotation_matrix
     for choice, steps in (({}, 5 if quaternion else 100), ({"naive": True}, 3)):
         naive = bool(choice)
@@ -146,7 +140,6 @@ def test_random_rotations_are_those_of_the_samplers_and_are_shown(quaternion, tm
         assert f"under {steps} random rotations" in animation.alt
         assert len(animation.pictures) == steps + 1
         assert animation.seconds == pytest.approx(max(4, (steps + 1) / 25))
-        assert is_saved_small(animation, tmp_path)
 
 
 @pytest.mark.parametrize("function", [rb.exp_so3, rb.quaternion_from_rotation_vector])
@@ -182,55 +175,46 @@ def test_paths_have_ten_steps_and_plans_are_in_the_world_by_default():
     assert np.array_equal(path, [[0, 1], [2, -1], [2, 2]])
 
 
-def data_of(line):
-    return np.transpose(line.get_data())
-
-
 def edges_of(figure):
     return np.linalg.norm(np.diff(figure.axes[0].patches[-1].get_xy(), axis=0), axis=1)[:4]
 
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7", "RR 4.3", "RR Fig. 8", "RR Fig. 9")
 @pytest.mark.parametrize(("states", "pale"), [(1, [0]), (12, [0, 2, 4, 7, 9, 11])])
-def test_paths_are_shown(states, pale, tmp_path):
+def test_paths_are_shown(states, pale):
     """Six states at most are pale; the last one is drawn over them."""
     path, arm_path = PATH[:states], ARM_PATH[:states]
     figure, animation = rr.visualize_path(path)
     arm, arm_animation = rr.visualize_arm_path(arm_path)
     _, other = rr.visualize_arm_path(path[:1], lengths=[1, 2, 3])
     assert "links of 1, 2 and 3 m" in other.alt
-    other, _ = rr.visualize_path(path[:1], length=0.3)
-    assert np.allclose(edges_of(other), [0.3, 0.15] * 2)
+    assert np.allclose(edges_of(rr.visualize_path(path[:1], length=0.3)[0]), [0.3, 0.15] * 2)
     for shown, player in ((figure, animation), (arm, arm_animation)):
         assert isinstance(shown, Figure)
         assert len(player.pictures) == len(player.states) == states
-        assert is_saved_small(player, tmp_path)
-        assert "<script>" in player._repr_html_()
     assert animation.alt.startswith("A rectangle goes from (")
-    way = next(line for line in figure.axes[0].lines if line.get_color() == COLOURS["path"])
-    assert np.array_equal(data_of(way), path[:, :2])
     *others, body = figure.axes[0].patches
     centres = [patch.get_xy()[:4].mean(axis=0) for patch in (*others, body)]
     assert np.abs(centres - path[[*pale, -1], :2]).max() < 1e-14
     assert all(body.get_zorder() > other.get_zorder() for other in figure.axes[0].lines[:-1])
     assert arm_animation.alt.startswith("An arm with links of 2 and 1.5 m turns its joints from")
-    *others, links, way = arm.axes[0].lines
+    *others, links, way = (np.transpose(line.get_data()) for line in arm.axes[0].lines)
     joints = rb.arm.arm_forward_kinematics(arm_path).joints
-    assert np.array_equal(data_of(way), joints[:, -1])
-    assert np.array_equal(data_of(links), joints[-1])
-    assert np.abs([data_of(line) for line in others] - joints[pale]).max() < 1e-14
-    for line, channel in ((links, 2), (way, 0)):  # blue, and red
-        assert np.argmax(plt.matplotlib.colors.to_rgb(line.get_color())) == channel
+    assert np.array_equal(way, joints[:, -1])
+    assert np.array_equal(links, joints[-1])
+    assert np.abs(np.array(others) - joints[pale]).max() < 1e-14
 
 
-def test_of_a_long_path_forty_states_are_frames_and_all_are_drawn(tmp_path):
-    """The file is small, though the way covers the plane."""
+def test_of_a_long_path_forty_states_are_frames_and_the_file_is_small(tmp_path):
+    """Though the way covers the plane. So is that of a hundred random rotations."""
     t = np.linspace(0, 1, 10_000)
     path = np.transpose([1.3 * np.cos(716.9 * t), np.sin(245.86 * t), 50 * t])
     figure, animation = rr.visualize_path(path)
     assert len(animation.pictures) == 40
     assert any(len(line.get_xdata()) == len(path) for line in figure.axes[0].lines)
-    assert is_saved_small(animation, tmp_path)
+    for one in (animation, rr.visualize(False, rng=4)[1]):
+        one.save(tmp_path / "shown.gif")
+        assert (tmp_path / "shown.gif").stat().st_size < 500_000
 
 
 @pytest.mark.parametrize("place", [[1.1, 0.7], [1e14, 0]])
@@ -268,24 +252,18 @@ BAD = [
     (rr.correct_SEn, ([[1]],), r"m: shape .*n\+1.* wanted, got \(1, 1\)"),
     (rr.correct_SEn, (np.full((3, 3), np.inf),), r"m\[0, 0\] is inf"),
     (rr.random_rotation_matrix, (42,), "naive: True or False wanted, got 42"),
-    (rr.random_quaternion, ("no",), "naive: True or False wanted, got 'no'"),
     *((rr.visualize, (x,), "quaternion: True or False wanted, got") for x in (0, None)),
     *((rr.visualize_rotation, (x,), "rotation: ") for x in (np.eye(2), NINE, [2, 0, 0, 0])),
-    (rr.visualize_rotation, ([np.eye(3)],), "rotation: "),
     (rr.visualize_rotation, (np.eye(3), {"steps": 0}), "steps: an integer from 1 up wanted, got 0"),
     (rr.interpolate_rigid_body, ([0, 0], [1, 1, 1]), r"start_pose: shape \(3\)"),
     (rr.interpolate_rigid_body, ([0, 0, 0], [[1, 1, 1]]), r"goal_pose: shape \(3\)"),
     (rr.forward_propagate_rigid_body, ([0, 0, np.nan], []), r"start_pose\[2\] is nan"),
     (rr.interpolate_arm, ([0, 0], [1, 1, 1]), r"goal: shape \(2\) wanted"),
-    (rr.interpolate_arm, ([[0, 0]], [1, 1]), r"start: shape \(n\) wanted"),
     (rr.forward_propagate_arm, ([[0, 0]], []), r"start_pose: shape \(n\) wanted"),
-    (rr.visualize_path, (np.zeros((0, 3)),), "path: shape"),
     (rr.visualize_path, ([[0, 0]],), "path: shape"),
     (rr.visualize_path, ([[0, 0, np.inf]],), r"path\[0, 2\] is inf"),
     (rr.visualize_path, ([[0, 0, 0]], {"length": 0}), "length: above 0 wanted, and enough"),
     (rr.visualize_path, ([[1e17, 0, 0]], {"length": 1}), "length: above 0 wanted, and"),
-    (rr.visualize_path, ([[0, 0, 0]], {"length": np.nan}), "length is nan"),
-    (rr.visualize_arm_path, (np.zeros((0, 2)),), "path: shape"),
     (rr.visualize_arm_path, (np.ones((3, 4)),), r"lengths: shape \(4\) wanted, got \(2,\)"),
     (rr.visualize_arm_path, ([[0, 0]], {"lengths": [1, -1]}), r"lengths\[1\] is -1"),
 ]

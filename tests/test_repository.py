@@ -5,6 +5,7 @@ import importlib.metadata
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -60,12 +61,19 @@ def read(name):
     return (ROOT / name).read_text("utf-8")
 
 
-def test_the_first_list_contains_the_course_and_all_lists_are_exact():
+def test_all_lists_are_exact_agree_and_the_first_one_installs_the_course_without_other_tools():
+    versions = {}
     for name, lines in LISTS.items():
         editable = [line.split("#")[0].strip() for line in lines if line.startswith("-")]
         assert editable == (["-e .", "-e ./classroom"] if name == "environment.txt" else [])
         for pin in PINS[name]:
             assert re.fullmatch(r"==[\w.]+", str(pin.specifier)), pin
+            assert versions.setdefault((pin.name, str(pin.marker)), pin.specifier) == pin.specifier
+    others = {"nbgrader", "voila", "sympy", "sphinx", "pytest", "nbval", "mypy", "ruff", "notebook"}
+    assert not {canonical(pin.name) for pin in PINS["environment.txt"]} & others
+    peers = [Requirement(line) for line in PROJECT["optional-dependencies"]["peers"]]
+    assert all(re.fullmatch(r"==[\d.]+", str(peer.specifier)) for peer in peers)
+    assert not {peer.name for peer in peers} & {name for name, _ in versions}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -76,24 +84,10 @@ def test_each_list_is_complete_and_in_the_ranges_of_its_distributions(name):
     ranges = ranges_of(name)
     for range_ in ranges:
         assert range_.specifier.contains(str(pins[canonical(range_.name)].specifier)[2:]), range_
+        bounded = any(part.operator == ">=" for part in range_.specifier)
+        assert bounded or name not in NAMES[:2], range_
     needed = {canonical(each.name) for each in distributions_for(map(str, ranges))}
     assert needed <= there | {"pip"}
-
-
-def test_the_environment_of_students_has_no_tools_of_teachers_and_maintainers():
-    there = {canonical(pin.name) for pin in PINS["environment.txt"]}
-    others = {"nbgrader", "voila", "sympy", "sphinx", "pytest", "nbval", "mypy", "ruff", "notebook"}
-    assert not there & others
-
-
-def test_no_distribution_is_in_two_lists_with_different_versions():
-    pins = {}
-    for pin in (pin for name in NAMES for pin in PINS[name]):
-        assert pins.setdefault((pin.name, str(pin.marker)), pin.specifier) == pin.specifier
-
-
-def test_the_core_needs_numpy_and_scipy_only():
-    assert {Requirement(line).name for line in PROJECT["dependencies"]} == {"numpy", "scipy"}
 
 
 @pytest.mark.parametrize("document", ["README.md", "docs/conventions.md"])
@@ -106,30 +100,18 @@ def test_examples_of_documents_run(document, tmp_path, monkeypatch):
     assert not failed
 
 
-def test_binder_gets_the_same_environment():
+def test_binder_the_citation_and_the_licences_agree_with_the_package():
     assert read(".binder/requirements.txt").split() == ["-r", "../environment.txt"]
-
-
-def test_binder_gets_a_python_that_the_package_takes():
     python = read(".binder/runtime.txt").strip().removeprefix("python-")
     assert SpecifierSet(PROJECT["requires-python"]).contains(python)
-
-
-def test_every_file_has_the_same_version():
-    version = rbcourse.__version__
-    assert re.search(r"^version: (.*)$", read("CITATION.cff"), re.MULTILINE)[1] == version
+    assert {Requirement(line).name for line in PROJECT["dependencies"]} == {"numpy", "scipy"}
+    version, citation = rbcourse.__version__, read("CITATION.cff")
+    assert re.search(r"^version: (.*)$", citation, re.MULTILINE)[1] == version
     assert re.search(r"^## (\S+)", read("CHANGELOG.md"), re.MULTILINE)[1] == version
     assert rbclassroom.__version__ == version
-
-
-def test_the_citation_names_both_sources():
-    citation = read("CITATION.cff")
-    assert "10.1243/0954406021524909" in citation
     for name in ("Belta", "Kumar", "Samayamantula", "Zou"):
         assert f"family-names: {name}" in citation
-
-
-def test_both_licences_are_stated():
+    assert "10.1243/0954406021524909" in citation
     assert read("LICENSE").startswith("MIT License")
     assert "CC BY 4.0" in read("README.md")
 
@@ -141,37 +123,34 @@ def test_every_file_that_the_readme_points_to_is_there():
         assert target.startswith("https://") or (ROOT / target).exists(), target
 
 
-def course(*words, code="", folder=ROOT):
-    """Run course.py in a new Python, after some other code."""
-    source = f"""
-        import runpy, sys
-        sys.argv[1:] = {list(words)!r}
-        {code}
-        runpy.run_path({str(ROOT / "course.py")!r}, run_name="__main__")
-    """
-    return subprocess.run(
-        [sys.executable, "-c", dedent(source)], capture_output=True, text=True, cwd=folder
-    )
+@pytest.mark.parametrize(
+    ("words", "version", "message"),
+    [
+        (["figures"], (3, 10, 13), r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\."),
+        (["figure"], None, r"(?s).*There is no task 'figure'\. Choose from: lab, check.*"),
+    ],
+)
+def test_an_old_python_and_a_wrong_task_are_named(words, version, message, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["course.py", *words])
+    monkeypatch.setattr(sys, "version_info", version or sys.version_info)
+    with pytest.raises(SystemExit) as left:
+        runpy.run_path(str(ROOT / "course.py"), run_name="__main__")
+    said = capsys.readouterr()
+    assert re.fullmatch(message, (said.err or str(left.value.code)).strip())
+    assert said.out == ""
 
 
-def test_an_old_python_is_told_so_in_one_line():
-    done = course("figures", code="sys.version_info = (3, 10, 13)")
-    assert done.returncode == 1
-    assert done.stdout == ""
-    assert re.fullmatch(r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\.\n", done.stderr)
-
-
-def test_a_wrong_task_is_named():
-    done = course("figure")
-    assert done.returncode == 2
-    assert "There is no task 'figure'. Choose from: lab, check" in done.stderr
-
-
-def test_without_a_task_the_tasks_are_listed():
-    done = course()
-    assert done.returncode == 0
-    for task in course_module().TASKS:
-        assert re.search(rf"^ +{task} +\w", done.stdout, re.MULTILINE), task
+def test_without_a_task_the_tasks_are_listed_and_a_failed_command_shows_its_last_output(
+    monkeypatch, capsys
+):
+    module = course_module()
+    monkeypatch.setattr(sys, "argv", ["course.py"])
+    module.main()
+    said = capsys.readouterr().out
+    for task in module.TASKS:
+        assert re.search(rf"^ +{task} +\w", said, re.MULTILINE), task
+    with pytest.raises(module.SetUpError, match=r"^no network\n$"):
+        module.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
 
 
 def test_uv_does_not_make_an_environment_of_its_own():
@@ -215,12 +194,17 @@ def installed(done):
     return [command[command.index("-r") + 1 :: 2] for command in done if "-r" in command]
 
 
-def test_environments_grow_and_are_set_up_once(setting_up):
+def test_environments_grow_and_a_list_is_installed_once_and_again_in_place_when_it_changes(
+    setting_up,
+):
     module, done = setting_up
     for environment in ("lessons", "lessons", "teach", "test", "test", "lessons"):
         module.set_up(environment)
     lessons, teach, book, test = module.LISTS.values()
     assert installed(done) == [[lessons], [teach], [book, test]]
+    (module.ROOT / teach).write_text("scipy")
+    module.set_up("teach")
+    assert teach in installed(done)[3]
     assert sum("venv" in command for command in done) == 1
 
 
@@ -242,14 +226,6 @@ def test_the_environment_is_made_anew_when_needed(setting_up, disturb):
     module.set_up("lessons")
     assert sum("venv" in command for command in done) == 2
     assert not (module.VENV / "old").exists()
-
-
-def test_a_changed_list_of_another_environment_is_installed_again_in_place(setting_up):
-    module, done = setting_up
-    module.set_up("teach")
-    (module.ROOT / module.LISTS["teach"]).write_text("scipy")
-    module.set_up("teach")
-    assert installed(done)[1:] == [[module.LISTS["teach"]]]
 
 
 def test_an_environment_of_another_tool_is_left_alone(setting_up):
@@ -348,11 +324,6 @@ def test_other_releases_are_tested_in_an_environment_of_their_own(which, monkeyp
             releases.main()
 
 
-def test_every_range_has_a_lower_bound():
-    for range_ in (range_ for name in NAMES[:2] for range_ in ranges_of(name)):
-        assert any(part.operator == ">=" for part in range_.specifier), range_
-
-
 @pytest.mark.parametrize(("edit", "folder"), [(False, "work"), (True, "notebooks")])
 def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
     edit, folder, tmp_path, monkeypatch
@@ -385,12 +356,6 @@ def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
     assert "invert" in Path(styles, "custom.css").read_text()
 
 
-def test_the_last_output_of_a_command_that_fails_is_kept():
-    module = course_module()
-    with pytest.raises(module.SetUpError, match=r"^no network\n$"):
-        module.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
-
-
 def test_the_last_lesson_cites_what_the_citation_file_has():
     shown = re.sub(r"[{}]", "", read("notebooks/14_take_it_away.ipynb"))
     both, _ = read("CITATION.cff").split("- type: report")
@@ -401,14 +366,6 @@ def test_the_last_lesson_cites_what_the_citation_file_has():
     assert said["title"] in shown
 
 
-def test_the_peers_of_the_benchmarks_are_exact_and_not_in_the_environment():
-    extras = PROJECT["optional-dependencies"]
-    peers = [Requirement(line) for line in extras["peers"]]
-    assert {peer.name for peer in peers} == {"roma", "torch"}
-    assert not {peer.name for peer in peers} & {pin.name for name in NAMES for pin in PINS[name]}
-    assert all(re.fullmatch(r"==[\d.]+", str(peer.specifier)) for peer in peers)
-
-
 def test_every_task_has_a_row_for_users_in_the_readme_or_for_maintainers_in_contributing():
     rows = r"^\| `(?:python3 )?course\.py (\w+)"
     users, maintainers = (
@@ -416,27 +373,19 @@ def test_every_task_has_a_row_for_users_in_the_readme_or_for_maintainers_in_cont
     )
     assert users == ["lab", "check", "book", "lecture", "handout", "collect", "grade"]
     assert {*users, *maintainers} == set(course_module().TASKS)
-
-
-def test_the_readme_is_one_page():
     assert len(read("README.md").splitlines()) <= 130
 
 
-def built(place, folder):
-    code = f"from flit_core import buildapi; buildapi.build_wheel({str(folder)!r})"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT / place, check=True)
-    (path,) = folder.glob("*.whl")
-    return path
-
-
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    return built("", tmp_path_factory.mktemp("wheel"))
-
-
-@pytest.fixture(scope="module")
-def classroom_wheel(tmp_path_factory):
-    return built("classroom", tmp_path_factory.mktemp("wheel"))
+def wheels(tmp_path_factory):
+    """The wheels of rbcourse and of rbcourse-classroom."""
+    folder = tmp_path_factory.mktemp("wheels")
+    code = f"from flit_core import buildapi; print(buildapi.build_wheel({str(folder)!r}))"
+    words = [sys.executable, "-c", code]
+    return [
+        folder / subprocess.check_output(words, cwd=ROOT / place, text=True).strip()
+        for place in ("", "classroom")
+    ]
 
 
 def distributions_for(requirements):
@@ -463,19 +412,17 @@ TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # what is installed, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
-    "rbclassroom": (
-        [*DRAW, *CLASSROOM["dependencies"]],
-        [*NEEDS_LECTURE, *NEEDS_GRADING, "book"],
-    ),
+    "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_LECTURE, *NEEDS_GRADING, "book"]),
     "rbclassroom[lecture,grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], []),
 }
 
 
 @pytest.mark.parametrize("case", IMPORTED)
-def test_wheels_import_completely_with_their_declared_dependencies(
-    wheel, classroom_wheel, tmp_path, case
-):
-    """In an environment that has nothing else: links to the distributions, and the wheels."""
+def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_path, case):
+    """In an environment that has nothing else: links to the distributions, and the wheels.
+
+    The lines of the README run with NumPy and SciPy alone.
+    """
     installed, without = IMPORTED[case]
     package = case.partition("[")[0]
     for distribution in distributions_for(installed):
@@ -483,7 +430,7 @@ def test_wheels_import_completely_with_their_declared_dependencies(
             link = tmp_path / top
             if not link.exists():
                 link.symlink_to(distribution.locate_file(top))
-    for path in (wheel, classroom_wheel)[: 1 + (package == "rbclassroom")]:
+    for path in wheels[: 1 + (package == "rbclassroom")]:
         ZipFile(path).extractall(tmp_path)
     code = f"""
         import importlib, pkgutil, sys
@@ -495,53 +442,28 @@ def test_wheels_import_completely_with_their_declared_dependencies(
                 importlib.import_module(module.name)
                 print(name)
     """
-    words = [sys.executable, "-I", "-S", "-W", "ignore", "-c", dedent(code)]
-    done = subprocess.run(words, capture_output=True, text=True)
+    readme = re.search(r"```python\n(.*?)```", read("README.md"), re.DOTALL)[1]
+    lines = re.findall(r"^>>> (.*)$", readme, re.MULTILINE) if case == "rbcourse" else []
+    words = [sys.executable, "-I", "-S", "-W", "ignore", "-c", "\n".join([dedent(code), *lines])]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
     assert done.stderr.splitlines()[-1:] == []
     assert len(done.stdout.split()) > 15
+    if lines:
+        assert len(lines) <= 10
+        header, *rows = (tmp_path / "motion.csv").read_text("utf-8").splitlines()
+        assert header.startswith("time [s],x [m],")
+        assert len(rows) == 101
+        assert rows[40].startswith("2.0,2.0")
 
 
-def test_the_lines_of_the_readme_run_from_the_wheel_with_numpy_and_scipy_alone(wheel, tmp_path):
-    code = re.search(r"```python\n(.*?)```", read("README.md"), re.DOTALL)[1]
-    lines = [line.removeprefix(">>> ") for line in code.splitlines() if line.startswith(">>> ")]
-    assert len(lines) <= 10
-    code = f"""
-        import sys
-        sys.path.insert(0, {str(wheel)!r})
-        known = {{"numpy", "scipy", "rbcourse", *sys.stdlib_module_names}}
-
-        class Nothing:
-            def find_spec(self, name, path=None, target=None):
-                if name.split(".")[0] not in known and not name.startswith("_"):
-                    raise ModuleNotFoundError(name)
-
-        sys.meta_path.insert(0, Nothing())
-        import rbcourse
-        assert rbcourse.__file__.startswith({str(wheel)!r})
-    """
-    code = "\n".join([dedent(code), *lines])
-    done = subprocess.run(
-        [sys.executable, "-I", "-c", code], capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.stderr == ""
-    header, *rows = (tmp_path / "motion.csv").read_text("utf-8").splitlines()
-    assert header.startswith("time [s],x [m],")
-    assert len(rows) == 101
-    assert rows[40].startswith("2.0,2.0")
-
-
-def test_the_wheel_carries_types_and_style(wheel):
-    names = ZipFile(wheel).namelist()
-    assert "rbcourse/py.typed" in names
-    assert {"rbcourse/rbcourse.mplstyle", "rbcourse/paper.mplstyle"} <= set(names)
-    assert not [name for name in names if not name.startswith("rbcourse")]
-    drawn = [name for name in names if name.startswith("rbcourse/draw/")]
-    assert len(names) - len(drawn) <= 46
-
-
-def test_the_classroom_carries_its_pages(classroom_wheel):
-    names = ZipFile(classroom_wheel).namelist()
-    assert "rbclassroom/course/lecture_view/index.html.j2" in names
-    assert {name.split("/")[0] for name in names} <= {"rbclassroom"} | {
-        name.split("/")[0] for name in names if ".dist-info" in name
-    }
+def test_wheels_carry_types_styles_and_pages_and_nothing_else(wheels):
+    for path, package, files in (
+        (wheels[0], "rbcourse", {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"}),
+        (wheels[1], "rbclassroom", {"course/lecture_view/index.html.j2"}),
+    ):
+        names = ZipFile(path).namelist()
+        assert {f"{package}/{file}" for file in files} <= set(names)
+        apart = "rbcourse/draw/", "rbclassroom/"
+        assert sum(not name.startswith(apart) for name in names) <= 46
+        tops = {name.split("/")[0] for name in names}
+        assert all(top == package or top.endswith(".dist-info") for top in tops)

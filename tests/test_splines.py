@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from numpy.polynomial import Polynomial
-from optima import BOOK, _polynomials, _quaternion_and_rates, _rates
-from scipy.interpolate import CubicSpline
+from numpy.polynomial import Chebyshev, Polynomial
+from optima import BOOK
+from scipy.interpolate import BPoly, CubicSpline
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation, RotationSpline
 
@@ -190,27 +190,38 @@ def least_cost(t, R, bodies):
     """The least cost of quaternions (p, v)/‖(p, v)‖, with p the cubic of the ends and v of a higher
     degree, and of any velocities at the rotations: no equation of Euler and Lagrange is used."""
     h, count, free = np.diff(t), len(R), 9
-    weight, hermite, bumps = _polynomials(2, free, 30)
-    turns = R[:-1].mT @ R[1:]
-    units = np.repeat(np.eye(3)[:, None], count - 1, axis=1)
-    first, last = (
-        [_quaternion_and_rates(Q, w, 0 * w)[:2] for w in units]
-        for Q in (0 * turns + np.eye(3), turns)
-    )
-    by_w = [np.stack([rate for _, rate in x], axis=-1) * h[:, None, None] for x in (first, last)]
+    x, weight = np.polynomial.legendre.leggauss(30)
+    s = (x + 1) / 2
+    hermite = BPoly.from_derivatives([0, 1], np.eye(4).reshape(2, 2, 4))
+    bump = Polynomial([0, 0, 1, -2, 1])
+    bumps = [bump * Chebyshev.basis(k, [0, 1]).convert(kind=Polynomial) for k in range(free)]
+    last = Rotation.from_matrix(R[:-1].mT @ R[1:]).as_quat(canonical=True, scalar_first=True)
+    start = [np.tile([1.0, 0, 0, 0], (count - 1, 1)), last]
+
+    def rate(q, w):
+        half = np.insert(w * h[:, None] / 2, 0, 0, axis=1)
+        return np.stack(oracles.quaternion_product(q.T, half.T), axis=-1)
 
     def residuals(x):
         w, v = x[: 3 * count].reshape(count, 3), x[3 * count :].reshape(count - 1, free, 3)
-        rates = [(by @ y[..., None])[..., 0] for by, y in zip(by_w, (w[:-1], w[1:]), strict=True)]
-        ends = np.stack([first[0][0], rates[0], last[0][0], rates[1]], axis=1)
-        c = np.insert(v, 0, 0, axis=-1)
-        w, a = _rates(*(H @ ends + b @ c for H, b in zip(hermite, bumps, strict=True)))
+        rates = [rate(q, y) for q, y in zip(start, (w[:-1], w[1:]), strict=True)]
+        ends, c = np.stack([start[0], rates[0], last, rates[1]], axis=1), np.insert(v, 0, 0, -1)
+        jets = (np.stack([b.deriv(k)(s) for b in bumps], axis=-1) @ c for k in range(3))
+        P, P1, P2 = (hermite(s, k) @ ends + jet for k, jet in enumerate(jets))
+        N = np.sum(P * P, axis=-1, keepdims=True)
+        w = 2 * vector(P, P1) / N
+        a = 2 * vector(P, P2) / N - 2 * np.sum(P * P1, axis=-1, keepdims=True) / N * w
         u = (a @ BOOK + np.cross(w, w @ BOOK)) / np.sqrt(2) if bodies else a
-        return (np.sqrt(2 * weight)[:, None] * u / h[:, None, None] ** 1.5).ravel()
+        return (np.sqrt(weight)[:, None] * u / h[:, None, None] ** 1.5).ravel()
 
-    start = np.append(textbook.spline_velocities(t, R).ravel(), np.zeros(3 * free * (count - 1)))
+    first = np.append(textbook.spline_velocities(t, R).ravel(), np.zeros(3 * free * (count - 1)))
     tolerances = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-15)
-    return 2 * least_squares(residuals, start, jac="cs", **tolerances).cost
+    return 2 * least_squares(residuals, first, jac="cs", **tolerances).cost
+
+
+def vector(p, q):
+    """The vector part of p̄ q."""
+    return p[..., :1] * q[..., 1:] - q[..., :1] * p[..., 1:] - np.cross(p[..., 1:], q[..., 1:])
 
 
 @pytest.mark.parametrize("bodies", [False, True])

@@ -93,32 +93,6 @@ def test_descriptions_give_numbers():
         assert words in said
 
 
-def test_an_arrow_has_its_barbs_at_its_tip_and_on_four_sides(axes):
-    along = np.array([1.0, -2, 2])
-    arrow = bodies.draw_arrow(axes[0], np.ones(3), along, "red")
-    start, tip, *others = np.transpose(arrow.get_data_3d())
-    assert np.array_equal(np.stack([start, tip]), [[1, 1, 1], [2, -1, 3]])
-    barbs, back = np.array(others[::2]) - tip, np.array(others[1::2]) - tip
-    assert not back.any()
-    assert np.abs(barbs.sum(axis=0) @ along + 4 * 0.12 * 3).max() < 1e-14
-    beside = barbs - np.outer(barbs @ along, along) / 9
-    assert np.linalg.matrix_rank(beside, tol=1e-12) == 2
-    assert np.abs(beside.sum(axis=0)).max() < 1e-15
-
-
-def test_the_room_has_names_with_units_and_numbers_where_they_are(axes):
-    low, high = np.array([-1.0, 2, 0]), np.array([11.0, 9, 5])
-    axes[0].fit(low, high)
-    bodies.draw_room(axes[0], low, high)
-    texts = [(text.get_text(), text.get_position_3d()) for text in axes[0].texts]
-    numbers = [(float(name.replace("−", "-")), at) for name, at in texts if name[-1] != ")"]
-    assert {"x (m)", "y (m)", "z (m)"} == {name for name, _ in texts if name[-1] == ")"}
-    assert all(value in place for value, place in numbers)
-    assert all(sum(place[k] == value for value, place in numbers) > 1 for k in range(3))
-    places = np.concatenate([np.transpose(line.get_data_3d()) for line in axes[0].lines])
-    assert ((places >= low) & (places <= high)).all()
-
-
 def test_tables_hold_the_poses_and_the_rates_with_their_units():
     table = bodies.pose_table({"t [1]": TIMES}, SCREW)
     wanted = {"t [1]": TIMES, "y [m]": SCREW[:, 1, 3], "R23 [1]": SCREW[:, 1, 2]}

@@ -144,19 +144,6 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     assert max(places[-1, 3] for places in line) == pytest.approx(steps.sum())
 
 
-def test_a_face_is_lightest_where_it_is_turned_to_the_light(ax):
-    shades = {}
-    for R in rb.sample_rotation(20, rng=np.random.default_rng(5)):
-        corners = bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), 1.0).corners[:6]
-        faces = space.Faces(corners, 6 * ["1"]).pieces(1.0, np.zeros(3))
-        for face, centre in zip(faces, corners.mean(axis=1), strict=True):
-            shades[float(centre @ space.LIGHT / np.linalg.norm(centre))] = face.fill[0]
-    assert np.linalg.norm(space.LIGHT) == pytest.approx(1)
-    found = [shades[towards] for towards in sorted(shades)]
-    assert (np.diff(found) >= 0).all()
-    assert found[0] < 0.6 < 0.95 < found[-1]
-
-
 def test_the_zorder_decides_in_the_plane_of_a_face_and_over_everything(ax):
     ax.plot([-0.4, 0.4], [0, 0], [0.5, 0.5], lw=3, zorder=9)
     bodies.draw_box(ax, np.eye(4), 1.0)
