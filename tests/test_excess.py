@@ -1,4 +1,5 @@
 import importlib.util
+import itertools
 import re
 from functools import cache, partial
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 
 import rbcourse as rb
 from rbclassroom.surveys.atlas import random_problems
+from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 
 ROOT = Path(__file__).parents[1]
@@ -85,6 +87,21 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
     for name, factor in wanted.items():
         found = FORMS[name].compose(list(at_rest.items())).exquo(12 * ss)
         assert found == factor * ss**2, name
+
+
+@pytest.mark.source("beyond BK 10")
+def test_the_deviation_in_the_package_is_the_derived_one():
+    """Exactly, with fractions, as polynomials in t."""
+    numbers = np.random.default_rng(5).integers(-9, 9, (3, 3))
+    vectors = np.array([[Q(int(n), 3) for n in row] for row in numbers])
+    u, bump = exact.RING(2) * exact.t - 1, exact.t**2 * (1 - exact.t) ** 2
+    pairs = itertools.combinations_with_replacement(vectors, 2)
+    symbols = exact.ss, exact.se, exact.sd, exact.ee, exact.ed, exact.dd
+    inner = [(s, x @ y) for s, (x, y) in zip(symbols, pairs, strict=True)]
+    theirs = [share.subs(inner) for share in exact.deviations()["bezier_so3"]]
+    for i in range(3):
+        ours = sum(c[i] * u**k for k, c in enumerate(bezier_deviation(*vectors)))
+        assert sum(v[i] * share for share, v in zip(theirs, vectors, strict=True)) == bump * ours
 
 
 @pytest.mark.source("beyond BK 10")
