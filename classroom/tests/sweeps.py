@@ -37,8 +37,8 @@ def settings(explorer):
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)
-    for signs in hadamard(8)[:, 1 : len(ranges) + 1]:
-        yield {name: x[0 if sign > 0 else -1] for (name, x), sign in zip(ranges.items(), signs)}
+    for ends in (hadamard(8)[:, 1 : len(ranges) + 1] - 1) // 2:  # 0 or -1
+        yield {name: ranges[name][end] for name, end in zip(ranges, ends, strict=True)}
 
 
 def _range(control):
