@@ -2,9 +2,9 @@
 
 import re
 from functools import cache
-from itertools import combinations, product
 
 import numpy as np
+from scipy.linalg import hadamard
 
 from rbclassroom import explorers
 
@@ -33,22 +33,20 @@ def sweep(name, **base):
 
 
 def settings(explorer):
-    """Each control at nine places of its range, then all pairs of extremes."""
+    """Each control at five places of its range; then all at extremes, each pair in every way."""
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)
-    for pair in combinations(ranges, 2):
-        for ends in product(*(ranges[name][:: len(ranges[name]) - 1] for name in pair)):
-            yield dict(zip(pair, ends, strict=True))
+    for ends in (hadamard(8)[:, 1 : len(ranges) + 1] - 1) // 2:  # 0 or -1
+        yield {name: ranges[name][end] for name, end in zip(ranges, ends, strict=True)}
 
 
 def _range(control):
     if hasattr(control, "step"):
-        steps = round((control.max - control.min) / control.step)
-        values = [control.min + i * control.step for i in range(steps)] + [control.max]
-    else:
-        values = [option[1] if isinstance(option, tuple) else option for option in control.options]
-    return [values[i] for i in np.unique(np.linspace(0, len(values) - 1, 9).round().astype(int))]
+        return np.linspace(control.min, control.max, 5)
+    if isinstance(control.options[0], str):
+        return control.options
+    return [control.options[i][1] for i in np.linspace(0, len(control.options) - 1, 5).astype(int)]
 
 
 def points(artist):

@@ -16,7 +16,6 @@ from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.handout import make_handout, make_solutions, release
 
 ROOT = Path(__file__).parents[3]
-SECRETS = ["return x * x", "half = 0.5", "square(-3)", "isclose", "Like signs", "Mark scheme"]
 
 
 @pytest.fixture(scope="module")
@@ -38,13 +37,9 @@ def unpacked(course, tmp_path_factory):
     return folder / "ps0"
 
 
-def wheels_in(folder):
-    return sorted(path.name for path in folder.glob("*.whl"))
-
-
 def test_the_handout_holds_what_a_student_needs(course, unpacked):
     names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*.*")}
-    wheels = wheels_in(unpacked)
+    wheels = sorted(path.name for path in unpacked.glob("*.whl"))
     assert [name.partition("-")[0] for name in wheels] == ["rbcourse", "rbcourse_classroom"]
     own = {"ps0.ipynb", "original/ps0.ipynb", "requirements.txt", "README.txt", "table.csv"}
     assert names == {*own, *wheels}
@@ -61,23 +56,12 @@ def test_the_handout_holds_what_a_student_needs(course, unpacked):
     assert readme.decode("ascii").startswith("Problem set ps0")
 
 
-def test_nothing_in_the_handout_gives_a_solution_away(unpacked):
-    texts = [path.read_bytes() for path in unpacked.rglob("*.*") if path.suffix != ".whl"]
-    for secret in SECRETS:
-        assert not [text for text in texts if secret.encode() in text], secret
-    wheels = [ZipFile(unpacked / name) for name in wheels_in(unpacked)]
-    texts = [wheel.read(name) for wheel in wheels for name in wheel.namelist()]
-    for secret in SECRETS[:1] + SECRETS[2:3] + SECRETS[4:5]:
-        assert not [text for text in texts if secret.encode() in text], secret
-
-
 def test_the_wheels_are_installed_from_the_unpacked_folder(unpacked, tmp_path):
     pip = [*MODULE, "pip", "install", "--no-deps", "--no-index", "--no-compile", "-q", "--target"]
-    wheels = [f"./{name}" for name in wheels_in(unpacked)]
+    wheels = [f"./{path.name}" for path in unpacked.glob("*.whl")]
     subprocess.run([*pip, str(tmp_path), *wheels], cwd=unpacked, check=True, capture_output=True)
-    code = "import rbclassroom; print(rbclassroom.__file__)"
+    words = [sys.executable, "-c", "import rbclassroom; print(rbclassroom.__file__)"]
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    words = [sys.executable, "-c", code]
     place = subprocess.check_output(words, cwd=tmp_path, env=environment, text=True)
     assert place.startswith(str(tmp_path))
 
@@ -100,29 +84,20 @@ def test_a_private_set_replaces_that_of_the_course(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("at", "old", "new", "message"),
+    ("at", "change", "message"),
     [
-        (3, "BEGIN HIDDEN TESTS", "BEGIN HIDEN TESTS", "gives away '### BEGIN HIDEN TESTS'"),
-        (6, "?", "?\nMark scheme: a point", "ps0.ipynb gives away 'Mark scheme'"),
-        (2, "### END SOLUTION", "", "cannot be released: no end solution statement found"),
-        (
-            7,
-            {"attachments": {"a.png": {"image/png": "AA=="}}},
-            "",
-            "nbgrader leaves the attachment",
-        ),
-        (2, {"metadata": {"note": "it is def square(x):"}}, "", r"gives away 'def square\(x\):'"),
+        (3, {"source": "### BEGIN HIDEN TESTS"}, "gives away '### BEGIN HIDEN TESTS'"),
+        (6, {"source": "Mark scheme: a point"}, "ps0.ipynb gives away 'Mark scheme'"),
+        (2, {"source": "### BEGIN SOLUTION"}, "be released: no end solution statement found"),
+        (7, {"attachments": {"a.png": {"image/png": "AA=="}}}, "nbgrader leaves the attachment"),
+        (2, {"metadata": {"note": "it is def square(x):"}}, r"gives away 'def square\(x\):'"),
     ],
 )
-def test_sets_that_give_something_away_are_refused(tmp_path, at, old, new, message):
+def test_sets_that_give_something_away_are_refused(tmp_path, at, change, message):
     path = write_tiny_set(tmp_path)
     notebook = nbformat.read(path, as_version=4)
     cell = notebook.cells[at]
-    if isinstance(old, str):
-        cell.source = cell.source.replace(old, new)
-    else:
-        cell.metadata |= old.pop("metadata", {})
-        cell |= old
+    cell.update(change, metadata=cell.metadata | change.get("metadata", {}))
     nbformat.write(notebook, path)
     with pytest.raises(ValueError, match=message):
         make_handout("ps0", tmp_path, ROOT)

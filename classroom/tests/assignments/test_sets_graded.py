@@ -13,13 +13,14 @@ import nbformat
 import pytest
 from nbgrader.api import Gradebook
 from nbgrader.utils import determine_grade
-from test_problems import SETS, SOURCE, TABLES, sets
+from test_problems import SETS, SOURCE, TABLES
 
+from rbclassroom.assignments.forbidden import find_in_cells
 from rbclassroom.assignments.grade import grade
-from rbclassroom.assignments.handout import make_handout, make_solutions, release
+from rbclassroom.assignments.handout import make_handout, release
 
-ROOT = SOURCE.parents[2]
-FIRST = next(iter(SETS))
+FIRST, *_, LAST = SETS
+UNSEEN = "HIDDEN TESTS|MARK SCHEME"
 
 
 def regions(name, kinds):
@@ -40,15 +41,6 @@ def points(name):
     return tests, {key: value for key, value in graded.items() if key not in tests}
 
 
-def answered(name, text, answer):
-    """The release with the answers that ``answer(grade_id, source)`` gives."""
-    notebook = nbformat.reads(text, as_version=4)
-    for cell in notebook.cells:
-        if cell.metadata.nbgrader.solution:
-            cell.source = answer(cell.metadata.nbgrader.grade_id, cell.source)
-    return nbformat.writes(notebook)
-
-
 def wrong(grade_id, source):
     """A wrong answer of the first set."""
     slug, table = grade_id.removesuffix("-answer"), TABLES[FIRST]
@@ -61,24 +53,27 @@ def wrong(grade_id, source):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """A course in which all sets were graded: solved, the first one wrong and untouched too.
+    """A course in which two sets were graded: solved, the first one wrong and untouched too.
 
     Another student solves each, so that all can be graded at once.
     """
     folder = tmp_path_factory.mktemp("course")
     shutil.copytree(SOURCE, folder / "source")
     shutil.copy(SOURCE.parent / "nbgrader_config.py", folder)
-    given = {name: release(name, folder)[f"{name}.ipynb"].decode() for name in SETS}
-    handed_in = {(FIRST, "untouched"): given[FIRST]}
-    handed_in[FIRST, "wrong"] = answered(FIRST, given[FIRST], wrong)
-    for name, text in given.items():
-        model = {cell.metadata.nbgrader.grade_id: cell.source for cell in SETS[name].cells}
-        solved = answered(name, text, lambda key, _, model=model: model[key])
-        handed_in[name, f"solved {name}"] = solved
-    for (name, student), text in handed_in.items():
+    model = {c.metadata.nbgrader.grade_id: c.source for n in (FIRST, LAST) for c in SETS[n].cells}
+    for name, student, answer in [
+        (FIRST, "untouched", lambda key, source: source),
+        (FIRST, "wrong", wrong),
+        (FIRST, f"solved {FIRST}", lambda key, source: model[key]),
+        (LAST, f"solved {LAST}", lambda key, source: model[key]),
+    ]:
+        notebook = nbformat.reads(release(name, folder)[f"{name}.ipynb"].decode(), as_version=4)
+        for cell in notebook.cells:
+            if cell.metadata.nbgrader.solution:
+                cell.source = answer(cell.metadata.nbgrader.grade_id, cell.source)
         path = folder / "submitted" / student / name / f"{name}.ipynb"
         path.parent.mkdir(parents=True)
-        path.write_text(text, encoding="utf-8")
+        nbformat.write(notebook, path)
     grade([], folder)
     return folder
 
@@ -88,13 +83,9 @@ def row(course, name, student):
         return next(row for row in csv.DictReader(table) if row["student"] == student)
 
 
-def page(course, name, student):
-    text = (course / "feedback" / student / name / f"{name}.html").read_text("utf-8")
-    return html.unescape(re.sub(r"<[^>]*>", "", text.split("<body>", 1)[1]))
-
-
-@sets
-def test_the_reference_gets_all_points(course, name):
+@pytest.mark.parametrize("name", [FIRST, LAST])
+def test_the_reference_gets_all_points_in_a_release_that_is_what_nbgrader_makes(course, name):
+    """Of the other sets, test_problems.py sees that the reference passes."""
     tests, words = points(name)
     student = f"solved {name}"
     found = row(course, name, student)
@@ -107,50 +98,25 @@ def test_the_reference_gets_all_points(course, name):
         submission = gradebook.find_submission(name, student)
         assert submission.score == submission.max_score == float(found["maximum"]) == 20
         gradebook.db.rollback()
-
-
-@sets
-def test_the_untouched_release_gets_no_points_and_no_work_for_a_human(course, name):
-    """Of the other sets, test_problems.py sees that their tests fail."""
-    if name == FIRST:
-        found = row(course, name, "untouched")
-        assert float(found["total"]) == float(found["automatic"]) == 0
-        assert (found["by hand"], found["remarks"]) == ("", "")
-    notebook = nbformat.read(course / "release" / name / f"{name}.ipynb", as_version=4)
-    cells = {cell.metadata.nbgrader.grade_id: cell for cell in notebook.cells}
-    for key, value in points(name)[1].items():
-        assert determine_grade(cells[key]) == (0, value)
-
-
-def test_wrong_answers_get_no_points_and_their_hints(course):
-    """Of the other sets, test_problems.py sees that their tests fail, and how."""
-    found = row(course, FIRST, "wrong")
-    assert {found[key] for key in points(FIRST)[0]} == {"0"}
-    text = " ".join(page(course, FIRST, "wrong").split())
-    for slug, table in TABLES[FIRST].items():
-        if slug != "helpers":
-            assert table["mistakes"][-1]["hint"][:40] in text
-
-
-@sets
-def test_the_release_is_what_nbgrader_makes_with_its_gradebook(course, name):
     made = (course / "release" / name / f"{name}.ipynb").read_bytes()
     assert made == release(name, course)[f"{name}.ipynb"]
 
 
-@pytest.mark.parametrize("student", ["wrong", "untouched"])
-def test_feedback_shows_no_hidden_test_and_no_mark_scheme(course, student):
-    """Of the other sets, each release, which is what feedback is made from, shows none."""
-    secrets = [re.sub(r"\s", "", line) for line in regions(FIRST, "HIDDEN TESTS|MARK SCHEME")]
-    assert len(secrets) > 20
-    text = re.sub(r"\s", "", page(course, FIRST, student))
-    assert not [line for line in secrets if line in text]
-
-
-def test_the_solutions_of_a_set_are_run(course):
-    notebook = nbformat.read(make_solutions(FIRST, course), as_version=4)
-    said = [out.text for cell in notebook.cells for out in cell.get("outputs", []) if "text" in out]
-    assert sum(text.startswith("As it should be") for text in said) == len(points(FIRST)[0])
+def test_wrong_answers_get_no_points_and_their_hints_and_feedback_shows_nothing_unseen(course):
+    """Of the other sets, test_problems.py sees that their tests fail, and how."""
+    untouched = row(course, FIRST, "untouched")
+    assert float(untouched["total"]) == float(untouched["automatic"]) == 0
+    assert (untouched["by hand"], untouched["remarks"]) == ("", "")
+    assert {row(course, FIRST, "wrong")[key] for key in points(FIRST)[0]} == {"0"}
+    hints = [t["mistakes"][-1]["hint"] for slug, t in TABLES[FIRST].items() if slug != "helpers"]
+    unseen = [re.sub(r"\s", "", line) for line in regions(FIRST, UNSEEN)]
+    assert len(unseen) > 20
+    for student in ("wrong", "untouched"):
+        text = (course / "feedback" / student / FIRST / f"{FIRST}.html").read_text("utf-8")
+        page = re.sub(r"\s", "", html.unescape(re.sub(r"<[^>]*>", "", text.split("<body>", 1)[1])))
+        assert not [line for line in unseen if line in page]
+        if student == "wrong":
+            assert all(re.sub(r"\s", "", hint[:40]) in page for hint in hints)
 
 
 def files_in(content, place=""):
@@ -164,15 +130,22 @@ def files_in(content, place=""):
                 yield f"{place}{name}", inner.decode("utf-8", "replace")
 
 
-@sets
-def test_no_file_of_a_handout_gives_anything_away(course, name):
-    files = dict(files_in(make_handout(name, course, ROOT).read_bytes()))
+@pytest.fixture(scope="module")
+def handed_out(course):
+    """The files of the handout of the first set."""
+    return dict(files_in(make_handout(FIRST, course, SOURCE.parents[2]).read_bytes()))
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_no_file_of_a_handout_gives_anything_away(course, handed_out, name):
+    """Nor does the release of the set; in it a question without words is no work for a human."""
+    own = {path: content.decode() for path, content in release(name, course).items()}
+    files = {**handed_out, **own}
     assert any("whl/rbclassroom/assignments/marking.py" in path for path in files)
-    for line in regions(name, "HIDDEN TESTS|MARK SCHEME"):
-        assert not [path for path, text in files.items() if line in text], line
-    shown = [text for path, text in files.items() if ".whl/" not in path]
-    for line in regions(name, "HIDDEN TESTS|MARK SCHEME|SOLUTION"):
-        assert not [text for text in shown if line in text], line
+    shown = {path: text for path, text in files.items() if ".whl/" not in path}
+    for kinds, some in ((UNSEEN, files), (f"{UNSEEN}|SOLUTION", shown)):
+        for line in regions(name, kinds):
+            assert not [path for path in some if line in some[path]], line
     packed = "\n".join(files.values())
     region = re.compile(r"### BEGIN SOLUTION\n(.*?) *### END", re.DOTALL)
     secrets = [text for cell in SETS[name].cells for text in region.findall(cell.source)]
@@ -182,3 +155,12 @@ def test_no_file_of_a_handout_gives_anything_away(course, name):
         encoded = base64.b64encode(secret.encode()).decode().rstrip("=")[:-4]
         hidden = [secret, secret[::-1], encoded]
         assert not [text for text in hidden if len(text) > 40 and text in packed]
+    cells = nbformat.reads(own[f"{name}.ipynb"], as_version=4).cells
+    graded = {cell.metadata.nbgrader.grade_id: cell for cell in cells}
+    for key, value in points(name)[1].items():
+        assert determine_grade(graded[key]) == (0, value)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_no_reference_is_refused_for_what_it_uses(name):
+    assert list(find_in_cells(SETS[name].cells)) == []

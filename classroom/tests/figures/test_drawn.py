@@ -7,7 +7,7 @@ that they hold its numbers under their names, have labels, and are not clipped (
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from shown import FIGURES, by_names, lost_columns, numbers, numbers_of, pooled
+from shown import numbers, numbers_of
 
 import rbcourse as rb
 from rbclassroom.figures import (
@@ -32,80 +32,6 @@ MARGINS = {
 }
 
 
-def poses_of(data):
-    """The poses of a table, shape (n, 4, 4)."""
-    poses = np.tile(np.eye(4), (len(data["x [m]"]), 1, 1))
-    for i, axis in enumerate("xyz"):
-        poses[:, i, 3] = data[f"{axis} [m]"]
-        poses[:, i, :3] = np.transpose([data[f"R{i + 1}{j} [1]"] for j in (1, 2, 3)])
-    return poses
-
-
-def matrices_of(data):
-    return {name: M.T for name, M in vectors("{} {} [1]", data, "xy").items()}
-
-
-def draw_paths(axes, data):
-    paths = vectors("{} {} [1]", data)
-    lesson06.draw_paths(axes[0], paths)
-    speeds = {name: data[f"{name} speed [rad]"] for name in paths}
-    lesson06.draw_speeds(axes[1], data["t [1]"], speeds)
-
-
-def draw_spins(axes, data):
-    lesson08.draw_spins(axes, data["t [1]"], vectors("{} w{} [rad]", data, "123"))
-
-
-def draw_momenta(axes, data):
-    directions = np.stack([data[f"{x} [1]"] for x in "xyz"], axis=-1).reshape(24, -1, 3)
-    lesson08.draw_momenta(axes[0], directions)
-
-
-def draw_atlas(axes, data):
-    atlas_figures.draw_atlas(plt.gcf(), data, "across", "median")
-
-
-SPACE, FLAT = "space", None
-DRAWN = {
-    "lesson03_gimbal": ([FLAT] * 3, lesson03.draw_angles),
-    "lesson03_order": (
-        [SPACE] * 6,
-        lambda axes, data: lesson03.draw_turns(axes, data["frame"], poses_of(data)[:, :3, :3]),
-    ),
-    "lesson04_drift": ([FLAT], lambda axes, data: lesson04.draw_drift(axes[0], data)),
-    "lesson04_columns": (
-        [FLAT] * 4,
-        lambda axes, data: lesson04.draw_columns(axes, matrices_of(data)),
-    ),
-    "lesson04_shadows": (
-        [FLAT] * 2,
-        lambda axes, data: lesson04.draw_shadows(axes, vectors("{} {} [1]", data, "xy")),
-    ),
-    "lesson04_frames": ([FLAT], lambda axes, data: lesson04.draw_frames(axes[0], data)),
-    "lesson06_same_path": ([SPACE, FLAT], draw_paths),
-    "lesson06_chord": ([FLAT], lambda axes, data: lesson06.draw_chord(axes[0], data)),
-    "paper_fig1": (
-        [SPACE],
-        lambda axes, data: lesson06.draw_moving_frame(axes[0], data["frame"], poses_of(data)),
-    ),
-    "lesson08_half": (
-        [FLAT] * 4,
-        lambda axes, data: lesson08.draw_carried(axes, data["turn [rad]"]),
-    ),
-    "lesson08_spins": ([FLAT] * 3, draw_spins),
-    "lesson08_momenta": ([SPACE], draw_momenta),
-    "lesson09_excursion": ([FLAT], lambda axes, data: lesson09.draw_excess(axes[0], data)),
-    "paper_fig4c": ([], lambda axes, data: lesson09.draw_comparison(plt.gcf(), data)),
-    "lesson12_median_across": ([], draw_atlas),
-    "lesson12_growth": ([FLAT], lambda axes, data: atlas_figures.draw_growth(axes[0], data)),
-    "lesson12_margins": ([FLAT] * 2, atlas_figures.draw_margins),
-    "lesson12_deviations": ([FLAT] * 2, atlas_figures.draw_deviations),
-    "lesson13_torques": ([FLAT] * 3, lesson13.draw_torques),
-    "lesson13_jerk": ([FLAT], lambda axes, data: lesson13.draw_speeds(axes[0], data)),
-}
-"""How a stored figure is drawn from its numbers: the projections of its axes, and a function."""
-
-
 @pytest.fixture
 def axes():
     """A function that makes axes of some projections."""
@@ -116,14 +42,6 @@ def axes():
 
     yield make
     plt.close("all")
-
-
-@pytest.mark.parametrize("name", DRAWN)
-def test_artists_hold_the_stored_numbers_under_their_names(axes, name):
-    kinds, draw = DRAWN[name]
-    draw(axes(*kinds), numbers(name))
-    pools = pooled(by_names(plt.gcf().findobj()))
-    assert not list(lost_columns(FIGURES / f"{name}.csv", pools))
 
 
 def check_held(axes, held):

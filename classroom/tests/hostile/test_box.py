@@ -7,17 +7,11 @@ import time
 from pathlib import Path
 
 import psutil
-import pytest
-from tiny_class import Class, make_template
+from tiny_class import Class
 
 from rbclassroom.assignments.grade import grade
 
 ROOT = Path(__file__).parents[3]
-
-
-@pytest.fixture(scope="module")
-def template(tmp_path_factory):
-    return make_template(tmp_path_factory.mktemp("template"))
 
 
 def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(

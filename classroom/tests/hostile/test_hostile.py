@@ -1,7 +1,6 @@
 """Submissions that mean harm, and unlucky ones, graded in one go: nobody else is harmed."""
 
 import base64
-import builtins
 import codecs
 import html
 import os
@@ -15,7 +14,7 @@ import nbformat
 import psutil
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell
-from tiny_class import Class, begun, make_template
+from tiny_class import Class, begun
 from tiny_set import ANSWERS, cell
 
 import rbcourse
@@ -31,11 +30,8 @@ HIDDEN = ["assert square(-3) == 9", "assert math.isclose(half, 0.5)"]
 SLEEP = f"9{os.getpid():08d}"  # a number of seconds that nobody else sleeps
 SECRET = "the-token-of-the-teacher"
 REFUSALS = {"AssertionError", "CalledProcessError", "OperationalError"}
-REFUSALS |= {
-    name
-    for name, kind in vars(builtins).items()
-    if isinstance(kind, type) and issubclass(kind, OSError)
-}
+KINDS = [OSError, *OSError.__subclasses__(), *ConnectionError.__subclasses__()]
+REFUSALS |= {kind.__name__ for kind in KINDS}
 
 # Each is the answer with the square, to which the right one is added, or only that with the half.
 HONEST = {
@@ -77,8 +73,7 @@ SNEAKS = {
     "forks": "import os, signal\nfor _ in range(10**4):\n"
     "    if not os.fork():\n        signal.pause()",
     "becomes root": "import os\nos.setuid(0)",
-    "mounts": "import subprocess\n"
-    "subprocess.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
+    "mounts": "import subprocess as s\ns.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
 # These do what they want, in the box; the points are those of their answers.
 LOUD = {
@@ -150,8 +145,8 @@ def write_words(notebook):
 
 
 def add_cell(notebook):
-    added = new_code_cell("mine = 1", metadata={"tags": ["raises-exception"]})
-    notebook.cells.insert(3, added)
+    tagged = {"tags": ["raises-exception"]}
+    notebook.cells.insert(3, new_code_cell("mine = 1", metadata=tagged))
 
 
 CELL_5 = "cell 5, answer of “A tiny set”"
@@ -170,12 +165,7 @@ OTHERS = [
     ("floods", f"{begun()}\nwhile True: print('x' * 9**4)", "2 0", f"{CELL_5}: "),
     ("takes memory", "bytearray(3 * 10**9)", "2 0", f"{CELL_5}: takes too much memory"),
     ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
-    (
-        "ends itself",
-        "import os\nos.kill(os.getpid(), 9)",
-        " ",
-        f"Python ended in or before {CELL_5}",
-    ),
+    ("ends itself", "import os\nos.kill(os.getpid(), 9)", " ", "Python ended in or before cell 5"),
     # test_forbidden.py has more ways round the tests
     ("transforms", TRANSFORMS, " ", f"{CELL_5}, line 2 uses get_ipython: grade by hand"),
     ("an alias", "m = [math][0]\nm.isclose = print", " ", f"{CELL_5}, line 2 replaces m.isclose"),
@@ -194,6 +184,9 @@ FILES = [
 RESULTS = [(student, *result) for student, _, *result in OTHERS + FILES]
 RESULTS += [("a link", " ", "ps0.ipynb, or what is beside it, is a link")]
 RESULTS += [("prints", "2 1", f"{CELL_5}: the output is too large")]
+RESULTS += [(student, "2 1", "") for student in HONEST]  # without a remark
+RESULTS += [(student, "2 0", None) for student in SNEAKS]
+RESULTS += [(student, "2 1", None) for student in LOUD if student != "prints"]
 
 
 def hand_in_all(course, port):
@@ -216,11 +209,6 @@ def hand_in_all(course, port):
     place = course.folder / "submitted" / "a link" / "ps0"
     place.mkdir(parents=True)
     (place / "ps0.ipynb").symlink_to(course.folder / "source" / "ps0" / "ps0.ipynb")
-
-
-@pytest.fixture(scope="module")
-def template(tmp_path_factory):
-    return make_template(tmp_path_factory.mktemp("template"))
 
 
 @pytest.fixture(scope="module")
@@ -258,45 +246,29 @@ def state(folder):
     return {path: path.read_bytes() for path in paths if path.is_file()}
 
 
-def points(row):
-    return row["square-test"], row["half-test"]
-
-
-@pytest.mark.parametrize("student", HONEST)
-def test_honest_work_is_graded_without_a_remark(rows, student):
-    assert (points(rows[student]), rows[student]["remarks"]) == (("2", "1"), "")
+@pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
+def test_each_submission_has_its_points_and_a_clear_line(course, rows, student, wanted, remark):
+    """Noise costs nobody points. A remark that is None may be any."""
+    row = rows["'" * student.startswith("=") + student]
+    assert f"{row['square-test']} {row['half-test']}" == wanted, row
+    assert row["remarks"].isprintable()
+    assert len(row["remarks"]) < 700
+    assert course.graded(student).exists() == (wanted != " ")
+    if remark is not None:
+        assert row["remarks"].startswith("refused: " * (wanted == " ") + remark), row
+        assert bool(remark) == bool(row["remarks"])
 
 
 @pytest.mark.parametrize("student", SNEAKS)
-def test_attempts_to_get_out_of_the_box_fail(course, rows, student):
-    assert points(rows[student]) == ("2", "0")
+def test_attempts_to_get_out_of_the_box_fail(course, student):
     answer = cell(nbformat.read(course.graded(student), as_version=4), "half-answer")
     assert {output.get("ename") for output in answer.outputs} & REFUSALS, answer.outputs
 
 
-@pytest.mark.parametrize("student", LOUD)
-def test_noise_in_the_box_costs_nobody_points(rows, student):
-    assert points(rows[student]) == ("2", "1")
-
-
-@pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
-def test_each_submission_has_its_points_and_a_clear_line(course, rows, student, wanted, remark):
-    row = rows["'" * student.startswith("=") + student]
-    assert " ".join(points(row)) == wanted, row
-    assert row["remarks"].startswith("refused: " * (wanted == " ") + remark), row
-    assert bool(remark) == bool(row["remarks"])
-    assert row["remarks"].isprintable()
-    assert len(row["remarks"]) < 700
-    assert course.graded(student).exists() == (wanted != " ")
-
-
-def test_nothing_outside_is_changed(course, rows):
+def test_nothing_outside_is_changed_and_nothing_is_left_running(course, rows):
     assert state(course.folder) == course.before
     assert not (Path(rbcourse.__file__).parent / "mine.py").exists()
     assert {row["boxed"] for row in rows.values()} == {"yes"}
-
-
-def test_nothing_is_left_running(course):
     assert not [job for job in psutil.process_iter(["cmdline"]) if SLEEP in str(job.info)]
 
 

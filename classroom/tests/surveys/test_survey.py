@@ -92,16 +92,6 @@ def test_every_executor_gives_the_same_bytes_and_tells_how_far_it_is(monkeypatch
     assert told == 3 * [(5, 15), (10, 15), (15, 15)]
 
 
-def test_a_cluster_gives_the_same_bytes(monkeypatch):
-    distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(survey, "CHUNK", 20)
-    cluster = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-    with distributed.Client(**cluster) as client:
-        found = survey.survey(SOME, client.get_executor(), inertia=BOOK)
-    for name, x in survey.survey(SOME, inertia=BOOK).items():
-        assert x.tobytes() == found[name].tobytes()
-
-
 def refuses(*ends):
     raise ValueError("no curve")
 
