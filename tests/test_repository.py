@@ -126,7 +126,7 @@ def test_every_file_that_the_readme_points_to_is_there():
 @pytest.mark.parametrize(
     ("words", "version", "message"),
     [
-        (["figures"], (3, 10, 13), r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\."),
+        (["--help"], (3, 10, 13), r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\."),
         (["figure"], None, r"(?s).*There is no task 'figure'\. Choose from: lab, check.*"),
     ],
 )
