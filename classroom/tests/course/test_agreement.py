@@ -84,6 +84,10 @@ def test_of_a_living_picture_rounding_is_not_seen_and_a_change_is(change):
     assert reconciled(LIVING, again) == (LIVING if change in ROUNDING else again)
 
 
+def test_the_unit_of_the_comparison_is_that_of_the_display():
+    assert agreement.UNIT == 1 / PARTS
+
+
 def image(array):
     content = io.BytesIO()
     Image.fromarray(array).save(content, "png")
