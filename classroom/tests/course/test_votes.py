@@ -15,7 +15,7 @@ from tiny import ask, lecture, lesson_at
 
 from rbclassroom.course import lecture as module
 from rbclassroom.course.lecture import open_votes
-from rbclassroom.course.votes import Ballot
+from rbclassroom.course.votes import Ballot, find_address
 
 
 def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
@@ -67,6 +67,15 @@ def test_without_a_network_the_class_votes_by_hand(monkeypatch, capsys):
     monkeypatch.setattr(module, "find_address", nowhere)
     assert open_votes("") is None
     assert "show of hands" in capsys.readouterr().out
+
+
+def test_the_address_that_is_found_is_of_this_machine():
+    try:
+        address = find_address()
+    except OSError:
+        return  # there is no network
+    with socket.socket() as probe:
+        probe.bind((address, 0))
 
 
 FORM = {"Content-Type": "application/x-www-form-urlencoded"}
