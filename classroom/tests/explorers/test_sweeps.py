@@ -16,6 +16,7 @@ BOOK = np.array([0.20, 0.13, 0.03])
 MOMENTS = 0.5 / 12 * (BOOK @ BOOK - BOOK**2)
 START = np.radians([-20, 110])
 DIAGONAL = {"about": "the diagonal x + y + z"}
+COSTS_NOTHING = "none: the optimum costs nothing"
 
 
 def off(found, wanted):
@@ -50,10 +51,16 @@ def assert_seen(ax, places, *limits):
         ("cube", {}, "their ratio", "1.773"),  # 77 % more: lesson 9, the figure of the paper
         ("minimum_acceleration", {"k": 5.0}, "their ratio", "1.174"),  # case (c)
         ("minimum_acceleration", {"k": 0.0}, "cost, projection", "0.222 rad²"),  # case (a)
+        # of turns at constant ω: the geodesic; the projection costs 3e-11 rad² and 3e-14 rad²
+        ("minimum_acceleration", {"k": 0, "size": 0.1}, "their ratio", COSTS_NOTHING),
+        ("minimum_acceleration", {"k": 0, "size": 0.05}, "their ratio", "none: both cost nothing"),
         ("flip", {"axis": "axis 1", "t": 8.0}, "turned over", "0 times"),
         ("flip", {"axis": "axis 2", "t": 8.0}, "turned over", "2 times"),
         ("flip", {"axis": "axis 2", "t": 3.0}, "turned over", "once"),
         ("flip", {"axis": "axis 3", "t": 8.0}, "turned over", "0 times"),
+        # the axis is √(1 + cot²(angle/2)) m away, 3.07 and 2.996 m; up to 3 m are in sight
+        ("screw", {"angle": 38.0, "z": 0.0}, "its axis through", "(1.0, 2.9, 0.0) m, not in sight"),
+        ("screw", {"angle": 39.0, "z": 0.0}, "its axis through", "(1.0, 2.8, 0.0) m"),
         ("screw", {"angle": 0.0}, "its axis through", "none"),
         ("screw", {"angle": 0.0}, "slide along it", "all of the way"),
         ("rotation", {"alpha": 0.0, "beta": 0.0, "gamma": 0.0}, "axis", "any"),
@@ -252,7 +259,7 @@ def assert_compared(said, curves, costs, t, rival="projection"):
     for name, cost in zip(("optimum", rival), costs, strict=True):
         assert reads(said[f"cost, {name}"], cost)
     ratio, (low, high) = said["their ratio"], costs
-    assert reads(ratio, high / low) if low > 1e-12 else ratio == "none: the optimum costs nothing"
+    assert reads(ratio, high / low) if low > 1e-12 else ratio == COSTS_NOTHING
     best, near = (curve(t)[..., :3, :3] for curve in curves)
     turned = rb.log_so3(np.swapaxes(best, -1, -2) @ near)
     apart = said["apart at most" if np.ndim(t) else "apart now"]
@@ -295,6 +302,14 @@ def test_both_cubes_their_ways_and_their_costs():
             assert off(way, curve(TIMES)[:, :3, 3]) < 1e-11
             for places in (way, artists[name].corners, artists[f"{name} goal"].corners):
                 assert_seen(artists[name].axes, places, (left, left + 280), (20, 350))
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("flip", 8), ("chain", 6)])
+def test_a_motion_with_a_duration_in_seconds_plays_in_as_many(name, seconds):
+    explorer = made(name)
+    explorer.restart()
+    assert explorer.values.get("duration", explorer.steps[-1]) == seconds
+    assert explorer.play.interval * explorer.play.max == 1000 * seconds
 
 
 LEGS = {"geodesics": rb.geodesic_se3, "optima": rb.minimum_acceleration_se3}
