@@ -24,7 +24,8 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
-from rbcourse.optimum import search
+from rbcourse.curves import Ends
+from rbcourse.optimum import guesses, search
 from rbcourse.optimum.chebyshev import grid, interpolation
 
 every_solver = pytest.mark.parametrize("what", SOLVERS)
@@ -253,6 +254,14 @@ def test_the_search_tells_where_newtons_method_fails_from_the_cheapest_start(mon
     assert np.array_equal(curves.converged, [False, True, True])
     assert curves.cost[0] > 100
     assert np.abs(curves(TIMES) - good(TIMES))[:, 1:].max() < 1e-10
+
+
+@pytest.mark.parametrize("angle", [1.9, 2.5, 3.1, -1.9, -2.5, -3.1])
+def test_the_search_starts_with_the_shortest_way_and_then_tries_the_other_one(angle):
+    ends = Ends(I3, rb.exp_so3([[0, 0, angle]]), REST, REST)
+    _, starts = guesses.starts(ends, 5)
+    halfway = np.linalg.norm(rb.log_so3(starts[:, 2]), axis=-1)
+    assert halfway == pytest.approx([abs(angle) / 2, np.pi - abs(angle) / 2], rel=1e-12)
 
 
 @every_solver
