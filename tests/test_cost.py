@@ -160,6 +160,12 @@ def test_fast_motion_in_the_first_instant_is_not_missed(speed):
     assert rb.acceleration_cost(cubic) == pytest.approx(want, rel=5 / speed + 1e-9)
 
 
+def test_panels_are_as_fine_about_each_axis():
+    one, *others = (rb.exponential_cubic_so3(I3, I3, 1e3 * x, 1e3 * x).breakpoints for x in I3)
+    assert len(one) > 17
+    assert all(other == pytest.approx(one, rel=1e-9) for other in others)
+
+
 def test_a_jump_and_a_curve_that_was_not_found_have_no_cost():
     for turn in (np.diag([-1.0, -1, 1]), np.diag([1.0, -1, -1]), about_z(np.pi - 5e-7)):
         with pytest.warns(RuntimeWarning, match="margin < 1e-6"):
