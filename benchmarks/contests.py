@@ -30,6 +30,14 @@ try:
     import torch
 except ImportError:
     roma = torch = None
+try:
+    import toppra
+    import toppra.algorithm
+    import toppra.constraint
+
+    toppra.setup_logging("ERROR")
+except ImportError:
+    toppra = None
 OURS, SAMPLE, MOMENTS = "rbcourse", 100, np.linspace(0, 1, 101)
 """The first method of each contest, the number of items with an error, times on an optimum."""
 LEGS = {"projected cubics": rb.projected_cubic_se3, "geodesics": rb.geodesic_se3}
@@ -304,6 +312,44 @@ def _true_optimum(ends, G, near=None):
     return oracles.rotation_of_quaternions(found.sol(MOMENTS)[:4])
 
 
+def timing_of_poses(n, rng):
+    """Compare the fastest timing of a leg within boxes; beside it within norms, and of n poses."""
+    steps = rb.exp_se3(rng.uniform(-0.7, 0.7, (n - 1, 6)))
+    poses = np.array(list(accumulate(steps, np.matmul, initial=np.eye(4))))
+    path, leg, does = rb.chain(np.arange(n), poses), rb.geodesic_se3(*poses[:2]), "fastest, norms"
+    norms = {"angular_speed": 1.5, "speed": 1, "angular_acceleration": 4, "acceleration": 3}
+    boxes = norms | {"angular_acceleration": [4, 4, 4], "acceleration": [3, 3, 3]}
+    methods = {
+        OURS: Method("fastest, boxes", lambda: [rb.fastest(leg, **boxes).duration]),
+        "rbcourse, norms": Method(does, partial(rb.fastest, leg, **norms), None),
+        "rbcourse, chain": Method(does, partial(rb.fastest, path, **norms), None),
+    }
+    if toppra:
+        methods["toppra"] = Method("TOPPRA", partial(_by_toppra, leg, 1000))
+    return methods, _distance(_by_toppra(leg, 1000) if toppra else methods[OURS].call())
+
+
+def _by_toppra(curve, cells):
+    """Return the least time for a curve on [0, 1], within the same boxes, in as many cells."""
+    linear, s = toppra.constraint.linear_constraint, np.linspace(0, 1, cells + 1)
+    V, A = curve(s, 1), curve(s, 2)
+
+    class Boxes(linear.LinearConstraint):
+        def compute_constraint_params(self, *_):
+            faces = np.vstack([np.eye(6), -np.eye(6)]) / [4, 4, 4, 3, 3, 3]
+            F, g = np.tile(faces, (len(s), 1, 1)), np.ones((len(s), 12))
+            both = linear.canlinear_colloc_to_interpolate(V, A, 0 * V, F, g, None, None, s)
+            speeds = np.linalg.norm(V.reshape(-1, 2, 3), axis=2) / [1.5, 1]
+            return *both[:5], None, np.stack([0 * s, speeds.max(axis=1) ** -2], axis=1)
+
+    limit = Boxes()
+    limit.dof, limit._format_string = 1, ""
+    path = toppra.SplineInterpolator([0, 1], [[0], [1]])
+    solver = toppra.algorithm.TOPPRA([limit], path, gridpoints=s, solver_wrapper="seidel")
+    rate = solver.compute_parameterization(0, 0)[1]
+    return [np.sum(2 / cells / (rate[1:] + rate[:-1]))]
+
+
 class Contest(NamedTuple):
     """Methods for the same task and case, as the CSV names them, for each of some sizes N.
 
@@ -334,6 +380,7 @@ CONTESTS = [
     Contest("closed forms with derivatives", "", SOME, None, closed_forms, (3,)),
     *(Contest("chain at N times", legs, SOME, None, chain_of_poses, (legs,)) for legs in LEGS),
     Contest("spline of N legs", "30°", (10, 1000), None, splines),
+    Contest("fastest timing", "chain of N", (8,), 1e-5, timing_of_poses),
     *(Contest("optimum, one problem", case, (1,), 1e-10, one_optimum, (case,)) for case in CASES),
     Contest("optimum, stacked", "random", (1000,), 1e-10, stacked_optima, ("acceleration",)),
     *(Contest(f"{BODY}, one problem", case, (1,), 1e-10, one_body, (case,)) for case in CASES),

@@ -20,6 +20,7 @@ TABLE = [
     ("a chain of 1,000 poses at {} times", "chain at N times", "projected cubics"),
     ("the same of geodesics", "chain at N times", "geodesics"),
     ("minimum acceleration through the ends of {} legs", "spline of N legs", "30°"),
+    ("the fastest timing of a leg, in 1,000 cells", "fastest timing", "chain of N"),
     ("minimum acceleration, BK Figure 4c", "optimum, one problem", "4c"),
     ("minimum acceleration, {} random problems at once", "optimum, stacked", "random"),
     ("least torque of a book, BK Figure 4c", "optimum of a body, one problem", "4c"),

@@ -120,9 +120,10 @@ from rbcourse.so3 import (
     right_jacobian_so3,
     vee_so3,
 )
+from rbcourse.timing import Timed, fastest, limits_used
 from rbcourse.velocities import bessel_velocities, spline_velocities
 
-__version__ = "0.28.0"
+__version__ = "0.29.0"
 
 __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     # rotations
@@ -230,6 +231,9 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "minimum_torque_spline_so3",
     "minimum_jerk_spline_so3",
     "OptimalChain",
+    "fastest",
+    "limits_used",
+    "Timed",
     "read_path",
     "write_path",
     # for annotations

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import first_index
 from rbcourse._numerics import Array, matvec
-from rbcourse._quaternion_curve import QuaternionCurve, other_way
 from rbcourse._taylor import (
     Jet,
     exp,
@@ -20,7 +19,9 @@ from rbcourse._taylor import (
 from rbcourse.conversions import quaternion_from_matrix, quaternion_from_rotation_vector
 from rbcourse.curves import (
     Ends,
+    QuaternionCurve,
     identity,
+    other_way,
 )
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import exp_so3, log_so3

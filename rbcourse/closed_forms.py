@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array, matvec
-from rbcourse._quaternion_curve import QuaternionCurve, other_way, polynomial_jet
 from rbcourse._taylor import (
     Jet,
     angular_velocity,
@@ -25,10 +24,13 @@ from rbcourse.conversions import quaternion_from_matrix
 from rbcourse.curves import (
     Curve,
     Ends,
+    QuaternionCurve,
     check_defined,
     graded,
     least_over_time,
     near_margins,
+    other_way,
+    polynomial_jet,
     which_curve,
     with_inertia,
 )

@@ -46,10 +46,10 @@ FUNCTIONS = rb.CLOSED_FORMS | {
     for name in rb.__all__
     if inspect.isfunction(function := getattr(rb, name)) and returns_a_curve(function)
 }
-NO_STACKS = {  # curves through many poses, see test_paths.py and test_splines.py
+NO_STACKS = {  # see test_paths.py, test_splines.py and test_timing.py
     name
     for name, function in FUNCTIONS.items()
-    if issubclass(typing.get_type_hints(function)["return"], rb.Chain)
+    if issubclass(typing.get_type_hints(function)["return"], rb.Chain | rb.Timed)
 }
 bezier, cubic = rb.bezier_so3, rb.projected_cubic_so3
 MAKERS = {

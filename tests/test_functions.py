@@ -130,7 +130,9 @@ def test_parameters_and_results_are_documented(name):
     function = exported()[name]
     sections = re.split(r"^(\w.*)\n-{3,}\n", inspect.getdoc(function), flags=re.MULTILINE)
     text = dict(zip(sections[1::2], sections[2::2], strict=True))
-    documented = re.findall(r"^(\w+(?:, \w+)*)(?: :|$)", text.get("Parameters", ""), re.MULTILINE)
+    documented = re.findall(
+        r"^\**(\w+(?:, \w+)*)(?: :|$)", text.get("Parameters", ""), re.MULTILINE
+    )
     wanted = set(inspect.signature(function).parameters)
     assert wanted == {one for names in documented for one in names.split(", ")}
     assert "Returns" in text or inspect.signature(function).return_annotation == "None"

@@ -1,0 +1,453 @@
+"""The fastest timing of a path under limits on speeds, accelerations, torque and force.
+
+A path c(s) is run through by s(t); x = s'², u = s'' = ½ dx/ds. With V = c(s, 1) = (ω, v) and
+A = c(s, 2) = (α, β) the motion has the velocity V s' and the acceleration V u + A x, body frame.
+The torque is G ω u + (G α + ω × G ω) x, the acceleration of the point r of the body is
+(v + ω × r) u + (β + α × r + ω × (ω × r)) x, and the force on a mass m there m times that, minus
+m Rᵀ g. So a limit on a speed is x ≤ X(s), and every other one ‖a u + b x + k‖ ≤ 1.
+
+The path is divided into cells of length h. In a cell u is constant, x changes evenly from x_i to
+y = x_i+1, and u = (y − x_i)/2h. A limit holds at both ends of the cell, with the a, b, k of this
+side, as they may jump: ‖p x_i + q y + k‖ ≤ 1 with p = b − a/2h, q = a/2h at the start, and
+p = −a/2h, q = b + a/2h at the end. These are ellipses, or strips, in the plane of x_i and y.
+
+Two passes. Backward: the largest x_i from which the end can be reached. Forward: the largest x_i+1
+that x_i and the first pass allow. Cells are convex: if a timing keeps the limits on the cells, one
+is found. It takes the time Σ 2h/(s'_i + s'_i+1), which any larger x makes shorter.
+
+At the top of an ellipse x_i grows only as y falls. The largest x_i, the choice of Pham and Pham
+(IEEE Transactions on Robotics 34, 2018) for joints, is then not the best: a little of x_i costs
+much of y. Both have nearly the same weight in the time, so `_tops` takes the largest x_i + y.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, sqrt
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, as_time
+from rbcourse._numerics import Array, cross, matvec
+from rbcourse.curves import Curve
+from rbcourse.paths import Chain
+
+FINER = 1, 2, 4, 8
+TOLERANCE = 1e-4  # by which a limit may be exceeded inside a cell
+_REPEATS = 12
+_INSIDE = np.linspace(0, 1, 6)[:, None, None]
+_SPEEDS = "angular_speed", "speed"
+_BENDS = "angular_acceleration", "acceleration", "torque", "force"
+Row = tuple[str, Array, Array, Array]
+
+
+def fastest(
+    curve: Curve,
+    *,
+    angular_speed: ArrayLike | None = None,
+    speed: ArrayLike | None = None,
+    angular_acceleration: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
+    force: ArrayLike | None = None,
+    inertia: ArrayLike | None = None,
+    mass: float = 1.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    rates: tuple[float, float] = (0.0, 0.0),
+) -> Timed:
+    """Return the path of a curve with the fastest timing within limits.
+
+    Source: beyond BK 16.
+
+    Parameters
+    ----------
+    curve : Curve
+        A single one; of a `Timed` curve the path. Its times do not matter.
+    angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
+        The largest norms of ω, of the velocity of the point `centre` of the body, of ω', and of the
+        acceleration of that point. Three numbers are the largest magnitudes of the components in
+        the body frame. Of rotations only ω, ω' and the torque have limits.
+    torque, force : likewise
+        Of G ω' + ω × G ω, and of `mass` times the acceleration of `centre`, less its weight. One of
+        the accelerations, the torque or the force is needed.
+    inertia : array_like, shape (3, 3), optional
+        G, about the centre of mass; for a torque.
+    mass, centre, gravity : float; array_like, shape (3,); optional
+        For a force the mass, the centre of mass in the body frame, and the acceleration of free
+        fall in the fixed frame. Without a force `centre` is any point, as the tip of a tool.
+    rates : (float, float), optional
+        s' at both ends: 0 is rest, 1 is the velocity of the curve itself. Without effect at an end
+        where the curve rests.
+
+    Returns
+    -------
+    Timed
+        A `Curve` on [0, T].
+
+    Raises
+    ------
+    ValueError
+        If the path stands still, nothing limits the speed, the force cannot hold the body at rest,
+        or the `rates` are out of reach; with the first place on the path.
+
+    Warns
+    -----
+    RuntimeWarning
+        If a limit is exceeded by more than 1e-4 between the points of the finest grid.
+
+    Notes
+    -----
+    The grid has 1,000 cells, for chains 250 for each leg (25 if there are many), and up to eight
+    times as many until the limits hold between its points to 1e-4. T is then about 1e-3 above the
+    shortest time. The motion stops where the velocity of the path jumps. Its acceleration jumps
+    where that of the path does, and between cells; jerk is not limited.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, geodesic_so3
+    >>> turn = geodesic_so3(np.eye(3), exp_so3([0, 0, 3]))
+    >>> c = fastest(turn, angular_speed=1, angular_acceleration=2)  # 3/1 + 1/2 s
+    >>> round(c.domain[1], 4), c(1.75, 1).round(9)
+    (3.5, array([0., 0., 1.]))
+    """
+    path = curve.curve if isinstance(curve, Timed) else curve
+    limits = _limits(
+        path,
+        angular_speed=angular_speed,
+        speed=speed,
+        angular_acceleration=angular_acceleration,
+        acceleration=acceleration,
+        torque=torque,
+        force=force,
+        inertia=inertia,
+        mass=mass,
+        centre=centre,
+        gravity=gravity,
+    )
+    if not set(limits.most) & set(_BENDS):
+        raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
+    ends = as_single("rates", rates, 2)
+    if ends.min() < 0:
+        raise ValueError(f"rates: two numbers from 0 up wanted, got {rates}")
+    for finer in FINER:
+        grid = _sampled(path, finer)
+        x, used = _squared_rates(grid, limits, ends)
+        worst = int(np.argmax(used))
+        if used[worst] <= 1 + TOLERANCE:
+            break
+    else:
+        what = f"a limit is exceeded by {used[worst] - 1:.1e} near s = {grid.s[worst]:.6g}"
+        warnings.warn(what, RuntimeWarning, stacklevel=2)
+    timed = Timed(duration=np.array(1.0), curve=path, s=grid.s, rate=np.sqrt(x))
+    return replace(timed, duration=np.array(timed.times[-1]))
+
+
+def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
+    """Return for each limit the largest share of it that a curve over time uses, and when.
+
+    Source: beyond BK 16.
+
+    Parameters
+    ----------
+    curve : Curve
+        A single one.
+    **limits
+        The keyword arguments of `fastest`, without `rates`.
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Share and time, among 20,001 times and both sides of the joints of a chain.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, geodesic_so3
+    >>> limits_used(geodesic_so3(np.eye(3), exp_so3([0, 0, 3])), angular_speed=[1, 1, 2])
+    {'angular_speed': (1.5, 0.0)}
+    """
+    known, t = _limits(curve, **limits), np.linspace(*curve.domain, 20001)
+    if isinstance(curve, Chain | Timed):
+        t = np.unique([*t, *curve.times[:-1], *np.nextafter(curve.times[1:], -inf)])
+    V, A, R = (curve(t, order) for order in (1, 2, 0))
+    shares: dict[str, Array] = {}
+    for name, a, b, k in known.rows(V, A, R[:, :3, :3]):
+        share = np.linalg.norm(a if name in _SPEEDS else b + k, axis=-1)
+        shares[name] = np.maximum(shares.get(name, 0.0), share)
+    return {name: (float(x.max()), float(t[np.argmax(x)])) for name, x in shares.items()}
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Timed(Curve):
+    """The `Curve` c(s(t)) on [0, T]. s'' is constant in a cell; at its end the next cell counts.
+
+    Attributes
+    ----------
+    curve : Curve
+        The path c(s).
+    s, rate, times : ndarray, shape (N + 1,)
+        The grid, s' there, and when it is there.
+    """
+
+    curve: Curve
+    s: Array
+    rate: Array
+
+    @cached_property
+    def times(self) -> Array:
+        """When it is at the grid points."""
+        return np.append(0, np.cumsum(2 * np.diff(self.s) / (self.rate[1:] + self.rate[:-1])))
+
+    @property
+    def size(self) -> int:
+        """The size of its matrices: 3 on SO(3), 4 on SE(3)."""
+        return self.curve.size
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the curve with another duration."""
+        return replace(self, duration=duration, rate=self.rate * (self.duration / duration))
+
+    def progress(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return s, s' and s'' at times."""
+        t = as_time(t, 0, self.domain)
+        i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.s) - 2)
+        past, v = t - self.times[i], self.rate[i]
+        u = (np.diff(self.rate**2) / np.diff(self.s) / 2)[i]
+        last = np.where(t < self.times[-1], np.nextafter(self.s[i + 1], -inf), self.s[-1])
+        return np.clip(self.s[i] + past * (v + past * u / 2), self.s[i], last), v + past * u, u
+
+    def evaluate(self, t: Array, order: int) -> Array:
+        """Return the values at the times t, shape (T, 1), by the chain rule."""
+        s, v, u = self.progress(t)
+        c = [self.curve.evaluate(s, k) for k in range((order + 1) // 2, order + 1)]
+        v, u = v[..., None], u[..., None]
+        if order < 2:
+            return c[0] * v if order else c[0]
+        return c[0] * u + c[1] * v**2 if order == 2 else 3 * c[0] * u * v + c[1] * v**3
+
+    def values(self, t: Array, order: int) -> Array:
+        """Raise a RuntimeError: costs are integrals of smooth curves."""
+        raise RuntimeError("cost: the acceleration of a Timed curve jumps between its cells")
+
+    @property
+    def flat(self) -> Self:
+        """The curve."""
+        return self
+
+
+class _Limits(NamedTuple):
+    most: dict[str, Array]
+    G: Array
+    mass: float
+    centre: Array
+    gravity: Array
+
+    def rows(self, V: Array, A: Array, R: Array) -> list[Row]:
+        """Return the name, a, b and k of each limit; that on a speed is ‖a‖² x ≤ 1."""
+        (w, bend), (_, G, m, r, g) = (V[..., :3], A[..., :3]), self
+        parts = {"angular_speed": (w,), "angular_acceleration": (w, bend)}
+        parts["torque"] = w @ G, bend @ G + cross(w, w @ G)
+        if V.shape[-1] == 6:
+            v, pull = V[..., 3:] + cross(w, r), A[..., 3:] + cross(bend, r) + cross(w, cross(w, r))
+            parts |= {"speed": (v,), "acceleration": (v, pull)}
+            parts["force"] = m * v, m * pull, -m * matvec(R.mT, g)
+        rows = []
+        for name, most in self.most.items():
+            a, b, k = (*parts[name], *np.zeros((2, *w.shape)))[:3]
+            for i in [[0, 1, 2]] if most.ndim == 0 else [[0], [1], [2]]:
+                each = np.broadcast_to(most, 3)[i]
+                rows.append((name, a[..., i] / each, b[..., i] / each, k[..., i] / each))
+        return rows
+
+
+def _limits(
+    curve: Curve,
+    *,
+    inertia: ArrayLike | None = None,
+    mass: float = 1.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    **limits: ArrayLike | None,
+) -> _Limits:
+    if not isinstance(curve, Curve) or curve.batch_shape:
+        raise ValueError(f"curve: a single Curve wanted, no stack, got {curve!r}")
+    most = {name: as_finite(name, x) for name, x in limits.items() if x is not None}
+    for name, x in most.items():
+        if name not in _SPEEDS + _BENDS:
+            raise TypeError(f"{name}: no limit has this name")
+        if x.shape not in ((), (3,)) or x.min() <= 0:
+            raise ValueError(f"{name}: a number above 0, or three, wanted, got {x.tolist()}")
+        if curve.size == 3 and name in ("speed", "acceleration", "force"):
+            raise ValueError(f"{name}: a curve on SO(3) has none")
+    if not most:
+        raise ValueError(f"limits: none of {', '.join(_SPEEDS + _BENDS)} is given")
+    if "torque" in most and inertia is None:
+        raise ValueError("inertia: it is needed for a torque")
+    G = np.eye(3) if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
+    vectors = as_single("centre", centre, 3), as_single("gravity", gravity, 3)
+    return _Limits(most, G, as_positive("mass", mass), *vectors)
+
+
+class _Grid(NamedTuple):
+    """Grid points, (N + 1,); V, A and R at six points of each cell, (6, N, ...); where x is 0."""
+
+    s: Array
+    V: Array
+    A: Array
+    R: Array
+    stops: NDArray[np.intp]
+
+
+def _sampled(curve: Curve, finer: int) -> _Grid:
+    """Return a grid of as many cells for each leg, smaller ones near an end with c' = c'' = 0."""
+    legs = (curve.legs if isinstance(curve, Chain) else curve).flat
+    knots = curve.times if isinstance(curve, Chain) else np.append(0.0, legs.duration)
+    L, h, halves = legs.count, legs.duration, (curve.size - 2, 3)
+    n = finer * max(1000 // L, min(250, 4000 // L), 25)
+    probe = np.linspace(0, 1, 5)[:, None]
+    far = np.array([1.0, np.abs(legs.values(probe, 0)[..., :3, 3:]).max(initial=0)])[: halves[0]]
+
+    def sizes(x: Array) -> Array:
+        return np.abs(x.reshape(*x.shape[:-1], *halves)).max(axis=-1)
+
+    rates, bends = (sizes(legs.values(probe, order)) for order in (1, 2))
+    none = 1e-12 * rates.max(axis=(0, 1)) + 1e-14 * far  # 0, but for rounding
+    slow = (rates <= none) & (bends <= 1e-9 * bends.max(axis=(0, 1)) + 1e-12 * far)
+    slow, q = slow[[0, -1]].all(axis=-1), np.linspace(0, 1, n + 1)[:, None]
+    graded = q * q * (3 - 2 * q), q * q, 1 - (1 - q) ** 2
+    share = np.select([slow.all(axis=0), slow[0], slow[1]], graded, q + np.zeros(L))
+    points = np.minimum(share[:-1] + _INSIDE * np.diff(share, axis=0), 1)
+
+    def along(order: int) -> Array:
+        x = legs.values(points.reshape(-1, L), order)
+        x = x.reshape(*points.shape, *x.shape[2:]).swapaxes(1, 2)
+        return x.reshape(len(points), L * n, *x.shape[3:])
+
+    V, A, R, each = along(1), along(2), along(0)[..., :3, :3], np.repeat(h, n)[:, None]
+    V = np.where(np.repeat(sizes(V) <= none, 3, axis=-1), 0, V) / each
+    s = np.append((knots[:-1, None] + h[:, None] * share[:-1].T).ravel(), knots[-1])
+    if (still := ~V.any(axis=(0, 2))).any():
+        i = np.argmax(still)
+        between = f", between poses[{i // n}] and poses[{i // n + 1}]" if L > 1 else ""
+        raise ValueError(f"curve: the path stands still near s = {s[i]:.6g}{between}")
+    joints, fast = np.arange(1, L) * n, sizes(V).max(axis=(0, 1))
+    corners = (sizes(V[0, joints] - V[-1, joints - 1]) > 1e-9 * fast).any(axis=-1)
+    ends = np.flatnonzero(slow[0]) * n, np.flatnonzero(slow[1]) * n + n
+    return _Grid(s, V, A / each**2, R, np.concatenate([joints[corners], *ends]))
+
+
+def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, Array]:
+    """Return x on the grid, and the largest share of a limit that is used in each cell.
+
+    Cells in which a limit is exceeded between the ends are solved again with a lower one.
+    """
+    s, V, A, R, stops = grid
+    rows, h, X = limits.rows(V, A, R), np.diff(s), np.full(V.shape[:2], inf)
+    with np.errstate(divide="ignore"):
+        for name, a, _, _ in rows:
+            if name in _SPEEDS:
+                X = np.minimum(X, 1 / np.sum(a * a, axis=-1))
+    parts = [row[1:] for row in rows if row[0] in _BENDS]
+    held = np.max([np.linalg.norm(k, axis=-1) for _, _, k in parts], axis=(0, 1))
+    if (held >= 1).any():
+        where = (
+            f"{held.max():.3g} times that to hold the body near s = {s[np.argmax(held >= 1)]:.6g}"
+        )
+        raise ValueError(f"force: it takes {where}")
+    caps = np.minimum(np.append(X[0], inf), np.append(inf, X[-1]))
+    caps[stops] = 0
+    moving = V[0, 0].any(), V[-1, -1].any()
+    ends = [(r * r, r * r) if v else (0, inf) for r, v in zip(rates.tolist(), moving, strict=True)]
+    scale = np.ones((len(h), 1))
+    for _ in range(_REPEATS):
+        x = _two_passes(s, [[scale * y[[0, -1]] for y in row] for row in parts], caps, ends)
+        u, inside = (np.diff(x) / h / 2)[:, None], x[:-1] + _INSIDE[..., 0] * np.diff(x)
+        used = [np.linalg.norm(a * u + b * inside[..., None] + k, axis=-1) for a, b, k in parts]
+        share, fast = np.max(used, axis=(0, 1)), np.sqrt(inside / X).max(axis=0)
+        if max(share.max(), fast.max()) < 1 + TOLERANCE / 10:
+            break
+        scale = np.minimum(scale * np.maximum(share, 1)[:, None], 0.999 / (held[:, None] + 1e-3))
+        over = np.maximum(np.append(fast, 1), np.append(1, fast))
+        caps = np.where(over > 1, np.minimum(caps, x) / np.maximum(over, 1) ** 2, caps)
+    return x, np.maximum(share, fast)
+
+
+def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any]) -> Array:
+    """Return x on the grid; `ends` are its least and its greatest value at both ends."""
+    A, B, C, D, E, F = Q = _ellipses(np.diff(s), rows)
+    tops, cap, N = _tops(Q, caps).tolist(), caps.tolist(), len(s) - 1
+    there, back, least = (
+        np.stack(some).transpose(1, 2, 0).tolist()
+        for some in ((A, B, C, D, E, F), (C, B, A, E, D, F), (A, -B, C, -D, E, F))
+    )
+    (first, most), (last, most_there) = ends
+    low, high = [0.0] * N + [last], [inf] * N + [min(most_there, cap[N])]
+    if last > high[N]:
+        raise ValueError("rates[1] is above a limit on a speed")
+    for i in range(N - 1, -1, -1):  # from which x the end is reached
+        high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])
+        low[i] = max(0.0, -_largest(least[i], low[i + 1])) if low[i + 1] > 0 else 0.0
+        if high[i] == inf:
+            raise ValueError(f"limits: none of them bounds the speed near s = {s[i]:.6g}")
+        if low[i] > high[i] * (1 + 1e-9):
+            raise ValueError(f"rates[1] is out of reach: too low a limit near s = {s[i]:.6g}")
+    x = [min(high[0], most)]
+    if x[0] < max(low[0], first) * (1 - 1e-9):
+        why = "too low for rates[1]" if low[0] > x[0] else "too high to brake, or above a limit"
+        raise ValueError(f"rates[0] is {why}")
+    for i in range(N):  # as fast as that allows
+        x.append(max(min(_largest(back[i], x[i]), high[i + 1]), low[i + 1], 0.0))
+    return np.array(x)
+
+
+def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
+    """Return A, …, F, (6, N, limits), of A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0."""
+    made = []
+    for a, b, k in rows:
+        q = a / (2 * h[:, None])
+        for p, r, c in ((b[0] - q[0], q[0], k[0]), (-q[1], b[1] + q[1], k[1])):
+            A, B, C, D, E, F = np.vecdot([p, p, r, p, r, c], [p, r, r, c, c, c])
+            made.append([A, B, C, D, E, F - 1])
+    return np.stack(made, axis=-1)
+
+
+def _tops(Q: Array, caps: Array) -> Array:
+    """Return for each cell the y up to which x + y rises, x the largest that all limits allow.
+
+    By bisection, of the exponent at first.
+    """
+    A, B, C, D, E, F = Q
+    free = A == 0  # a limit on y alone
+    low, high = np.full((len(A), 1), 1e-60), np.minimum(caps[1:], 1e60)[:, None]
+    for _ in range(50):
+        y = np.sqrt(low * high)
+        t, G = B * y + D, (C * y + 2 * E) * y + F
+        square = t * t - A * G
+        root = np.sqrt(np.maximum(square, 0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            most, least = (
+                np.where(free, sign * inf, np.where(sign * t > 0, -G / (t + x), (x - t) / A))
+                for sign, x in ((1, root), (-1, -root))
+            )
+            i = np.arange(len(A)), most.argmin(axis=1)
+            x = most[i][:, None]
+            rises = ((A - B) * x + (B - C) * y + D - E)[i][:, None] > 0
+        allowed = np.where(free, G <= 0, square >= 0).all(axis=1, keepdims=True)
+        allowed &= (x >= least.max(axis=1, keepdims=True)) & (x >= 0) & (x < caps[:-1, None])
+        low, high = np.where(allowed & rises, y, low), np.where(allowed & rises, high, y)
+    return np.minimum(low[:, 0], caps[1:])
+
+
+def _largest(ellipses: list[list[float]], y: float) -> float:
+    """Return the largest x that all limits of a cell allow beside y."""
+    x = inf
+    for A, B, C, D, E, F in ellipses:
+        if A > 0:
+            t, G = B * y + D, (C * y + 2 * E) * y + F
+            root = sqrt(max(t * t - A * G, 0.0))
+            x = min(x, -G / (t + root) if t > 0 else (root - t) / A)
+    return x

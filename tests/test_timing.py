@@ -1,0 +1,308 @@
+"""The fastest timing: formulas, other programs' optima, limits at many times, symmetries."""
+
+from itertools import pairwise
+
+import numpy as np
+import oracles
+import pytest
+from scipy.integrate import quad
+
+import rbcourse as rb
+from rbcourse import textbook, timing
+
+I4, REST = np.eye(4), np.zeros(3)
+LEMNISCATE = 2.62205755429212  # B(1/4, 1/2)/2
+BODY = {"inertia": np.diag([0.02, 0.03, 0.04]), "torque": 0.08, "mass": 1.5, "force": 25.0}
+NORMS = {"angular_speed": 1.5, "speed": 1, "angular_acceleration": 4, "acceleration": 3}
+SETS = {
+    "norms": NORMS,
+    "boxes": NORMS | {"angular_acceleration": [4, 3, 5], "acceleration": [3, 4, 2]},
+    "body": BODY | {"gravity": (0, 0, -9.81), "centre": (0.05, 0, 0.1)},
+    "accelerations": {"angular_acceleration": 4, "acceleration": 3},
+}
+
+
+def random_chain(seed):
+    rng = np.random.default_rng([52, seed])
+    n, poses = int(rng.integers(3, 9)), [I4]
+    scale = [0.8, 0.8, 0.8, 0.5, 0.5, 0.5]
+    for step in rb.pose_from_coordinates(rng.uniform(-1, 1, (n, 6)) * scale):
+        poses.append(poses[-1] @ step)
+    return rb.chain(np.append(0, np.cumsum(rng.uniform(0.5, 1.5, n))), np.array(poses))
+
+
+def moved(*d):
+    return rb.pose_from_components(np.eye(3), d)
+
+
+def circle(angle, radius):
+    R = rb.exp_so3([0, 0, angle])
+    return rb.screw_se3(moved(radius, 0, 0), rb.pose_from_components(R, R @ [radius, 0, 0]))
+
+
+def trapezoid(length, v, a):
+    return length / v + v / a if length >= v * v / a else 2 * np.sqrt(length / a)
+
+
+def on_circle(angle, r, a):
+    """From rest to rest on a circle: v² = r a sin(2s/r), until v² = r a."""
+    if angle > np.pi / 2:
+        return LEMNISCATE * np.sqrt(r / a) + (angle - np.pi / 2) * np.sqrt(r / a)
+    half = np.sqrt(r * angle / 2)
+    return 2 * quad(lambda q: 2 * q / np.sqrt(r * a * np.sin(2 * q * q / r)), 0, half)[0]
+
+
+TURN, LINE = np.array([0.3, 1.0, -0.7]), moved(1, 2, 2)
+ANGLE = np.linalg.norm(TURN)
+SIDEWAYS, G = np.array([1, 2, -1]) / np.sqrt(6), np.diag([1.0, 2, 3])
+ALONG, ACROSS = np.linalg.norm(G @ SIDEWAYS), np.linalg.norm(np.cross(SIDEWAYS, G @ SIDEWAYS))
+CORNERS = rb.exp_so3([[0, 0, 0], [0, 0, 1], [0, 0.7, 1]])
+CORNER = [float(rb.angle_between(R0, R1)) for R0, R1 in pairwise(CORNERS)]
+
+
+def about(axis):
+    return rb.geodesic_so3(np.eye(3), rb.exp_so3(axis))
+
+
+SPINNING = {"angular_speed": 1, "angular_acceleration": 2}
+MOVING = {"speed": 1, "acceleration": 2}
+FORMULAS = {
+    "trapezoid": (about(TURN), SPINNING, trapezoid(ANGLE, 1, 2), 3e-7),
+    "bang-bang": (about(TURN), {"angular_acceleration": 2}, 2 * np.sqrt(ANGLE / 2), 1e-12),
+    "line": (rb.geodesic_se3(I4, LINE), MOVING, 3.5, 2e-6),
+    "line, cubic": (rb.chain([0, 1], [I4, LINE]), MOVING, 3.5, 2e-5),
+    "line, quintic": (
+        rb.chain([0, 1], [I4, LINE], leg=rb.projected_quintic_so3),
+        MOVING,
+        3.5,
+        5e-4,
+    ),
+    "long circle": (circle(3, 0.5), {"acceleration": 2}, on_circle(3, 0.5, 2), 3e-4),
+    "short circle": (circle(1.2, 0.5), {"acceleration": 2}, on_circle(1.2, 0.5, 2), 3e-4),
+    "tool": (
+        rb.geodesic_se3(I4, rb.pose_from_components(rb.exp_so3([0, 0, 3]), REST)),
+        {"acceleration": 2, "centre": (0.3, 0.4, 1)},
+        on_circle(3, 0.5, 2),
+        3e-4,
+    ),
+    "torque": (
+        about(3 * SIDEWAYS),
+        {"torque": 1.5, "inertia": G},
+        on_circle(3 * ACROSS / ALONG, ALONG / ACROSS, 1.5 / ALONG),
+        1e-4,
+    ),
+    "principal axis": (about([0, 2, 0]), {"torque": 1.5, "inertia": G}, np.sqrt(32 / 3), 1e-12),
+    "upwards": (
+        rb.geodesic_se3(I4, moved(0, 0, 2)),
+        {"force": 15, "gravity": (0, 0, -9.81)},
+        2 * np.sqrt(1 / (15 - 9.81) + 1 / (15 + 9.81)),
+        1e-9,
+    ),
+    "corner": (
+        rb.chain([0, 1, 3], CORNERS, leg=rb.geodesic_so3),
+        SPINNING,
+        sum(trapezoid(angle, 1, 2) for angle in CORNER),
+        1e-5,
+    ),
+    "from 0.5 to 0.8 m/s": (
+        rb.geodesic_se3(I4, LINE),
+        MOVING | {"rates": (0.5 / 3, 0.8 / 3)},
+        0.35 + 3 - (1 - 0.25) / 4 - (1 - 0.64) / 4,
+        2e-6,
+    ),
+}
+
+
+@pytest.mark.source("beyond BK 16")
+@pytest.mark.parametrize("name", FORMULAS)
+def test_the_time_is_that_of_the_formula(name):
+    curve, limits, T, tolerance = FORMULAS[name]
+    assert rb.fastest(curve, **limits).domain[1] == pytest.approx(T, rel=tolerance)
+
+
+def test_a_turn_with_bounded_torque_is_timed_as_on_the_board():
+    s, times = textbook.fastest(2.5 * SIDEWAYS, G, 1.5, 1000)
+    timed = rb.fastest(about(2.5 * SIDEWAYS), torque=1.5, inertia=G)
+    np.testing.assert_allclose(timed.s, s, rtol=1e-14)
+    np.testing.assert_allclose(timed.times, times, rtol=1e-10)
+
+
+OPTIMA = {
+    "norms": [6.400006444, 6.118844646, 4.46818924, 3.023376116],
+    "boxes": [6.071880093, 5.777161945, 4.280636912, 2.98707453],
+    "body": [7.85807474, 7.153200228, 4.84100414, 2.785995165],
+    "accelerations": [6.093687594, 5.602320193, 4.178093288, 2.900274533],
+}
+"""The least times on the same cells, by the cone program Clarabel."""
+
+
+@pytest.mark.parametrize("name", OPTIMA)
+def test_no_timing_on_the_same_cells_is_faster(name, monkeypatch):
+    monkeypatch.setattr(timing, "_REPEATS", 1)
+    for seed, T in enumerate(OPTIMA[name]):
+        limits = timing._limits(random_chain(seed), **SETS[name])
+        grid = timing._sampled(random_chain(seed), 1)
+        x, _ = timing._squared_rates(grid, limits, np.zeros(2))
+        found = np.sum(2 * np.diff(grid.s) / (np.sqrt(x[1:]) + np.sqrt(x[:-1])))
+        assert -1e-8 < found / T - 1 < 1e-4
+
+
+def test_times_within_boxes_are_those_of_toppra():
+    for seed, T in enumerate([2.4639600513, 2.8119294681, 1.8797166882]):
+        c, rng = random_chain(seed), np.random.default_rng(seed)
+        A0, A1 = c(np.array(c.domain))
+        leg = rb.minimum_acceleration_se3(A0, A1, *rng.uniform(-1, 1, (4, 3)))
+        limits = {"angular_speed": 1.5, "speed": 1.0}
+        limits |= {"angular_acceleration": [4, 3, 5], "acceleration": [3, 4, 2]}
+        assert rb.fastest(leg, **limits).domain[1] == pytest.approx(T, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_limits_are_kept_and_one_is_used_at_nearly_all_times(name):
+    for seed in range(3):
+        timed = rb.fastest(random_chain(100 + seed), **SETS[name])
+        t = np.linspace(*timed.domain, 100_001)
+        known = timing._limits(timed, **SETS[name])
+        V, A, R = (timed(t, order) for order in (1, 2, 0))
+        used = [
+            np.linalg.norm(a if limit.endswith("speed") else b + k, axis=-1)
+            for limit, a, b, k in known.rows(V, A, R[:, :3, :3])
+        ]
+        used = np.max(used, axis=0)
+        assert used.max() < 1 + 1e-4
+        assert np.mean(used > 0.99) > 0.9
+        largest = rb.limits_used(timed, **SETS[name])
+        assert max(share for share, _ in largest.values()) == pytest.approx(used.max(), abs=1e-4)
+
+
+def test_shares_are_those_of_torque_force_and_a_point_of_the_body():
+    c, r, g = random_chain(4), np.array([0.2, -0.1, 0.4]), np.array([1.0, 2, -9])
+    t = np.linspace(0.2, 0.8, 7) * c.times[1]
+    V, A, R = c(t, 1), c(t, 2), c(t)[:, :3, :3]
+
+    def point(t):
+        return c(t)[..., :3, :3] @ r + c(t)[..., :3, 3]
+
+    rate = oracles.derivative_by_differences(point, t, 1e-3)
+    bend = oracles.derivative_by_differences(
+        lambda t: oracles.derivative_by_differences(point, t, 1e-2), t, 1e-2
+    )
+    force = (R.mT @ (2.0 * (bend - g))[..., None])[..., 0]
+    limits = {"speed": 1, "acceleration": 1, "force": [1, 1, 1], "torque": 1, "inertia": G}
+    known = timing._limits(c, **limits, mass=2.0, centre=r, gravity=g)
+    rows = {}
+    for name, a, b, k in known.rows(V, A, R):
+        rows.setdefault(name, []).append(a if name == "speed" else b + k)
+    w = V[:, :3]
+    torque = A[:, :3] @ G + np.cross(w, w @ G)
+    np.testing.assert_allclose(rows["torque"][0], torque, atol=1e-13)
+    np.testing.assert_allclose(np.hstack(rows["force"]), force, atol=1e-7)
+    np.testing.assert_allclose(
+        np.linalg.norm(rows["speed"][0], axis=1), np.linalg.norm(rate, axis=1)
+    )
+    size = np.linalg.norm(bend, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(rows["acceleration"][0], axis=1), size, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_time_has_the_symmetries_of_the_problem(name):
+    """Moved path, backwards, other times and units of the path; faster limits."""
+    c, limits = random_chain(7), SETS[name]
+    t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
+    turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # about the vertical
+    metres = ("speed", "acceleration", "force", "gravity", "centre")
+
+    def longer(unit):
+        far = poses.copy()
+        far[:, :3, 3] *= unit
+        return far, {k: np.multiply(x, unit) if k in metres else x for k, x in limits.items()}
+
+    def faster(k):
+        power = {"centre": 0, "mass": 0, "inertia": 0, "speed": 1, "angular_speed": 1}
+        return {name: np.multiply(x, k ** power.get(name, 2)) for name, x in limits.items()}
+
+    same = [rb.fastest(rb.chain(t, turned @ poses), **limits)]
+    same += [rb.fastest(rb.chain(-t[::-1], poses[::-1]), **limits)]
+    same += [rb.fastest(rb.retime(c, 7.0), **limits)]
+    for unit in (1e-4, 1e6):
+        far, theirs = longer(unit)
+        same += [rb.fastest(rb.chain(t, far), **theirs)]
+    assert [x.domain[1] / T for x in same] == pytest.approx(np.ones(len(same)), rel=1e-12)
+    assert rb.fastest(c, **faster(1.7)).domain[1] * 1.7 == pytest.approx(T, rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [3, 4])
+def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size):
+    c = random_chain(5)
+    if size == 3:
+        c = rb.chain(c.times, c(c.times)[:, :3, :3])
+    limits = {k: NORMS[k] for k in NORMS if size == 4 or k.startswith("angular")}
+    timed = rb.fastest(c, **limits)
+    there = timed.times[np.searchsorted(timed.s, c.times)]
+    assert np.abs(timed(there) - c(c.times)).max() < 1e-14
+    assert timed.progress(timed.domain)[0] == pytest.approx(c.domain)
+    t = (timed.times[1:-1:50] + timed.times[2::50])[3:-3] / 2  # inside cells
+    for order in range(2, 4 if size == 3 else 2):
+        slope = oracles.derivative_by_differences(lambda t, k=order: timed(t, k - 1), t, 1e-4)
+        np.testing.assert_allclose(timed(t, order)[:, :3], slope[:, :3], atol=1e-7)
+    rate = oracles.derivative_by_differences(lambda t: timed(t)[:, :3, 3:], t, 1e-4)
+    if size == 4:
+        v = (timed(t)[:, :3, :3].mT @ rate)[..., 0]
+        np.testing.assert_allclose(timed(t, 1)[:, 3:], v, atol=1e-9)
+        slow = rb.retime(timed, 3 * timed.domain[1])
+        np.testing.assert_allclose(slow(3 * t, 2), timed(t, 2) / 9, rtol=1e-9, atol=1e-12)
+        assert rb.fastest(slow, **limits).domain == timed.domain
+    before, after = (timed(x, 1) for x in (np.nextafter(timed.times[1:-1], 0), timed.times[1:-1]))
+    assert np.abs(after - before).max() < 1e-12
+    with pytest.raises(RuntimeError, match="jumps between its cells"):
+        rb.acceleration_cost(timed)
+
+
+@pytest.mark.parametrize("name", ["norms", "boxes", "accelerations"])
+def test_no_even_timing_within_the_limits_is_faster(name):
+    for seed in range(4):
+        c, limits = random_chain(20 + seed), SETS[name]
+        shares = rb.limits_used(c, **limits)
+        powers = [x if k.endswith("speed") else x**0.5 for k, (x, _) in shares.items()]
+        even = max(powers) * (c.domain[1] - c.domain[0])
+        assert rb.fastest(c, **limits).domain[1] < even * (1 + 1e-3)
+
+
+UP = rb.geodesic_se3(I4, moved(0, 0, 2))
+REFUSED = [
+    (about(TURN), {}, "limits: none of angular_speed, "),
+    (about(TURN), {"angular_speed": 1}, "limits: one of angular_acceleration, "),
+    (about(TURN), {"torque": 1}, "inertia: it is needed for a torque"),
+    (about(TURN), {"torque": -1, "inertia": G}, "torque: a number above 0, or three"),
+    (about(TURN), {"angular_acceleration": [1, 2]}, "angular_acceleration: a number above 0"),
+    (about(TURN), {"angular_acceleration": np.nan}, "angular_acceleration is nan"),
+    (about(TURN), {"acceleration": 1}, "acceleration: a curve on SO.3. has none"),
+    (about(TURN), SPINNING | {"rates": (-1, 0)}, "rates: two numbers from 0 up"),
+    (about(TURN), SPINNING | {"rates": (2, 0)}, "rates.0. is too high to brake, or above"),
+    (about(TURN), SPINNING | {"rates": (0, 2)}, "rates.1. is above a limit on a speed"),
+    (about(TURN), {"angular_acceleration": 2, "rates": (0, 5)}, "rates.0. is too low for rates.1."),
+    (UP, {"force": 9, "gravity": (0, 0, -9.81)}, "force: it takes 1.09 times .* near s = 0"),
+    (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
+    (rb.chain([0, 1, 2], [I4, LINE, LINE]), MOVING, r"near s = 1, between poses\[1\] and poses\[2"),
+    (rb.geodesic_so3(np.eye(3), CORNERS), SPINNING, "curve: a single Curve wanted, no stack"),
+    (np.sin, SPINNING, "curve: a single Curve wanted"),
+]
+
+
+@pytest.mark.parametrize(("curve", "limits", "message"), REFUSED)
+def test_bad_limits_and_paths_are_refused(curve, limits, message):
+    with pytest.raises(ValueError, match=message):
+        rb.fastest(curve, **limits)
+
+
+def test_an_unknown_limit_is_refused():
+    with pytest.raises(TypeError, match="jerk: no limit has this name"):
+        rb.limits_used(UP, jerk=1)
+
+
+def test_a_limit_that_is_exceeded_between_the_points_is_warned_of(monkeypatch):
+    monkeypatch.setattr(timing, "FINER", (1,))
+    monkeypatch.setattr(timing, "TOLERANCE", 1e-9)
+    monkeypatch.setattr(timing, "_REPEATS", 1)
+    with pytest.warns(RuntimeWarning, match="a limit is exceeded by .* near s = "):
+        rb.fastest(random_chain(0), **NORMS)
