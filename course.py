@@ -55,6 +55,7 @@ TASKS = {  # task: environment, commands, of which the last takes the further wo
     "lock": ("test", ["rbclassroom.course.lock"], "write the lists of exact versions"),
 }
 PATHS = "check", "collect"  # these take a path, from where the command is typed
+PLAIN = "ledger", "atlas", "bench"  # these take no further words
 
 
 class SetUpError(Exception):
@@ -72,6 +73,8 @@ def main():
     if task not in TASKS:
         print("There is no task %r. Choose from: %s." % (task, ", ".join(TASKS)), file=sys.stderr)
         sys.exit(2)
+    if words and task in PLAIN:
+        sys.exit("'course.py %s' takes no options, got: %s" % (task, " ".join(words)))
     if task in PATHS:
         words = [os.path.abspath(word) if os.path.exists(word) else word for word in words]
     environment, commands, _ = TASKS[task]
