@@ -356,3 +356,9 @@ def test_the_book_of_lesson_13_is_turned_by_its_torques():
         end = solve_ivp(euler, (0, 1), start, args=torque, rtol=1e-10, atol=1e-12).y[:, -1]
         for R in (diagonal, matrices(poses, f"{law} R{{}} [1]")[-1]):
             assert np.abs(end - [*R.ravel(), *rest]).max() < 1e-6, law
+
+
+def test_the_readme_says_what_the_projection_costs():
+    best, near = numbers("paper_fig5_costs")["rotation [rad²]"]
+    readme = (FIGURES.parent / "README.md").read_text("utf-8")
+    assert f"costs {100 * (near / best - 1):.0f} % more" in readme

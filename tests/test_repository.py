@@ -285,19 +285,25 @@ def test_each_task_runs_modules_that_take_its_words(task, setting_up, tmp_path, 
     ran = []
     (tmp_path / "ps1.ipynb").touch()
     monkeypatch.setattr(module, "run", lambda *given: ran.append(given))
-    monkeypatch.setattr(sys, "argv", ["course.py", task, "ps1.ipynb", "--due", "2026"])
+    words = [] if (plain := task in module.PLAIN) else ["ps1.ipynb", "--due", "2026"]
+    monkeypatch.setattr(sys, "argv", ["course.py", task, *words])
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "")
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     monkeypatch.chdir(tmp_path)
     module.main()
     environment, commands, _ = module.TASKS[task]
     assert [*module.read_stamp()][-1] == environment
-    file = str(tmp_path / "ps1.ipynb") if task in module.PATHS else "ps1.ipynb"
-    assert ran[-1] == (*commands[-1].split(), file, "--due", "2026")
+    if task in module.PATHS:
+        words[0] = str(tmp_path / "ps1.ipynb")
+    assert ran[-1] == (*commands[-1].split(), *words)
     assert [words[0] for words in ran] == [command.split()[0] for command in commands]
     for name, *_ in ran:
         assert find_spec(name), name
     assert ("PYTHONDONTWRITEBYTECODE" in os.environ) is not ("pytest" in ran[-1])
+    if plain:
+        monkeypatch.setattr(sys, "argv", ["course.py", task, "--help"])
+        with pytest.raises(SystemExit, match="takes no options, got: --help"):
+            module.main()
 
 
 @pytest.mark.parametrize("which", ["oldest", "newest"])
@@ -467,3 +473,11 @@ def test_wheels_carry_types_styles_and_pages_and_nothing_else(wheels):
         assert sum(not name.startswith(apart) for name in names) <= 46
         tops = {name.split("/")[0] for name in names}
         assert all(top == package or top.endswith(".dist-info") for top in tops)
+
+
+def test_tasks_and_options_that_pages_name_exist():
+    teach = "classroom/rbclassroom/book/pages/teach/index.md"
+    text = "".join(map(read, ["README.md", "notebooks/assignments/README.md", teach]))
+    code = "".join(path.read_text("utf-8") for path in ROOT.glob("classroom/rbclassroom/**/*.py"))
+    assert all(f'"{x}"' in code for x in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
+    assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course_module().TASKS)

@@ -1,6 +1,8 @@
 """The fastest timing: formulas, other programs' optima, limits at many times, symmetries."""
 
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import oracles
@@ -293,6 +295,13 @@ REFUSED = [
 def test_bad_limits_and_paths_are_refused(curve, limits, message):
     with pytest.raises(ValueError, match=message):
         rb.fastest(curve, **limits)
+
+
+def test_the_call_in_the_readme_starts_and_ends_at_rest():
+    text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+    (call,) = re.findall(r"`(rb\.fastest\(motion.*?\))`", text)
+    timed = eval(call, {"rb": rb, "motion": random_chain(1)})
+    assert np.abs(timed(timed.domain, 1)).max() < 1e-9
 
 
 def test_an_unknown_limit_is_refused():
