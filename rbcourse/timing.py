@@ -46,6 +46,10 @@ FINER = 1, 2, 4, 8
 TOLERANCE = 1e-4  # by which a limit may be exceeded inside a cell
 _REPEATS = 12
 _INSIDE = np.linspace(0, 1, 6)[:, None, None]
+_BETWEEN = np.linalg.solve(
+    np.vander(np.linspace(0, 1, 6)).T, np.vander(np.linspace(0, 1, 121), 6).T
+).T
+"""What takes values at the six points of a cell to those of their polynomial at 121."""
 _SPEEDS = "angular_speed", "speed"
 _BENDS = "angular_acceleration", "acceleration", "torque", "force"
 Row = tuple[str, Array, Array, Array]
@@ -111,7 +115,8 @@ def fastest(
     The grid has 1,000 cells, for chains 250 for each leg (25 if there are many), and up to eight
     times as many until the limits hold between its points to 1e-4. T is then about 1e-3 above the
     shortest time. The motion stops where the velocity of the path jumps. Its acceleration jumps
-    where that of the path does, and between cells; jerk is not limited.
+    where that of the path does, at both ends, and between cells; jerk is not limited. A thousand
+    cells take about 50 ms.
 
     Examples
     --------
@@ -170,7 +175,8 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
     Returns
     -------
     dict of str to (float, float)
-        Share and time, among 20,001 times and both sides of the joints of a chain.
+        Share and time, among 20,001 times and both sides of the joints of a chain; a limit may be
+        exceeded between them.
 
     Examples
     --------
@@ -202,7 +208,8 @@ class Timed(Curve):
     curve : Curve
         The path c(s).
     s, rate, times : ndarray, shape (N + 1,)
-        The grid, s' there, and when it is there.
+        The grid, s' there, and when it is there. The pose of a path at s0 is passed at
+        ``times[np.searchsorted(s, s0)]``.
     """
 
     curve: Curve
@@ -369,7 +376,7 @@ def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, A
     held = np.max([np.linalg.norm(k, axis=-1) for _, _, k in parts], axis=(0, 1))
     if (held >= 1).any():
         where = (
-            f"{held.max():.3g} times that to hold the body near s = {s[np.argmax(held >= 1)]:.6g}"
+            f"{held.max():.6g} times that to hold the body near s = {s[np.argmax(held >= 1)]:.6g}"
         )
         raise ValueError(f"force: it takes {where}")
     caps = np.minimum(np.append(X[0], inf), np.append(inf, X[-1]))
@@ -378,13 +385,15 @@ def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, A
     ends = [(r * r, r * r) if v else (0, inf) for r, v in zip(rates.tolist(), moving, strict=True)]
     scale = np.ones((len(h), 1))
     for _ in range(_REPEATS):
-        x = _two_passes(s, [[scale * y[[0, -1]] for y in row] for row in parts], caps, ends)
+        ends_of_cells = [[y[[0, -1]] for y in (scale * a, scale * b, k)] for a, b, k in parts]
+        x = _two_passes(s, ends_of_cells, caps, ends)
         u, inside = (np.diff(x) / h / 2)[:, None], x[:-1] + _INSIDE[..., 0] * np.diff(x)
-        used = [np.linalg.norm(a * u + b * inside[..., None] + k, axis=-1) for a, b, k in parts]
-        share, fast = np.max(used, axis=(0, 1)), np.sqrt(inside / X).max(axis=0)
+        squares = [np.sum((a * u + b * inside[..., None] + k) ** 2, axis=-1) for a, b, k in parts]
+        share = np.sqrt(np.max([(_BETWEEN @ y).max(axis=0) for y in squares], axis=0))
+        fast = np.sqrt((_BETWEEN @ (inside / X)).max(axis=0))
         if max(share.max(), fast.max()) < 1 + TOLERANCE / 10:
             break
-        scale = np.minimum(scale * np.maximum(share, 1)[:, None], 0.999 / (held[:, None] + 1e-3))
+        scale *= 1 + 2 * (np.maximum(share, 1) - 1)[:, None] / (1 - held)[:, None]
         over = np.maximum(np.append(fast, 1), np.append(1, fast))
         caps = np.where(over > 1, np.minimum(caps, x) / np.maximum(over, 1) ** 2, caps)
     return x, np.maximum(share, fast)
@@ -400,7 +409,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
     )
     (first, most), (last, most_there) = ends
     low, high = [0.0] * N + [last], [inf] * N + [min(most_there, cap[N])]
-    if last > high[N]:
+    if last > high[N] * (1 + 1e-9):
         raise ValueError("rates[1] is above a limit on a speed")
     for i in range(N - 1, -1, -1):  # from which x the end is reached
         high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])

@@ -270,6 +270,26 @@ def test_no_even_timing_within_the_limits_is_faster(name):
         assert rb.fastest(c, **limits).domain[1] < even * (1 + 1e-3)
 
 
+def test_limits_are_kept_in_the_cells_beside_a_rest():
+    """There a speed and an acceleration change as a polynomial of a cell."""
+    line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
+    slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
+    still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)
+    held = rb.fastest(still, force=12, gravity=(0, 0, -9.81), acceleration=3)
+    for timed, order, most in ((slow, 1, 1e-3), (held, 2, 3)):
+        t = np.geomspace(1e-8, 0.5, 100_001) * timed.domain[1]
+        for moments in (t, timed.domain[1] - t):
+            sizes = np.linalg.norm(timed(moments, order)[:, 3:], axis=1)
+            assert sizes.max() < most * (1 + 1e-4)
+
+
+def test_a_uniform_motion_at_its_limits_stays_as_it_is():
+    leg = rb.geodesic_se3(I4, rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2]))
+    w, v = np.linalg.norm(leg(0, 1).reshape(2, 3), axis=1)
+    timed = rb.fastest(leg, angular_speed=w, speed=v, acceleration=1, rates=(1, 1))
+    assert timed.domain[1] == pytest.approx(1, rel=1e-9)
+
+
 UP = rb.geodesic_se3(I4, moved(0, 0, 2))
 REFUSED = [
     (about(TURN), {}, "limits: none of angular_speed, "),
@@ -283,7 +303,11 @@ REFUSED = [
     (about(TURN), SPINNING | {"rates": (2, 0)}, "rates.0. is too high to brake, or above"),
     (about(TURN), SPINNING | {"rates": (0, 2)}, "rates.1. is above a limit on a speed"),
     (about(TURN), {"angular_acceleration": 2, "rates": (0, 5)}, "rates.0. is too low for rates.1."),
-    (UP, {"force": 9, "gravity": (0, 0, -9.81)}, "force: it takes 1.09 times .* near s = 0"),
+    (
+        UP,
+        {"force": 9, "gravity": (0, 0, -9.81)},
+        "force: it takes 1.09 times that to hold the body near s = 0",
+    ),
     (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
     (rb.chain([0, 1, 2], [I4, LINE, LINE]), MOVING, r"near s = 1, between poses\[1\] and poses\[2"),
     (rb.geodesic_so3(np.eye(3), CORNERS), SPINNING, "curve: a single Curve wanted, no stack"),
