@@ -49,7 +49,7 @@ _INSIDE = np.linspace(0, 1, 6)[:, None, None]
 _BETWEEN = np.linalg.solve(
     np.vander(np.linspace(0, 1, 6)).T, np.vander(np.linspace(0, 1, 121), 6).T
 ).T
-"""What takes values at the six points of a cell to those of their polynomial at 121."""
+"""The matrix that interpolates values at six points of a cell, by their polynomial, at 121."""
 _SPEEDS = "angular_speed", "speed"
 _BENDS = "angular_acceleration", "acceleration", "torque", "force"
 Row = tuple[str, Array, Array, Array]
@@ -108,7 +108,7 @@ def fastest(
     Warns
     -----
     RuntimeWarning
-        If a limit is exceeded by more than 1e-4 on the finest grid, between its points.
+        If a limit is still exceeded by more than 1e-4 between the points of the finest grid.
 
     Notes
     -----

@@ -276,7 +276,10 @@ def test_limits_are_kept_in_the_cells_beside_a_rest():
     slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
     still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)
     held = rb.fastest(still, force=12, gravity=(0, 0, -9.81), acceleration=3)
-    for timed, order, most in ((slow, 1, 1e-3), (held, 2, 3)):
+    further = rb.pose_from_coordinates([0.5, 0.3, 1, 2, 0, 0])
+    still = rb.chain([0, 1], [I4, further], leg=rb.projected_quintic_so3)
+    free = rb.fastest(still, acceleration=3, angular_acceleration=3)
+    for timed, order, most in ((slow, 1, 1e-3), (held, 2, 3), (free, 2, 3)):
         t = np.geomspace(1e-8, 0.5, 100_001) * timed.domain[1]
         for moments in (t, timed.domain[1] - t):
             sizes = np.linalg.norm(timed(moments, order)[:, 3:], axis=1)
