@@ -262,7 +262,7 @@ def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size)
 
 def test_a_share_that_lasts_is_given_with_its_first_time():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
-    assert used["speed"] == pytest.approx((1, 0.5), abs=1e-3)
+    assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 
 
 @pytest.mark.parametrize("name", ["norms", "boxes", "accelerations"])
