@@ -8,12 +8,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from jupyter_server.base.handlers import APIHandler
-from tornado.escape import json_decode
 from tornado.httpserver import HTTPServer
-from tornado.web import Application, HTTPError, RequestHandler, authenticated
+from tornado.web import Application, HTTPError, RequestHandler
 
-TEMPLATES = Path(__file__).with_name("lecture_view")
+TEMPLATES = Path(__file__).with_name("static")
 PORT = 8000
 MOST = 500
 """How many phones, and how many connections at once, there may be."""
@@ -22,25 +20,26 @@ MOST = 500
 class Ballot:
     """One vote at a time: opened, taken, closed, and then counted.
 
-    Of the vote that was opened last, `key` is a random name, `poll` the poll, and `letters` are the
-    options, ``"ABCD"``. Votes are taken while it is `open`.
+    Of the vote that was opened last, `key` is a random name, `poll` the poll, and `options` has the
+    text of each letter, as HTML. Votes are taken while it is `open`, and counted in `counts` then.
     """
 
     def __init__(self) -> None:
-        self.key = self.poll = self.letters = ""
+        self.key = self.poll = ""
+        self.options: dict[str, str] = {}
         self.open = False
         self._votes: dict[str, str] = {}
-        self._counts: Counter[str] = Counter()
+        self.counts: Counter[str] = Counter()
 
-    def begin(self, poll: str, options: int) -> None:
+    def begin(self, poll: str, options: list[str]) -> None:
         """Open a vote on a poll; what was counted before is forgotten."""
         if self.open:
             raise ValueError(f"The vote on {self.poll} is open; close it first.")
-        if not 2 <= options <= 26:
-            raise ValueError(f"A poll has 2 to 26 options, not {options}.")
+        if not 2 <= len(options) <= 26:
+            raise ValueError(f"A poll has 2 to 26 options, not {len(options)}.")
         self.key = secrets.token_hex(8)
         self.poll = poll
-        self.letters = string.ascii_uppercase[:options]
+        self.options = dict(zip(string.ascii_uppercase, options, strict=False))
         self.open = True
 
     def admit(self) -> str:
@@ -57,8 +56,8 @@ class Ballot:
 
     def vote(self, phone: str, letter: str) -> None:
         """Take the vote of a phone that was admitted, in place of its last one."""
-        if letter not in tuple(self.letters):
-            raise ValueError(f"The options are {', '.join(self.letters)}.")
+        if letter not in self.options:
+            raise ValueError(f"The options are {', '.join(self.options)}.")
         if not self.knows(phone):
             raise ValueError("This phone was not admitted to this vote.")
         self._votes[phone] = letter
@@ -70,13 +69,13 @@ class Ballot:
     def close(self) -> None:
         """Close the vote, if it is open, count it, and forget who voted for what."""
         if self.open:
-            self._counts = Counter(filter(None, self._votes.values()))
+            self.counts = Counter(filter(None, self._votes.values()))
             self._votes.clear()
             self.open = False
 
     def state(self) -> dict[str, Any]:
         """Return what is shown: how many have voted, and for what when the vote is closed."""
-        counts = [] if self.open else [self._counts[letter] for letter in self.letters]
+        counts = [] if self.open else [self.counts[letter] for letter in self.options]
         voters = sum(map(bool, self._votes.values())) if self.open else sum(counts)
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
 
@@ -89,29 +88,11 @@ class WithBallot(RequestHandler):
         self.ballot = ballot
 
 
-class Lecturer(WithBallot, APIHandler):
-    """Open, watch and close votes, with the token of the lecture."""
-
-    @authenticated
-    def get(self) -> None:
-        """Answer with the state."""
-        self.finish(self.ballot.state())
-
-    @authenticated
-    def post(self) -> None:
-        """Open the vote on a poll, ``{"poll": "Poll 1", "options": 4}``, or close it, ``{}``."""
-        asked = json_decode(self.request.body)
-        try:
-            self.ballot.begin(asked["poll"], asked["options"]) if asked else self.ballot.close()
-        except ValueError as error:
-            raise HTTPError(409, str(error)) from error
-        self.get()
-
-
 class Phone(WithBallot):
     """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
 
     A phone is known by a random number in a cookie, which is another one for each vote.
+    When the vote is closed the page shows what was counted.
     """
 
     def set_default_headers(self) -> None:

@@ -1,0 +1,151 @@
+"""Slides as pages: a deck for each lesson, a crib for its lecturer, and the files they share."""
+
+import html
+import re
+import shutil
+from importlib.metadata import distribution
+from pathlib import Path
+from typing import Any
+
+from markdown_it import MarkdownIt
+from mdit_py_plugins.dollarmath import dollarmath_plugin
+
+from rbclassroom.lecture.slides import Deck, Slide, rows_of, starts_of, words_of
+from rbcourse.draw.display import ENGINE
+
+STATIC = Path(__file__).with_name("static")
+WIDE, IDEA = 1.9, 26
+"""A picture wider than this, over its height, is below its text; the words of an idea."""
+_KEYS = re.compile(r" \[[A-Z]\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
+
+
+def _math(text: str, options: dict[str, Any]) -> str:
+    tex = re.sub(r"\\mathsf(?: T|\{T\})", r"\\top", text)
+    both = (r"\[", r"\]") if options["display_mode"] else (r"\(", r"\)")
+    return html.escape(f"{both[0]}{tex}{both[1]}", quote=False)
+
+
+_MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable("table")
+_MARKDOWN.use(dollarmath_plugin, renderer=_math)
+
+
+def marked(text: str) -> str:
+    """Return Markdown as HTML; a formula stays on one line with the mark that follows it."""
+    page: str = _MARKDOWN.render(_KEYS.sub("", text))
+    page = page.replace("<p><em>Look for", '<p class="look"><em>Look for')
+    return re.sub(r"(\\\((?:(?!\\\)).)*\\\)[.,;:?!)]+)", r'<span class="whole">\1</span>', page)
+
+
+def _inline(text: str) -> str:
+    return marked(text).strip().removeprefix("<p>").removesuffix("</p>")
+
+
+def _words(slide: Slide) -> str:
+    """Return the text of a slide; parts after the first one, and items of lists, are steps."""
+    first, *later = slide.parts or [""]
+    parts = [marked(first), *(f'<div class="fragment">{marked(part)}</div>' for part in later)]
+    return "".join(parts).replace("<li>", '<li class="fragment">')
+
+
+def _options(slide: Slide) -> str:
+    rows = []
+    for letter, text in slide.options.items():
+        right, idea, state = letter == slide.right, "", ""
+        if slide.kind == "verdict":
+            state = " right" if right else " wrong"
+            said = _shortened(slide.ideas.get(letter, ""))
+            idea = f'<p class="idea{"" if right else " fragment"}">{_inline(said)}</p>'
+        body = f"<b>{letter}</b><div>{_inline(text)}{idea if slide.ideas else ''}</div>"
+        rows.append(f'<li class="option{state}">{body}</li>')
+    short = slide.kind == "poll" and all(len(text) < 14 for text in slide.options.values())
+    return f'<ul class="options{" short" * short}">{"".join(rows)}</ul>'
+
+
+def _shortened(text: str) -> str:
+    """Return the first sentences of an idea, at most so many words but one sentence."""
+    kept, *rest = re.split(r"(?<=[.?!])\s+(?=[A-Z$*(])", text.strip())
+    while rest and words_of(f"{kept} {rest[0]}") <= IDEA:
+        kept = f"{kept} {rest.pop(0)}"
+    return re.sub(r"^\**[a-z]", lambda match: match[0].upper(), kept)
+
+
+def section(slide: Slide) -> str:
+    """Return a slide as HTML for reveal.js."""
+    layout, words, head = slide.kind, _words(slide), f"<h2>{_inline(slide.title)}</h2>"
+    if slide.kind == "title":
+        head, words = "", f"<h1>{_inline(slide.title)}</h1>{words}"
+    elif slide.kind == "end":
+        behind = "Exercises and references are behind this slide: press <kbd>E</kbd>."
+        head, words = "", f"<h1>{slide.title}</h1><p>{behind}</p>"
+    elif slide.poll:
+        head, words = f"<h2>{slide.poll}</h2>", words + _options(slide)
+    elif slide.picture:
+        narrow = " narrow" * (slide.words < 18)
+        layout = "wide" if slide.picture.aspect > WIDE else f"split{narrow}"
+    layout += " tabled" * ("<table" in words)
+    shown = f"<figure>{slide.picture.html}</figure>" if slide.picture else ""
+    notes = "".join(f"<div>{marked(note)}</div>" for note in slide.notes)
+    timing = f' data-timing="{slide.seconds:.0f}"' if slide.seconds else ""
+    return (
+        f'<section class="{layout}" data-poll="{slide.poll}"{timing}>{head}'
+        f'<div class="body"><div class="words">{words}</div>{shown}</div>'
+        f'<aside class="notes">{notes}</aside></section>'
+    )
+
+
+def deck_page(deck: Deck) -> str:
+    """Return the page of a deck: sections from left to right, what is behind the end below it."""
+    *parts, end = deck.sections
+    stacks = [part for part in parts if part] + [[*end, *deck.behind]]
+    joined = ("".join(map(section, part)) for part in stacks)
+    slides = "\n".join(f"<section>{part}</section>" for part in joined)
+    template = (STATIC / "deck.html").read_text(encoding="utf-8")
+    return template.replace("<!--TITLE-->", html.escape(deck.title)).replace("<!--SLIDES-->", slides)
+
+
+def crib_page(deck: Deck) -> str:
+    """Return the crib of a lecture, one sheet: its run sheet with slides, and right answers."""
+    rows = rows_of(deck.sheet)
+    starts = starts_of(deck.shown, rows)
+    lines = ["| min | slide | part | ask, and what to hear | late? skip |", "|--|--|--|--|--|"]
+    for (minute, part, ask, skip), start in zip(rows, starts, strict=True):
+        lines.append(f"| {minute} | {start + 1} | {part} | {ask} | {skip} |")
+    polls = [slide for slide in deck.shown if slide.kind == "verdict"]
+    right = (
+        f"- **{poll.poll}: {poll.right}** · {poll.options[poll.right]}" for poll in polls
+    )
+    before = deck.sheet.partition("\n|")[0]
+    text = "\n".join([f"# {deck.title}", "", before, "", *lines, "", *right])
+    template = (STATIC / "crib.html").read_text(encoding="utf-8")
+    body = marked(text)
+    return template.replace("<!--TITLE-->", html.escape(deck.title)).replace("<!--BODY-->", body)
+
+
+def write(decks: dict[str, Deck], folder: Path) -> None:
+    """Write decks and cribs by their names, and all files that they share, to a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, deck in decks.items():
+        _put(folder / f"{name}.html", deck_page(deck))
+        _put(folder / f"{name}_crib.html", crib_page(deck))
+    shared = folder / "shared"
+    shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)
+    for name in ("slides.css", "slides.js"):
+        shutil.copyfile(STATIC / name, shared / name)
+    # reveal.js scales slides, and a canvas is to have one pixel for each of the screen
+    _put(shared / "display.js", ENGINE.replace("window.devicePixelRatio", "window.pixels"))
+
+
+def put_mathjax(folder: Path) -> None:
+    """Copy MathJax to where the book has it, ``_static`` beside the folder of the decks."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(mathjax(), folder / "tex-svg.js")
+
+
+def mathjax() -> Path:
+    """Return the file of MathJax."""
+    found = distribution("sphinx-mathjax-offline")
+    return Path(str(found.locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")))
+
+
+def _put(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,164 @@
+"""Show the slides of a lesson, with votes by phone if wanted, or write them as PDF."""
+
+import argparse
+import asyncio
+import os
+import secrets
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+import webbrowser
+from pathlib import Path
+
+import segno
+from tornado.escape import json_decode
+from tornado.httpserver import HTTPServer
+from tornado.netutil import bind_sockets
+from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
+
+from rbclassroom.course.notebooks import lesson_paths
+from rbclassroom.lecture.deck import put_mathjax, write
+from rbclassroom.lecture.slides import deck_of
+from rbclassroom.lecture.votes import Phones, find_address
+
+HOST = "127.0.0.1"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
+"""Programs that print a page as PDF."""
+
+
+def find_lesson(number: str, folder: Path) -> Path:
+    """Return the lesson of a number."""
+    paths = {path.name[:2]: path for path in lesson_paths(folder)}
+    if number.zfill(2) not in paths:
+        there = ", ".join(paths) or "none; this is run in the folder of the course"
+        raise ValueError(f"There is no lesson {number}; there are: {there}.")
+    return paths[number.zfill(2)]
+
+
+class _Here(RequestHandler):
+    """Answers only who asks for this machine by its number: no page of another site can."""
+
+    def prepare(self) -> None:
+        if self.request.host_name != HOST:
+            raise HTTPError(403)
+
+
+class Slides(_Here, StaticFileHandler):
+    """The files of the slides."""
+
+
+class Desk(_Here):
+    """Opens, watches and closes votes, for who has the token."""
+
+    def initialize(self, phones: Phones, token: str) -> None:
+        """Keep the votes and the token."""
+        self.phones, self.token = phones, token
+        code = segno.make(phones.url, micro=False)
+        self.code = code.svg_inline(border=2, light="white", omitsize=True)
+
+    def prepare(self) -> None:
+        super().prepare()
+        if not secrets.compare_digest(self.get_query_argument("token", ""), self.token):
+            raise HTTPError(403)
+
+    def get(self) -> None:
+        """Answer with the state, the address and its code."""
+        state = self.phones.ballot.state()
+        self.finish({**state, "address": self.phones.url, "code": self.code})
+
+    def post(self) -> None:
+        """Open the vote on a poll, ``{"poll": "Poll 1", "options": [...]}``, or close it, ``{}``."""
+        asked = json_decode(self.request.body)
+        ballot = self.phones.ballot
+        try:
+            ballot.begin(asked["poll"], asked["options"]) if asked else ballot.close()
+        except ValueError as error:
+            raise HTTPError(409, reason=str(error)) from error
+        self.get()
+
+
+async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | None) -> None:
+    """Serve the slides of a lesson until Ctrl-C, or until they are written as PDF."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        write({path.stem: deck_of(path)}, Path(folder, "slides"))
+        put_mathjax(Path(folder, "_static"))
+        token, handlers = secrets.token_hex(24), list[tuple[object, ...]]()
+        if phones:
+            handlers.append(("/slides/votes", Desk, {"phones": phones, "token": token}))
+            phones.start()
+        handlers.append((r"/(.*)", Slides, {"path": folder}))
+        server = HTTPServer(Application(handlers, log_function=lambda handler: None))
+        sockets = bind_sockets(0, HOST)
+        server.add_sockets(sockets)
+        address = f"http://{HOST}:{sockets[0].getsockname()[1]}/slides/{path.stem}.html"
+        if pdf:
+            await print_pdf(address, pdf)
+            return
+        shown = f"{address}?token={token}" if phones else address
+        print(f"{path.name} is shown at {shown}", flush=True)
+        print(f"Its crib is at {address.replace('.html', '_crib.html')}", flush=True)
+        if phones:
+            print(f"Phones vote at {phones.url}", flush=True)
+        print("Stop it with Ctrl-C.", flush=True)
+        if browser:  # some return only when they are closed
+            threading.Thread(target=webbrowser.open, args=[shown], daemon=True).start()
+        await asyncio.Event().wait()
+
+
+async def print_pdf(address: str, pdf: Path) -> None:
+    """Print slides as PDF with a browser that has the engine of Chromium."""
+    found = next(filter(None, map(shutil.which, (os.environ.get("BROWSER", ""), *BROWSERS))), None)
+    if not found:
+        wanted = f"no browser is found that prints; wanted is one of {', '.join(BROWSERS)}"
+        raise ValueError(f"{wanted}, or name it in the variable BROWSER")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        words = ["--headless", "--disable-gpu", "--no-pdf-header-footer", f"--user-data-dir={profile}"]
+        words += ["--virtual-time-budget=60000", f"--print-to-pdf={pdf.resolve()}"]
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            words.append("--no-sandbox")  # Chromium has none for the administrator
+        quiet = asyncio.subprocess.DEVNULL
+        job = await asyncio.create_subprocess_exec(
+            found, *words, f"{address}?print-pdf", stdout=quiet, stderr=quiet
+        )
+        if await job.wait() or not pdf.exists():
+            raise ValueError(f"{found} has not written {pdf}")
+    print(f"{pdf}: {pdf.stat().st_size / 1e6:.1f} MB")
+
+
+def open_votes(address: str) -> Phones | None:
+    """Let phones vote at an address, or at that of this machine in its network, if it has one."""
+    try:
+        address = address or find_address()
+    except OSError:
+        print("No network was found: the class votes by show of hands.", flush=True)
+        return None
+    try:
+        return Phones(address)
+    except (ValueError, OSError) as error:
+        raise ValueError(f"Phones cannot vote at {address}: {error}.") from error
+
+
+def main() -> None:
+    """Show a lesson from the command line, in the folder of the course."""
+    parser = argparse.ArgumentParser(prog="course.py lecture")
+    parser.add_argument("lesson", help="its number: 01")
+    parser.add_argument("--no-browser", action="store_true", help="print the address only")
+    parser.add_argument("--pdf", action="store_true", help="write the slides as PDF; show nothing")
+    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="of this machine")
+    words = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a script ignores Ctrl-C
+    try:
+        path = find_lesson(words.lesson, Path("notebooks"))
+        phones = None if words.votes is None or words.pdf else open_votes(words.votes)
+        pdf = Path(f"{path.stem}.pdf") if words.pdf else None
+        asyncio.run(serve(path, phones, not words.no_browser, pdf))
+    except ValueError as error:
+        sys.exit(str(error))
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,378 @@
+"""A stored lesson as slides: the metadata `slide` of a cell says what the class sees of it.
+
+A cell without it makes no slide; its text goes to the notes of the slide before. CONTRIBUTING.md
+has the rules for authors.
+"""
+
+import base64
+import io
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbformat import NotebookNode
+from PIL import Image
+
+from rbclassroom.book.lessons import living, split_sheet
+
+BEHIND = ("Exercises", "Misprints", "References")
+"""Sections that are behind the end, where a key leads."""
+ROWS, TOGETHER = 5, 80
+"""Rows of a long table, or works, on one slide; words of exercises on one slide."""
+_ITEM = re.compile(r"^- ((?:\*\*[A-Z]\*\*(?:, | and )?)+)(?: · |[,:.]? ?)(.*(?:\n .*)*)", re.M)
+_PICTURE = re.compile(r"!\[\]\(([^)]+)\)\n*")
+_LIVING = re.compile(r"rbcourseDisplay\.revive\(image, (\{.*\})\);\s*\}</script>", re.S)
+
+
+@dataclass
+class Picture:
+    """A picture of a code cell: its HTML, and its width over its height."""
+
+    html: str
+    aspect: float
+
+
+@dataclass
+class Slide:
+    """What is seen at once, and what the lecturer is told.
+
+    Of the `parts`, Markdown texts, each after the first one appears at a key. A row of the run
+    sheet calls the slide by one of its `keys`. A poll has `options`; its verdict also has the
+    `ideas` behind them, and which is `right`.
+    """
+
+    title: str
+    kind: str = "plain"
+    parts: list[str] = field(default_factory=list)
+    picture: Picture | None = None
+    keys: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    poll: str = ""
+    options: dict[str, str] = field(default_factory=dict)
+    ideas: dict[str, str] = field(default_factory=dict)
+    right: str = ""
+    seconds: float = 0
+
+    @property
+    def words(self) -> int:
+        """How many words its text has; a formula within a text counts as one."""
+        return words_of("\n\n".join(self.parts))
+
+
+def words_of(text: str) -> int:
+    """Return the number of words of a slide text."""
+    text = re.sub(r"\$\$.*?\$\$", " ", text, flags=re.S)
+    text = re.sub(r"\$[^$]*\$", " x ", text)
+    return len(re.findall(r"\w[\w’'.,-]*", re.sub(r"^[-*] |<[^>]*>|\. \. \.", " ", text, flags=re.M)))
+
+
+@dataclass
+class Deck:
+    """The slides of a lesson: those of each section, those behind the end, and the run sheet."""
+
+    title: str
+    sections: list[list[Slide]]
+    behind: list[Slide]
+    sheet: str
+
+    @property
+    def shown(self) -> list[Slide]:
+        """The slides up to the end."""
+        return [slide for section in self.sections for slide in section]
+
+
+class _Reader:
+    """Reads the cells of a lesson in their order."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.sections: list[list[Slide]] = [[]]
+        self.behind: list[Slide] = []
+        self.section = self.title = ""
+        self.keys: set[str] = set()  # for the next slide
+        self.poll: Slide | None = None  # whose verdict is to come
+        self.answer = ""
+
+    @property
+    def after(self) -> bool:
+        return self.section.startswith(BEHIND)
+
+    def put(self, slide: Slide) -> None:
+        """Add a slide to its section."""
+        slide.keys |= self.keys
+        self.keys = set()
+        (self.behind if self.after else self.sections[-1]).append(slide)
+
+    def put_text(self, wish: str, own: Picture | None = None) -> None:
+        """Add the slides of a text; the picture of its cell goes to the last one."""
+        texts = [text.strip() for text in re.split(r"^---$", wish, flags=re.M)]
+        for text in texts:
+            borrowed = [self.borrowed(name) for name in _PICTURE.findall(text)]
+            if text is texts[-1] and own:
+                borrowed = [own]
+            parts = re.split(r"^\. \. \.$", _PICTURE.sub("", text), flags=re.M)
+            parts = [part.strip() for part in parts if part.strip()]
+            if parts or borrowed:
+                self.put(Slide(self.title, "plain", parts, borrowed[0] if borrowed else None))
+
+    def borrowed(self, name: str) -> Picture:
+        """Return the picture of a cell of this lesson, or of another one, ``lesson/cell``."""
+        lesson, _, cell = name.rpartition("/")
+        cells = self.notebook.cells
+        if lesson:
+            path = self.root / "notebooks" / f"{lesson}.ipynb"
+            cells = nbformat.read(path, as_version=4).cells
+        found = [picture_of(each, self.root) for each in cells if each.id == cell]
+        if not found or not found[0]:
+            raise ValueError(f"slide: there is no picture {name}")
+        return found[0]
+
+    def note(self, text: str) -> None:
+        """Tell the lecturer what the class does not see."""
+        if (slides := self.sections[-1]) and text.strip() and not self.after:
+            slides[-1].notes.append(text.strip())
+
+    def read(self, notebook: NotebookNode) -> Deck:
+        """Return the deck of a lesson."""
+        self.notebook = notebook
+        cells, sheet = split_sheet(notebook)
+        for cell in cells:
+            wish = cell.metadata.get("slide", False)
+            if wish is not False and not isinstance(wish, str):
+                raise ValueError(f"slide: a text or false wanted in {cell.id}, got {wish!r}")
+            if {"solution", "not-in-lectures"} & {*cell.metadata.get("tags", [])}:
+                continue
+            if cell.cell_type == "code":
+                if wish is not False:
+                    self.read_code(cell, wish)
+            else:
+                self.read_text(cell, wish)
+        deck = Deck(self.sections[0][0].title, self.sections, self.behind, sheet)
+        self.keys, self.section = {"homework"}, ""
+        self.sections.append([])
+        self.put(Slide("Questions?", "end"))
+        plan(deck.shown, sheet)
+        return deck
+
+    def read_code(self, cell: NotebookNode, wish: str) -> None:
+        name = re.search(r'save_\w+\(\s*fig,\s*"(?:lesson\d\d_|paper_|report_)?(\w+)"', cell.source)
+        if r"\printed" in wish:
+            wish = wish.replace(r"\printed", printed(cell))
+        key = name[1] if name else "explorer" if "_explorer()" in cell.source else cell.id
+        figure = re.fullmatch(r"fig(\d+)([a-z]?)", key)
+        self.keys |= {f"figure {figure[1]}", f"figure {figure[1]}{figure[2]}"} if figure else {key}
+        self.keys.add(cell.id.replace("-", " "))
+        self.put_text(wish, picture_of(cell, self.root))
+
+    def read_text(self, cell: NotebookNode, wish: str | bool) -> None:
+        heading = re.match(r"(#+) (.*)\n*", cell.source)
+        text = cell.source[heading.end() :] if heading else cell.source
+        self.keys |= {cell.id.replace("-", " ")} if wish else set()
+        if heading and self.begins(len(heading[1]), heading[2], text, wish):
+            return
+        if self.after:
+            if not self.answer:
+                self.put_behind(wish or re.sub(r"<details>.*?</details>", "", text, flags=re.S))
+        elif self.answer and self.poll and not heading:
+            self.put_answer(self.poll, text, wish or "")
+        else:
+            if self.section == "Recap":
+                wish = wish or text
+            self.put_text(wish or "")
+            self.note(text)
+
+    def begins(self, level: int, words: str, text: str, wish: str | bool) -> bool:
+        """Begin what has this heading; tell whether the rest of its cell is read by that."""
+        self.answer = words if words.startswith("Answer") else ""
+        if level == 1:
+            question = re.search(r"\*\*The question of this \w+\.\*\* (.*)", text)
+            self.title, self.keys = words, {"question"}
+            self.put_text(wish or (question[1] if question else ""))
+            self.sections[0][0].kind = "title"
+            self.note(text)
+            return True
+        if level == 2:
+            self.section = self.title = words
+            number = re.match(r"\d+", words)
+            self.keys = {number[0] if number else words.lower(), words.lower()}
+            if not self.after:
+                self.sections.append([])
+        elif words.startswith("Poll"):
+            self.begins_poll(words, text, wish)
+            return True
+        elif not self.answer:
+            self.title = words
+            self.keys |= {words.lower()}
+        return bool(self.answer)
+
+    def begins_poll(self, words: str, text: str, wish: str | bool) -> None:
+        question = wish or _ITEM.sub("", text).strip()
+        options = {item[1].strip("*"): item[2] for item in _ITEM.finditer(text)}
+        self.poll = Slide(self.title, "poll", [question], poll=words, options=options)
+        self.keys |= {words.lower()}
+        self.put(self.poll)
+
+    def put_answer(self, poll: Slide, text: str, wish: str) -> None:
+        """Read a cell of an answer: evidence, or what is said of the options, the verdict."""
+        listed = [*_ITEM.finditer(text)]
+        outside = re.search(r"(?:^|[^-] )\*\*([A-Z])\*\*(.*(?:\n.+)*)", _ITEM.sub("", text), re.M)
+        if outside and not poll.right:
+            poll.right = outside[1]
+            said = re.sub(r"^( it is)?[:., ]+", "", outside[2].partition("*Look for")[0])
+            if outside[0].startswith("**"):
+                poll.ideas[poll.right] = said.strip()
+        for item in [*listed, *_ITEM.finditer(wish)]:  # an author's words replace those before
+            said = re.sub(r"^(is|are) ", "", item[2].strip())
+            poll.ideas |= dict.fromkeys(re.findall("[A-Z]", item[1]), said)
+        if listed:
+            verdict = Slide(self.title, "verdict", poll.parts, poll=poll.poll)
+            verdict.options, verdict.ideas, verdict.right = poll.options, poll.ideas, poll.right
+            told = [f"**{letter}**: {poll.ideas.get(letter, '')}" for letter in poll.options]
+            verdict.notes, verdict.keys = told, {self.answer.lower()}
+            poll.notes = [f"Right: **{poll.right}**.", *poll.notes, *told]
+            self.put(verdict)
+            self.poll = None
+        self.put_text(_ITEM.sub("", wish))
+        self.note(_ITEM.sub("", text))
+
+    def put_behind(self, text: str) -> None:
+        """Add what is behind the end, a long table or list in several slides."""
+        text = text.strip()
+        if text.startswith("<small>") and "\n" not in text:
+            return
+        table = re.search(r"^\|.*\n\|[-| :]+\n", text, re.M)
+        before = text[: table.start()].strip() if table else text
+        rows = text[table.end() :].strip().split("\n") if table else []
+        items = re.split(r"\n(?=- )", text) if text.startswith("- ") else []
+        for i in range(0, len(rows), ROWS):
+            some = table[0] + "\n".join(rows[i : i + ROWS]) if table else ""
+            self.put(Slide(self.title, "plain", [some]))
+        for i in range(0, len(items), ROWS):
+            self.put(Slide(self.title, "plain", ["\n".join(items[i : i + ROWS])]))
+        if before and not rows and not items:
+            self.put_exercise(before)
+
+    def put_exercise(self, text: str) -> None:
+        """Add an exercise, beside the one before it if both are short."""
+        if self.title != self.section:
+            text = f"**{self.title}.** {text}"
+        last = self.behind[-1] if self.behind else None
+        if last and last.title == self.section and last.words + words_of(text) <= TOGETHER:
+            last.parts[0] += f"\n\n{text}"
+        else:
+            self.put(Slide(self.section, "plain", [text]))
+
+
+def printed(cell: NotebookNode) -> str:
+    """Return the first matrix that a code cell prints, as TeX."""
+    texts = [o.get("text") or o.get("data", {}).get("text/plain", "") for o in cell.outputs]
+    lines = re.findall(r"\[([^\[\]]+)\]", "".join(texts))
+    rows = [re.findall(r"-?\d+(?:\.\d*)?", line) for line in lines]
+    rows = [row for row in rows if row and len(row) == len(rows[0])]
+    if not rows:
+        raise ValueError(f"slide: {cell.id} prints no matrix")
+    inside = r" \\ ".join(" & ".join(row) for row in rows)
+    return rf"\begin{{pmatrix}}{inside}\end{{pmatrix}}"
+
+
+def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
+    """Return the picture of a code cell: alive where it can be, without its caption."""
+    explorer = re.search(r"explorers\.(\w+)_explorer\(\)", cell.source)
+    pages = [o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {})]
+    page = living(explorer[1], root) if explorer else "".join(pages)
+    image = re.search(r'<img [^>]*?alt="([^"]*)"[^>]*?src="data:image/png;base64,([^"]+)"', page)
+    if not image:
+        return None
+    data, still = _LIVING.search(page), base64.b64decode(image[2])
+    moves = data and '"controls":[]' not in data[1]
+    crop, aspect = (0.0,) * 4, 0.0
+    with Image.open(io.BytesIO(still)) as opened:
+        crop = crop if moves else margins(opened)
+        inner = opened.width * (1 - crop[0] - crop[2]), opened.height * (1 - crop[1] - crop[3])
+        aspect = inner[0] / inner[1]
+    shares = " ".join(f"{share:.3f}" for share in crop)
+    src = f"data:image/png;base64,{image[2]}"
+    html = f'<img data-crop="{shares if any(crop) else ""}" alt="{image[1]}" src="{src}">'
+    if data:
+        html += f'<script type="application/json">{data[1]}</script>'
+    return Picture(html, aspect)
+
+
+def margins(still: Image.Image) -> tuple[float, ...]:
+    """Return how much of a still is white margin: left, top, right, bottom, as shares."""
+    grey = still.convert("L")
+    box = grey.point([255 * (x < 245) for x in range(256)]).getbbox() or (0, 0, *still.size)
+    sides = box[0], box[1], still.width - box[2], still.height - box[3]
+    sizes = still.width, still.height, still.width, still.height
+    return tuple(max(0.0, side / size - 0.01) for side, size in zip(sides, sizes, strict=True))
+
+
+def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
+    """Return the rows of a run sheet: minute, part, what to ask and hear, what to skip when late.
+
+    Examples
+    --------
+    >>> rows_of("| minute | part | ask | skip |\\n|---|---|---|---|\\n| 3 | 2 | Why? *So.* | |")
+    [(3, '2', 'Why? *So.*', '')]
+    """
+    found = re.findall(r"^\| (\d+) \|([^|]*)\|([^|]*)\|([^|]*)\|", sheet, re.M)
+    return [(int(minute), *(text.strip() for text in texts)) for minute, *texts in found]
+
+
+def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> list[int]:
+    """Return where each row of a run sheet begins: the first slide that its part names.
+
+    A part has several names, ``poll 1, explorer``; those that are of no slide are for the lecturer.
+    Homework is at the end, in a lesson of two lectures also on the last slide of the first one.
+    """
+    starts: list[int] = []
+    later = [i for i, row in enumerate(rows[1:], 1) if row[0] < rows[i - 1][0]]
+    if later and rows[later[0] - 1][1] == "homework":
+        cut = later[0]
+        starts = starts_of(slides, rows[: cut - 1])
+        rest = starts_of(slides, rows[cut:])
+        return [*starts, rest[0] - 1, *rest]
+    for minute, part, *_ in rows:
+        names = [re.sub(r"^the ", "", name) for name in re.split(r"[,;] | and ", part.lower())]
+        found = (
+            k
+            for name in names
+            for k, slide in enumerate(slides)
+            if name in slide.keys or (len(name) > 3 and any(name in key for key in slide.keys))
+        )
+        start = next(found, None)
+        if start is None or (starts and start < starts[-1]):
+            where = "no slide" if start is None else "a slide before that of the row above"
+            raise ValueError(f"run sheet, minute {minute}: {where} for {part!r}")
+        starts.append(start)
+    return starts
+
+
+def plan(slides: list[Slide], sheet: str) -> None:
+    """Give each slide its row of the run sheet, and its share of the time."""
+    rows = rows_of(sheet)
+    starts = starts_of(slides, rows)
+    before = re.search(r"\*Before class:\*.*", sheet)
+    if before:
+        slides[0].notes.insert(0, before[0])
+    for i, (minute, part, ask, skip) in enumerate(rows):
+        last = i + 1 == len(rows)
+        end = minute + 1 if last else rows[i + 1][0]
+        end = end if end >= minute else minute + 2  # the next row begins another lecture
+        span = slides[starts[i] : len(slides) if last else max(starts[i + 1], starts[i] + 1)]
+        for slide in span:
+            slide.seconds = 60 * (end - minute) / len(span)
+            late = f" · late? skip {skip}" if skip else ""
+            told = [f"*Minute {minute}–{end}* · {part}{late}"]
+            slide.notes[:0] = [*told, f"**Ask:** {ask}"] if ask else told
+
+
+def deck_of(path: Path) -> Deck:
+    """Return the slides of a lesson in the folder ``notebooks`` of a course."""
+    try:
+        notebook = nbformat.read(path, as_version=4)
+        return _Reader(path.resolve().parents[1]).read(notebook)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from error

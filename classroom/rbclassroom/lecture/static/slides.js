@@ -1,0 +1,146 @@
+"use strict";
+// Slides of a lesson: sizes, living pictures, keys, votes. All that is asked for is in the folder.
+const all = (what, where = document) => [...where.querySelectorAll(what)];
+const printing = /[?&](print-pdf|view=print)/.test(location.search);
+const voting = /[?&]token=/.test(location.search) && window === window.top;
+const sections = all(".slides section section");
+
+// A picture is as large as its place allows, with its controls; white margins are cut off.
+const fit = (figure) => {
+  const seen = figure.querySelector(":scope > :is(canvas, img)"), panel = figure.querySelector(":scope > div");
+  if (!seen || !figure.clientWidth) return;
+  const crop = figure.dataset.crop ?? seen.dataset.crop ?? "";
+  figure.dataset.crop = crop;
+  const [left, top, right, bottom] = (crop || "0 0 0 0").split(" ").map(Number);
+  const ratio = +figure.dataset.ratio || seen.naturalWidth / seen.naturalHeight;
+  const height = figure.clientHeight - (panel && !crop ? panel.offsetHeight + 10 : 0);
+  const room = Math.min(figure.clientWidth / (1 - left - right), (height * ratio) / (1 - top - bottom));
+  const width = Math.floor(room), high = width / ratio;
+  figure.style.setProperty("--w", `${width}px`);
+  if (!crop) return;
+  const sides = [top * high, right * width, bottom * high, left * width].map((side) => `${side}px`);
+  seen.style.margin = sides.map((side) => `-${side}`).join(" ");
+  seen.style.clipPath = `inset(${sides.join(" ")} round 14px)`;
+  seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene turns out of its margins
+};
+
+// Short text is larger. Text too long for its slide gets smaller, down to 80 %; a formula as wide
+// as its column, down to 62 %.
+const settle = (section) => {
+  const body = section.querySelector(".body"), words = section.querySelector(".words");
+  const formulas = all("mjx-container[display=true]", section);
+  const shrink = () => formulas.forEach((box) => {
+    box.style.fontSize = "";
+    const [width, room] = [box.querySelector("svg"), box.parentElement].map((part) => part.getBoundingClientRect().width);
+    if (width > room) box.style.fontSize = `${Math.max(62, Math.floor((98 * room) / width))}%`;
+  });
+  const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
+  const over = () => words.offsetHeight > body.clientHeight + 4;
+  const short = section.matches(".plain") && words.innerText.length < 170 && words.offsetHeight < 420;
+  let size = short ? 54 : 45;
+  for (set(size); over() && size > 36; size--) set(size - 1);
+};
+
+// Pictures come to life when their slide is next; on paper they stay stills.
+const revive = async (section) => {
+  for (const script of section ? all("figure > script", section) : []) {
+    const figure = script.parentElement, image = figure.querySelector("img"), data = JSON.parse(script.text);
+    script.remove();
+    figure.dataset.ratio = data.size[0] / data.size[1];
+    await rbcourseDisplay.revive(image, data);
+    figure.classList.toggle("quiet", data.controls.length > 1 && !section.dataset.told);
+    fit(figure);
+  }
+};
+
+const keys = {
+  D: ["Dark or light", () => document.documentElement.classList.toggle("dark")],
+  E: ["Behind the end: exercises, references", () => {
+    const end = all(".slides > section").length - 1, { h, v } = Reveal.getIndices();
+    Reveal.slide(end, h === end && v === 0 ? 1 : 0);
+  }],
+  M: ["Move: play or pause a picture", () => Reveal.getCurrentSlide().querySelector("figure [aria-label='play or pause']")?.click()],
+  R: ["Readouts of a picture", () => all("figure:has(input)", Reveal.getCurrentSlide()).forEach((figure) => {
+    figure.classList.toggle("quiet");
+    fit(figure);
+  })],
+  T: ["Take a vote, or close it", () => {
+    const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
+    const options = all(".option > div", section).map((option) => {
+      const copy = option.cloneNode(true);
+      all(".idea, mjx-assistive-mml", copy).forEach((part) => part.remove());
+      return copy.innerHTML;
+    });
+    if (voting && (poll || state.open)) ask(state.open ? {} : { poll, options });
+  }],
+};
+
+// Votes are counted by the server that hands out this page; without its token there are none.
+let state = { open: false };
+const ask = async (body) => {
+  const answer = await fetch(`votes${location.search}`, body && { method: "POST", body: JSON.stringify(body) }).catch(() => null);
+  if (!answer?.ok) return;
+  state = await answer.json();
+  const panel = document.querySelector("#vote");
+  panel.hidden = !state.open;
+  document.documentElement.classList.toggle("voting", state.open);
+  const votes = `${state.voters} ${state.voters === 1 ? "vote" : "votes"}`;
+  if (state.open) panel.innerHTML = `${state.code}<div>${state.address.replace("http://", "")}</div><div>${votes}</div>`;
+  for (const section of sections.filter(({ dataset }) => dataset.poll && dataset.poll === state.poll)) {
+    all(".option", section).forEach((option, i) => {
+      const share = `${Math.round((100 * (state.counts[i] ?? 0)) / (state.voters || 1))}%`;
+      option.dataset.count = state.counts.length ? `${state.counts[i]} · ${share}` : "";
+      option.style.setProperty("--share", state.counts.length ? share : "0");
+    });
+  }
+};
+
+const show = ({ currentSlide }) => {
+  if (printing) return;
+  if (currentSlide.matches(".verdict")) { // readouts may be seen from now on
+    const before = all("section", currentSlide.parentElement);
+    for (const section of before) section.dataset.told = "yes";
+    for (const figure of before.flatMap((section) => all("figure.quiet", section))) figure.classList.remove("quiet");
+  }
+  all("figure", currentSlide).forEach(fit);
+  revive(currentSlide).then(() => revive(sections[sections.indexOf(currentSlide) + 1]));
+};
+
+const begin = async () => {
+  document.documentElement.classList.toggle("dark", /[?&]dark/.test(location.search));
+  await MathJax.startup.promise;
+  await Promise.all([...document.fonts].map((font) => font.load()));
+  document.body.classList.add("settling"); // all slides are laid out; Reveal hides all but one
+  await MathJax.typesetPromise(sections);
+  sections.forEach(settle);
+  all("figure").forEach(fit);
+  all("aside mjx-assistive-mml").forEach((part) => part.remove()); // the speaker view lacks their style
+  document.body.classList.remove("settling");
+  await Reveal.initialize({
+    width: 1920, height: 1080, margin: 0, minScale: 0.1, maxScale: 4, center: false, display: "flex",
+    progress: false, controls: false, hash: true, slideNumber: "c/t", navigationMode: "linear",
+    transition: "none", backgroundTransition: "none", pdfSeparateFragments: false, pdfMaxPagesPerSlide: 1,
+    totalTime: 50 * 60, plugins: [RevealNotes],
+    keyboardCondition: (event) => !event?.target?.closest?.("figure"), // a slider has its own keys
+  });
+  for (const [key, [description, act]] of Object.entries(keys)) {
+    Reveal.addKeyBinding({ keyCode: key.charCodeAt(0), key, description }, act);
+  }
+  const sharpen = () => { window.pixels = window.devicePixelRatio * Reveal.getScale(); };
+  sharpen();
+  Reveal.on("resize", sharpen);
+  Reveal.on("slidechanged", show);
+  show({ currentSlide: Reveal.getCurrentSlide() });
+  // the keys of a remote control turn slides also after a slider was touched
+  addEventListener("keydown", (event) => {
+    const turn = { PageDown: "next", PageUp: "prev" }[event.key];
+    if (!turn || !event.target.closest?.("figure")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    Reveal[turn]();
+  }, true);
+  if (voting) await ask();
+  if (voting) setInterval(() => state.open && ask(), 1000);
+  document.documentElement.dataset.ready = Math.round(performance.now());
+};
+begin();
