@@ -39,7 +39,7 @@ TASKS = {  # task: environment, commands, of which the last takes the further wo
     "lab": ("lessons", ["rbclassroom.course.lab"], "open the lessons in JupyterLab"),
     "check": ("lessons", ["rbclassroom.assignments.check"], "check a problem set: check FILE"),
     "book": ("book", ["rbclassroom.book.build"], "write the course as web pages, in book/"),
-    "lecture": ("teach", ["rbclassroom.course.show"], "show a lesson to a class: lecture 01"),
+    "lecture": ("book", ["rbclassroom.lecture.serve"], "show slides to a class: lecture 01"),
     "handout": ("teach", ["rbclassroom.assignments handout"], "pack a problem set: handout ps1"),
     "collect": ("teach", ["rbclassroom.assignments collect"], "sort LMS downloads: collect FOLDER"),
     "grade": ("teach", ["rbclassroom.assignments grade"], "grade what was collected: grade ps1"),

@@ -38,7 +38,7 @@ PINS = {
 }
 EXTRAS = {  # of rbcourse and of rbcourse-classroom, and the list that contains them
     "environment.txt": (["draw"], ["lessons"]),
-    "classroom/environment-teach.txt": ([], ["lecture", "grading"]),
+    "classroom/environment-teach.txt": ([], ["grading"]),
     "classroom/environment-book.txt": ([], ["book"]),
     "tests/environment-test.txt": (["test", "lint"], ["browser"]),
 }
@@ -411,15 +411,15 @@ def distributions_for(requirements):
     return [importlib.metadata.distribution(name) for name in asked]
 
 
-NEEDS_LECTURE = [f"course.{name}" for name in ("lab", "lecture", "rehearsal", "show", "votes")]
+NEEDS_PAGES = ["course.lab", "lecture", "book"]
 NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # what is installed, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
-    "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_LECTURE, *NEEDS_GRADING, "book"]),
-    "rbclassroom[lecture,grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], []),
+    "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),
+    "rbclassroom[grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], NEEDS_PAGES),
 }
 
 
@@ -465,7 +465,7 @@ def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_p
 def test_wheels_carry_types_styles_and_pages_and_nothing_else(wheels):
     for path, package, files in (
         (wheels[0], "rbcourse", {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"}),
-        (wheels[1], "rbclassroom", {"course/lecture_view/index.html.j2"}),
+        (wheels[1], "rbclassroom", {"lecture/static/deck.html", "lecture/static/vendor/LICENSES.txt"}),
     ):
         names = ZipFile(path).namelist()
         assert {f"{package}/{file}" for file in files} <= set(names)

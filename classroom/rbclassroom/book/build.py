@@ -24,6 +24,8 @@ from rbclassroom.book import lessons, places, reference
 from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.course import ledger
 from rbclassroom.course.notebooks import lesson_paths
+from rbclassroom.lecture.deck import write as write_decks
+from rbclassroom.lecture.slides import deck_of
 
 HERE = Path(__file__).parent
 TEMPLATES = Environment(
@@ -72,7 +74,7 @@ class Sources:
         )
 
     def put_lessons(self) -> None:
-        """Write the lessons and their run sheets."""
+        """Write the lessons, their run sheets and their slides."""
         figures, works, shown = list[lessons.Figure](), defaultdict(list), []
         pictures = sorted((self.root / "figures").glob("*.png"))
         known = {path.read_bytes(): f"../figures/{path.name}" for path in pictures}
@@ -91,6 +93,12 @@ class Sources:
             short = f"{path.stem[:2]} {title.partition(':')[0]}"
             shown.append({"stem": path.stem, "short": short, "sheet": sheet})
         self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
+        beside = {content: re.sub("^pictures", "../lessons/pictures", to) for content, to in known.items()}
+        ready = partial(
+            lessons.with_picture_files, known=beside, folder=self.extra / "slides", loading="eager"
+        )
+        decks = {path.stem: deck_of(path) for path in lesson_paths(self.root / "notebooks")}
+        write_decks(decks, self.extra / "slides", ready)
 
     def put_problem_sets(self) -> None:
         """Write the problem sets as students get them."""

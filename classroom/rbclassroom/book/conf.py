@@ -1,13 +1,13 @@
 """What Sphinx is to do with the sources of the book; it reads this file itself."""
 
 import os
-from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
 from rbclassroom.book import reference
 from rbclassroom.book.places import anchor, file_of, fragment, to_tests
 from rbclassroom.course.ledger import KEY
+from rbclassroom.lecture.deck import mathjax
 
 project = html_title = "Rigid-body motion"
 author = "The rbcourse authors"
@@ -82,9 +82,7 @@ def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
 
 def setup(app: Any) -> None:
     """Add MathJax, and what these functions do, before the contents of a page are collected."""
-    scripts = distribution("sphinx-mathjax-offline")
-    path = scripts.locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")
-    app.config.html_static_path.append(str(path))
+    app.config.html_static_path.append(str(mathjax()))
     app.add_config_value("tests", reference.naming(Path()), "")
     app.config.html_extra_path.append(os.environ["RBCOURSE_BOOK_EXTRA"])
     app.connect("autodoc-skip-member", skip_foreign)

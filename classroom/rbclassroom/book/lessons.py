@@ -96,8 +96,10 @@ def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
     return [*result, new_markdown_cell("</details>")] if inside else result
 
 
-def with_picture_files(shown: str, known: dict[bytes, str], folder: Path) -> str:
-    """Return HTML whose pictures are files, loaded when they come into sight.
+def with_picture_files(
+    shown: str, known: dict[bytes, str], folder: Path, loading: str = "lazy"
+) -> str:
+    """Return HTML whose pictures are files, by default loaded when they come into sight.
 
     Those that are not `known`, as addresses by contents, are written to ``pictures`` in a folder.
     """
@@ -110,7 +112,7 @@ def with_picture_files(shown: str, known: dict[bytes, str], folder: Path) -> str
             (folder / known[content]).write_bytes(content)
         width, height = struct.unpack(">II", content[16:24])
         before = match[1].replace('style="', f'style="aspect-ratio: {width}/{height}; ', 1)
-        return f'{before} loading="lazy" src="{known[content]}"'
+        return f'{before} loading="{loading}" src="{known[content]}"'
 
     return _PICTURE.sub(put, shown)
 
@@ -173,7 +175,8 @@ def prepared(
 def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
     """Put the number of a lesson before its title, and ways to run it below."""
     title, _, rest = notebook.cells[0].source.partition("\n")
-    ways = [f'<a download href="{name}">Download the notebook</a>']
+    slides = f"../slides/{Path(name).stem}.html"
+    ways = [f'<a href="{slides}">Present</a>', f'<a download href="{name}">Download the notebook</a>']
     if repository:
         lesson = quote(f"notebooks/{name}", safe="")
         binder = f"https://mybinder.org/v2/gh/{repository}/HEAD?labpath={lesson}"

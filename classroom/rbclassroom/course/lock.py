@@ -9,7 +9,7 @@ from pathlib import Path
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
 LISTS = {  # what each list adds to those before it
     "environment.txt": COURSE,
-    "classroom/environment-teach.txt": "-e ./classroom[lecture,grading]\n",
+    "classroom/environment-teach.txt": "-e ./classroom[grading]\n",
     "classroom/environment-book.txt": "-e ./classroom[book]\n",
     "tests/environment-test.txt": "-e .[test,lint]\n-e ./classroom[browser]\n",
 }

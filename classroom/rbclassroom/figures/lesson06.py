@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.patches import Arc
 
 from rbclassroom.figures import columns
@@ -21,7 +22,8 @@ _MOTIONS: dict[str, dict[str, Any]] = {
     "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 9, "mfc": "white", **_MARKED},
     "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 5, **_MARKED},
 }
-_COLOURS: Any = plt.get_cmap("viridis_r")
+_COLOURS = ListedColormap(plt.get_cmap("viridis_r")(np.linspace(0.4, 1, 256)))
+"""Without the bright end, which is hard to see on white."""
 _DASHES: list[Any] = ["-", "--", "-.", ":", (0, (6, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1))]
 _LABELS = {"t": "time t", "angle": "angle a (rad)", "theta": "θ"}
 _LABELS |= {"theta_dot": "dθ/dt", "f_dot": "df/dt"}

@@ -3,6 +3,7 @@
 import html
 import re
 import shutil
+from collections.abc import Callable
 from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from rbcourse.draw.display import ENGINE
 STATIC = Path(__file__).with_name("static")
 WIDE, IDEA = 1.9, 26
 """A picture wider than this, over its height, is below its text; the words of an idea."""
-_KEYS = re.compile(r" \[[A-Z]\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
+_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
+_WHOLE = re.compile(r'(<span class="math inline">(?:(?!</span>).)*</span>[.,;:?!)]+)')
 
 
 def _math(text: str, options: dict[str, Any]) -> str:
@@ -31,9 +33,10 @@ _MARKDOWN.use(dollarmath_plugin, renderer=_math)
 
 def marked(text: str) -> str:
     """Return Markdown as HTML; a formula stays on one line with the mark that follows it."""
-    page: str = _MARKDOWN.render(_KEYS.sub("", text))
+    text = re.sub(r"(\d) %", "\\1\N{NO-BREAK SPACE}%", _KEYS.sub("", text))
+    page: str = _MARKDOWN.render(text)
     page = page.replace("<p><em>Look for", '<p class="look"><em>Look for')
-    return re.sub(r"(\\\((?:(?!\\\)).)*\\\)[.,;:?!)]+)", r'<span class="whole">\1</span>', page)
+    return _WHOLE.sub(r'<span class="whole">\1</span>', page)
 
 
 def _inline(text: str) -> str:
@@ -121,11 +124,16 @@ def crib_page(deck: Deck) -> str:
     return template.replace("<!--TITLE-->", html.escape(deck.title)).replace("<!--BODY-->", body)
 
 
-def write(decks: dict[str, Deck], folder: Path) -> None:
-    """Write decks and cribs by their names, and all files that they share, to a folder."""
+def write(
+    decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = lambda page: page
+) -> None:
+    """Write decks and cribs by their names, and all files that they share, to a folder.
+
+    A page is made `ready` first: in the book its stills are files that the lesson has, too.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for name, deck in decks.items():
-        _put(folder / f"{name}.html", deck_page(deck))
+        _put(folder / f"{name}.html", ready(deck_page(deck)))
         _put(folder / f"{name}_crib.html", crib_page(deck))
     shared = folder / "shared"
     shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)

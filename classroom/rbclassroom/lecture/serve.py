@@ -10,13 +10,17 @@ import sys
 import tempfile
 import threading
 import webbrowser
+from base64 import b64decode
 from pathlib import Path
+from typing import Any
 
 import segno
-from tornado.escape import json_decode
+from tornado.escape import json_decode, json_encode
+from tornado.httpclient import AsyncHTTPClient
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
+from tornado.websocket import websocket_connect
 
 from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.deck import put_mathjax, write
@@ -26,6 +30,8 @@ from rbclassroom.lecture.votes import Phones, find_address
 HOST = "127.0.0.1"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
 """Programs that print a page as PDF."""
+READY = "document.documentElement.dataset.ready"
+"""JavaScript: whether the slides are laid out."""
 
 
 def find_lesson(number: str, folder: Path) -> Path:
@@ -109,22 +115,48 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
 
 async def print_pdf(address: str, pdf: Path) -> None:
     """Print slides as PDF with a browser that has the engine of Chromium."""
-    found = next(filter(None, map(shutil.which, (os.environ.get("BROWSER", ""), *BROWSERS))), None)
+    named = os.environ.get("BROWSER", "")
+    found = next(filter(None, map(shutil.which, (named, *BROWSERS))), None)
     if not found:
         wanted = f"no browser is found that prints; wanted is one of {', '.join(BROWSERS)}"
         raise ValueError(f"{wanted}, or name it in the variable BROWSER")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        words = ["--headless", "--disable-gpu", "--no-pdf-header-footer", f"--user-data-dir={profile}"]
-        words += ["--virtual-time-budget=60000", f"--print-to-pdf={pdf.resolve()}"]
+        words = ["--headless", "--disable-gpu", "--no-first-run", "--remote-debugging-port=0"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             words.append("--no-sandbox")  # Chromium has none for the administrator
+        words += [f"--user-data-dir={profile}", f"{address}?print-pdf"]
         quiet = asyncio.subprocess.DEVNULL
-        job = await asyncio.create_subprocess_exec(
-            found, *words, f"{address}?print-pdf", stdout=quiet, stderr=quiet
-        )
-        if await job.wait() or not pdf.exists():
-            raise ValueError(f"{found} has not written {pdf}")
+        job = await asyncio.create_subprocess_exec(found, *words, stdout=quiet, stderr=quiet)
+        try:
+            async with asyncio.timeout(120):
+                pdf.write_bytes(await _printed(Path(profile, "DevToolsActivePort")))
+        except (TimeoutError, OSError, KeyError) as error:
+            raise ValueError(f"{found} has not printed the slides: {error!r}") from error
+        finally:
+            job.kill()
+            await job.wait()
     print(f"{pdf}: {pdf.stat().st_size / 1e6:.1f} MB")
+
+
+async def _printed(told: Path) -> bytes:
+    """Return the page of a browser as PDF; the browser has told its port in a file."""
+    while not (told.exists() and told.read_text().count("\n")):
+        await asyncio.sleep(0.1)
+    port = told.read_text().split()[0]
+    pages = await AsyncHTTPClient().fetch(f"http://{HOST}:{port}/json/list")
+    page = next(each for each in json_decode(pages.body) if each["type"] == "page")
+    socket = await websocket_connect(page["webSocketDebuggerUrl"], max_message_size=200_000_000)
+
+    async def ask(method: str, **parameters: object) -> Any:
+        socket.write_message(json_encode({"id": 1, "method": method, "params": parameters}))
+        while (answer := json_decode(await socket.read_message() or "{}")).get("id") != 1:
+            pass
+        return answer["result"]
+
+    while not (await ask("Runtime.evaluate", expression=READY))["result"].get("value"):
+        await asyncio.sleep(0.1)
+    made = await ask("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+    return b64decode(made["data"])
 
 
 def open_votes(address: str) -> Phones | None:

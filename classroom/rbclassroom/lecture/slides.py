@@ -19,7 +19,7 @@ from rbclassroom.book.lessons import living, split_sheet
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections that are behind the end, where a key leads."""
-ROWS, TOGETHER = 5, 80
+ROWS, TOGETHER = 5, 85
 """Rows of a long table, or works, on one slide; words of exercises on one slide."""
 _ITEM = re.compile(r"^- ((?:\*\*[A-Z]\*\*(?:, | and )?)+)(?: · |[,:.]? ?)(.*(?:\n .*)*)", re.M)
 _PICTURE = re.compile(r"!\[\]\(([^)]+)\)\n*")

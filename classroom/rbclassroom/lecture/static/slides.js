@@ -110,6 +110,7 @@ const begin = async () => {
   document.documentElement.classList.toggle("dark", /[?&]dark/.test(location.search));
   await MathJax.startup.promise;
   await Promise.all([...document.fonts].map((font) => font.load()));
+  await Promise.all(all("figure > img").map((image) => image.decode()));
   document.body.classList.add("settling"); // all slides are laid out; Reveal hides all but one
   await MathJax.typesetPromise(sections);
   sections.forEach(settle);

@@ -1,0 +1,258 @@
+"""Slides: what the metadata of cells makes, and that the lessons keep the rules for authors."""
+
+import base64
+import io
+import re
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from PIL import Image
+
+from rbclassroom.lecture import deck as pages
+from rbclassroom.lecture import slides
+from rbclassroom.lecture.slides import deck_of, words_of
+
+ROOT = Path(__file__).parents[3]
+LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
+SHEET = "## Run sheet for the lecturer\n\n| minute | part | ask | skip |\n|---|---|---|---|\n"
+QUESTION = "# Tiny: a lesson\n\n**The question of this sitting.** Why?\n\nGoals."
+
+
+def text(source, slide=None, **more):
+    metadata = {} if slide is None else {"slide": slide}
+    return new_markdown_cell(source, metadata={**metadata, **more})
+
+
+def picture(name, slide=None, size=(400, 300), **more):
+    """A code cell with a black picture of this size on a white margin of a tenth on each side."""
+    still = Image.new("L", size, 255)
+    still.paste(0, (size[0] // 10, size[1] // 10, size[0] * 9 // 10, size[1] * 9 // 10))
+    file = io.BytesIO()
+    still.save(file, "PNG")
+    src = f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+    data = {"text/html": f'<figure><img id="x" alt="described" src="{src}"/></figure>'}
+    metadata = {} if slide is None else {"slide": slide}
+    outputs = [new_output("display_data", data)]
+    source = f'save_figure(fig, "lesson01_{name}", data, alt)'
+    return new_code_cell(source, metadata=metadata, outputs=outputs, **more)
+
+
+def tiny(folder, *cells, sheet=""):
+    """The deck of a lesson that has a title and these cells."""
+    cells = [text(QUESTION), *cells, *([text(SHEET + sheet)] if sheet else [])]
+    (folder / "notebooks").mkdir(exist_ok=True)
+    path = folder / "notebooks" / "01_tiny.ipynb"
+    path.write_text(nbformat.writes(new_notebook(cells=cells)), encoding="utf-8")
+    return deck_of(path)
+
+
+def shown(deck):
+    return [(slide.title, slide.kind, slide.parts) for slide in deck.shown]
+
+
+def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lecturer(tmp_path):
+    deck = tiny(
+        tmp_path,
+        text("## 1 · One\n\nLong.", "Short.\n\n. . .\n\nThen.\n\n---\n\nNext."),
+        text("More, for the lecturer."),
+        text("## 2 · Two\n\nNothing here.", False),
+        text("### Below\n\nText.", "On it."),
+        text("## Recap\n\n- all of it"),
+    )
+    assert shown(deck) == [
+        ("Tiny: a lesson", "title", ["Why?"]),
+        ("1 · One", "plain", ["Short.", "Then."]),
+        ("1 · One", "plain", ["Next."]),
+        ("Below", "plain", ["On it."]),
+        ("Recap", "plain", ["- all of it"]),
+        ("Questions?", "end", []),
+    ]
+    assert deck.shown[2].notes == ["Long.", "More, for the lecturer."]
+    assert deck.shown[0].notes[0].endswith("Goals.")
+    page = pages.deck_page(deck)
+    assert "<p>Short.</p>" in page
+    assert '<div class="fragment"><p>Then.</p>' in page
+    assert '<li class="fragment">all of it</li>' in page
+    for wrong in (True, 3, {"text": "x"}, None):
+        cell = text("x")
+        cell.metadata["slide"] = wrong
+        with pytest.raises(ValueError, match=r"01_tiny\.ipynb: slide: a text or false"):
+            tiny(tmp_path, cell)
+
+
+def test_a_picture_stands_with_the_text_of_its_cell_and_may_be_borrowed(tmp_path):
+    matrix = new_code_cell("print(R)", metadata={"slide": r"$$R = \printed$$"})
+    matrix.outputs = [new_output("stream", text="[[ 1.   0.5 ]\n [-0.25 1.  ]]\n")]
+    deck = tiny(
+        tmp_path,
+        text("## 1 · One", "One.\n\n![](high)"),
+        picture("wide", "Before.\n\n---\n\n*Look for:* it.", (900, 400)),
+        picture("high", "It.", (400, 300), id="high"),
+        picture("unseen"),
+        matrix,
+    )
+    _, borrowed, before, wide, high, printed, _ = deck.shown
+    assert before.picture is None
+    assert borrowed.picture == high.picture
+    assert high.picture.aspect == pytest.approx(4 / 3, rel=0.01)
+    assert wide.picture.aspect == pytest.approx(9 / 4, rel=0.01)
+    margin = re.search(r'data-crop="([\d. ]+)"', high.picture.html)[1]
+    assert [float(share) for share in margin.split()] == pytest.approx([0.09] * 4, abs=0.003)
+    assert 'class="wide"' in pages.section(wide)
+    assert 'class="split narrow"' in pages.section(high)
+    assert '<p class="look"><em>Look for:</em> it.</p>' in pages.section(wide)
+    wanted = r"$$R = \begin{pmatrix}1. & 0.5 \\ -0.25 & 1.\end{pmatrix}$$"
+    assert printed.parts == [wanted]
+    with pytest.raises(ValueError, match="there is no picture nowhere"):
+        tiny(tmp_path, text("## 1", "![](nowhere)"))
+    with pytest.raises(ValueError, match="prints no matrix"):
+        tiny(tmp_path, new_code_cell("1", metadata={"slide": r"$$\printed$$"}))
+
+
+ANSWER = "**B** it is. It is even.\n\n- **A** is odd, which nobody wants. More.\n- **C** and **D** are as odd."
+
+
+def poll(question="Which?", answer=ANSWER, slide=None):
+    options = "".join(f"- **{letter}** · option {letter}\n" for letter in "ABCD")
+    return (
+        text("## 1 · One"),
+        text(f"### Poll 1\n\n{question}\n\n{options}"),
+        text("### Answer to poll 1"),
+        text("It was measured.", "Evidence."),
+        text(answer, slide),
+    )
+
+
+def test_a_poll_comes_before_the_evidence_and_its_verdict_after_it(tmp_path):
+    deck = tiny(tmp_path, *poll(slide="- **C** Short.\n\nAfter."))
+    _, asked, evidence, verdict, after, _ = deck.shown
+    assert (asked.kind, asked.parts, asked.poll) == ("poll", ["Which?"], "Poll 1")
+    assert asked.options == {letter: f"option {letter}" for letter in "ABCD"}
+    assert evidence.parts == ["Evidence."]
+    assert (verdict.kind, verdict.right) == ("verdict", "B")
+    ideas = {"A": "odd, which nobody wants. More.", "B": "It is even.", "C": "Short."}
+    assert verdict.ideas == {**ideas, "D": "as odd."}
+    assert after.parts == ["After."]
+    page = pages.section(verdict)
+    assert page.count('class="option wrong"') == 3
+    assert page.count('class="option right"') == 1
+    assert page.count("fragment") == 3  # each wrong idea comes by itself
+    seen = pages.section(asked).partition("<aside")[0]
+    assert seen.count('class="option"') == 4
+    assert "even" not in seen
+    assert "Right: **B**." in asked.notes
+
+
+def test_what_is_behind_the_end_is_grouped_and_long_tables_are_parted(tmp_path):
+    rows = "".join(f"| row {i} | x |\n" for i in range(7))
+    deck = tiny(
+        tmp_path,
+        text("## Exercises"),
+        text("### Exercise 1, by hand\n\nShow it.\n\n<details>\nSecret.\n</details>"),
+        text("### Exercise 2\n\nAnd this."),
+        text("### Answer to exercise 2"),
+        text("The answer."),
+        text(f"## Misprints\n\nOf the scan.\n\n| a | b |\n|---|---|\n{rows}"),
+        text("## Recap\n\n- so"),
+        text("## References\n\n- [One1999] One\n- [Two2000] Two"),
+    )
+    behind = [slide.parts[0] for slide in deck.behind]
+    assert behind[0] == "**Exercise 1, by hand.** Show it.\n\n**Exercise 2.** And this."
+    assert [part.count("row") for part in behind[1:3]] == [5, 2]
+    assert all(part.startswith("| a | b |\n|---|---|\n") for part in behind[1:3])
+    assert "One1999" not in pages.section(deck.behind[3])
+    assert deck.shown[-2].title == "Recap"
+
+
+def test_each_row_of_the_run_sheet_begins_on_its_slide_with_its_share_of_the_time(tmp_path):
+    sheet = "| 0 | question | Ask. | |\n| 2 | poll 1, a vote | | the second |\n| 12 | recap, homework | | |\n"
+    deck = tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=sheet)
+    seconds = [slide.seconds for slide in deck.shown]
+    assert seconds == [120, 200, 200, 200, 30, 30]
+    assert deck.shown[1].notes[0] == "*Minute 2–12* · poll 1, a vote · late? skip the second"
+    assert deck.shown[0].notes[:2] == ["*Minute 0–2* · question", "**Ask:** Ask."]
+    crib = pages.crib_page(deck)
+    assert re.findall(r"<td>(\d+)</td>\s*<td>(\d+)</td>", crib) == [("0", "1"), ("2", "2"), ("12", "5")]
+    assert "Poll 1: B" in crib
+    for bad, why in {
+        "| 0 | a dance | | |\n": "no slide for 'a dance'",
+        "| 0 | recap | | |\n| 1 | poll 1 | | |\n": "before that of the row above",
+    }.items():
+        with pytest.raises(ValueError, match=why):
+            tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=bad)
+    two = "| 0 | question | | |\n| 9 | homework | | |\n| 0 | poll 1 | | |\n| 9 | homework | | |\n"
+    deck = tiny(tmp_path, text("## 0", "x"), *poll(), sheet=two)
+    assert slides.starts_of(deck.shown, slides.rows_of(two)) == [0, 1, 2, len(deck.shown) - 1]
+
+
+def test_words_are_counted_without_formulas_and_marks():
+    assert words_of("*Two* words $a + b$:\n\n$$c = d$$\n\n. . .\n\n- 5 % of [it](x)") == 7
+
+
+@pytest.fixture(scope="module")
+def decks():
+    return {path.stem: deck_of(path) for path in LESSONS}
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
+def test_lessons_keep_the_rules_for_authors(path, decks):
+    deck = decks[path.stem]
+    assert len(deck.shown) > 8
+    polls = [slide for slide in deck.shown if slide.kind == "poll"]
+    verdicts = [slide for slide in deck.shown if slide.kind == "verdict"]
+    assert [slide.poll for slide in polls] == [slide.poll for slide in verdicts]
+    for slide in verdicts:
+        assert slide.right in slide.options
+        assert {*slide.ideas} == {*slide.options}
+    for slide in deck.shown:
+        most = 52
+        if slide.kind in ("poll", "verdict"):
+            most = 35
+        elif slide.title == "Recap":
+            most = 120
+        elif slide.picture:
+            most = 30 if slide.picture.aspect > pages.WIDE else 40
+        assert slide.words <= most, slide
+        assert sum(part.count("$$") for part in slide.parts) <= 6, slide
+        looks = any("*Look for" in part for part in slide.parts)
+        assert slide.picture or not looks, slide
+        assert "array(" not in "".join(slide.parts)
+    bare = [slide.title for slide in deck.shown if slide.kind == "plain" and not slide.parts]
+    assert not bare
+
+
+def plain(tex):
+    """TeX without what changes only its look."""
+    return re.sub(r"\\(?:bigl|bigr|Bigl|Bigr|left|right|qquad|quad|[,;:! ])|[\s&{}]", "", tex).rstrip(".,;")
+
+
+def pieces(formula):
+    """A formula, and if it is one of several or a chain its parts."""
+    return [part for part in re.split(r"\\q?quad|=|\\\\", formula) if part.strip()]
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
+def test_slides_have_no_number_and_no_formula_that_their_section_has_not(path):
+    sections, now = [], []
+    for cell in nbformat.read(path, as_version=4).cells:
+        if re.match(r"## ", cell.source):
+            now = []
+        if not now:
+            sections.append(now)
+        now.append(cell)
+    for cells in sections:
+        outputs = [o for cell in cells for o in cell.get("outputs", [])]
+        printed = "".join(o.get("text") or o.get("data", {}).get("text/plain", "") for o in outputs)
+        source = "\n".join(cell.source for cell in cells) + printed
+        known = plain(source)
+        for cell in cells:
+            slide = re.sub(r"!\[\]\([^)]*\)", "", cell.metadata.get("slide") or "")
+            formulas = re.findall(r"\$\$?([^$]+)\$\$?", slide)
+            for formula in formulas:
+                whole = plain(formula) in known or r"\printed" in formula
+                assert whole or all(plain(part) in known for part in pieces(formula)), formula
+            words = re.sub(r"\$\$?[^$]+\$\$?", " ", slide)
+            for number in re.findall(r"(?<![\w.])\d[\d,.]*(?:e-\d+)?", words):
+                assert number.rstrip(".,") in source, (cell.id, number)
