@@ -15,7 +15,7 @@ MODULE = [sys.executable, "-m"]
 
 def lesson_at(folder, *cells):
     """Write a lesson of these cells into the course of a folder; return its path."""
-    (folder / "notebooks").mkdir()
+    (folder / "notebooks").mkdir(parents=True)
     path = folder / "notebooks" / "01_tiny.ipynb"
     path.write_text(nbformat.writes(new_notebook(cells=list(cells))), encoding="utf-8")
     return path
@@ -24,7 +24,7 @@ def lesson_at(folder, *cells):
 @contextmanager
 def lecture(folder, *further):
     """The address of a lecture, and the process."""
-    words = [*MODULE, "rbclassroom.course.show", "1", "--no-browser", *further]
+    words = [*MODULE, "rbclassroom.lecture.serve", "1", "--no-browser", *further]
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
         try:
             yield server.stdout.readline().split()[-1], server

@@ -134,7 +134,8 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     for name, deck in decks.items():
         _put(folder / f"{name}.html", ready(deck_page(deck)))
-        _put(folder / f"{name}_crib.html", crib_page(deck))
+        if deck.sheet:
+            _put(folder / f"{name}_crib.html", crib_page(deck))
     shared = folder / "shared"
     shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)
     for name in ("slides.css", "slides.js"):

@@ -66,7 +66,8 @@ class Desk(_Here):
 
     def prepare(self) -> None:
         super().prepare()
-        if not secrets.compare_digest(self.get_query_argument("token", ""), self.token):
+        asked = self.get_query_argument("token", "").encode()
+        if not secrets.compare_digest(asked, self.token.encode()):
             raise HTTPError(403)
 
     def get(self) -> None:
@@ -104,7 +105,8 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
             return
         shown = f"{address}?token={token}" if phones else address
         print(f"{path.name} is shown at {shown}", flush=True)
-        print(f"Its crib is at {address.replace('.html', '_crib.html')}", flush=True)
+        if Path(folder, "slides", f"{path.stem}_crib.html").exists():
+            print(f"Its crib is at {address.replace('.html', '_crib.html')}", flush=True)
         if phones:
             print(f"Phones vote at {phones.url}", flush=True)
         print("Stop it with Ctrl-C.", flush=True)

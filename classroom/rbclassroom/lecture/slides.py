@@ -149,6 +149,8 @@ class _Reader:
                     self.read_code(cell, wish)
             else:
                 self.read_text(cell, wish)
+        if not self.sections[0]:
+            raise ValueError("it does not begin with a title, such as # The plane")
         deck = Deck(self.sections[0][0].title, self.sections, self.behind, sheet)
         self.keys, self.section = {"homework"}, ""
         self.sections.append([])
@@ -190,6 +192,8 @@ class _Reader:
             question = re.search(r"\*\*The question of this \w+\.\*\* (.*)", text)
             self.title, self.keys = words, {"question"}
             self.put_text(wish or (question[1] if question else ""))
+            if not self.sections[0]:
+                self.put(Slide(words))
             self.sections[0][0].kind = "title"
             self.note(text)
             return True

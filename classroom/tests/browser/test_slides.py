@@ -1,264 +1,248 @@
-"""The lecture view: large letters, pages, votes; of every lesson, its question and explorer."""
+"""The slides of the book, from files: every slide of every lesson, keys, votes, notes, PDF."""
 
 import re
+import subprocess
+import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import nbformat
 import pytest
-from pages import SEEN, move_every_control, wait_for, watched
+from pages import watched
 from playwright.sync_api import expect
 from servers import serving
 
-# text that is smaller than `least` pixels; code and panels may have 5/6 of it
-SMALL = """(least) => {
-  const found = [];
-  const walker = document.createTreeWalker(document.querySelector("#rendered_cells"), 4);
-  while (walker.nextNode()) {
-    const text = walker.currentNode, box = text.parentElement;
-    const apart = "mjx-container, script, style, sup, sub, small, [hidden]";
-    if (!text.textContent.trim() || box.closest(apart)) continue;
-    const smaller = "pre, code, .rbcourse-panel, .rbcourse-view";
-    const printed = box.closest(smaller) ? least * 5 / 6 : least;
-    if (parseFloat(getComputedStyle(box).fontSize) < printed)
-      found.push(getComputedStyle(box).fontSize + " " + text.textContent.trim().slice(0, 40));
+from rbclassroom.lecture.slides import deck_of
+
+ROOT = Path(__file__).parents[3]
+SLIDES = ROOT / "book" / "slides"
+LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
+# faults of all slides with all steps: what is cut, text that is too small, thin slides
+FAULTS = """async () => {
+  const faults = [], thin = [], sections = [...document.querySelectorAll(".slides section section")];
+  const frame = () => new Promise(requestAnimationFrame);
+  for (const [number, section] of sections.entries()) {
+    const { h, v } = Reveal.getIndices(section), scale = Reveal.getScale();
+    Reveal.slide(h, v, 99);
+    for (let wait = 0; wait < 300 && section.querySelector("figure > script"); wait++) await frame();
+    await frame();
+    const say = (what) => faults.push(`${number + 1}: ${what}`);
+    const sheet = section.getBoundingClientRect(), body = section.querySelector(".body").getBoundingClientRect();
+    const box = (part) => part.getBoundingClientRect(), seen = (part) => part.checkVisibility() && box(part).width;
+    for (const part of section.querySelectorAll(".words, .words *, mjx-container > svg")) {
+      if (!seen(part) || part.closest("aside, mjx-assistive-mml") || part.closest("mjx-container > svg > *")) continue;
+      const { left, right, top, bottom } = box(part), room = 3 * scale;
+      if (left < body.left - room || right > body.right + room) say(`too wide: ${part.tagName} ${part.textContent}`);
+      if (top < body.top - 2 * room || bottom > body.bottom + 2 * room) say(`too high: ${part.tagName} ${part.textContent}`);
+    }
+    for (const part of section.querySelectorAll("figure > :is(img, canvas), figure > div > div:not(.rbcourse-view)")) {
+      const { left, right, bottom } = box(part), margin = section.querySelector("img")?.dataset.crop ? 1e9 : 3 * scale;
+      if (seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin))
+        say(`picture cut: ${part.tagName}`);
+    }
+    const texts = document.createTreeWalker(section, NodeFilter.SHOW_TEXT);
+    while (texts.nextNode()) {
+      const part = texts.currentNode.parentElement, apart = "aside, script, sup, sub, mjx-container, .rbcourse-view, [role=status]";
+      if (!texts.currentNode.textContent.trim() || part.closest(apart) || !part.checkVisibility()) continue;
+      const share = parseFloat(getComputedStyle(part).fontSize) / 10.8, least = part.matches(".words > p") ? 3.3 : 3.0;
+      if (share < least) say(`text of ${share.toFixed(2)} %: ${texts.currentNode.textContent}`);
+    }
+    if (section.querySelector("[data-mjx-error], mjx-merror")) say("a formula cannot be set");
+    const boxes = [...section.querySelectorAll(".words > *")].map(box).filter(({ height }) => height);
+    const height = Math.max(...boxes.map(({ bottom }) => bottom)) - Math.min(...boxes.map(({ top }) => top));
+    if (height < sheet.height / 4 && !section.querySelector("figure") && !section.matches(".title, .end")) thin.push(number + 1);
   }
-  return found;
+  return [faults, thin];
 }"""
-TYPESET = """() => ![...document.querySelectorAll("#rendered_cells .jp-MarkdownOutput")]
-    .some((cell) => /\\$[^$]+\\$/.test(cell.innerText))"""
-# parts that were whole on no page so far; a table larger than a page is cut between its rows
-UNSEEN = """() => {
-  const top = document.querySelector(".lecture-above").getBoundingClientRect().bottom;
-  const bottom = document.querySelector(".lecture-below").getBoundingClientRect().top;
-  const parts = "h1, h2, h3, p, li, table, tr, pre, figure, .rbcourse-explorer";
-  window.seen ??= new Set();
-  const all = [...document.querySelectorAll("#rendered_cells :is(" + parts + ")")]
-    .filter((part) => part.checkVisibility() && part.getBoundingClientRect().height)
-    .filter((part) => part.tagName !== "TABLE" || part.offsetHeight < 0.98 * innerHeight);
-  for (const part of all) {
-    const box = part.getBoundingClientRect();
-    if (box.top > top - 2 && box.bottom < bottom + 2) seen.add(part);
-  }
-  return all.filter((part) => !seen.has(part)).map((part) => part.innerText.slice(0, 60));
-}"""
-# from each closed answer to the next cell that is seen
-GAPS = """() => [...document.querySelectorAll(".lecture-answer:not([open])")].map((answer) => {
-  const after = [...document.querySelectorAll("#rendered_cells .jp-Cell")].find((cell) =>
-    answer.compareDocumentPosition(cell) & Node.DOCUMENT_POSITION_FOLLOWING &&
-    !answer.contains(cell) && cell.getBoundingClientRect().height);
-  return after ? after.getBoundingClientRect().top - answer.getBoundingClientRect().bottom : 1e9;
-})"""
-# scroll to the last heading before an explorer, and return it
-QUESTION = """(explorer) => {
-  const heading = [...document.querySelectorAll("h1, h2, h3")].filter((heading) =>
-    heading.compareDocumentPosition(explorer) & Node.DOCUMENT_POSITION_FOLLOWING).at(-1);
-  heading.scrollIntoView();
-  return heading.innerText;
-}"""
-# a busy machine: the renderer of widgets looks for one every 100 ms, here only once in 2.5 s
-LATE = """(() => {
-  const soon = window.setTimeout;
-  window.setTimeout = (todo, ms, ...rest) => soon(todo, ms === 100 ? 2500 : ms, ...rest);
-})()"""
+PICTURES = """() => [...document.querySelectorAll(".slides section section")].flatMap((section, i) =>
+  [...section.querySelectorAll("figure > img")].map((image) => [i + 1, image.alt, image.naturalWidth,
+    parseFloat(getComputedStyle(image.parentElement).getPropertyValue("--w"))]))"""
+HERE = "() => Reveal.getCurrentSlide().innerText"
+
+
+def opened(page, address):
+    page.goto(address)
+    page.wait_for_function("document.documentElement.dataset.ready")
+    return page
+
+
+def of(path):
+    return (SLIDES / f"{path.stem}.html").as_uri()
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
+def test_every_slide_fits_and_can_be_read_from_the_last_row(context, path):
+    for size, theme in (((1920, 1080), ""), ((1280, 720), "?dark")):
+        with watched(context) as page:
+            page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+            opened(page, of(path) + theme)
+            pictures = page.evaluate(PICTURES)
+            faults, thin = page.evaluate(FAULTS)
+            assert faults == []
+            assert len(thin) <= 3, thin
+    cells = nbformat.read(path, as_version=4).cells
+    small = {  # letters of 12 points at 100 pixels per inch, of 13 at 80
+        output.data["text/plain"].partition(": ")[2]
+        for cell in cells
+        for output in cell.get("outputs", [])
+        if "text/html" in output.get("data", {}) and re.search(r'dpi"?[=:] ?80', cell.source)
+    }
+    for number, alt, natural, width in pictures:
+        points, dpi = (13, 80) if alt in small else (12, 100)
+        letters = points / 72 * width / (natural / 2 / dpi)
+        assert letters > 0.025 * 1080, (number, alt, letters)
+
+
+def test_decks_are_small_enough_to_be_sent():
+    decks = [path for path in SLIDES.glob("*.html") if not path.stem.endswith("_crib")]
+    assert {path.stem for path in decks} == {path.stem for path in LESSONS}
+    assert max(path.stat().st_size for path in decks) < 1.2e6
+    shared = [*(SLIDES / "shared").iterdir(), SLIDES.parent / "_static" / "tex-svg.js"]
+    assert sum(path.stat().st_size for path in shared) < 2.6e6
+
+
+@pytest.fixture
+def deck(page):
+    """The slides of lesson 06."""
+    page.set_viewport_size({"width": 1280, "height": 720})
+    return opened(page, of(LESSONS[6]))
+
+
+def until(page, selector, key="PageDown"):
+    """Press a key until a slide is shown."""
+    for _ in range(150):
+        if page.evaluate("(what) => Reveal.getCurrentSlide().matches(what)", selector):
+            return
+        page.keyboard.press(key)
+    raise AssertionError(f"no slide {selector}")
+
+
+def test_a_remote_control_leads_through_all_steps_also_after_a_slider_was_touched(deck):
+    seen, steps = [], 0
+    until(deck, ":has(figure input)")
+    slider = deck.locator("section.present figure input").first
+    slider.focus()
+    at = slider.input_value()
+    here = deck.evaluate(HERE)
+    deck.keyboard.press("ArrowRight")
+    assert slider.input_value() != at
+    assert deck.evaluate(HERE).partition("\n")[0] == here.partition("\n")[0]
+    deck.keyboard.press("PageDown")
+    assert deck.locator("section.present figure input").count() == 0
+    deck.keyboard.press("Shift+ArrowLeft")
+    while not deck.evaluate("Reveal.getCurrentSlide().matches('.end')"):
+        seen.append(deck.evaluate("Reveal.getCurrentSlide().className"))
+        deck.keyboard.press("PageDown")
+        steps += 1
+        assert steps < 150
+    lesson = deck_of(LESSONS[6])
+    assert steps >= len(lesson.shown) + 20
+    deck.keyboard.press("e")
+    assert "Exercise 1" in deck.evaluate(HERE)
+    deck.keyboard.press("e")
+    assert "Questions?" in deck.evaluate(HERE)
+
+
+def test_keys_change_what_is_seen_and_it_is_never_dark_by_itself(context):
+    with watched(context) as page:
+        page.emulate_media(color_scheme="dark")
+        opened(page, of(LESSONS[6]))
+        root = page.locator("html")
+        colour = "getComputedStyle(document.body).backgroundColor"
+        assert page.evaluate(colour) == "rgb(255, 255, 255)"
+        page.keyboard.press("d")
+        assert page.evaluate(colour) == "rgb(22, 24, 28)"
+        page.keyboard.press("d")
+        expect(root).not_to_have_class(re.compile("dark"))
+        page.keyboard.press("?")
+        help_ = page.locator(".r-overlay-help, .overlay-help, .r-overlay")
+        for words in ("Take a vote", "Dark or light", "Behind the end", "Readouts", "Slide overview"):
+            expect(help_).to_contain_text(words)
+        page.keyboard.press("Escape")
+        until(page, ":has(figure input)")
+        table = page.locator("section.present figure table")
+        expect(table).to_be_hidden()
+        page.keyboard.press("r")
+        expect(table).to_be_visible()
+        page.keyboard.press("r")
+        time = page.locator("section.present figure input").last
+        before = time.input_value()
+        page.keyboard.press("m")
+        page.wait_for_function(f"Reveal.getCurrentSlide().querySelectorAll('figure input')[1].value !== '{before}'")
+        page.keyboard.press("m")
+        until(page, ".verdict")
+        until(page, ":has(figure input)", "PageUp")
+        expect(table).to_be_visible()  # the vote is over
 
 
 @contextmanager
-def shown(context, course, env, *words, script=""):
-    """A page with a lesson as a lecturer shows it."""
-    words = ["rbclassroom.course.show", *words, "--no-browser"]
-    address = r"(http://127\.0\.0\.1:\d+/\?token=\w+)"
-    with serving(words, course, env, address) as found, watched(context) as page:
-        page.set_viewport_size({"width": 1024, "height": 768})
-        page.add_init_script(script)
-        page.goto(found[1])
-        loaded(page)
-        yield page
+def lecture(home, *words):
+    course, env = home
+    words = ["rbclassroom.lecture.serve", "06", "--no-browser", *words]
+    with serving(words, course, env, r"(http://127\.0\.0\.1:\d+/slides/\S+)") as found:
+        yield found[1]
+
+
+def test_phones_vote_and_the_count_stands_on_the_poll_and_on_its_verdict(context, home):
+    with lecture(home, "--votes", "127.0.0.1") as address, watched(context) as page:
+        opened(page, address)
+        page.keyboard.press("t")  # there is no poll here
+        until(page, ".poll")
+        page.keyboard.press("t")
+        panel = page.locator("#vote")
+        expect(panel.locator("svg")).to_be_visible()
+        url = "http://" + panel.locator("div").first.inner_text()
+        options = page.locator("section.present .option > div").all_inner_texts()
+        for letters in ("B", "AC", "C"):
+            phone = context.browser.new_context().new_page()
+            phone.goto(url)
+            for letter in letters:
+                index = "ABCD".index(letter)
+                phone.get_by_role("button", name=options[index], exact=False).click()
+            expect(phone.locator("p").first).to_contain_text(f"You voted {letters[-1]}.")
+            phone.context.close()
+        expect(panel).to_contain_text("3 votes")
+        page.keyboard.press("t")
+        expect(panel).to_be_hidden()
+        counts = ["0 · 0%", "1 · 33%", "2 · 67%", "0 · 0%"]
+        for kind in (".poll", ".verdict"):
+            until(page, kind)
+            shown = page.locator("section.present .option")
+            assert [each.get_attribute("data-count") for each in shown.all()] == counts
+        page.reload()
+        page.wait_for_function("document.documentElement.dataset.ready")
+        expect(page.locator("section.present .option").nth(2)).to_have_attribute("data-count", counts[2])
         page.goto("about:blank")  # before the server ends
 
 
-def loaded(page):
-    wait_for(page.locator(".rbcourse-explorer").last)
-    page.locator("mjx-container").first.wait_for()
-    page.wait_for_function(TYPESET)
-
-
-@pytest.fixture(scope="module")
-def screen(context, home):
-    """Lesson 06 as the class sees it; phones may vote."""
-    with shown(context, *home, "06", "--votes", "127.0.0.1") as page:
-        yield page
-
-
-def test_the_keys_of_a_remote_control_turn_the_pages(screen):
-    places, unseen = [], None
-    while len(places) < 60 and (len(places) < 2 or places[-1] != places[-2]):
-        if len(places) == 4:
-            handle = screen.locator(".noUi-handle").first  # as after the mouse was there
-            handle.evaluate("(handle) => handle.focus({ preventScroll: true })")
-        unseen = screen.evaluate(UNSEEN)
-        places.append(screen.evaluate("scrollY"))
-        screen.keyboard.press("PageDown")
-    assert len(places) > 15
-    assert unseen == []  # everything was whole on some page
+def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck, context):
+    with context.expect_page() as found:
+        deck.keyboard.press("s")
+    speaker = found.value
+    notes = speaker.locator(".speaker-controls-notes")
+    expect(notes).to_contain_text("Which column of")
+    expect(notes).to_contain_text("Minute 0–3")
     for _ in range(60):
-        screen.keyboard.press("PageUp")
-    assert screen.evaluate("scrollY") < 20
-    turn_pages(screen, screen, "document.activeElement.matches('.lecture-answer > summary')")
-    for there in (True, False):
-        screen.keyboard.press("Enter")
-        assert screen.evaluate("document.activeElement.parentElement.open") is there
-    # who scrolls by hand sees the lesson without pages
-    screen.evaluate("window.lecture.press('Home')")
-    screen.keyboard.press("PageDown")
-    cover = "document.querySelector('.lecture-below').getBoundingClientRect().height"
-    screen.wait_for_function(f"{cover} > 0")
-    screen.mouse.move(300, 300)
-    screen.mouse.wheel(0, 200)
-    screen.wait_for_function(f"{cover} === 0")
-    screen.keyboard.press("PageUp")
-    screen.wait_for_function(f"{cover} > 0")
+        if deck.evaluate("Reveal.getCurrentSlide().matches('.poll')"):
+            break
+        speaker.keyboard.press("PageDown")
+        speaker.wait_for_timeout(50)
+    expect(notes).to_contain_text("Right: C.")
+    expect(notes).to_contain_text("Minute 14–21")
+    assert notes.locator("svg").count() or notes.locator("mjx-container").count() >= 0
+    now = speaker.frame_locator("#current-slide iframe").locator("section.present h2").last
+    expect(now).to_have_text("Poll 1")
+    speaker.close()
 
 
-def test_letters_grow_with_the_window_and_answers_and_code_are_not_seen(screen):
-    assert screen.evaluate(SEEN) == []
-    assert screen.evaluate("document.documentElement.scrollWidth") <= 1024
-    assert screen.evaluate(SMALL, 24) == []
-    for height in (720, 1080, 768):
-        screen.set_viewport_size({"width": height * 4 // 3, "height": height})
-        assert screen.evaluate(SMALL, 0.022 * height) == []
-    gaps = screen.evaluate(GAPS)
-    assert len(gaps) > 3
-    assert min(gaps) >= 768
-    assert screen.locator(".jp-InputArea .highlight:visible").count() == 0
-    text = screen.inner_text("#rendered_cells")
-    assert "def geodesic_so3" not in text
-    assert "Run sheet" not in text
-    assert "planned" not in text
-
-
-def test_keys_change_the_look_and_the_place_is_kept_when_the_page_is_loaded_again(screen):
-    for key, name in {"b": "lecture-blank", "d": "lecture-dark"}.items():
-        for there in (True, False):
-            screen.keyboard.press(key)
-            assert (name in screen.evaluate("document.documentElement.className")) is there
-    screen.evaluate("window.lecture.press('Home')")
-    for _ in range(4):
-        screen.keyboard.press("ArrowRight")
-    screen.keyboard.press("ArrowLeft")
-    place = screen.locator(".lecture-place")
-    told = place.inner_text()
-    assert re.fullmatch(r"[2-9] / \d\d", told)
-    where = "() => document.querySelectorAll('#rendered_cells h2')[2].getBoundingClientRect().top"
-    before = screen.evaluate(where)
-    screen.reload()
-    loaded(screen)
-    expect(place).to_have_text(told)
-    screen.wait_for_function(f"Math.abs(({where})() - ({before})) < 3")
-
-
-def test_controls_move_the_explorer_and_say_so_where_python_has_ended(screen):
-    move_every_control(screen.locator(".rbcourse-explorer"))
-    assert screen.evaluate(SEEN) == []
-    screen.evaluate(
-        """() => {
-            window.asked = fetch;
-            window.fetch = async (address, ...more) => {
-                if (String(address).includes("?token=")) throw new Error("no answer");
-                return asked(address, ...more);
-            };
-        }"""
-    )
-    expect(screen.locator(".lecture-gone .rbcourse-explorer")).to_be_visible()
-    screen.evaluate("window.fetch = asked")
-    expect(screen.locator(".lecture-gone")).to_have_count(0)
-
-
-def test_the_lecturer_sees_in_a_second_window_what_the_class_does_not(screen, context):
-    with context.expect_page() as opened:
-        screen.keyboard.press("l")
-    lecturer = opened.value
-    turn_pages(screen, lecturer, "window.lecture.tell().name === 'Poll 1'")
-    expect(lecturer.locator("#now")).to_have_text("Poll 1")
-    expect(lecturer.locator("#next")).to_have_text("Next: 6 · Why: a chord and its arc")
-    expect(lecturer.locator("#answer")).to_contain_text("C it is")
-    expect(lecturer.locator("#sheet tr.now td").nth(1)).to_have_text("poll 1")
-    expect(lecturer.locator("#plan")).to_have_text("planned: minute 14 to 21")
-    expect(lecturer.locator("#clock")).to_have_text(re.compile(r"\d+:\d\d"))
-    assert lecturer.locator("#answer math").count()  # formulas, too
-
-    expect(lecturer.locator("#vote")).to_have_text("V opens the vote on a poll.")
-    lecturer.locator("#vote").click()
-    panel, counted = screen.locator(".lecture-vote"), screen.locator(".lecture-counted")
-    expect(panel.locator("svg")).to_be_visible()
-    address = panel.locator("p").first.inner_text()
-    for letters in ("B", "AC", "C"):
-        phone = context.browser.new_context().new_page()
-        phone.goto(address)
-        for letter in letters:
-            phone.get_by_role("button", name=letter, exact=True).click()
-        expect(phone.locator("p").first).to_contain_text(f"You voted {letters[-1]}.")
-        phone.context.close()
-    expect(panel).to_contain_text("3 votes")
-    assert counted.count() == 0
-    screen.keyboard.press("v")
-    expect(panel).to_have_count(0)
-    for again in (False, True):
-        if again:
-            screen.reload()
-        expect(counted).to_have_count(4)
-        shares = [item.get_attribute("data-count") for item in counted.all()]
-        assert shares == ["0 · 0%", "1 · 33%", "2 · 67%", "0 · 0%"]
-    for _ in "vv":  # by mistake
-        screen.keyboard.press("v")
-    expect(panel).to_be_visible()
-    for _ in range(2):
-        with screen.expect_response(re.compile("/votes")):  # it asks again
-            pass
-    assert panel.is_visible()
-    lecturer.close()
-
-
-def turn_pages(page, window, until):
-    """Turn the pages, from the first one, with the keys of a window, until something holds."""
-    page.evaluate("window.lecture.press('Home')")
-    for _ in range(60):
-        if page.evaluate(until):
-            return
-        window.keyboard.press("PageDown")
-    raise AssertionError(f"{until} on no page")
-
-
-def test_every_question_stands_with_its_explorer_on_one_screen(context, home, tmp_path):
-    """However seldom the renderer of widgets looks."""
+def test_the_pdf_has_a_page_for_each_slide_and_its_letters(home):
     course, env = home
-    parts, new = [], nbformat.v4.new_notebook
-    for path in sorted((course / "notebooks").glob("[0-9][0-9]_*.ipynb"))[1:]:
-        cells = nbformat.read(path, as_version=4).cells
-        end = next(i for i, cell in enumerate(cells) if "_explorer()" in cell.source)
-        headings = [i for i in range(end) if cells[i].source.startswith("#")]
-        parts += cells[headings[-1] : end + 1]
-    for number, cell in enumerate(parts):
-        cell.id = f"cell-{number}"
-    (tmp_path / "notebooks").mkdir()
-    nbformat.write(new(cells=parts), tmp_path / "notebooks" / "01_all.ipynb")
-    with shown(context, tmp_path, env, "01", script=LATE) as page:
-        explorers = page.locator(".rbcourse-explorer").all()
-        assert len(explorers) == 14
-        for explorer in map(wait_for, explorers):
-            assert re.match(r"Poll \d", explorer.evaluate(QUESTION))
-            canvas, view = explorer.locator("canvas"), explorer.locator(".rbcourse-view")
-            box = canvas.bounding_box()
-            for each in (box, explorer.locator(".rbcourse-panel").bounding_box()):
-                assert 0 <= each["x"] <= each["x"] + each["width"] <= 1024
-                assert 0 <= each["y"] <= each["y"] + each["height"] <= 768
-            assert box["width"] == pytest.approx(560, abs=1)  # so that letters have 18 px
-            if view.count():  # a picture in space has buttons that appear with the pointer
-                page.mouse.move(1020, 400)
-                expect(view).to_have_css("opacity", "0")
-                canvas.hover()
-                expect(view).to_have_css("opacity", "1")
-                row = view.bounding_box()
-                assert abs(row["x"] - box["x"]) < 2
-                assert box["y"] < row["y"] < row["y"] + row["height"] <= 768
-        assert page.evaluate(SEEN) == []
-        assert "model not found" not in page.inner_text("#rendered_cells")
+    words = [sys.executable, "-m", "rbclassroom.lecture.serve", "06", "--pdf"]
+    done = subprocess.run(words, cwd=course, env=env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    content = (course / "06_geodesics.pdf").read_bytes()
+    lesson = deck_of(LESSONS[6])
+    assert len(re.findall(rb"/Type /Page\b(?!s)", content)) == len(lesson.shown) + len(lesson.behind)
+    fonts = [each for each in content.split(b"endobj") if b"/FontDescriptor\n" in each or b"/Type /FontDescriptor" in each]
+    assert fonts
+    assert all(b"/FontFile" in each or b"/Type3" in each for each in fonts)

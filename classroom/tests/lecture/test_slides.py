@@ -9,6 +9,9 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 from PIL import Image
+from tiny import lesson_at
+
+pytest.importorskip("markdown_it", reason="slides are made in the environment of the book")
 
 from rbclassroom.lecture import deck as pages
 from rbclassroom.lecture import slides
@@ -75,6 +78,8 @@ def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lec
     assert "<p>Short.</p>" in page
     assert '<div class="fragment"><p>Then.</p>' in page
     assert '<li class="fragment">all of it</li>' in page
+    with pytest.raises(ValueError, match="does not begin with a title"):
+        deck_of(lesson_at(tmp_path / "untitled", text("Text.")))
     for wrong in (True, 3, {"text": "x"}, None):
         cell = text("x")
         cell.metadata["slide"] = wrong

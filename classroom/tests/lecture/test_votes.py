@@ -13,20 +13,36 @@ import pytest
 from nbformat.v4 import new_markdown_cell
 from tiny import ask, lecture, lesson_at
 
-from rbclassroom.course import lecture as module
-from rbclassroom.course.lecture import open_votes
-from rbclassroom.course.votes import Ballot, find_address
+pytest.importorskip("segno", reason="slides are made in the environment of the book")
+
+from rbclassroom.lecture import serve as module
+from rbclassroom.lecture.serve import find_lesson, main, open_votes
+from rbclassroom.lecture.votes import Ballot, find_address
+
+OPTIONS = ["one", "two <b>2</b>", "three", "four"]
+
+
+def test_a_lesson_is_found_by_its_number(tmp_path, monkeypatch):
+    path = lesson_at(tmp_path)
+    assert find_lesson("01", path.parent) == find_lesson("1", path.parent) == path
+    for number in ("2", "11", "plane", ""):
+        with pytest.raises(ValueError, match=f"no lesson {number}; there are: 01"):
+            find_lesson(number, path.parent)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["lecture", "7"])
+    with pytest.raises(SystemExit, match=r"^There is no lesson 7; there are: 01\.$"):
+        main()
 
 
 def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
     ballot = Ballot()
-    for options in (1, 27):
+    for options in (["one"], ["some"] * 27):
         with pytest.raises(ValueError, match="2 to 26"):
             ballot.begin("Poll 1", options)
-    ballot.begin("Poll 1", 4)
+    ballot.begin("Poll 1", OPTIONS)
     key = ballot.key
     with pytest.raises(ValueError, match="Poll 1 is open"):
-        ballot.begin("Poll 2", 4)
+        ballot.begin("Poll 2", OPTIONS)
     phones = a, b, c, silent, *_ = [ballot.admit() for _ in range(500)]
     with pytest.raises(ValueError, match="500 phones"):
         ballot.admit()
@@ -45,7 +61,7 @@ def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
     for stranger in ("", "a", a):
         with pytest.raises(ValueError, match="not admitted"):
             ballot.vote(stranger, "A")
-    ballot.begin("Poll 1", 4)
+    ballot.begin("Poll 1", OPTIONS)
     assert ballot.key != key
     assert ballot.state()["voters"] == 0
     ballot.close()
@@ -86,6 +102,7 @@ def vote(url, letters):
     status, page, cookie = ask(url)
     assert status == 200
     assert re.findall(r'value="(.)"', page) == list("ABCD")
+    assert all(option in page for option in OPTIONS)
     for letter in letters:
         body = urlencode({"choice": letter})
         assert ask(url, "POST", body, **FORM, Cookie=cookie)[0] == 303
@@ -95,35 +112,52 @@ def vote(url, letters):
 
 
 def test_thirty_phones_vote_and_nobody_sees_the_count_before_it_is_closed(tmp_path):
-    lesson_at(tmp_path, new_markdown_cell("### Poll 1\n\n- **A** · yes\n- **B** · no"))
+    lesson_at(
+        tmp_path,
+        new_markdown_cell("# Tiny"),
+        new_markdown_cell("### Poll 1\n\n- **A** · yes\n- **B** · no"),
+    )
     with lecture(tmp_path, "--votes", "127.0.0.1") as (address, server):
         url = re.search(r"Phones vote at (\S+)", server.stdout.readline())[1]
-        desk = address.replace("/?", "/votes?")
+        page, token = address.split("?token=")
+        assert "<h1>Tiny</h1>" in ask(page)[1]
+        desk = page.rpartition("/")[0] + "/votes"
 
         def state(words=None):
             method, body = ("GET", None) if words is None else ("POST", json.dumps(words))
-            return json.loads(ask(desk, method, body)[1])
+            status, text, _ = ask(f"{desk}?token={token}", method, body)
+            return json.loads(text) if status == 200 else status
 
-        begin = {"poll": "Poll 1", "options": 4}
+        begin = {"poll": "Poll 1", "options": OPTIONS}
         late = urlencode({"choice": "A"})
         assert "No vote is open" in ask(url)[1]
-        assert ask(desk.split("?")[0])[0] in (302, 401, 403)
+        for other in ("", "?token=", f"?token={token[:-1]}!", "?token=%C3%A9"):
+            assert ask(desk + other)[0] == 403
+            assert ask(desk + other, "POST", json.dumps(begin))[0] == 403
+        for target in (page, f"{desk}?token={token}"):
+            assert ask(target, Host="evil.example")[0] == 403
         assert ask(url + "/votes")[0] == 404
         assert state(begin)["open"]
-        assert "is open" in state(begin)["message"]
+        assert state(begin) == 409
         letters = ["BA", "DA", *"CCCCCBBBBDDDAAAAAAAAAABCBCBC", "AB"]
         with ThreadPoolExecutor(30) as phones:
             pages, cookies = zip(*phones.map(vote, [url] * len(letters), letters), strict=True)
         assert len(set(cookies)) == len(letters)  # a random name each
-        assert not any(re.search(r"\b\d+ votes?\b", page) for page in pages)
+        assert not any(re.search(r"\b\d+ votes?\b|<meter", page) for page in pages)
         assert ask(url, "POST", late, **FORM)[0] == 303  # of no phone that was admitted
         assert ask(url, "POST", late, **FORM, Cookie="vote-1=a")[0] == 303
         assert ask(url, "POST", "choice=E", **FORM, Cookie=cookies[0])[0] == 400
-        assert state() == {"poll": "Poll 1", "open": True, "voters": len(letters), "counts": []}
-        closed = state({})
+        now = state()
+        assert now["address"] == url
+        assert now["code"].startswith("<svg")
+        assert (now["open"], now["voters"], now["counts"]) == (True, len(letters), [])
         counts = Counter(last for *_, last in letters)
+        closed = state({})
         assert closed["counts"] == [counts[letter] for letter in "ABCD"]
-        assert "Poll 1 is closed" in ask(url)[1]
+        result = ask(url)[1]
+        assert "Poll 1: the result" in result
+        values = re.findall(r'<meter max="(\d+)" value="(\d+)">', result)
+        assert values == [(str(len(letters)), str(counts[letter])) for letter in "ABCD"]
         assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # too late
         assert state() == closed
         state(begin)
@@ -132,5 +166,6 @@ def test_thirty_phones_vote_and_nobody_sees_the_count_before_it_is_closed(tmp_pa
             end = signal.SIGTERM if sys.platform == "win32" else signal.SIGINT
             server.send_signal(end)
             server.wait()
-    with socket.socket() as probe:
-        assert probe.connect_ex(("127.0.0.1", urlsplit(url).port))
+    for there in (url, page):
+        with socket.socket() as probe:
+            assert probe.connect_ex(("127.0.0.1", urlsplit(there).port))
