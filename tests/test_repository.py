@@ -69,7 +69,7 @@ def test_all_lists_are_exact_agree_and_the_first_one_installs_the_course_without
         for pin in PINS[name]:
             assert re.fullmatch(r"==[\w.]+", str(pin.specifier)), pin
             assert versions.setdefault((pin.name, str(pin.marker)), pin.specifier) == pin.specifier
-    others = {"nbgrader", "voila", "sympy", "sphinx", "pytest", "nbval", "mypy", "ruff", "notebook"}
+    others = {"nbgrader", "sympy", "sphinx", "pytest", "nbval", "mypy", "ruff", "notebook"}
     assert not {canonical(pin.name) for pin in PINS["environment.txt"]} & others
     peers = [Requirement(line) for line in PROJECT["optional-dependencies"]["peers"]]
     assert all(re.fullmatch(r"==[\d.]+", str(peer.specifier)) for peer in peers)
@@ -351,12 +351,11 @@ def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
     configuration = Path(os.environ["JUPYTER_CONFIG_PATH"])
     page = json.loads((configuration / "labconfig" / "page_config.json").read_text())
     assert page["disabledExtensions"]["@jupyter/nbgrader"]
-    assert page["disabledExtensions"]["@voila-dashboards/jupyterlab-preview"]
     server = json.loads((configuration / "jupyter_server_config.json").read_text())
     extensions = importlib.metadata.distribution("nbgrader").locate_file("nbgrader")
     off = server["ServerApp"]["jpserver_extensions"]
     there = {path.name for path in Path(extensions, "server_extensions").glob("[a-z]*")}
-    assert {name.rpartition(".")[2] for name in off} == there | {"server_extension"}
+    assert {name.rpartition(".")[2] for name in off} == there
     assert not any(off.values())
     (styles,) = server["ServerApp"]["tornado_settings"]["static_custom_path"]
     assert "invert" in Path(styles, "custom.css").read_text()
@@ -465,7 +464,11 @@ def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_p
 def test_wheels_carry_types_styles_and_pages_and_nothing_else(wheels):
     for path, package, files in (
         (wheels[0], "rbcourse", {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"}),
-        (wheels[1], "rbclassroom", {"lecture/static/deck.html", "lecture/static/vendor/LICENSES.txt"}),
+        (
+            wheels[1],
+            "rbclassroom",
+            {"lecture/static/deck.html", "lecture/static/vendor/LICENSES.txt"},
+        ),
     ):
         names = ZipFile(path).namelist()
         assert {f"{package}/{file}" for file in files} <= set(names)

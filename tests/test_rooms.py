@@ -35,7 +35,8 @@ MAY_IMPORT = {  # the parts, beside itself, that a part of the packages may impo
     "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
     "rbclassroom.course": {"rbclassroom"},  # not even the mathematics
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
-    "rbclassroom.book": {"rbclassroom.course", "rbclassroom.assignments"},
+    "rbclassroom.lecture": {"rbclassroom.course", "rbcourse.draw"},
+    "rbclassroom.book": {"rbclassroom.course", "rbclassroom.lecture", "rbclassroom.assignments"},
 }
 PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))} | {
     "report",
@@ -50,8 +51,9 @@ LIBRARIES = {
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl"},
-    "rbclassroom.course": {"PIL", "jupyter_server", "jupyterlab", "nbclient", "nbformat"}
-    | {"segno", "tornado", "traitlets", "voila"},
+    "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
+    "rbclassroom.lecture": {"PIL", "markdown_it", "mdit_py_plugins", "nbformat"}
+    | {"segno", "tornado"},
     "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
     | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
     "rbclassroom.book": {"jinja2", "nbformat", "pygments", "sphinx"},

@@ -23,7 +23,7 @@ from rbclassroom.assignments.handout import pack, release
 from rbclassroom.book import lessons, places, reference
 from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.course import ledger
-from rbclassroom.course.notebooks import lesson_paths
+from rbclassroom.course.notebooks import lesson_paths, living
 from rbclassroom.lecture.deck import write as write_decks
 from rbclassroom.lecture.slides import deck_of
 
@@ -93,7 +93,9 @@ class Sources:
             short = f"{path.stem[:2]} {title.partition(':')[0]}"
             shown.append({"stem": path.stem, "short": short, "sheet": sheet})
         self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
-        beside = {content: re.sub("^pictures", "../lessons/pictures", to) for content, to in known.items()}
+        beside = {
+            content: re.sub("^pictures", "../lessons/pictures", to) for content, to in known.items()
+        }
         ready = partial(
             lessons.with_picture_files, known=beside, folder=self.extra / "slides", loading="eager"
         )
@@ -165,7 +167,7 @@ class Sources:
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""
-        self.put("scene.html", lessons.living("cube", self.root))
+        self.put("scene.html", living("cube", self.root))
         for path in (HERE / "pages").rglob("*.md"):
             page = path.relative_to(HERE / "pages").as_posix()
             self.put(page, self.rendered(page))

@@ -13,9 +13,8 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 
 from rbclassroom.book.places import relinked, with_keys
-from rbclassroom.course.notebooks import lesson_paths
+from rbclassroom.course.notebooks import lesson_paths, living, split_sheet
 
-SHEET = "## Run sheet for the lecturer"
 _PICTURE = re.compile(r'(<img\b[^>]*?) src="data:image/png;base64,([^"]+)"')
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
 _APART = re.compile(r"(the lecturer's) (run sheets?) (is|are) at the end")
@@ -67,15 +66,6 @@ def without_outputs(notebook: NotebookNode) -> NotebookNode:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
     return plain
-
-
-def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
-    """Return the cells for the class, and the run sheet, which has the answers."""
-    for i, cell in enumerate(notebook.cells):
-        if cell.source.startswith(SHEET):
-            sheet = "\n\n".join(other.source for other in notebook.cells[i:])
-            return notebook.cells[:i], sheet.removeprefix(SHEET).strip()
-    return notebook.cells, ""
 
 
 def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
@@ -131,12 +121,6 @@ def with_files(shown: str) -> str:
     return _FILES.sub(put, shown)
 
 
-def living(name: str, root: Path) -> str:
-    """Return an explorer that moves without Python, as HTML."""
-    page = (root / "figures" / "explorers" / f"{name}.html").read_text(encoding="utf-8")
-    return page[page.index("<figure>") : page.index("</html>")]
-
-
 def prepared(
     notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path
 ) -> str:
@@ -176,7 +160,10 @@ def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
     """Put the number of a lesson before its title, and ways to run it below."""
     title, _, rest = notebook.cells[0].source.partition("\n")
     slides = f"../slides/{Path(name).stem}.html"
-    ways = [f'<a href="{slides}">Present</a>', f'<a download href="{name}">Download the notebook</a>']
+    ways = [
+        f'<a href="{slides}">Present</a>',
+        f'<a download href="{name}">Download the notebook</a>',
+    ]
     if repository:
         lesson = quote(f"notebooks/{name}", safe="")
         binder = f"https://mybinder.org/v2/gh/{repository}/HEAD?labpath={lesson}"

@@ -10,7 +10,7 @@ from typing import Any
 
 from rbclassroom.course.notebooks import copy_lessons
 
-TEACHERS = ["@jupyter/nbgrader", "@voila-dashboards/jupyterlab-preview"]
+TEACHERS = ["@jupyter/nbgrader"]
 PARTS = ["formgrader", "validate_assignment", "assignment_list", "course_list"]
 OVERRIDES = {
     "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
@@ -38,7 +38,7 @@ def configure() -> Path:
     _write(folder / "labconfig" / "page_config.json", off)
     extensions = {f"nbgrader.server_extensions.{part}": False for part in PARTS}
     server = {
-        "jpserver_extensions": {**extensions, "voila.server_extension": False},
+        "jpserver_extensions": extensions,
         "tornado_settings": {"static_custom_path": [str(folder / "custom")]},
         "answer_yes": True,  # Ctrl-C ends it at once
     }

@@ -36,11 +36,27 @@ OPENED = {
         "version": platform.python_version(),
     },
 }
+SHEET = "## Run sheet for the lecturer"
 
 
 def lesson_paths(folder: Path) -> list[Path]:
     """Return the lessons of a folder in the order of the course, without assignments."""
     return sorted(folder.glob("[0-9][0-9]_*.ipynb"))
+
+
+def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
+    """Return the cells for the class, and the run sheet, which has the answers."""
+    for i, cell in enumerate(notebook.cells):
+        if cell.source.startswith(SHEET):
+            sheet = "\n\n".join(other.source for other in notebook.cells[i:])
+            return notebook.cells[:i], sheet.removeprefix(SHEET).strip()
+    return notebook.cells, ""
+
+
+def living(name: str, root: Path) -> str:
+    """Return an explorer that moves without Python, as HTML."""
+    page = (root / "figures" / "explorers" / f"{name}.html").read_text(encoding="utf-8")
+    return page[page.index("<figure>") : page.index("</html>")]
 
 
 def execute(path: Path, figures: Path) -> str:

@@ -103,7 +103,9 @@ def deck_page(deck: Deck) -> str:
     joined = ("".join(map(section, part)) for part in stacks)
     slides = "\n".join(f"<section>{part}</section>" for part in joined)
     template = (STATIC / "deck.html").read_text(encoding="utf-8")
-    return template.replace("<!--TITLE-->", html.escape(deck.title)).replace("<!--SLIDES-->", slides)
+    return template.replace("<!--TITLE-->", html.escape(deck.title)).replace(
+        "<!--SLIDES-->", slides
+    )
 
 
 def crib_page(deck: Deck) -> str:
@@ -114,9 +116,7 @@ def crib_page(deck: Deck) -> str:
     for (minute, part, ask, skip), start in zip(rows, starts, strict=True):
         lines.append(f"| {minute} | {start + 1} | {part} | {ask} | {skip} |")
     polls = [slide for slide in deck.shown if slide.kind == "verdict"]
-    right = (
-        f"- **{poll.poll}: {poll.right}** · {poll.options[poll.right]}" for poll in polls
-    )
+    right = (f"- **{poll.poll}: {poll.right}** · {poll.options[poll.right]}" for poll in polls)
     before = deck.sheet.partition("\n|")[0]
     text = "\n".join([f"# {deck.title}", "", before, "", *lines, "", *right])
     template = (STATIC / "crib.html").read_text(encoding="utf-8")

@@ -65,6 +65,7 @@ class Desk(_Here):
         self.code = code.svg_inline(border=2, light="white", omitsize=True)
 
     def prepare(self) -> None:
+        """Refuse who has not the token."""
         super().prepare()
         asked = self.get_query_argument("token", "").encode()
         if not secrets.compare_digest(asked, self.token.encode()):
@@ -76,7 +77,7 @@ class Desk(_Here):
         self.finish({**state, "address": self.phones.url, "code": self.code})
 
     def post(self) -> None:
-        """Open the vote on a poll, ``{"poll": "Poll 1", "options": [...]}``, or close it, ``{}``."""
+        """Open the vote on a poll, ``{"poll": "Poll 1", "options": []}``, or close it, ``{}``."""
         asked = json_decode(self.request.body)
         ballot = self.phones.ballot
         try:
@@ -91,7 +92,7 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         write({path.stem: deck_of(path)}, Path(folder, "slides"))
         put_mathjax(Path(folder, "_static"))
-        token, handlers = secrets.token_hex(24), list[tuple[object, ...]]()
+        token, handlers = secrets.token_hex(24), list[tuple[str, Any, dict[str, Any]]]()
         if phones:
             handlers.append(("/slides/votes", Desk, {"phones": phones, "token": token}))
             phones.start()
@@ -188,7 +189,7 @@ def main() -> None:
         phones = None if words.votes is None or words.pdf else open_votes(words.votes)
         pdf = Path(f"{path.stem}.pdf") if words.pdf else None
         asyncio.run(serve(path, phones, not words.no_browser, pdf))
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         sys.exit(str(error))
     except KeyboardInterrupt:
         sys.exit(130)

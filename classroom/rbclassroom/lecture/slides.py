@@ -9,13 +9,12 @@ import io
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import nbformat
 from nbformat import NotebookNode
 from PIL import Image
 
-from rbclassroom.book.lessons import living, split_sheet
+from rbclassroom.course.notebooks import living, split_sheet
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections that are behind the end, where a key leads."""
@@ -65,7 +64,9 @@ def words_of(text: str) -> int:
     """Return the number of words of a slide text."""
     text = re.sub(r"\$\$.*?\$\$", " ", text, flags=re.S)
     text = re.sub(r"\$[^$]*\$", " x ", text)
-    return len(re.findall(r"\w[\w’'.,-]*", re.sub(r"^[-*] |<[^>]*>|\. \. \.", " ", text, flags=re.M)))
+    return len(
+        re.findall(r"\w[\w’'.,-]*", re.sub(r"^[-*] |<[^>]*>|\. \. \.", " ", text, flags=re.M))
+    )
 
 
 @dataclass
@@ -126,7 +127,7 @@ class _Reader:
             cells = nbformat.read(path, as_version=4).cells
         found = [picture_of(each, self.root) for each in cells if each.id == cell]
         if not found or not found[0]:
-            raise ValueError(f"slide: there is no picture {name}")
+            raise ValueError(f"slide: {name} is no cell with a stored picture")
         return found[0]
 
     def note(self, text: str) -> None:
@@ -148,7 +149,7 @@ class _Reader:
                 if wish is not False:
                     self.read_code(cell, wish)
             else:
-                self.read_text(cell, wish)
+                self.read_text(cell, wish or "")
         if not self.sections[0]:
             raise ValueError("it does not begin with a title, such as # The plane")
         deck = Deck(self.sections[0][0].title, self.sections, self.behind, sheet)
@@ -166,9 +167,13 @@ class _Reader:
         figure = re.fullmatch(r"fig(\d+)([a-z]?)", key)
         self.keys |= {f"figure {figure[1]}", f"figure {figure[1]}{figure[2]}"} if figure else {key}
         self.keys.add(cell.id.replace("-", " "))
+        if not cell.outputs:
+            raise ValueError(
+                f"slide: {cell.id} has no outputs: run 'course.py figures' to store them"
+            )
         self.put_text(wish, picture_of(cell, self.root))
 
-    def read_text(self, cell: NotebookNode, wish: str | bool) -> None:
+    def read_text(self, cell: NotebookNode, wish: str) -> None:
         heading = re.match(r"(#+) (.*)\n*", cell.source)
         text = cell.source[heading.end() :] if heading else cell.source
         self.keys |= {cell.id.replace("-", " ")} if wish else set()
@@ -178,14 +183,14 @@ class _Reader:
             if not self.answer:
                 self.put_behind(wish or re.sub(r"<details>.*?</details>", "", text, flags=re.S))
         elif self.answer and self.poll and not heading:
-            self.put_answer(self.poll, text, wish or "")
+            self.put_answer(self.poll, text, wish)
         else:
             if self.section == "Recap":
                 wish = wish or text
-            self.put_text(wish or "")
+            self.put_text(wish)
             self.note(text)
 
-    def begins(self, level: int, words: str, text: str, wish: str | bool) -> bool:
+    def begins(self, level: int, words: str, text: str, wish: str) -> bool:
         """Begin what has this heading; tell whether the rest of its cell is read by that."""
         self.answer = words if words.startswith("Answer") else ""
         if level == 1:
@@ -211,7 +216,7 @@ class _Reader:
             self.keys |= {words.lower()}
         return bool(self.answer)
 
-    def begins_poll(self, words: str, text: str, wish: str | bool) -> None:
+    def begins_poll(self, words: str, text: str, wish: str) -> None:
         question = wish or _ITEM.sub("", text).strip()
         options = {item[1].strip("*"): item[2] for item in _ITEM.finditer(text)}
         self.poll = Slide(self.title, "poll", [question], poll=words, options=options)
@@ -284,16 +289,16 @@ def printed(cell: NotebookNode) -> str:
 def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
     """Return the picture of a code cell: alive where it can be, without its caption."""
     explorer = re.search(r"explorers\.(\w+)_explorer\(\)", cell.source)
-    pages = [o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {})]
-    page = living(explorer[1], root) if explorer else "".join(pages)
+    page = "".join(o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {}))
+    if explorer and (root / "figures" / "explorers" / f"{explorer[1]}.html").exists():
+        page = living(explorer[1], root)  # recorded, so that it moves without Python
     image = re.search(r'<img [^>]*?alt="([^"]*)"[^>]*?src="data:image/png;base64,([^"]+)"', page)
     if not image:
         return None
     data, still = _LIVING.search(page), base64.b64decode(image[2])
     moves = data and '"controls":[]' not in data[1]
-    crop, aspect = (0.0,) * 4, 0.0
     with Image.open(io.BytesIO(still)) as opened:
-        crop = crop if moves else margins(opened)
+        crop = (0.0,) * 4 if moves else margins(opened)
         inner = opened.width * (1 - crop[0] - crop[2]), opened.height * (1 - crop[1] - crop[3])
         aspect = inner[0] / inner[1]
     shares = " ".join(f"{share:.3f}" for share in crop)
@@ -314,11 +319,11 @@ def margins(still: Image.Image) -> tuple[float, ...]:
 
 
 def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
-    """Return the rows of a run sheet: minute, part, what to ask and hear, what to skip when late.
+    r"""Return the rows of a run sheet: minute, part, what to ask and hear, what to skip when late.
 
     Examples
     --------
-    >>> rows_of("| minute | part | ask | skip |\\n|---|---|---|---|\\n| 3 | 2 | Why? *So.* | |")
+    >>> rows_of("| minute | part | ask | skip |\n|---|---|---|---|\n| 3 | 2 | Why? *So.* | |")
     [(3, '2', 'Why? *So.*', '')]
     """
     found = re.findall(r"^\| (\d+) \|([^|]*)\|([^|]*)\|([^|]*)\|", sheet, re.M)

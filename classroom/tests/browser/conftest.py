@@ -50,7 +50,7 @@ def home(tmp_path_factory):
     kept = ("PATH", "SYSTEMROOT", "LANG")
     env = {name: os.environ[name] for name in kept if name in os.environ}
     env |= {"HOME": str(home), "USERPROFILE": str(home), "PYTHONPATH": os.pathsep.join(PACKAGES)}
-    for folder in ("notebooks", "benchmarks"):
+    for folder in ("notebooks", "benchmarks", "figures/explorers"):
         shutil.copytree(ROOT / folder, home / "course" / folder)
     code = "from rbclassroom.course.notebooks import Path, copy_lessons\n"
     code += "copy_lessons(Path('notebooks'), Path('work'))"

@@ -17,45 +17,10 @@ from rbclassroom.lecture.slides import deck_of
 ROOT = Path(__file__).parents[3]
 SLIDES = ROOT / "book" / "slides"
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
-# faults of all slides with all steps: what is cut, text that is too small, thin slides
-FAULTS = """async () => {
-  const faults = [], thin = [], sections = [...document.querySelectorAll(".slides section section")];
-  const frame = () => new Promise(requestAnimationFrame);
-  for (const [number, section] of sections.entries()) {
-    const { h, v } = Reveal.getIndices(section), scale = Reveal.getScale();
-    Reveal.slide(h, v, 99);
-    for (let wait = 0; wait < 300 && section.querySelector("figure > script"); wait++) await frame();
-    await frame();
-    const say = (what) => faults.push(`${number + 1}: ${what}`);
-    const sheet = section.getBoundingClientRect(), body = section.querySelector(".body").getBoundingClientRect();
-    const box = (part) => part.getBoundingClientRect(), seen = (part) => part.checkVisibility() && box(part).width;
-    for (const part of section.querySelectorAll(".words, .words *, mjx-container > svg")) {
-      if (!seen(part) || part.closest("aside, mjx-assistive-mml") || part.closest("mjx-container > svg > *")) continue;
-      const { left, right, top, bottom } = box(part), room = 3 * scale;
-      if (left < body.left - room || right > body.right + room) say(`too wide: ${part.tagName} ${part.textContent}`);
-      if (top < body.top - 2 * room || bottom > body.bottom + 2 * room) say(`too high: ${part.tagName} ${part.textContent}`);
-    }
-    for (const part of section.querySelectorAll("figure > :is(img, canvas), figure > div > div:not(.rbcourse-view)")) {
-      const { left, right, bottom } = box(part), margin = section.querySelector("img")?.dataset.crop ? 1e9 : 3 * scale;
-      if (seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin))
-        say(`picture cut: ${part.tagName}`);
-    }
-    const texts = document.createTreeWalker(section, NodeFilter.SHOW_TEXT);
-    while (texts.nextNode()) {
-      const part = texts.currentNode.parentElement, apart = "aside, script, sup, sub, mjx-container, .rbcourse-view, [role=status]";
-      if (!texts.currentNode.textContent.trim() || part.closest(apart) || !part.checkVisibility()) continue;
-      const share = parseFloat(getComputedStyle(part).fontSize) / 10.8, least = part.matches(".words > p") ? 3.3 : 3.0;
-      if (share < least) say(`text of ${share.toFixed(2)} %: ${texts.currentNode.textContent}`);
-    }
-    if (section.querySelector("[data-mjx-error], mjx-merror")) say("a formula cannot be set");
-    const boxes = [...section.querySelectorAll(".words > *")].map(box).filter(({ height }) => height);
-    const height = Math.max(...boxes.map(({ bottom }) => bottom)) - Math.min(...boxes.map(({ top }) => top));
-    if (height < sheet.height / 4 && !section.querySelector("figure") && !section.matches(".title, .end")) thin.push(number + 1);
-  }
-  return [faults, thin];
-}"""
-PICTURES = """() => [...document.querySelectorAll(".slides section section")].flatMap((section, i) =>
-  [...section.querySelectorAll("figure > img")].map((image) => [i + 1, image.alt, image.naturalWidth,
+FAULTS = Path(__file__).with_name("faults.js").read_text(encoding="utf-8")
+PICTURES = """() => [...document.querySelectorAll(".slides section section")]
+  .flatMap((section, i) => [...section.querySelectorAll("figure > img")].map((image) => [
+    i + 1, image.alt, image.naturalWidth,
     parseFloat(getComputedStyle(image.parentElement).getPropertyValue("--w"))]))"""
 HERE = "() => Reveal.getCurrentSlide().innerText"
 
@@ -114,13 +79,16 @@ def until(page, selector, key="PageDown"):
         if page.evaluate("(what) => Reveal.getCurrentSlide().matches(what)", selector):
             return
         page.keyboard.press(key)
+        page.wait_for_function(
+            "!Reveal.getCurrentSlide().querySelector('figure > :is(script, img[data-read])')"
+        )
     raise AssertionError(f"no slide {selector}")
 
 
 def test_a_remote_control_leads_through_all_steps_also_after_a_slider_was_touched(deck):
     seen, steps = [], 0
     until(deck, ":has(figure input)")
-    slider = deck.locator("section.present figure input").first
+    slider = deck.locator("section.present > section.present figure input").first
     slider.focus()
     at = slider.input_value()
     here = deck.evaluate(HERE)
@@ -128,7 +96,7 @@ def test_a_remote_control_leads_through_all_steps_also_after_a_slider_was_touche
     assert slider.input_value() != at
     assert deck.evaluate(HERE).partition("\n")[0] == here.partition("\n")[0]
     deck.keyboard.press("PageDown")
-    assert deck.locator("section.present figure input").count() == 0
+    assert deck.locator("section.present > section.present figure input").count() == 0
     deck.keyboard.press("Shift+ArrowLeft")
     while not deck.evaluate("Reveal.getCurrentSlide().matches('.end')"):
         seen.append(deck.evaluate("Reveal.getCurrentSlide().className"))
@@ -155,20 +123,28 @@ def test_keys_change_what_is_seen_and_it_is_never_dark_by_itself(context):
         page.keyboard.press("d")
         expect(root).not_to_have_class(re.compile("dark"))
         page.keyboard.press("?")
-        help_ = page.locator(".r-overlay-help, .overlay-help, .r-overlay")
-        for words in ("Take a vote", "Dark or light", "Behind the end", "Readouts", "Slide overview"):
+        help_ = page.locator(".r-overlay-help")
+        for words in (
+            "Take a vote",
+            "Dark or light",
+            "Behind the end",
+            "Readouts",
+            "Slide overview",
+        ):
             expect(help_).to_contain_text(words)
         page.keyboard.press("Escape")
         until(page, ":has(figure input)")
-        table = page.locator("section.present figure table")
+        table = page.locator("section.present > section.present figure table")
         expect(table).to_be_hidden()
         page.keyboard.press("r")
         expect(table).to_be_visible()
         page.keyboard.press("r")
-        time = page.locator("section.present figure input").last
+        time = page.locator("section.present > section.present figure input").last
         before = time.input_value()
         page.keyboard.press("m")
-        page.wait_for_function(f"Reveal.getCurrentSlide().querySelectorAll('figure input')[1].value !== '{before}'")
+        page.wait_for_function(
+            f"Reveal.getCurrentSlide().querySelectorAll('figure input')[1].value !== '{before}'"
+        )
         page.keyboard.press("m")
         until(page, ".verdict")
         until(page, ":has(figure input)", "PageUp")
@@ -192,7 +168,7 @@ def test_phones_vote_and_the_count_stands_on_the_poll_and_on_its_verdict(context
         panel = page.locator("#vote")
         expect(panel.locator("svg")).to_be_visible()
         url = "http://" + panel.locator("div").first.inner_text()
-        options = page.locator("section.present .option > div").all_inner_texts()
+        options = page.locator("section.present > section.present .option > div").all_inner_texts()
         for letters in ("B", "AC", "C"):
             phone = context.browser.new_context().new_page()
             phone.goto(url)
@@ -207,11 +183,15 @@ def test_phones_vote_and_the_count_stands_on_the_poll_and_on_its_verdict(context
         counts = ["0 · 0%", "1 · 33%", "2 · 67%", "0 · 0%"]
         for kind in (".poll", ".verdict"):
             until(page, kind)
-            shown = page.locator("section.present .option")
+            shown = page.locator("section.present > section.present .option")
             assert [each.get_attribute("data-count") for each in shown.all()] == counts
+        here = "`#/${Reveal.getIndices().h}/${Reveal.getIndices().v}`"
+        page.wait_for_function(f"location.hash.startsWith({here})")
         page.reload()
         page.wait_for_function("document.documentElement.dataset.ready")
-        expect(page.locator("section.present .option").nth(2)).to_have_attribute("data-count", counts[2])
+        expect(page.locator("section.present > section.present .option").nth(2)).to_have_attribute(
+            "data-count", counts[2]
+        )
         page.goto("about:blank")  # before the server ends
 
 
@@ -222,15 +202,15 @@ def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck,
     notes = speaker.locator(".speaker-controls-notes")
     expect(notes).to_contain_text("Which column of")
     expect(notes).to_contain_text("Minute 0–3")
-    for _ in range(60):
-        if deck.evaluate("Reveal.getCurrentSlide().matches('.poll')"):
-            break
-        speaker.keyboard.press("PageDown")
-        speaker.wait_for_timeout(50)
+    before = deck.evaluate(HERE)
+    speaker.keyboard.press("PageDown")
+    deck.wait_for_function("(before) => Reveal.getCurrentSlide().innerText !== before", arg=before)
+    until(deck, ".poll")
     expect(notes).to_contain_text("Right: C.")
     expect(notes).to_contain_text("Minute 14–21")
-    assert notes.locator("svg").count() or notes.locator("mjx-container").count() >= 0
-    now = speaker.frame_locator("#current-slide iframe").locator("section.present h2").last
+    now = speaker.frame_locator("#current-slide iframe").locator(
+        "section.present > section.present h2"
+    )
     expect(now).to_have_text("Poll 1")
     speaker.close()
 
@@ -242,7 +222,13 @@ def test_the_pdf_has_a_page_for_each_slide_and_its_letters(home):
     assert done.returncode == 0, done.stderr
     content = (course / "06_geodesics.pdf").read_bytes()
     lesson = deck_of(LESSONS[6])
-    assert len(re.findall(rb"/Type /Page\b(?!s)", content)) == len(lesson.shown) + len(lesson.behind)
-    fonts = [each for each in content.split(b"endobj") if b"/FontDescriptor\n" in each or b"/Type /FontDescriptor" in each]
+    assert len(re.findall(rb"/Type /Page\b(?!s)", content)) == len(lesson.shown) + len(
+        lesson.behind
+    )
+    fonts = [
+        each
+        for each in content.split(b"endobj")
+        if b"/FontDescriptor\n" in each or b"/Type /FontDescriptor" in each
+    ]
     assert fonts
     assert all(b"/FontFile" in each or b"/Type3" in each for each in fonts)

@@ -110,13 +110,19 @@ def test_a_picture_stands_with_the_text_of_its_cell_and_may_be_borrowed(tmp_path
     assert '<p class="look"><em>Look for:</em> it.</p>' in pages.section(wide)
     wanted = r"$$R = \begin{pmatrix}1. & 0.5 \\ -0.25 & 1.\end{pmatrix}$$"
     assert printed.parts == [wanted]
-    with pytest.raises(ValueError, match="there is no picture nowhere"):
+    with pytest.raises(ValueError, match="nowhere is no cell with a stored picture"):
         tiny(tmp_path, text("## 1", "![](nowhere)"))
-    with pytest.raises(ValueError, match="prints no matrix"):
-        tiny(tmp_path, new_code_cell("1", metadata={"slide": r"$$\printed$$"}))
+    for output, why in (("1", "prints no matrix"), ("", "run 'course.py figures'")):
+        bare = new_code_cell("1", metadata={"slide": r"$$\printed$$"} if output else {"slide": ""})
+        bare.outputs = [new_output("stream", text=output)] if output else []
+        with pytest.raises(ValueError, match=why):
+            tiny(tmp_path, bare)
 
 
-ANSWER = "**B** it is. It is even.\n\n- **A** is odd, which nobody wants. More.\n- **C** and **D** are as odd."
+ANSWER = """**B** it is. It is even.
+
+- **A** is odd, which nobody wants. More.
+- **C** and **D** are as odd."""
 
 
 def poll(question="Which?", answer=ANSWER, slide=None):
@@ -172,14 +178,21 @@ def test_what_is_behind_the_end_is_grouped_and_long_tables_are_parted(tmp_path):
 
 
 def test_each_row_of_the_run_sheet_begins_on_its_slide_with_its_share_of_the_time(tmp_path):
-    sheet = "| 0 | question | Ask. | |\n| 2 | poll 1, a vote | | the second |\n| 12 | recap, homework | | |\n"
+    sheet = """| 0 | question | Ask. | |
+| 2 | poll 1, a vote | | the second |
+| 12 | recap, homework | | |
+"""
     deck = tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=sheet)
     seconds = [slide.seconds for slide in deck.shown]
     assert seconds == [120, 200, 200, 200, 30, 30]
     assert deck.shown[1].notes[0] == "*Minute 2–12* · poll 1, a vote · late? skip the second"
     assert deck.shown[0].notes[:2] == ["*Minute 0–2* · question", "**Ask:** Ask."]
     crib = pages.crib_page(deck)
-    assert re.findall(r"<td>(\d+)</td>\s*<td>(\d+)</td>", crib) == [("0", "1"), ("2", "2"), ("12", "5")]
+    assert re.findall(r"<td>(\d+)</td>\s*<td>(\d+)</td>", crib) == [
+        ("0", "1"),
+        ("2", "2"),
+        ("12", "5"),
+    ]
     assert "Poll 1: B" in crib
     for bad, why in {
         "| 0 | a dance | | |\n": "no slide for 'a dance'",
@@ -230,7 +243,9 @@ def test_lessons_keep_the_rules_for_authors(path, decks):
 
 def plain(tex):
     """TeX without what changes only its look."""
-    return re.sub(r"\\(?:bigl|bigr|Bigl|Bigr|left|right|qquad|quad|[,;:! ])|[\s&{}]", "", tex).rstrip(".,;")
+    return re.sub(
+        r"\\(?:bigl|bigr|Bigl|Bigr|left|right|qquad|quad|[,;:! ])|[\s&{}]", "", tex
+    ).rstrip(".,;")
 
 
 def pieces(formula):

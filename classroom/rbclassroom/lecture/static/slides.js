@@ -132,13 +132,13 @@ const begin = async () => {
   Reveal.on("resize", sharpen);
   Reveal.on("slidechanged", show);
   show({ currentSlide: Reveal.getCurrentSlide() });
-  // the keys of a remote control turn slides also after a slider was touched
+  // a remote control turns slides also after a slider was touched; "?" is elsewhere on some keyboards
   addEventListener("keydown", (event) => {
-    const turn = { PageDown: "next", PageUp: "prev" }[event.key];
-    if (!turn || !event.target.closest?.("figure")) return;
+    const act = { PageDown: "next", PageUp: "prev", "?": "toggleHelp" }[event.key];
+    if (!act || (event.key !== "?" && !event.target.closest?.("figure"))) return;
     event.preventDefault();
     event.stopPropagation();
-    Reveal[turn]();
+    Reveal[act]();
   }, true);
   if (voting) await ask();
   if (voting) setInterval(() => state.open && ask(), 1000);
