@@ -47,7 +47,7 @@ COLOURS = {
     "z": "#0072B2",
     "optimum": "#000000",
     "projection": "#CC79A7",
-    "screw": "#B07800",
+    "screw": "#8821D9",
     "reference": "#585858",
     "path": "#BB0000",
 }

@@ -88,16 +88,16 @@ def screw_explorer() -> Explorer:
     with new_figure() as fig:
         ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.5)
         draw_box(ax, np.eye(4), _SIDE).set_alpha(0.3)
-        black, orange = COLOURS["optimum"], COLOURS["screw"]
+        black, violet = COLOURS["optimum"], COLOURS["screw"]
         artists: dict[str, Any] = {
             "axis": new_line(ax, color=COLOURS["reference"], ls="-.", lw=2, label="its axis"),
             "geodesic way": new_line(ax, color=black, label="geodesic"),
-            "screw way": new_line(ax, color=orange, ls="--", label="screw"),
+            "screw way": new_line(ax, color=violet, ls="--", label="screw"),
             **{name: draw_box(ax, np.eye(4), _SIDE) for name in ("goal", "geodesic", "screw")},
         }
         artists["goal"].set_alpha(0.3)
         artists["geodesic"].set_edgecolor(black)
-        artists["screw"].set_edgecolor(orange)
+        artists["screw"].set_edgecolor(violet)
         fig.legend(loc="lower left", ncols=3, handlelength=1.5, columnspacing=1)
     controls = {
         "angle": widgets.slider("turn (°)", 120.0, -180.0, 180.0, 1.0),

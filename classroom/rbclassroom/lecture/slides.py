@@ -93,6 +93,7 @@ class _Reader:
         self.behind: list[Slide] = []
         self.section = self.title = ""
         self.keys: set[str] = set()  # for the next slide
+        self.ahead: list[str] = []  # its notes
         self.poll: Slide | None = None  # whose verdict is to come
         self.answer = ""
 
@@ -103,7 +104,8 @@ class _Reader:
     def put(self, slide: Slide) -> None:
         """Add a slide to its section."""
         slide.keys |= self.keys
-        self.keys = set()
+        slide.notes = [*self.ahead, *slide.notes]
+        self.keys, self.ahead = set(), []
         (self.behind if self.after else self.sections[-1]).append(slide)
 
     def put_text(self, wish: str, own: Picture | None = None) -> None:
@@ -188,7 +190,10 @@ class _Reader:
             if self.section == "Recap":
                 wish = wish or text
             self.put_text(wish)
-            self.note(text)
+            if heading and not wish and text.strip():
+                self.ahead.append(text.strip())
+            else:
+                self.note(text)
 
     def begins(self, level: int, words: str, text: str, wish: str) -> bool:
         """Begin what has this heading; tell whether the rest of its cell is read by that."""
