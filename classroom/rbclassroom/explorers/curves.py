@@ -11,7 +11,7 @@ from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
-from rbcourse.projected_line import f, line_singular_value, theta
+from rbcourse.projected_line import line_singular_value, theta
 
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8
@@ -24,11 +24,11 @@ _SEEN_FIRST = np.array([0.8, 0.8, 1])  # at the start one looks at the ends with
 
 
 def theta_explorer() -> Explorer:
-    """Return an explorer of the straight line and its shadow: θ(t), and its inverse f(t).
+    """Return an explorer of the straight line and its shadow, θ(t).
 
-    On the left the circle of the rotations between the two ends, with the chord; on the right θ and
-    f over time. Controls: the ``angle`` a in degrees, and the time ``t``, which plays (BK Prop.
-    6, BK (15), BK (16), BK Cor. 1, BK Cor. 2, BK Fig. 2, BK Fig. 3).
+    On the left the circle of the rotations between the two ends, with the chord; on the right θ
+    over time. Controls: the ``angle`` a in degrees, and the time ``t``, which plays (BK Prop. 6,
+    BK (15), BK (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
@@ -37,7 +37,7 @@ def theta_explorer() -> Explorer:
         side = fig.add_axes((0.57, 0.16, 0.4, 0.76))
         side.plot([0, 1], [0, 1], color=COLOURS["reference"], lw=1)
         side.set(xlim=(0, 1), ylim=(0, 1), xlabel="time t", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
-        black, pink, blue = ({"color": COLOURS[name]} for name in ("optimum", "projection", "z"))
+        black, pink = ({"color": COLOURS[name]} for name in ("optimum", "projection"))
         dot: dict[str, Any] = {"marker": "o", "ms": 10, "ls": ""}
         artists = {
             "arc": new_line(ax, **black, lw=2.5),
@@ -47,9 +47,7 @@ def theta_explorer() -> Explorer:
             "line": new_line(ax, **black, **{**dot, "ms": 5}, label="line"),
             "shadow": new_line(ax, **pink, **dot, label="its projection"),
             "theta": new_line(side, **pink, label="θ(t)"),
-            "f": new_line(side, **blue, ls="--", label="f(t)"),
             "theta now": new_line(side, **pink, **dot, clip_on=False),
-            "f now": new_line(side, **blue, **dot, clip_on=False),
         }
         handles = [artists[name] for name in ("even", "line", "shadow")]
         fig.legend(handles=handles, loc="lower left", handlelength=1, bbox_to_anchor=(0, -0.01))
@@ -68,10 +66,9 @@ def theta_explorer() -> Explorer:
         places["ray"] = np.append(0, places["shadow"])
         for name, where in places.items():
             artists[name].set_data(where.real, where.imag)
-        for name, curve in {"theta": theta, "f": f}.items():
-            artists[name].set_data(_TIMES, curve(_TIMES, a))
-            artists[f"{name} now"].set_data([t], [curve(t, a)])
-        said = {"θ(t)": theta(t, a), "dθ/dt": theta(t, a, 1), "f(t)": f(t, a)}
+        artists["theta"].set_data(_TIMES, theta(_TIMES, a))
+        artists["theta now"].set_data([t], [theta(t, a)])
+        said = {"θ(t)": theta(t, a), "dθ/dt": theta(t, a, 1)}
         said["s(t), of the line"] = line_singular_value(t, a)
         return {name: f"{value:.3f}" for name, value in said.items()}
 

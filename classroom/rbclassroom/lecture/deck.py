@@ -113,11 +113,13 @@ def crib_page(deck: Deck) -> str:
     rows = rows_of(deck.sheet)
     starts = starts_of(deck.shown, rows)
     lines = ["| min | slide | part | ask, and what to hear | late? skip |", "|--|--|--|--|--|"]
-    for (minute, part, ask, skip), start in zip(rows, starts, strict=True):
+    for i, ((minute, part, ask, skip), start) in enumerate(zip(rows, starts, strict=True)):
+        if i and minute < rows[i - 1][0]:
+            lines.append("| | | **second lecture** | | |")
         lines.append(f"| {minute} | {start + 1} | {part} | {ask} | {skip} |")
     polls = [slide for slide in deck.shown if slide.kind == "verdict"]
     right = (f"- **{poll.poll}: {poll.right}** · {poll.options[poll.right]}" for poll in polls)
-    before = deck.sheet.partition("\n|")[0]
+    before = deck.sheet.partition("\n")[0]
     text = "\n".join([f"# {deck.title}", "", before, "", *lines, "", *right])
     template = (STATIC / "crib.html").read_text(encoding="utf-8")
     body = marked(text)
