@@ -15,8 +15,10 @@ from rbclassroom.lecture.slides import Deck, Slide, rows_of, starts_of, words_of
 from rbcourse.draw.display import ENGINE
 
 STATIC = Path(__file__).with_name("static")
-WIDE, IDEA = 1.9, 26
-"""A picture wider than this, over its height, is below its text; the words of an idea."""
+WIDE = 1.9
+"""A picture that is wider, over its height, is below its text."""
+IDEA = 26
+"""The most words of an idea behind an option, unless its first sentence has more."""
 _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
 _WHOLE = re.compile(r'(<span class="math inline">(?:(?!</span>).)*</span>[.,;:?!)]+)')
 

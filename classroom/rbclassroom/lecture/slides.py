@@ -18,8 +18,10 @@ from rbclassroom.course.notebooks import living, split_sheet
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections that are behind the end, where a key leads."""
-ROWS, TOGETHER = 5, 85
-"""Rows of a long table, or works, on one slide; words of exercises on one slide."""
+ROWS = 5
+"""Rows of a long table, or works, on one slide."""
+TOGETHER = 85
+"""The most words of two exercises on one slide."""
 _ITEM = re.compile(r"^- ((?:\*\*[A-Z]\*\*(?:, | and )?)+)(?: · |[,:.]? ?)(.*(?:\n .*)*)", re.M)
 _PICTURE = re.compile(r"!\[\]\(([^)]+)\)\n*")
 _LIVING = re.compile(r"rbcourseDisplay\.revive\(image, (\{.*\})\);\s*\}</script>", re.S)
@@ -132,10 +134,11 @@ class _Reader:
             raise ValueError(f"slide: {name} is no cell with a stored picture")
         return found[0]
 
-    def note(self, text: str) -> None:
-        """Tell the lecturer what the class does not see."""
-        if (slides := self.sections[-1]) and text.strip() and not self.after:
-            slides[-1].notes.append(text.strip())
+    def note(self, text: str, ahead: bool = False) -> None:
+        """Tell the lecturer what the class does not see, on the next slide or on the last one."""
+        slides = self.sections[-1]
+        if text.strip() and not self.after and (ahead or slides):
+            (self.ahead if ahead else slides[-1].notes).append(text.strip())
 
     def read(self, notebook: NotebookNode) -> Deck:
         """Return the deck of a lesson."""
@@ -189,11 +192,9 @@ class _Reader:
         else:
             if self.section == "Recap":
                 wish = wish or text
+            leads = wish or heading or "*Look for" in text  # to the slide that comes
+            self.note(text, ahead=bool(leads))
             self.put_text(wish)
-            if heading and not wish and text.strip():
-                self.ahead.append(text.strip())
-            else:
-                self.note(text)
 
     def begins(self, level: int, words: str, text: str, wish: str) -> bool:
         """Begin what has this heading; tell whether the rest of its cell is read by that."""
@@ -248,8 +249,9 @@ class _Reader:
             poll.notes = [f"Right: **{poll.right}**.", *poll.notes, *told]
             self.put(verdict)
             self.poll = None
-        self.put_text(_ITEM.sub("", wish))
-        self.note(_ITEM.sub("", text))
+        wish = _ITEM.sub("", wish).strip()
+        self.note(_ITEM.sub("", text), ahead=bool(wish))
+        self.put_text(wish)
 
     def put_behind(self, text: str) -> None:
         """Add what is behind the end, a long table or list in several slides."""
@@ -335,52 +337,65 @@ def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
     return [(int(minute), *(text.strip() for text in texts)) for minute, *texts in found]
 
 
-def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> list[int]:
-    """Return where each row of a run sheet begins: the first slide that its part names.
+def named_in(slides: list[Slide], part: str) -> list[int]:
+    """Return the first slide of each name in a part of the run sheet, ``poll 1, explorer``.
 
-    A part has several names, ``poll 1, explorer``; those that are of no slide are for the lecturer.
+    Names that are of no slide are for the lecturer.
+    """
+    found = []
+    for name in re.split(r"[,;] | and ", part.lower()):
+        name = name.removeprefix("the ")
+        for k, slide in enumerate(slides):
+            if name in slide.keys or (len(name) > 3 and any(name in key for key in slide.keys)):
+                found.append(k)
+                break
+    return found
+
+
+def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> list[int]:
+    """Return the slide at which each row of a run sheet begins: the first one that it names.
+
     Homework is at the end, in a lesson of two lectures also on the last slide of the first one.
     """
     starts: list[int] = []
     later = [i for i, row in enumerate(rows[1:], 1) if row[0] < rows[i - 1][0]]
     if later and rows[later[0] - 1][1] == "homework":
         cut = later[0]
-        starts = starts_of(slides, rows[: cut - 1])
         rest = starts_of(slides, rows[cut:])
-        return [*starts, rest[0] - 1, *rest]
+        return [*starts_of(slides, rows[: cut - 1]), rest[0] - 1, *rest]
     for minute, part, *_ in rows:
-        names = [re.sub(r"^the ", "", name) for name in re.split(r"[,;] | and ", part.lower())]
-        found = (
-            k
-            for name in names
-            for k, slide in enumerate(slides)
-            if name in slide.keys or (len(name) > 3 and any(name in key for key in slide.keys))
-        )
-        start = next(found, None)
-        if start is None or (starts and start < starts[-1]):
-            where = "no slide" if start is None else "a slide before that of the row above"
+        start, *_ = [*named_in(slides, part), -1]
+        if start < max([0, *starts[-1:]]):
+            where = "no slide" if start < 0 else "a slide before that of the row above"
             raise ValueError(f"run sheet, minute {minute}: {where} for {part!r}")
         starts.append(start)
     return starts
 
 
 def plan(slides: list[Slide], sheet: str) -> None:
-    """Give each slide its row of the run sheet, and its share of the time."""
+    """Give each slide its row of the run sheet, and its share of the time.
+
+    The question of a row is asked at the last slide that it names, and never before a vote is over.
+    """
     rows = rows_of(sheet)
     starts = starts_of(slides, rows)
-    before = re.search(r"\*Before class:\*.*", sheet)
-    if before:
-        slides[0].notes.insert(0, before[0])
     for i, (minute, part, ask, skip) in enumerate(rows):
         last = i + 1 == len(rows)
         end = minute + 1 if last else rows[i + 1][0]
         end = end if end >= minute else minute + 2  # the next row begins another lecture
         span = slides[starts[i] : len(slides) if last else max(starts[i + 1], starts[i] + 1)]
+        late = f" · late? skip {skip}" if skip else ""
         for slide in span:
             slide.seconds = 60 * (end - minute) / len(span)
-            late = f" · late? skip {skip}" if skip else ""
-            told = [f"*Minute {minute}–{end}* · {part}{late}"]
-            slide.notes[:0] = [*told, f"**Ask:** {ask}"] if ask else told
+            slide.notes.insert(0, f"*Minute {minute}–{end}* · {part}{late}")
+        at = max(named_in(slides, part.partition(", recap")[0]), default=0)
+        at = next((k for k in range(at, len(slides)) if slides[k].kind != "poll"), at)
+        over = [k for k, slide in enumerate(slides) if slide.kind == "verdict" and slide in span]
+        asked = span[-1] if part == "homework" else slides[max([at, *over])]
+        if ask:
+            asked.notes.insert(1 if asked in span else 0, f"**Ask:** {ask}")
+    if before := re.search(r"\*Before class:\*.*", sheet):
+        slides[0].notes.insert(0, before[0])
 
 
 def deck_of(path: Path) -> Deck:

@@ -43,8 +43,9 @@ def watched(context):
     # JupyterLab shows why it cannot save, and then throws it
     meant = "is an original, and is not saved"
     page.on("pageerror", lambda error: meant in str(error) or faults.append(f"error {error}"))
-    # widgets say that they cannot send the values of their sliders to a kernel that has ended
-    known = re.compile("^(?!error)|Could not send widget sync message")
+    # an original that JupyterLab cannot save is refused: 403; and widgets say that they cannot
+    # send the values of their sliders to a kernel that has ended
+    known = re.compile("^(?!error)|403|Could not send widget sync message")
     page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
     yield page
     page.close()

@@ -72,7 +72,8 @@ def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lec
         ("Recap", "plain", ["- all of it"]),
         ("Questions?", "end", []),
     ]
-    assert deck.shown[2].notes == ["Long.", "More, for the lecturer."]
+    assert deck.shown[1].notes == ["Long."]
+    assert deck.shown[2].notes == ["More, for the lecturer."]
     assert deck.shown[3].notes == ["Nothing here.", "Text."]
     assert deck.shown[0].notes[0].endswith("Goals.")
     page = pages.deck_page(deck)
