@@ -29,7 +29,8 @@ def _math(text: str, options: dict[str, Any]) -> str:
     return html.escape(f"{both[0]}{tex}{both[1]}", quote=False)
 
 
-_MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable("table")
+_MARKDOWN = MarkdownIt("commonmark", {"html": True, "typographer": True})
+_MARKDOWN.enable(["table", "smartquotes"])
 _MARKDOWN.use(dollarmath_plugin, renderer=_math)
 
 
@@ -80,8 +81,7 @@ def section(slide: Slide) -> str:
     if slide.kind == "title":
         head, words = "", f"<h1>{_inline(slide.title)}</h1>{words}"
     elif slide.kind == "end":
-        behind = "Exercises and references are behind this slide: press <kbd>E</kbd>."
-        head, words = "", f"<h1>{slide.title}</h1><p>{behind}</p>"
+        head, words = "", f"<h1>{slide.title}</h1>{words}"
     elif slide.poll:
         head, words = f"<h2>{slide.poll}</h2>", words + _options(slide)
     elif slide.picture:

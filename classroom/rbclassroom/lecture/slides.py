@@ -160,7 +160,8 @@ class _Reader:
         deck = Deck(self.sections[0][0].title, self.sections, self.behind, sheet)
         self.keys, self.section = {"homework"}, ""
         self.sections.append([])
-        self.put(Slide("Questions?", "end"))
+        self.note("E leads to exercises, misprints and references, behind this slide.", ahead=True)
+        self.put(Slide("Questions?", "end", self.sections[0][0].parts))
         plan(deck.shown, sheet)
         return deck
 
@@ -177,6 +178,8 @@ class _Reader:
                 f"slide: {cell.id} has no outputs: run 'course.py figures' to store them"
             )
         self.put_text(wish, picture_of(cell, self.root))
+        if key == "explorer":
+            self.note("M plays the picture; R shows its numbers, which stay after the verdict.")
 
     def read_text(self, cell: NotebookNode, wish: str) -> None:
         heading = re.match(r"(#+) (.*)\n*", cell.source)
@@ -260,7 +263,7 @@ class _Reader:
             return
         table = re.search(r"^\|.*\n\|[-| :]+\n", text, re.M)
         before = text[: table.start()].strip() if table else text
-        rows = text[table.end() :].strip().split("\n") if table else []
+        rows = re.findall(r"^\|.*", text[table.end() :], re.M) if table else []
         items = re.split(r"\n(?=- )", text) if text.startswith("- ") else []
         for i in range(0, len(rows), ROWS):
             some = table[0] + "\n".join(rows[i : i + ROWS]) if table else ""
@@ -289,7 +292,8 @@ def printed(cell: NotebookNode) -> str:
     rows = [row for row in rows if row and len(row) == len(rows[0])]
     if not rows:
         raise ValueError(f"slide: {cell.id} prints no matrix")
-    inside = r" \\ ".join(" & ".join(row) for row in rows)
+    places = max(len(number.partition(".")[2]) for row in rows for number in row)
+    inside = r" \\ ".join(" & ".join(f"{float(x):.{places}f}" for x in row) for row in rows)
     return rf"\begin{{pmatrix}}{inside}\end{{pmatrix}}"
 
 

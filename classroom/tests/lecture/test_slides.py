@@ -70,7 +70,7 @@ def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lec
         ("1 · One", "plain", ["Next."]),
         ("Below", "plain", ["On it."]),
         ("Recap", "plain", ["- all of it"]),
-        ("Questions?", "end", []),
+        ("Questions?", "end", ["Why?"]),
     ]
     assert deck.shown[1].notes == ["Long."]
     assert deck.shown[2].notes == ["More, for the lecturer."]
@@ -110,7 +110,7 @@ def test_a_picture_stands_with_the_text_of_its_cell_and_may_be_borrowed(tmp_path
     assert 'class="wide"' in pages.section(wide)
     assert 'class="split narrow"' in pages.section(high)
     assert '<p class="look"><em>Look for:</em> it.</p>' in pages.section(wide)
-    wanted = r"$$R = \begin{pmatrix}1. & 0.5 \\ -0.25 & 1.\end{pmatrix}$$"
+    wanted = r"$$R = \begin{pmatrix}1.00 & 0.50 \\ -0.25 & 1.00\end{pmatrix}$$"
     assert printed.parts == [wanted]
     with pytest.raises(ValueError, match="nowhere is no cell with a stored picture"):
         tiny(tmp_path, text("## 1", "![](nowhere)"))

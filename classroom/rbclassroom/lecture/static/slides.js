@@ -24,8 +24,8 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene turns out of its margins
 };
 
-// Short text is larger. Text too long for its slide gets smaller, down to 80 %; a formula as wide
-// as its column, down to 62 %.
+// Text alone is larger, where it fits; text too long for its slide gets smaller, down to 80 %, and a
+// formula that is wider than its column, down to 62 %.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
   const formulas = all("mjx-container[display=true]", section);
@@ -36,9 +36,8 @@ const settle = (section) => {
   });
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
   const over = () => words.offsetHeight > body.clientHeight + 4;
-  const short = section.matches(".plain") && words.innerText.length < 170 && words.offsetHeight < 420;
-  let size = short ? 54 : 45;
-  for (set(size); over() && size > 36; size--) set(size - 1);
+  let size = section.matches(".plain:not(.tabled)") ? 52 : 45;
+  for (set(size); over() && size > 36; size = size > 45 ? 45 : size - 1) set(size > 45 ? 45 : size - 1);
 };
 
 // Pictures come to life when their slide is next; on paper they stay stills.
