@@ -68,7 +68,7 @@ def _options(slide: Slide) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Return the first sentences of an idea, at most so many words but one sentence."""
+    """Return the first sentence of an idea, and more while there are at most `IDEA` words."""
     kept, *rest = re.split(r"(?<=[.?!])\s+(?=[A-Z$*(])", text.strip())
     while rest and words_of(f"{kept} {rest[0]}") <= IDEA:
         kept = f"{kept} {rest.pop(0)}"
@@ -99,7 +99,7 @@ def section(slide: Slide) -> str:
 
 
 def deck_page(deck: Deck) -> str:
-    """Return the page of a deck: sections from left to right, what is behind the end below it."""
+    """Return the page of a deck; its last column is the end, with exercises and references."""
     *parts, end = deck.sections
     stacks = [part for part in parts if part] + [[*end, *deck.behind]]
     joined = ("".join(map(section, part)) for part in stacks)

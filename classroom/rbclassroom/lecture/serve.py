@@ -44,7 +44,7 @@ def find_lesson(number: str, folder: Path) -> Path:
 
 
 class _Here(RequestHandler):
-    """Answers only who asks for this machine by its number: no page of another site can."""
+    """Answers only requests to this machine by its number: no page of another site sends these."""
 
     def prepare(self) -> None:
         if self.request.host_name != HOST:
@@ -56,7 +56,7 @@ class Slides(_Here, StaticFileHandler):
 
 
 class Desk(_Here):
-    """Opens, watches and closes votes, for who has the token."""
+    """Opens, watches and closes votes, for requests with the token."""
 
     def initialize(self, phones: Phones, token: str) -> None:
         """Keep the votes and the token."""
@@ -65,7 +65,7 @@ class Desk(_Here):
         self.code = code.svg_inline(border=2, light="white", omitsize=True)
 
     def prepare(self) -> None:
-        """Refuse who has not the token."""
+        """Refuse a request without the token."""
         super().prepare()
         asked = self.get_query_argument("token", "").encode()
         if not secrets.compare_digest(asked, self.token.encode()):

@@ -1,4 +1,4 @@
-"""A stored lesson as slides: the metadata `slide` of a cell says what the class sees of it.
+"""A stored lesson as slides: the metadata `slide` of a cell is the text that the class sees of it.
 
 A cell without it makes no slide; its text goes to the notes of the slide before. CONTRIBUTING.md
 has the rules for authors.
@@ -18,7 +18,7 @@ from rbclassroom.course.notebooks import living, split_sheet
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections that are behind the end, where a key leads."""
-ROWS = 5
+ROWS = 4
 """Rows of a long table, or works, on one slide."""
 TOGETHER = 85
 """The most words of two exercises on one slide."""
@@ -37,7 +37,7 @@ class Picture:
 
 @dataclass
 class Slide:
-    """What is seen at once, and what the lecturer is told.
+    """The content of a slide, and the notes for the lecturer.
 
     Of the `parts`, Markdown texts, each after the first one appears at a key. A row of the run
     sheet calls the slide by one of its `keys`. A poll has `options`; its verdict also has the
@@ -135,7 +135,7 @@ class _Reader:
         return found[0]
 
     def note(self, text: str, ahead: bool = False) -> None:
-        """Tell the lecturer what the class does not see, on the next slide or on the last one."""
+        """Add a note for the lecturer to the next slide or to the last one."""
         slides = self.sections[-1]
         if text.strip() and not self.after and (ahead or slides):
             (self.ahead if ahead else slides[-1].notes).append(text.strip())
@@ -200,7 +200,7 @@ class _Reader:
             self.put_text(wish)
 
     def begins(self, level: int, words: str, text: str, wish: str) -> bool:
-        """Begin what has this heading; tell whether the rest of its cell is read by that."""
+        """Begin the part with this heading; return whether the rest of its cell is read, too."""
         self.answer = words if words.startswith("Answer") else ""
         if level == 1:
             question = re.search(r"\*\*The question of this \w+\.\*\* (.*)", text)
@@ -233,7 +233,7 @@ class _Reader:
         self.put(self.poll)
 
     def put_answer(self, poll: Slide, text: str, wish: str) -> None:
-        """Read a cell of an answer: evidence, or what is said of the options, the verdict."""
+        """Read a cell of an answer: evidence, or the list of ideas, which makes the verdict."""
         listed = [*_ITEM.finditer(text)]
         outside = re.search(r"(?:^|[^-] )\*\*([A-Z])\*\*(.*(?:\n.+)*)", _ITEM.sub("", text), re.M)
         if outside and not poll.right:
@@ -257,7 +257,7 @@ class _Reader:
         self.put_text(wish)
 
     def put_behind(self, text: str) -> None:
-        """Add what is behind the end, a long table or list in several slides."""
+        """Add slides behind the end, several of them for a long table or list."""
         text = text.strip()
         if text.startswith("<small>") and "\n" not in text:
             return

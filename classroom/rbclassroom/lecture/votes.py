@@ -32,7 +32,7 @@ class Ballot:
         self.counts: Counter[str] = Counter()
 
     def begin(self, poll: str, options: list[str]) -> None:
-        """Open a vote on a poll; what was counted before is forgotten."""
+        """Open a vote on a poll; earlier counts are deleted."""
         if self.open:
             raise ValueError(f"The vote on {self.poll} is open; close it first.")
         if not 2 <= len(options) <= 26:
@@ -63,7 +63,7 @@ class Ballot:
         self._votes[phone] = letter
 
     def vote_of(self, phone: str) -> str:
-        """Return the last vote of a phone; ``""`` if there is none."""
+        """Return the last vote of a phone; ``""`` if it has not voted."""
         return self._votes.get(phone, "")
 
     def close(self) -> None:
@@ -74,7 +74,7 @@ class Ballot:
             self.open = False
 
     def state(self) -> dict[str, Any]:
-        """Return what is shown: how many have voted, and for what when the vote is closed."""
+        """Return the number of votes, and the counts when the vote is closed."""
         counts = [] if self.open else [self.counts[letter] for letter in self.options]
         voters = sum(map(bool, self._votes.values())) if self.open else sum(counts)
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
@@ -92,11 +92,11 @@ class Phone(WithBallot):
     """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
 
     A phone is known by a random number in a cookie, which is another one for each vote.
-    When the vote is closed the page shows what was counted.
+    When the vote is closed the page shows the counts.
     """
 
     def set_default_headers(self) -> None:
-        """Let the page ask this server only, and nobody store or frame it."""
+        """Restrict the page to this server; forbid storing and framing."""
         here = "default-src 'self' 'unsafe-inline'; form-action 'self'; frame-ancestors 'none'"
         self.set_header("Content-Security-Policy", here)
         self.set_header("Cache-Control", "no-store")
@@ -137,7 +137,7 @@ class State(WithBallot):
 
 
 class _Server(HTTPServer):
-    """A server that closes what comes when it has enough connections."""
+    """A server that closes further connections when it has `MOST` of them."""
 
     def handle_stream(self, stream: Any, address: Any) -> None:
         if len(self._connections) < MOST:
@@ -149,7 +149,7 @@ class _Server(HTTPServer):
 def find_address() -> str:
     """Return the address of this machine in its network, or raise an OSError; nothing is sent."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect(("192.0.2.1", 9))  # an address that nobody has
+        probe.connect(("192.0.2.1", 9))  # an address for documentation, of no machine
         address: str = probe.getsockname()[0]
         return address
 
