@@ -19,7 +19,7 @@ from rbcourse.draw.spheres import draw_sphere
 
 _MARKED: dict[str, Any] = {"marker": "o", "markevery": 10}
 _MOTIONS: dict[str, dict[str, Any]] = {
-    "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 9, "mfc": "white", **_MARKED},
+    "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 9, "mfc": "none", **_MARKED},
     "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 5, **_MARKED},
 }
 _COLOURS = ListedColormap(plt.get_cmap("viridis_r")(np.linspace(0.4, 1, 256)))

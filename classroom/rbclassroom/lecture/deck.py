@@ -20,6 +20,12 @@ WIDE = 1.9
 IDEA = 26
 """The most words of an idea behind an option, unless its first sentence has more."""
 _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
+_TOGETHER = {  # patterns of what no line shall part
+    r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
+    r" –": "\N{NO-BREAK SPACE}–",
+    r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
+    r" ([^\s<]{1,5}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
+}
 _WHOLE = re.compile(r'(<span class="math inline">(?:(?!</span>).)*</span>[.,;:?!)]+)')
 
 
@@ -36,8 +42,9 @@ _MARKDOWN.use(dollarmath_plugin, renderer=_math)
 
 def marked(text: str) -> str:
     """Return Markdown as HTML; a formula stays on one line with the mark that follows it."""
-    text = re.sub(r"(\d) %", "\\1\N{NO-BREAK SPACE}%", _KEYS.sub("", text))
-    page: str = _MARKDOWN.render(text)
+    page: str = _MARKDOWN.render(_KEYS.sub("", text))
+    for pattern, kept in _TOGETHER.items():
+        page = re.sub(pattern, kept, page)
     page = page.replace("<p><em>Look for", '<p class="look"><em>Look for')
     return _WHOLE.sub(r'<span class="whole">\1</span>', page)
 

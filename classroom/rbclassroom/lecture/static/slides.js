@@ -47,7 +47,8 @@ const revive = async (section) => {
     script.remove();
     figure.dataset.ratio = data.size[0] / data.size[1];
     await rbcourseDisplay.revive(image, data);
-    figure.classList.toggle("quiet", data.controls.length > 1 && !section.dataset.told);
+    const asked = section.parentElement.querySelector(".poll") && !section.dataset.told;
+    figure.classList.toggle("quiet", Boolean(data.controls.length > 1 && asked));
     fit(figure);
   }
 };
