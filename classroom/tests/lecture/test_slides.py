@@ -76,7 +76,7 @@ def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lec
     assert deck.shown[2].notes == ["More, for the lecturer."]
     assert deck.shown[3].notes == ["Nothing here.", "Text."]
     assert deck.shown[0].notes[0].endswith("Goals.")
-    page = pages.deck_page(deck)
+    page = pages.deck_page(deck).replace("\N{NO-BREAK SPACE}", " ")
     assert "<p>Short.</p>" in page
     assert '<div class="fragment"><p>Then.</p>' in page
     assert '<li class="fragment">all of it</li>' in page
@@ -109,7 +109,8 @@ def test_a_picture_stands_with_the_text_of_its_cell_and_may_be_borrowed(tmp_path
     assert [float(share) for share in margin.split()] == pytest.approx([0.09] * 4, abs=0.003)
     assert 'class="wide"' in pages.section(wide)
     assert 'class="split narrow"' in pages.section(high)
-    assert '<p class="look"><em>Look for:</em> it.</p>' in pages.section(wide)
+    look = '<p class="look"><em>Look for:</em>\N{NO-BREAK SPACE}it.</p>'
+    assert look in pages.section(wide)
     wanted = r"$$R = \begin{pmatrix}1.00 & 0.50 \\ -0.25 & 1.00\end{pmatrix}$$"
     assert printed.parts == [wanted]
     with pytest.raises(ValueError, match="nowhere is no cell with a stored picture"):
@@ -205,6 +206,13 @@ def test_each_row_of_the_run_sheet_begins_on_its_slide_with_its_share_of_the_tim
     two = "| 0 | question | | |\n| 9 | homework | | |\n| 0 | poll 1 | | |\n| 9 | homework | | |\n"
     deck = tiny(tmp_path, text("## 0", "x"), *poll(), sheet=two)
     assert slides.starts_of(deck.shown, slides.rows_of(two)) == [0, 1, 2, len(deck.shown) - 1]
+
+
+def test_no_line_parts_a_number_from_its_unit_or_leaves_a_short_word_alone():
+    text = "In 5 % of 12 m, pages 3–9, it is so – or 1 : 2 of *it* is."
+    whole = "In 5_% of 12_m, pages 3~–~9, it is so_– or 1_: 2 of <em>it</em>_is."
+    marks = {"_": "\N{NO-BREAK SPACE}", "~": "\N{WORD JOINER}"}
+    assert pages.marked(text).strip() == f"<p>{whole.translate(str.maketrans(marks))}</p>"
 
 
 def test_words_are_counted_without_formulas_and_marks():

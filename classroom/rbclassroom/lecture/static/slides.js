@@ -47,7 +47,7 @@ const revive = async (section) => {
     script.remove();
     figure.dataset.ratio = data.size[0] / data.size[1];
     await rbcourseDisplay.revive(image, data);
-    const asked = section.parentElement.querySelector(".poll") && !section.dataset.told;
+    const asked = section.parentElement.querySelector(".title, .poll") && !section.dataset.told;
     figure.classList.toggle("quiet", Boolean(data.controls.length > 1 && asked));
     fit(figure);
   }
