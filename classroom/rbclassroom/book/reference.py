@@ -60,6 +60,7 @@ def coloured(source: str) -> str:
         match node:
             case (
                 ast.FunctionDef(name=name)
+                | ast.AsyncFunctionDef(name=name)
                 | ast.ClassDef(name=name)
                 | ast.Assign(targets=[ast.Name(id=name)])
                 | ast.AnnAssign(target=ast.Name(id=name))

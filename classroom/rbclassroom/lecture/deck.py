@@ -20,6 +20,7 @@ WIDE = 1.9
 IDEA = 26
 """The most words of an idea behind an option, unless its first sentence has more."""
 _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
+_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # to files of the course
 _TOGETHER = {  # patterns of what no line shall part
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
     r" –": "\N{NO-BREAK SPACE}–",
@@ -42,7 +43,7 @@ _MARKDOWN.use(dollarmath_plugin, renderer=_math)
 
 def marked(text: str) -> str:
     """Return Markdown as HTML; a formula stays on one line with the mark that follows it."""
-    page: str = _MARKDOWN.render(_KEYS.sub("", text))
+    page: str = _MARKDOWN.render(_LINK.sub(r"\1", _KEYS.sub("", text)))
     for pattern, kept in _TOGETHER.items():
         page = re.sub(pattern, kept, page)
     page = page.replace("<p><em>Look for", '<p class="look"><em>Look for')

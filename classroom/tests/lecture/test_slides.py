@@ -209,7 +209,7 @@ def test_each_row_of_the_run_sheet_begins_on_its_slide_with_its_share_of_the_tim
 
 
 def test_no_line_parts_a_number_from_its_unit_or_leaves_a_short_word_alone():
-    text = "In 5 % of 12 m, pages 3–9, it is so – or 1 : 2 of *it* is."
+    text = "[In](01.ipynb#s2) 5 % of 12 m, pages 3–9, it is so – or 1 : 2 of *it* is."
     whole = "In 5_% of 12_m, pages 3~–~9, it is so_– or 1_: 2 of <em>it</em>_is."
     marks = {"_": "\N{NO-BREAK SPACE}", "~": "\N{WORD JOINER}"}
     assert pages.marked(text).strip() == f"<p>{whole.translate(str.maketrans(marks))}</p>"

@@ -35,7 +35,8 @@ const settle = (section) => {
     if (width > room) box.style.fontSize = `${Math.max(62, Math.floor((98 * room) / width))}%`;
   });
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
-  const over = () => words.offsetHeight > body.clientHeight + 4;
+  const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
+  const over = () => words.offsetHeight > room + 4;
   let size = section.matches(".plain:not(.tabled)") ? 52 : 45;
   for (set(size); over() && size > 36; size = size > 45 ? 45 : size - 1) set(size > 45 ? 45 : size - 1);
 };
