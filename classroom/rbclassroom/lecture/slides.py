@@ -208,7 +208,10 @@ class _Reader:
             self.put_text(wish or (question[1] if question else ""))
             if not self.sections[0]:
                 self.put(Slide(words))
-            self.sections[0][0].kind = "title"
+            title = self.sections[0][0]
+            title.kind = "title"
+            if title.picture and '"controls":[]' not in title.picture.html:
+                title.picture.html = title.picture.html.partition("<script")[0]  # no sliders here
             self.note(text)
             return True
         if level == 2:
