@@ -215,6 +215,18 @@ def test_no_line_parts_a_number_from_its_unit_or_leaves_a_short_word_alone():
     assert pages.marked(text).strip() == f"<p>{whole.translate(str.maketrans(marks))}</p>"
 
 
+def test_a_question_of_the_run_sheet_is_asked_when_the_vote_is_over(tmp_path):
+    sheet = "| 0 | question, 1, poll 1 | Why B? | |\n| 9 | recap | And so? | |\n"
+    deck = tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=sheet)
+    asked = {slide.kind: [n for n in slide.notes if "Ask" in n] for slide in deck.shown[:4]}
+    assert asked == {"title": [], "poll": [], "plain": [], "verdict": ["**Ask:** Why B?"]}
+    assert "**Ask:** And so?" in deck.shown[4].notes
+    cells = poll()
+    cells[3].id = "proof"  # its row begins before the verdict, and after the vote
+    deck = tiny(tmp_path, *cells, sheet="| 0 | poll 1 | Why B? | |\n| 5 | proof | | |\n")
+    assert "**Ask:** Why B?" in deck.shown[2].notes
+
+
 def test_words_are_counted_without_formulas_and_marks():
     assert words_of("*Two* words $a + b$:\n\n$$c = d$$\n\n. . .\n\n- 5 % of [it](x)") == 7
 
