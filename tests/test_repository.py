@@ -90,7 +90,7 @@ def test_each_list_is_complete_and_in_the_ranges_of_its_distributions(name):
     assert needed <= there | {"pip"}
 
 
-@pytest.mark.parametrize("document", ["README.md", "docs/conventions.md"])
+@pytest.mark.parametrize("document", ["README.md", "docs/conventions.md", "docs/museum.md"])
 def test_examples_of_documents_run(document, tmp_path, monkeypatch):
     """Their files are written to another folder."""
     monkeypatch.chdir(tmp_path)
@@ -363,7 +363,7 @@ def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
 
 
 def test_the_last_lesson_cites_what_the_citation_file_has():
-    shown = re.sub(r"[{}]", "", read("notebooks/14_take_it_away.ipynb"))
+    shown = re.sub(r"[{}]", "", read("notebooks/16_take_it_away.ipynb"))
     both, _ = read("CITATION.cff").split("- type: report")
     said = dict(re.findall(r"^\W*([a-z-]+): (.*)$", both, re.MULTILINE))
     for name in ("version", "family-names", "given-names", "volume", "issue", "start", "year"):

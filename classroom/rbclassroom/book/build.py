@@ -122,7 +122,7 @@ class Sources:
             self.put(f"package/{module['name']}.rst", page)
         for old, new in MOVED.items():
             moved = self.rendered("moved.html.j2", page=f"{new}.html")
-            _write(self.extra / f"package/{old}.html", moved)
+            _write(self.extra / f"{old}.html", moved)
         for path in reference.shown_code(self.root):
             code, up = reference.coloured(self.read(path)), "../" * (path.count("/") + 1)
             page = self.rendered("code.html.j2", path=path, up=up, code=code)

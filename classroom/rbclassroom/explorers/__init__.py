@@ -3,9 +3,10 @@
 from rbclassroom.explorers.bodies import body_explorer
 from rbclassroom.explorers.curves import flip_explorer, screw_explorer, theta_explorer
 from rbclassroom.explorers.optima import cube_explorer, minimum_acceleration_explorer
-from rbclassroom.explorers.paths import chain_explorer
+from rbclassroom.explorers.paths import chain_explorer, spline_explorer
 from rbclassroom.explorers.plane import arm_explorer, planar_explorer
 from rbclassroom.explorers.rotations import projection_explorer, random_explorer, rotation_explorer
+from rbclassroom.explorers.timing import timing_explorer
 
 __all__ = [
     "arm_explorer",
@@ -19,5 +20,7 @@ __all__ = [
     "random_explorer",
     "rotation_explorer",
     "screw_explorer",
+    "spline_explorer",
     "theta_explorer",
+    "timing_explorer",
 ]

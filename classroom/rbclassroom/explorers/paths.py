@@ -1,4 +1,4 @@
-"""The explorer of a motion through four poses."""
+"""Explorers of motions through many poses: on the sphere of directions, and of a box in space."""
 
 from typing import Any
 
@@ -9,6 +9,7 @@ from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
+from rbcourse.draw.spheres import draw_sphere
 
 POSES = rb.pose_from_coordinates(
     [
@@ -21,23 +22,96 @@ POSES = rb.pose_from_coordinates(
 """Four poses: σ in rad and d in m."""
 SHARES = np.array([0.0, 0.35, 0.65, 1.0])
 """When each is reached, of the whole time."""
-LEGS: dict[str, Any] = {
-    "geodesics": rb.geodesic_se3,
-    "projected cubics": rb.projected_cubic_se3,
-    "optima": rb.minimum_acceleration_se3,
-    "projected quintics": rb.projected_quintic_so3,
-}
+JOINED = ["geodesics", "cubics, parabolas", "cubics, spline", "the optimum"]
 _EDGES = np.array([0.9, 0.6, 0.3])
 _LONGEST = 12.0
 _WAYS = {"angular speed (rad/s)": 2.5, "speed (m/s)": 3.5}
+
+ANGLES = np.array([[-60.0, 0, 0], [-10, 40, 0], [50, -20, 30], [90, 20, 0]])
+"""Yaw, pitch and roll of four orientations, in degrees."""
+KINDS = {"parabolas": "z", "spline": "path"}
+_STEEPEST = 8.0
+_BETWEEN = np.linspace(0, 1, 41)
+
+
+def spline_explorer() -> Explorer:
+    """Return an explorer of two curves through four rotations, with their accelerations over time.
+
+    On the left projected cubics with the velocities of parabolas, on the right with those of the
+    spline. A line is the path of the first body axis on the sphere of directions, a stroke the
+    third axis, a dot a given orientation. Below, ‖ω′‖ over time. Controls: the ``ends``, "natural"
+    or "at rest"; ``pitch``, of the third orientation in degrees; ``third``, the time when it is
+    reached; and the time ``t`` in s, which plays (beyond BK 12, beyond BK 13).
+    """
+    with new_figure() as fig:
+        artists: dict[str, Any] = {}
+        for i, (kind, colour) in enumerate(KINDS.items()):
+            ax: Any = fig.add_axes((0.48 * i + 0.06, 0.4, 0.48, 0.54), projection="space")
+            draw_sphere(ax)
+            ax.view_init(elev=20, azim=12)
+            below = fig.add_axes((0.11 + 0.48 * i, 0.15, 0.38, 0.24))
+            below.set(xlim=(0, 4), ylim=(0, _STEEPEST), xticks=[0, 1, 2, 3, 4], yticks=[0, 4, 8])
+            below.set_xlabel("time (s)")
+            below.tick_params(labelleft=i == 0)
+            fig.text(0.3 + 0.48 * i, 0.94, kind, ha="center")
+            look: Any = {"color": COLOURS[colour]}
+            artists |= {
+                f"{kind} path": new_line(ax, **look, lw=2),
+                f"{kind} given": new_line(ax, color=COLOURS["reference"], marker="o", ls="", ms=7),
+                f"{kind} up": new_line(ax, color="black", lw=2.5),
+                f"{kind} now": new_line(ax, color="black", marker="o", ls="", ms=5),
+                f"{kind} joints": below.vlines([], 0, _STEEPEST, color="0.7", lw=1, ls=":"),
+                f"{kind} ‖ω′‖": new_line(below, **look),
+                f"{kind} ‖ω′‖ now": new_line(below, color="black", marker="o", ls=""),
+            }
+        fig.text(0.02, 0.42, "‖ω′‖ (rad/s²)")
+    controls = {
+        "ends": widgets.choice("ends", ["natural", "at rest"]),
+        "pitch": widgets.slider("third pitch (°)", -40.0, -60.0, 60.0, 5.0),
+        "third": widgets.slider("third time (s)", 2.0, 2.0, 3.0, 0.1),
+        "t": widgets.stepped("time t (s)", 0.0, 0.0, 4.0, 0.04),
+    }
+
+    def show(ends: str, pitch: float, third: float, t: float) -> dict[str, str]:
+        times, angles = np.array([0, 1, third, 4]), ANGLES.copy()
+        angles[2, 1] = pitch
+        R = rb.matrix_from_zyx(np.radians(angles))
+        rest = (np.zeros(3), np.zeros(3)) if ends == "at rest" else "natural"
+        w = rb.bessel_velocities(times, R)
+        w[[0, -1]] *= ends == "natural"
+        curves = rb.chain(times, R, w), rb.projected_spline_so3(times, R, rest)
+        starts, h = times[:-1, None], np.diff(times)[:, None]
+        inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()  # both sides of each joint
+        inside[::41] = times[:-1]
+        said, costs = {}, []
+        for kind, curve in zip(KINDS, curves, strict=True):
+            path, now, a = curve(inside), curve(t), np.linalg.norm(curve(inside, 2), axis=-1)
+            artists[f"{kind} path"].set_data_3d(*path[:, :, 0].T)
+            artists[f"{kind} given"].set_data_3d(*R[:, :, 0].T)
+            artists[f"{kind} up"].set_data_3d(*(now[:, :1] + now[:, 2:] * [0, 0.35]))
+            artists[f"{kind} now"].set_data_3d(*now[:, :1])
+            lines = [[(x, 0), (x, _STEEPEST)] for x in times[1:-1]]
+            artists[f"{kind} joints"].set_segments(lines)
+            artists[f"{kind} ‖ω′‖"].set_data(inside, a)
+            artists[f"{kind} ‖ω′‖ now"].set_data([t], [np.linalg.norm(curve(t, 2))])
+            jumps = np.linalg.norm(curve.jumps(2), axis=1)
+            said[f"{kind}: ω′ jumps"] = f"by {numbers(jumps, 2)} rad/s²"
+            costs.append(rb.acceleration_cost(curve))
+        least = rb.minimum_acceleration_spline_so3(times, R, rest).cost
+        for kind, cost in zip(KINDS, costs, strict=True):
+            said[f"{kind}: cost"] = f"{numbers(cost / least, 3)} × the least"
+        return said
+
+    name = "Four orientations, two curves"
+    return Explorer(name, fig, artists, controls, show, plays="t")
 
 
 def chain_explorer() -> Explorer:
     """Return an explorer of a box on its way through four poses.
 
-    Controls: the ``leg``, a curve with its name; ``share``, the velocities at the two poses between
-    as a share of Bessel's, of which geodesics have no need; the ``duration`` of the whole in s; and
-    the time ``t`` in [0, 1], as a share of it, which plays (BK 6.3).
+    Controls: the ``curve``: geodesics, projected cubics with the velocities of parabolas or of the
+    spline, or the optimum, all but the geodesics at rest at both ends; the ``duration`` of the
+    whole in s; and the time ``t`` in [0, 1], as a share of it, which plays (BK 6.3, beyond BK 14).
     """
     with new_figure() as fig:
         space = new_space(fig, (-0.08, -0.1, 0.74, 1.2), 2.05)
@@ -57,17 +131,14 @@ def chain_explorer() -> Explorer:
             }
         ax.set_xlabel("time (s)")
     controls = {
-        "leg": widgets.menu("joined by", list(LEGS)),
-        "share": widgets.slider("× Bessel's ω, v", 1.0, 0.0, 1.5, 0.1),
+        "curve": widgets.menu("joined by", JOINED),
         "duration": widgets.slider("duration (s)", 6.0, 4.0, _LONGEST, 0.5),
         "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
-    def show(leg: str, share: float, duration: float, t: float) -> dict[str, str]:
+    def show(curve: str, duration: float, t: float) -> dict[str, str]:
         knots = duration * SHARES
-        velocities = share * rb.bessel_velocities(knots, POSES) * [[0], [1], [1], [0]]
-        controls["share"].disabled = rested = leg == "geodesics"
-        motion = rb.chain(knots, POSES, None if rested else velocities, leg=LEGS[leg])
+        motion, best = _joined(curve, knots), _joined(JOINED[-1], knots)
         times, now = np.linspace(0, duration, 241), t * duration
         artists["way"].set_data_3d(*motion(times)[:, :3, 3].T)
         move_box(artists["box"], motion(now), _EDGES)
@@ -78,14 +149,31 @@ def chain_explorer() -> Explorer:
             artists[f"{name} joints"].set_segments([[(k, 0), (k, high)] for k in knots[1:-1]])
         fastest, strongest = speeds.max(axis=0), _norms(motion(times, 2)).max(axis=0)
         jumps = [_norms(motion.jumps(order))[:, 0].max() for order in (1, 2)]
+        cost = "infinite: ω jumps"
+        if curve != JOINED[0]:
+            costs = [rb.acceleration_cost_parts(c)[0] for c in (motion, best)]
+            cost = f"{numbers(costs[0] / costs[1], 3)} × the least"
         return {
             "fastest": f"{numbers(fastest[0], 2)} rad/s, {numbers(fastest[1], 2)} m/s",
             "strongest": f"{numbers(strongest[0], 2)} rad/s², {numbers(strongest[1], 2)} m/s²",
             "ω jumps": f"by {numbers(jumps[0], 2)} rad/s",
             "ω′ jumps": f"by {numbers(jumps[1], 2)} rad/s²",
+            "cost of turning": cost,
         }
 
     return Explorer("Through four poses", fig, artists, controls, show, plays="t", seconds=6.0)
+
+
+def _joined(curve: str, knots: rb.Array) -> rb.Chain:
+    """Return one of the curves of `chain_explorer`."""
+    if curve == JOINED[0]:
+        return rb.chain(knots, POSES, leg=rb.geodesic_se3)
+    if curve == JOINED[1]:
+        w = rb.bessel_velocities(knots, POSES) * [[0], [1], [1], [0]]
+        return rb.chain(knots, POSES, w)
+    rest = np.zeros(6), np.zeros(6)
+    spline = rb.projected_spline_se3 if curve == JOINED[2] else rb.minimum_acceleration_spline_se3
+    return spline(knots, POSES, rest)
 
 
 def _norms(vectors: rb.Array) -> rb.Array:

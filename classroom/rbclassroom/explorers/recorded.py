@@ -12,7 +12,7 @@ from rbclassroom import explorers
 from rbclassroom.course.agreement import reconciled
 from rbclassroom.course.notebooks import regenerate
 from rbclassroom.explorers.explorer import Explorer, numbers
-from rbclassroom.explorers.paths import LEGS
+from rbclassroom.explorers.paths import JOINED
 from rbcourse.draw.display import Player
 
 _PAGE = Template("""\
@@ -31,7 +31,7 @@ _LESSON = "In the lesson, with Python, every control moves, with all of its step
 MOVED: dict[str, tuple[str, Sequence[Any]]] = {
     "arm": ("theta1", range(-180, 181, 30)),
     "body": ("turn", range(25, 176, 25)),
-    "chain": ("leg", list(LEGS)),
+    "chain": ("curve", JOINED),
     "cube": ("spin", range(-5, 6, 2)),
     "flip": ("axis", ["axis 1", "axis 2", "axis 3"]),
     "minimum_acceleration": ("size", [tenths / 10 for tenths in range(2, 15, 2)]),
@@ -40,7 +40,9 @@ MOVED: dict[str, tuple[str, Sequence[Any]]] = {
     "random": ("sampler", ["three angles", "uniform"]),
     "rotation": ("gamma", range(-140, 176, 45)),
     "screw": ("tilt", range(0, 91, 15)),
+    "spline": ("pitch", range(-60, 61, 20)),
     "theta": ("angle", range(10, 171, 10)),
+    "timing": ("acceleration", [0.5, 1, 1.5, 2, 3, 4, 6]),
 }
 """Of each explorer the control that is recorded beside what plays, and which of its values."""
 

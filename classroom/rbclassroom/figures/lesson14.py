@@ -1,6 +1,6 @@
-"""Lesson 14: speeds and accelerations of a motion, and what curves through rotations cost."""
+"""Lessons 14 to 16: accelerations of curves through rotations, their costs, speeds of motions."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 from scipy.integrate import quad_vec
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 import rbcourse as rb
@@ -26,6 +27,18 @@ EXCESSES: dict[str, dict[str, Any]] = {
     "SciPy's spline": {"color": COLOURS["reference"], "ls": ":"},
 }
 """The curves of `excess_table`, and how they are drawn."""
+_CURVES: dict[str, dict[str, Any]] = {
+    "parabolas": {"color": COLOURS["z"], "ls": "-."},
+    "projected spline": {"color": COLOURS["projection"], "ls": "--"},
+    "optimum": {"color": COLOURS["optimum"], "ls": "-", "lw": 2},
+}
+_CLOCK = np.array([0, 1, 1 + 2**0.5])
+_ANGLES = np.array([0, 1, 0.3])
+_TURNS: list[dict[str, Any]] = [
+    {"color": COLOURS["z"], "ls": "-."},
+    {"color": COLOURS["projection"], "ls": "--"},
+    {"color": COLOURS["optimum"], "ls": "-"},
+]
 
 
 def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
@@ -79,6 +92,80 @@ def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
         label, unit = name.removesuffix("]").split(" [")
         if name != _TIME:
             yield label, unit, np.asarray(values)
+
+
+def acceleration_table(curves: Mapping[str, Curve], component: int) -> Table:
+    """Return a component of ω' of curves on SO(3) at 401 even times."""
+    t = np.linspace(*next(iter(curves.values())).domain, 401)
+    return {_TIME: t} | {f"{name} [rad/s²]": c(t, 2)[:, component] for name, c in curves.items()}
+
+
+def draw_accelerations(ax: Axes, data: Table, knots: ArrayLike) -> None:
+    """Draw an `acceleration_table`, with a dotted line at each of some times."""
+    for knot in np.asarray(knots):
+        ax.axvline(knot, color=COLOURS["reference"], lw=0.8, ls=":")
+    for name, _, values in _profiles(data):
+        ax.plot(data[_TIME], values, label=name, **_CURVES[name])
+    ax.set(xlabel="time (s)", ylabel="ω′ about one axis (rad/s²)", xlim=(knots[0], knots[-1]))
+    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+
+
+def describe_accelerations(data: Table, knots: ArrayLike) -> str:
+    """Return in words what `draw_accelerations` shows."""
+    t, inner = np.asarray(data[_TIME]), np.asarray(knots)[1:-1]
+    parts = []
+    for name, _, values in _profiles(data):
+        steps = [np.interp(k + 0.01, t, values) - np.interp(k - 0.01, t, values) for k in inner]
+        parts.append(f"{name} by {', '.join(in_words(x, 1) for x in steps)} rad/s²")
+    return (
+        "One component of the angular acceleration of curves over time, with dotted lines where "
+        f"rotations are reached. Within 0.02 s at the inner ones they change: {'; '.join(parts)}."
+    )
+
+
+def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
+    """Return natural cubic splines through three angles, with so many whole turns more.
+
+    The bend is the difference from the straight line between the ends.
+    """
+    t = np.linspace(0, _CLOCK[-1], 201)
+    data = {_TIME: t}
+    for name, (first, second) in turns.items():
+        angles = _ANGLES + 2 * np.pi * np.array([0, first, first + second])
+        data[f"{name} [rad]"] = spline = CubicSpline(_CLOCK, angles, bc_type="natural")(t)
+        data[f"{name} bend [rad]"] = spline - spline[-1] * t / t[-1]
+    return data
+
+
+def draw_turns(axes: Sequence[Axes], data: Table) -> None:
+    """Draw a `turns_table`; dots: all angles of the three rotations, by whole turns apart."""
+    t, *columns = (np.asarray(x) for x in data.values())
+    low, high = np.min(columns) - 8, np.max(columns) + 8
+    for clock, angle in zip(_CLOCK, _ANGLES, strict=True):
+        dots = angle + 2 * np.pi * np.arange(-20, 20)
+        dots = dots[(dots > low) & (dots < high)]
+        axes[0].plot(np.full(len(dots), clock), dots, "o", color="0.7", ms=4, zorder=0)
+    names = list(data)[1::2]
+    for name, angle, bend, look in zip(names, columns[::2], columns[1::2], _TURNS, strict=True):
+        for ax, values in zip(axes, (angle, bend), strict=True):
+            ax.plot(t, values, label=name.removesuffix(" [rad]"), **look)
+    axes[0].set(xlabel="time (s)", ylabel="angle θ (rad)", ylim=(low, high))
+    axes[1].set(xlabel="time (s)", ylabel="θ less the straight line (rad)")
+    axes[1].legend(loc="center", bbox_to_anchor=(0.47, 0.52))
+
+
+def describe_turns(data: Table) -> str:
+    """Return in words what `draw_turns` shows."""
+    names, values = list(data)[1::2], list(data.values())
+    said = (
+        f"{name.removesuffix(' [rad]')} to {in_words(x[-1], 10)} rad, at most "
+        f"{in_words(np.abs(bend).max(), 1)} rad off the straight line"
+        for name, x, bend in zip(names, values[1::2], values[2::2], strict=True)
+    )
+    return (
+        "Cubic splines through three rotations about one axis, with more and more whole turns: the "
+        f"angle over time, and its difference from a straight line. {'; '.join(said)}."
+    )
 
 
 def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:

@@ -13,7 +13,7 @@ from rbclassroom.course.notebooks import KERNEL
 
 # in the plane, with a menu, with buttons, and in space: the slider whose keys are pressed, by its
 # place and its name; it changes the text; that of the last one is solved for each picture
-KINDS = {"theta": (1, "t"), "chain": (1, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
+KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
 # when keys go down, and when the screen shows a new picture
 NOTE = """() => {

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from sweeps import made, notice, points, read_off, reads, sweep, tell
 
 import rbcourse as rb
-from rbclassroom.explorers.paths import POSES, SHARES
+from rbclassroom.explorers.paths import ANGLES, POSES, SHARES
 
 TIMES = np.linspace(0, 1, 61)
 BOOK = np.array([0.20, 0.13, 0.03])
@@ -309,18 +309,26 @@ def test_a_motion_with_a_duration_in_seconds_plays_in_as_many(name, seconds):
     assert explorer.play.interval * explorer.play.max == 1000 * seconds
 
 
-LEGS = {"geodesics": rb.geodesic_se3, "optima": rb.minimum_acceleration_se3}
-LEGS |= {"projected cubics": rb.projected_cubic_se3, "projected quintics": rb.projected_quintic_so3}
+def curve_of(name, knots):
+    """What the explorer of four poses joins them by."""
+    rest = np.zeros((2, 6))
+    if name == "geodesics":
+        return rb.chain(knots, POSES, leg=rb.geodesic_se3)
+    if name == "cubics, parabolas":
+        velocities = rb.bessel_velocities(knots, POSES)
+        velocities[[0, -1]] = 0
+        return rb.chain(knots, POSES, velocities)
+    if name == "cubics, spline":
+        return rb.chain(knots, POSES)
+    return rb.minimum_acceleration_spline_se3(knots, POSES, tuple(rest))
 
 
 def test_the_box_its_way_and_its_speeds_are_those_of_the_chain():
     artists = made("chain").artists
     assert np.array_equal(points(artists["poses"]), POSES[:, :3, 3])
-    for v, said in sweep("chain", leg="projected cubics", share=1.5, duration=4.0, t=0.4):
+    for v, said in sweep("chain", curve="cubics, parabolas", duration=4.0, t=0.4):
         knots, now = v["duration"] * SHARES, v["t"] * v["duration"]
-        velocities = v["share"] * rb.bessel_velocities(knots, POSES) * [[0], [1], [1], [0]]
-        given = (velocities,) if v["leg"] != "geodesics" else ()
-        c = rb.chain(knots, POSES, *given, leg=LEGS[v["leg"]])
+        c = curve_of(v["curve"], knots)
         way, A, times = points(artists["way"]), c(now), np.linspace(0, v["duration"], 241)
         assert off(way, c(np.linspace(*c.domain, len(way)))[:, :3, 3]) < 1e-12
         assert_box(artists["box"], A[:3, :3], [0.45, 0.3, 0.15], A[:3, 3], 1e-12, 1e-12)
@@ -334,9 +342,71 @@ def test_the_box_its_way_and_its_speeds_are_those_of_the_chain():
             joints = np.array(artists[f"{name} joints"].get_segments())
             assert np.array_equal(joints[:, 0, 0], c.times[1:-1])
         jumps = [np.linalg.norm(c.jumps(k)[:, :3], axis=1).max() for k in (1, 2)]
-        wanted = *(rate.max(axis=0) for rate in rates), *jumps
+        wanted = [*(rate.max(axis=0) for rate in rates), *jumps]
+        if v["curve"] == "geodesics":
+            assert said.pop("cost of turning") == "infinite: ω jumps"
+        else:
+            both = c, curve_of("the optimum", knots)
+            costs = [rb.acceleration_cost_parts(each)[0] for each in both]
+            wanted.append(costs[0] / costs[1])
         for text, values in zip(said.values(), wanted, strict=True):
             assert reads(text, values)
+
+
+@pytest.mark.source("beyond BK 13")
+def test_both_curves_pass_the_orientations_and_show_their_accelerations():
+    artists = made("spline").artists
+    for v, said in sweep("spline", pitch=15.0, third=2.3, t=1.4):
+        times, angles = np.array([0, 1, v["third"], 4]), ANGLES.copy()
+        angles[2, 1] = v["pitch"]
+        R = rb.matrix_from_zyx(np.radians(angles))
+        w = {"parabolas": rb.bessel_velocities(times, R)}
+        ends = "natural"
+        if v["ends"] == "at rest":
+            ends, w["parabolas"][[0, -1]] = (np.zeros(3), np.zeros(3)), 0
+        w["spline"] = rb.spline_velocities(times, R, ends)
+        least = rb.minimum_acceleration_spline_so3(times, R, ends).cost
+        for kind, velocities in w.items():
+            c = rb.chain(times, R, velocities)
+            path, curve = points(artists[f"{kind} path"]), points(artists[f"{kind} ‖ω′‖"])
+            assert off(path, c(curve[:, 0])[:, :, 0]) < 1e-12
+            assert off(curve[:, 1], np.linalg.norm(c(curve[:, 0], 2), axis=1)) < 1e-12
+            assert set(times[:-1]) <= {*curve[:, 0]}
+            assert curve[:, 1].max() < artists[f"{kind} ‖ω′‖"].axes.get_ylim()[1]
+            assert off(points(artists[f"{kind} given"]), R[:, :, 0]) < 1e-15
+            now = c(v["t"])
+            assert off(points(artists[f"{kind} now"]), now[:, 0]) < 1e-12
+            up = points(artists[f"{kind} up"])
+            assert off(up, [now[:, 0], now[:, 0] + 0.35 * now[:, 2]]) < 1e-12
+            dot = points(artists[f"{kind} ‖ω′‖ now"])
+            assert off(dot, [v["t"], np.linalg.norm(c(v["t"], 2))]) < 1e-12
+            assert reads(said[f"{kind}: ω′ jumps"], np.linalg.norm(c.jumps(2), axis=1))
+            assert reads(said[f"{kind}: cost"], rb.acceleration_cost(c) / least)
+
+
+@pytest.mark.source("beyond BK 16")
+def test_the_timing_keeps_below_the_limits_of_its_path():
+    artists, path = made("timing").artists, rb.projected_spline_se3(np.arange(4.0), POSES)
+    for v, said in sweep("timing", angular_speed=1.0, speed=1.2, acceleration=2.5, t=0.3):
+        limits = {name: v[name] for name in ("angular_speed", "speed", "acceleration")}
+        c, s = rb.fastest(path, **limits), np.linspace(0, 3, 241)
+        assert off(points(artists["fastest"]), np.stack([c.s, c.rate], axis=1)) < 1e-12
+        V, A = path(s, 1), path(s, 2)[:, 3:]
+        turned, moved = (np.linalg.norm(part, axis=1) for part in (V[:, :3], V[:, 3:]))
+        speeds = np.minimum(v["angular_speed"] / turned, v["speed"] / moved)
+        assert off(points(artists["speed limits"])[:, 1] / speeds, 1) < 1e-12
+        bend = np.linalg.norm(np.cross(V[:, 3:], A), axis=1) / moved  # across the path
+        highest = points(artists["acceleration limit"])[:, 1]
+        assert off(highest**2 * bend / v["acceleration"], 1) < 1e-9
+        rate = points(artists["one rate"])[0, 1]
+        used = rb.limits_used(rb.retime(path, 3 / rate), **limits).values()
+        assert max(share for share, _ in used) == pytest.approx(1)
+        now = v["t"] * c.domain[1]
+        assert off(points(artists["now"]), c.progress(now)[:2]) < 1e-12
+        pose = c(now)
+        assert_box(artists["box"], pose[:3, :3], [0.45, 0.3, 0.15], pose[:3, 3], 1e-12, 1e-12)
+        for key, value in (("fastest", c.domain[1]), ("one rate", 3 / rate)):
+            assert reads(said[key], value)
 
 
 def planned(v, t, frame):

@@ -19,6 +19,7 @@ from rbclassroom.figures import (
     lesson09,
     lesson13,
     lesson14,
+    lesson15,
     vectors,
 )
 from rbclassroom.surveys import atlas_figures
@@ -256,3 +257,91 @@ def test_profiles_are_those_of_the_motion():
             assert w == pytest.approx(np.linalg.norm(w_dot), abs=1e-6)
     with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) wanted"):
         lesson14.profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)
+
+
+@pytest.mark.source("beyond BK 7")
+def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
+    """They leave the lines t w with the square of w in exponential ones, with the cube here."""
+    book, t = rb.metrics.box_inertia([0.30, 0.20, 0.03]), np.linspace(0, 1, 5)
+    w = np.array([[0.8, 0.6, 1], [-0.6, 0.8, 1]])
+    kinds = "exponential coordinates", "normal coordinates"
+
+    def off(inertia, size):
+        """By how much the two motions leave their lines in the plane, in both coordinates."""
+        lines = vectors("{} {} [rad]", lesson13.normal_table(t, size * w, inertia), "xy")
+        for k in (1, 2):
+            assert np.allclose(lines[f"straight {k}"], t[:, None] * size * w[k - 1, :2], 1e-15)
+        return np.array(
+            [[lines[f"{kind} {k}"] - lines[f"straight {k}"] for k in (1, 2)] for kind in kinds]
+        )
+
+    whole, half = (np.linalg.norm(off(book, size)[:, :, -1], axis=-1) for size in (0.02, 0.01))
+    assert np.log2(whole / half) == pytest.approx(np.array([[2, 2], [3, 3]]), abs=0.05)
+    w_dot = -np.cross(w, w @ book) @ np.linalg.inv(book)  # Euler's equations
+    want = 0.01**2 / 2 * w_dot[:, :2]
+    assert off(book, 0.01)[0, :, -1] == pytest.approx(want, abs=0.03 * np.abs(want).max())
+    assert np.abs(off(2 * np.eye(3), 1)).max() < 1e-13  # of a ball: both are straight
+
+    data, panes = numbers("lesson13_normal"), axes(None, None)
+    lesson13.draw_normal(panes, data)
+    for ax, kind in zip(panes, kinds, strict=True):
+        motions = [np.transpose([data[f"{kind} {k} {x} [rad]"] for x in "xy"]) for k in (1, 8)]
+        title = ax.get_title()
+        assert title.startswith(f"{kind}\n")
+        check_held([ax], {(title, "free motion"): [*motions[0].T], (title, "_"): [*motions[1].T]})
+    words = "8 free motions", "exponential coordinates by up to", "normal coordinates by up to"
+    check_said(lesson13.describe_normal(data), *words)
+
+
+def test_the_turns_are_natural_splines_through_the_angles_and_their_bends_end_at_0():
+    data = lesson14.turns_table({"one": (0, 0), "two": (4, 6)})
+    t = data["t [s]"]
+    for name, goal in (("one", 0.3), ("two", 0.3 + 20 * np.pi)):
+        angle, bend = data[f"{name} [rad]"], data[f"{name} bend [rad]"]
+        assert angle[[0, -1]] == pytest.approx([0, goal])
+        assert np.abs(bend[[0, -1]]).max() < 1e-12
+        assert angle - bend == pytest.approx(goal * t / t[-1])
+        curvature = np.diff(angle, 2)
+        assert np.abs(curvature[[0, -1]]).max() < 0.05 * np.abs(curvature).max()
+
+
+def test_limit_curves_are_the_largest_rates_that_some_change_of_the_rate_allows():
+    """By trying many changes of the rate at each place."""
+    path = rb.minimum_acceleration_se3(
+        np.eye(4),
+        rb.pose_from_coordinates([1, 0, 1, 2, 1, 0]),
+        [0, 1, 0],
+        [1, 0, 0],
+        [1, 0, 0],
+        [0, 2, 1],
+    )
+    limits = {"speed": 1.5, "angular_speed": 0.7, "acceleration": 2.0, "angular_acceleration": 1.0}
+    s = np.linspace(0, 1, 9)
+    found = lesson15.highest_rates(path, s, limits)
+    V, A = (path(s, k).reshape(9, 2, 3) for k in (1, 2))
+    assert found["speeds"] == pytest.approx(
+        np.min([0.7, 1.5] / np.linalg.norm(V, axis=2), axis=1), rel=1e-12
+    )
+    ratios = np.linspace(-60, 60, 240_001)[:, None, None]  # u/x
+    for i, rate in enumerate(found["accelerations"]):
+        norms = np.linalg.norm(V[i] * ratios + A[i], axis=2) / [1.0, 2.0]
+        assert rate == pytest.approx(norms.max(axis=1).min() ** -0.5, rel=1e-5)
+
+
+def test_two_passes_are_the_largest_squares_below_all_cones():
+    """x_i is the least of highest_j + step |i − j|, with 0 at both ends."""
+    highest = np.random.default_rng(3).uniform(0.5, 6, 12)
+    highest[[0, -1]] = 0
+    apart = np.abs(np.subtract.outer(np.arange(12), np.arange(12)))
+    back, both = lesson15.two_passes(highest, 0.8)
+    assert both == pytest.approx((highest + 0.8 * apart).min(axis=1))
+    later = np.where(np.triu(np.ones((12, 12))), highest + 0.8 * apart, np.inf)
+    assert back == pytest.approx(later.min(axis=1))
+
+
+def test_shares_are_norms_over_limits(axes):
+    path = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
+    data = lesson15.share_table(path, {"angular_speed": 4.0, "speed": 5.0})
+    assert data["angular speed [1]"] == pytest.approx(0.5)
+    assert data["speed [1]"] == pytest.approx(np.linalg.norm(path(0, 1)[3:]) / 5)
+    check_said(lesson15.describe_shares(data), "angular speed 0 %, speed 0 %; one of them 0 %")

@@ -1,0 +1,92 @@
+"""The explorer of the fastest timing of a path, in the phase plane."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+import rbcourse as rb
+from rbclassroom.explorers import widgets
+from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
+from rbclassroom.explorers.paths import POSES
+from rbclassroom.figures.lesson15 import highest_rates
+from rbcourse.draw.bodies import draw_box, move_box
+from rbcourse.draw.save import COLOURS
+
+LIMITS = "angular_speed", "speed", "acceleration"
+_EDGES = np.array([0.9, 0.6, 0.3])
+_HIGHEST = 2.0
+_IN_USE = 0.995
+
+
+def timing_explorer() -> Explorer:
+    """Return an explorer of a path that is run through as fast as limits allow.
+
+    On the right the phase plane: the path parameter s, with a pose at each whole number, and its
+    rate. Above the limit curves no timing is allowed; grey: the whole path at one rate. The box
+    moves with the fastest timing. Controls: the most that the ``angular_speed``, the ``speed`` and
+    the ``acceleration`` of its centre may be, and ``t``, the share of the time that has passed,
+    which plays (beyond BK 16).
+    """
+    path = rb.projected_spline_se3(np.arange(4.0), POSES)
+    with new_figure() as fig:
+        space = new_space(fig, (-0.06, 0.08, 0.56, 0.9), 2.4)
+        artists: dict[str, Any] = {
+            "way": new_line(space, color=COLOURS["path"]),
+            "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
+            "box": draw_box(space, POSES[0], _EDGES),
+        }
+        artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
+        artists["way"].set_data_3d(*path(np.linspace(0, 3, 121))[:, :3, 3].T)
+        ax = fig.add_axes((0.53, 0.15, 0.45, 0.5))
+        ax.set(xlim=(0, 3), ylim=(0, _HIGHEST), xticks=[0, 1, 2, 3], xlabel="s", ylabel="rate ṡ")
+        for knot in (1, 2):
+            ax.axvline(knot, color="0.7", lw=1, ls=":")
+        looks: dict[str, Any] = {
+            "acceleration limit": {"color": COLOURS["x"], "lw": 1.5},
+            "speed limits": {"color": COLOURS["z"], "lw": 1.5, "ls": "-."},
+            "one rate": {"color": COLOURS["reference"], "lw": 1.5, "ls": "--"},
+            "fastest": {"color": COLOURS["optimum"], "lw": 2.5},
+        }
+        artists |= {name: new_line(ax, label=name, **look) for name, look in looks.items()}
+        artists["now"] = new_line(ax, color=COLOURS["optimum"], marker="o", ls="")
+        ax.legend(loc="lower right", bbox_to_anchor=(1.02, 1.0), handlelength=1.8)
+    controls = {
+        "angular_speed": widgets.slider("ω at most (rad/s)", 1.5, 0.5, 3.0, 0.1),
+        "speed": widgets.slider("v at most (m/s)", 1.5, 0.5, 3.0, 0.1),
+        "acceleration": widgets.slider("a at most (m/s²)", 2.0, 0.5, 6.0, 0.1),
+        "t": widgets.stepped("time t/T", 0.0, 0.0, 1.0, 0.01),
+    }
+
+    @lru_cache(maxsize=16)
+    def timed(*most: float) -> tuple[rb.Timed, float, dict[str, rb.Array]]:
+        limits = dict(zip(LIMITS, most, strict=True))
+        used = rb.limits_used(path, **limits)
+        even = max(x if name.endswith("speed") else x**0.5 for name, (x, _) in used.items())
+        s = np.linspace(0, 3, 241)
+        highest = highest_rates(path, s, limits)
+        return rb.fastest(path, **limits), 1 / even, {"s": s, **highest}
+
+    def show(angular_speed: float, speed: float, acceleration: float, t: float) -> dict[str, str]:
+        most = angular_speed, speed, acceleration
+        fastest, rate, highest = timed(*most)
+        s, now = highest["s"], t * fastest.domain[1]
+        artists["acceleration limit"].set_data(s, highest["accelerations"])
+        artists["speed limits"].set_data(s, highest["speeds"])
+        artists["one rate"].set_data([0, 3], [rate, rate])
+        artists["fastest"].set_data(fastest.s, fastest.rate)
+        here = fastest.progress(now)
+        artists["now"].set_data([here[0]], [here[1]])
+        move_box(artists["box"], fastest(now), _EDGES)
+        V, A = fastest(now, 1), fastest(now, 2)
+        used = np.linalg.norm([V[:3], V[3:], A[3:]], axis=1) / most
+        names = [n for n, x in zip(("ω", "v", "a"), used, strict=True) if x > _IN_USE]
+        return {
+            "fastest": f"{numbers(fastest.domain[1], 2)} s",
+            "one rate": f"{numbers(3 / rate, 2)} s",
+            "used now (ω, v, a)": f"{numbers(100 * used, 0)} %",
+            "at its limit": " and ".join(names) or "none",
+        }
+
+    name = "As fast as the limits allow"
+    return Explorer(name, fig, artists, controls, show, plays="t", seconds=6.0)

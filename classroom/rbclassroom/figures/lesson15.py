@@ -1,0 +1,179 @@
+"""Lesson 15: the phase plane of a path, two passes by hand, and the shares of limits in use."""
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from rbclassroom.figures.lesson14 import profile_table
+from rbcourse import Array, Curve, Timed
+from rbcourse.draw.save import COLOURS, Table, in_words
+
+LIMITS = {
+    "angular_speed": (1, 0, "angular speed [rad/s]"),
+    "speed": (1, 1, "speed [m/s]"),
+    "angular_acceleration": (2, 0, "angular acceleration [rad/s²]"),
+    "acceleration": (2, 1, "acceleration [m/s²]"),
+}
+"""The order of the derivative, which half of the twist, and the name in `profile_table`."""
+_LOOKS: dict[str, dict[str, Any]] = {
+    "accelerations": {"color": COLOURS["x"], "label": "limit of accelerations"},
+    "speeds": {"color": COLOURS["z"], "ls": "-.", "label": "limit of speeds"},
+    "one rate": {"color": COLOURS["reference"], "ls": "--"},
+    "fastest": {"color": COLOURS["optimum"], "lw": 2.5},
+}
+_SHARES: dict[str, dict[str, Any]] = {
+    "angular_speed": {"color": COLOURS["z"], "ls": "-."},
+    "speed": {"color": COLOURS["y"], "ls": "-"},
+    "angular_acceleration": {"color": COLOURS["projection"], "ls": ":"},
+    "acceleration": {"color": COLOURS["x"], "ls": "--"},
+}
+
+
+def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, Array]:
+    """Return the largest rate s' at which some s'' keeps the accelerations, and the speeds.
+
+    `limits` are norms, named as in `LIMITS`; the rate is infinite where nothing limits it.
+    """
+    halves = [path(s, order).reshape(len(s), -1, 3) for order in (1, 2)]
+    squares = {1: [np.zeros(len(s))], 2: list[Array]()}
+    a, b = [], []
+    for name, most in limits.items():
+        order, half, _ = LIMITS[name]
+        if order == 1:
+            squares[1].append(np.sum(halves[0][:, half] ** 2, axis=1) / most**2)
+        else:
+            a.append(halves[0][:, half] / most)
+            b.append(halves[1][:, half] / most)
+    with np.errstate(divide="ignore"):
+        speeds = np.max(squares[1], axis=0) ** -0.5
+        return {"accelerations": _least(a, b) ** -0.25, "speeds": speeds}
+
+
+def _least(a: list[Array], b: list[Array]) -> Array:
+    """Return the least max ‖a r + b‖² over r, at each place; a and b have a row for each limit."""
+    parts = [
+        [np.sum(x * y, axis=-1) for x, y in ((p, p), (p, q), (q, q))]
+        for p, q in zip(a, b, strict=True)
+    ]
+    if not parts:
+        return np.zeros(1)
+    aa, ab, bb = np.moveaxis(parts, 1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        trials = list(-ab / aa)
+        for i, j in combinations(range(len(aa)), 2):  # where two limits are equal
+            p, q, r = (x[i] - x[j] for x in (aa, ab, bb))
+            root = np.sqrt(q * q - p * r)
+            trials += [(-q + root) / p, (-q - root) / p]
+    trials = np.nan_to_num(trials, nan=0, posinf=0, neginf=0)
+    return np.min(np.max(aa * trials[:, None] ** 2 + 2 * ab * trials[:, None] + bb, 1), 0)
+
+
+def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
+    """Return over s the limit curves, the rate of a timing in `even` seconds, and the fastest.
+
+    Rates are cut at three times the largest of the fastest timing.
+    """
+    s = np.linspace(*timed.curve.domain, 601)
+    rates = highest_rates(timed.curve, s, limits)
+    rates |= {"one rate": np.full(len(s), np.ptp(s) / even)}
+    rates |= {"fastest": np.interp(s, timed.s, timed.rate**2) ** 0.5}
+    highest = 3 * rates["fastest"].max()
+    return {"s [s]": s, **{f"{name} [1]": np.minimum(x, highest) for name, x in rates.items()}}
+
+
+def draw_phase_plane(ax: Axes, data: Table, knots: ArrayLike) -> None:
+    """Draw a `phase_table`, with a dotted line at each pose."""
+    s, *columns = data.values()
+    for knot in np.asarray(knots):
+        ax.axvline(knot, color="0.7", lw=1, ls=":")
+    for (name, look), rate in zip(_LOOKS.items(), columns, strict=True):
+        ax.plot(s, rate, **{"label": name, **look})
+    ax.set(xlabel="path parameter s (s)", ylabel="rate ṡ", xlim=(s[0], s[-1]))
+    ax.set_ylim(0, 2 * np.max(columns[-1]))
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+
+
+def describe_phase_plane(data: Table) -> str:
+    """Return in words what `draw_phase_plane` shows."""
+    _, accelerations, speeds, even, best = (np.asarray(x) for x in data.values())
+    at_speeds, at_bends = (np.mean(best > 0.995 * x) for x in (speeds, accelerations))
+    return (
+        "The phase plane: the rate of the fastest timing over the path parameter, below the limits "
+        f"of accelerations and of speeds. The rate goes up to {in_words(best.max(), 1)}; it is "
+        f"{in_words(even[0], 1)} if it is the same everywhere. The fastest timing is on the limit "
+        f"of speeds on {100 * at_speeds:.0f} % of the path, on that of accelerations on "
+        f"{100 * at_bends:.0f} %."
+    )
+
+
+def share_table(motion: Curve, limits: dict[str, float]) -> Table:
+    """Return which share of each limit a motion uses, over time."""
+    rates = {order: profile_table(motion, order, 1201) for order in (1, 2)}
+    shares = {name: np.asarray(rates[LIMITS[name][0]][LIMITS[name][2]]) for name in limits}
+    return {
+        "t [s]": rates[1]["t [s]"],
+        **{f"{name.replace('_', ' ')} [1]": x / limits[name] for name, x in shares.items()},
+    }
+
+
+def draw_shares(ax: Axes, data: Table) -> None:
+    """Draw a `share_table`."""
+    t, *shares = data.values()
+    for name, share in zip(list(data)[1:], shares, strict=True):
+        label = name.removesuffix(" [1]")
+        ax.plot(t, share, label=label, **_SHARES[label.replace(" ", "_")])
+    ax.axhline(1, color="0.7", lw=1, zorder=0)
+    ax.set(xlabel="time (s)", ylabel="share of the limit", ylim=(0, 1.08), xlim=(t[0], t[-1]))
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+
+
+def describe_shares(data: Table) -> str:
+    """Return in words what `draw_shares` shows."""
+    shares = {name.removesuffix(" [1]"): np.asarray(x) for name, x in list(data.items())[1:]}
+    said = (f"{name} {100 * np.mean(x > 0.99):.0f} %" for name, x in shares.items())
+    some = np.mean(np.max(list(shares.values()), axis=0) > 0.99)
+    return (
+        "Which share of each limit a motion uses, over time. The part of the time during which a "
+        f"limit is used to 99 % or more: {', '.join(said)}; one of them {100 * some:.0f} %."
+    )
+
+
+def two_passes(highest: ArrayLike, step: float) -> tuple[Array, Array]:
+    """Return the largest x at nodes after the pass from the end, and after that from the start.
+
+    No x is above `highest`, nor above that of a neighbour by more than `step`; at both ends x = 0.
+    """
+    back = np.array(highest, float)
+    back[[0, -1]] = 0
+    for i in reversed(range(len(back) - 1)):
+        back[i] = min(back[i], back[i + 1] + step)
+    both = back.copy()
+    for i in range(len(both) - 1):
+        both[i + 1] = min(both[i + 1], both[i] + step)
+    return back, both
+
+
+def draw_passes(ax: Axes, data: Table) -> None:
+    """Draw the three columns of x over the place: the limits, and both passes."""
+    s, highest, back, both = data.values()
+    ax.plot(s, highest, color=COLOURS["z"], ls="", marker="_", ms=22, mew=3, label="speed limit")
+    ax.plot(s, back, color=COLOURS["reference"], ls="--", marker="o", label="from the end")
+    ax.plot(s, both, color=COLOURS["optimum"], lw=2.5, marker="o", label="then from the start")
+    for place, x in zip(s, both, strict=True):
+        ax.annotate(f"{x:g}", (place, x), (0, -18), textcoords="offset points", ha="center")
+    ax.set(xlabel="place s (m)", ylabel="x = ṡ² (m²/s²)", ylim=(-0.8, np.max(highest) * 1.1))
+    ax.set_xticks(s)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
+
+
+def describe_passes(data: Table) -> str:
+    """Return in words what `draw_passes` shows."""
+    _, highest, back, both = ([f"{x:g}" for x in column] for column in data.values())
+    return (
+        "The squared speeds at nine places of a straight path. Speed limits: "
+        f"{', '.join(highest)}; after the pass from the end {', '.join(back)}; after the pass from "
+        f"the start {', '.join(both)}."
+    )
