@@ -1,4 +1,4 @@
-"""A body turned by several laws: the torque on it, or its speed, over time (beyond BK 1)."""
+"""Lesson 13: a body turned by several laws, and free motions in two coordinates (beyond BK 1)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rbclassroom.figures import columns, vectors
-from rbcourse import Array, Curve
+from rbcourse import Array, Curve, geodesic_flow, log_so3, normal_cubic_so3
 from rbcourse.draw.save import COLOURS, Table
 
 LOOKS: dict[str, dict[str, Any]] = {
@@ -72,3 +72,69 @@ def describe_speeds(data: Table) -> str:
     """Return in words what `draw_speeds` shows."""
     said = (f"{name} at most {np.max(data[f'{name} [rad]']):.1f}" for name in _SPEEDS)
     return f"Angular speeds over time, in rad per unit time: {', '.join(said)}."
+
+
+_FREE = "{} {} [rad]"
+_STRAIGHT = "straight"
+_COORDINATES = {
+    "exponential coordinates": "y = log(R₀ᵀR)",
+    "normal coordinates": "x, to second order",
+}
+
+
+def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
+    """Return free motions in exponential and in normal coordinates, as columns (beyond BK 7).
+
+    They start at I with the angular velocities w, shape (motions, 3). The columns are components
+    x and y over the times t: of the straight lines t w, of the logarithm, and of the normal
+    coordinates to second order, those of `normal_cubic_so3`.
+    """
+    R, _ = geodesic_flow(inertia, np.eye(3), w, t)
+    rest = np.zeros(3)
+    normal = normal_cubic_so3(np.eye(3), R, rest, rest, inertia).controls[..., 1, :]
+    line = np.multiply.outer(t, w)
+    kinds = dict(zip((_STRAIGHT, *_COORDINATES), (line, log_so3(R), normal), strict=True))
+    found = {f"{kind} {k + 1}": x[:, k] for kind, x in kinds.items() for k in range(len(w))}
+    return {"t [s]": t} | columns(_FREE, found, "xy")
+
+
+def draw_normal(axes: Sequence[Axes], data: Table) -> None:
+    """Draw the free motions of a `normal_table`, in each coordinates beside the straight lines."""
+    lines, *kinds = _by_kind(data).items()
+    for ax, (kind, motions) in zip(axes, kinds, strict=True):
+        for k, line in enumerate(lines[1]):
+            ax.plot(*line.T, color=COLOURS["path"], ls=":", label="" if k else "straight line")
+        look: dict[str, Any] = {"color": COLOURS["optimum"], "marker": "o", "ms": 5}
+        middle = len(motions[0]) // 2
+        for k, motion in enumerate(motions):
+            label = "" if k else "free motion, with dots at half time and at the end"
+            ax.plot(*motion.T, markevery=[middle, -1], label=label, **look)
+        reach = 1.1 * np.abs([lines[1], motions]).max()
+        ax.set(title=f"{kind}\n{_COORDINATES[kind]}", xlabel="about x (rad)", aspect="equal")
+        ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
+    axes[0].set_ylabel("about y (rad)")
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=2)
+
+
+def describe_normal(data: Table) -> str:
+    """Return in words what `draw_normal` shows."""
+    (_, lines), *kinds = _by_kind(data).items()
+    said = []
+    for kind, motions in kinds:
+        x, y = np.array([lines, motions])[:, :, -1] @ np.array([1, 1j])
+        off = np.degrees(np.abs(np.angle(y / x))).max()
+        said.append(f"in {kind} by up to {off:.0f} degrees")
+    return (
+        f"{len(lines)} free motions of a body from one rotation, in two coordinates, beside "
+        "straight lines with the same start. Seen from the start the end of a motion is off its "
+        f"line {', '.join(said)}."
+    )
+
+
+def _by_kind(data: Table) -> dict[str, list[Array]]:
+    """Return the motions of a `normal_table`, shape (times, 2), in lists by what they are."""
+    found: dict[str, list[Array]] = {}
+    for name, motion in vectors(_FREE, data, "xy").items():
+        found.setdefault(name.rpartition(" ")[0], []).append(motion)
+    return found

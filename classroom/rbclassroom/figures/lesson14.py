@@ -124,7 +124,7 @@ def describe_accelerations(data: Table, knots: ArrayLike) -> str:
 
 
 def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
-    """Return natural cubic splines through three angles, with so many whole turns more.
+    """Return natural cubic splines through three angles, with some whole turns more.
 
     The bend is the difference from the straight line between the ends.
     """

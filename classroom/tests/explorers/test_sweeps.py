@@ -310,7 +310,7 @@ def test_a_motion_with_a_duration_in_seconds_plays_in_as_many(name, seconds):
 
 
 def curve_of(name, knots):
-    """What the explorer of four poses joins them by."""
+    """Return a curve of the explorer of four poses."""
     rest = np.zeros((2, 6))
     if name == "geodesics":
         return rb.chain(knots, POSES, leg=rb.geodesic_se3)
