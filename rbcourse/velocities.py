@@ -246,8 +246,9 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """Return velocities for a path: at each pose of the parabola through it and its neighbours.
 
     A change of one pose changes only the velocities there and at its neighbours. The price: the
-    acceleration jumps at the poses, and the motion costs 12 % more than the optimum, the median of
-    random paths, however small their steps are; `spline_velocities` have neither drawback.
+    acceleration jumps at the poses, and between random poses the motion costs 12 % more than the
+    optimum, in the median, however small the steps are; `spline_velocities` have neither drawback.
+    On samples of a smooth motion the excess falls by 4 for twice as many samples.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def minimum_acceleration_spline_so3(
 ) -> OptimalChain:
     """Return the curve of least acceleration through many rotations, of a ball or of any body.
 
-    A local minimum among the curves whose legs turn the short way, or the way that is asked for.
+    A local minimum, found from legs that turn the short way, or the way that is asked for.
     Source: BK (18); beyond BK 12, beyond BK 15.
 
     Parameters
@@ -109,8 +109,8 @@ def minimum_acceleration_spline_so3(
     -----
     With given velocities at both ends a curve of least acceleration exists. With natural or
     periodic ends it need not: rotations by 0, 1 and 0.3 rad about one axis at 0, 1 and 1 + √2 have
-    the cost 5.6; with more full turns for the legs it becomes as small as one likes. So the result
-    is the minimum in a class. A leg that is short beside its neighbours may spin: put poses
+    the cost 5.6; with more full turns for the legs it becomes as small as one likes. The result is
+    a local minimum. A leg that is short beside its neighbours may spin: put poses
     between. Singular set: rotations a half-turn apart are refused.
 
     Examples

@@ -167,7 +167,9 @@ class Sources:
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""
-        self.put("scene.html", living("cube", self.root))
+        cube = living("cube", self.root)
+        where = self.extra / "lessons", "lessons/pictures"
+        self.put("scene.html", lessons.with_script_files(cube, *where))
         for path in (HERE / "pages").rglob("*.md"):
             page = path.relative_to(HERE / "pages").as_posix()
             self.put(page, self.rendered(page))

@@ -14,8 +14,10 @@ from nbformat.v4 import new_markdown_cell
 
 from rbclassroom.book.places import relinked, with_keys
 from rbclassroom.course.notebooks import lesson_paths, living, split_sheet
+from rbcourse.draw.display import ENGINE
 
 _PICTURE = re.compile(r'(<img\b[^>]*?) src="data:image/png;base64,([^"]+)"')
+_PLAYER = re.compile(r"<script>\{\n.*?\n(for \(const image of [^\n]*)\n\}</script>", re.DOTALL)
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
 _APART = re.compile(r"(the lecturer's) (run sheets?) (is|are) at the end")
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
@@ -107,6 +109,25 @@ def with_picture_files(
     return _PICTURE.sub(put, shown)
 
 
+def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
+    """Return HTML whose living pictures have their states, and what draws them, in files.
+
+    The files are written to ``pictures`` in a folder, whose address is `to`; each once.
+    """
+
+    def put(match: re.Match[str]) -> str:
+        states = f"{hashlib.sha256(match[1].encode()).hexdigest()[:16]}.js"
+        engine = (
+            f"window.rbcourseDisplay ??= (() => {{\n{ENGINE}\nreturn rbcourseDisplay;\n}})();\n"
+        )
+        (folder / "pictures").mkdir(parents=True, exist_ok=True)
+        for name, text in (("display.js", engine), (states, match[1])):
+            (folder / "pictures" / name).write_text(text, encoding="utf-8", newline="\n")
+        return "".join(f'<script src="{to}/{name}"></script>' for name in ("display.js", states))
+
+    return _PLAYER.sub(put, shown)
+
+
 def with_files(shown: str) -> str:
     """Return a figure whose caption links its files; a still leads to its picture in full size."""
 
@@ -152,6 +173,7 @@ def prepared(
                 moved = " and ".join(f"<b>{label}</b>" for label in _CONTROL.findall(figure))
                 shown["text/html"] = f"<p>Of its controls these move here: {moved}.</p>{figure}"
             shown["text/html"] = with_files(with_picture_files(shown["text/html"], known, folder))
+            shown["text/html"] = with_script_files(shown["text/html"], folder)
     notebook.cells = folded(cells)
     return relinked(sheet, path, sheet_page)
 

@@ -10,7 +10,7 @@ from typing import Any
 from pygments import format as formatted
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
-from pygments.token import Comment, Keyword, Number, String, Token
+from pygments.token import Comment, Keyword, String, Token
 
 from rbclassroom.book.lessons import Figure
 from rbclassroom.book.places import CONTENTS, file_of, full_name, has_page
@@ -52,7 +52,7 @@ def shown_code(root: Path) -> list[str]:
 def coloured(source: str) -> str:
     """Return Python code as HTML, with an anchor for each definition."""
     tokens = (
-        (next((kind for kind in (Comment, Keyword, Number, String) if found in kind), Token), text)
+        (next((kind for kind in (Comment, Keyword, String) if found in kind), Token), text)
         for found, text in PythonLexer(stripnl=False).get_tokens(source)
     )
     lines = formatted(tokens, HtmlFormatter(nowrap=True)).split("\n")

@@ -39,9 +39,9 @@ def spline_explorer() -> Explorer:
 
     On the left projected cubics with the velocities of parabolas, on the right with those of the
     spline. A line is the path of the first body axis on the sphere of directions, a stroke the
-    third axis, a dot a given orientation. Below, ‖ω′‖ over time. Controls: the ``ends``, "natural"
-    or "at rest"; ``pitch``, of the third orientation in degrees; ``third``, the time when it is
-    reached; and the time ``t`` in s, which plays (beyond BK 12, beyond BK 13).
+    third axis, a dot a given orientation. Below, ‖ω′‖ up to the present time. Controls: the
+    ``ends``, "natural" or "at rest"; ``pitch``, of the third orientation in degrees; ``third``, the
+    time when it is reached; and the time ``t`` in s, which plays (beyond BK 12, beyond BK 13).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -92,10 +92,11 @@ def spline_explorer() -> Explorer:
             artists[f"{kind} now"].set_data_3d(*now[:, :1])
             lines = [[(x, 0), (x, _STEEPEST)] for x in times[1:-1]]
             artists[f"{kind} joints"].set_segments(lines)
-            artists[f"{kind} ‖ω′‖"].set_data(inside, a)
+            artists[f"{kind} ‖ω′‖"].set_data(inside[inside <= t], a[inside <= t])
             artists[f"{kind} ‖ω′‖ now"].set_data([t], [np.linalg.norm(curve(t, 2))])
-            jumps = np.linalg.norm(curve.jumps(2), axis=1)
-            said[f"{kind}: ω′ jumps"] = f"by {numbers(jumps, 2)} rad/s²"
+            jumps = np.linalg.norm(curve.jumps(2), axis=1)[times[1:-1] <= t]
+            jumped = f"by {numbers(jumps, 2)} rad/s²" if len(jumps) else "not yet"
+            said[f"{kind}: ω′ jumps"] = jumped
             costs.append(rb.acceleration_cost(curve))
         least = rb.minimum_acceleration_spline_so3(times, R, rest).cost
         for kind, cost in zip(KINDS, costs, strict=True):

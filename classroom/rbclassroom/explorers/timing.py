@@ -52,7 +52,7 @@ def timing_explorer() -> Explorer:
         artists["now"] = new_line(ax, color=COLOURS["optimum"], marker="o", ls="")
         ax.legend(loc="lower right", bbox_to_anchor=(1.02, 1.0), handlelength=1.8)
     controls = {
-        "angular_speed": widgets.slider("ω at most (rad/s)", 1.5, 0.5, 3.0, 0.1),
+        "angular_speed": widgets.slider("ω at most (rad/s)", 1.0, 0.5, 3.0, 0.1),
         "speed": widgets.slider("v at most (m/s)", 1.5, 0.5, 3.0, 0.1),
         "acceleration": widgets.slider("a at most (m/s²)", 2.0, 0.5, 6.0, 0.1),
         "t": widgets.stepped("time t/T", 0.0, 0.0, 1.0, 0.01),

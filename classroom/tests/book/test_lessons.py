@@ -2,12 +2,15 @@
 
 import base64
 import io
+import re
+from pathlib import Path
 
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 from PIL import Image
 
 from rbclassroom.book import lessons
+from rbclassroom.course.notebooks import living
 
 
 def markdown(*texts):
@@ -47,6 +50,23 @@ def test_pictures_become_files_and_figures_are_not_written_twice(tmp_path):
     assert 'loading="lazy" src="../figures/one.png"' in found
     assert found.count(f'src="pictures/{written.name}"') == 2
     assert "base64" not in found
+
+
+def test_living_pictures_share_what_draws_them_and_equal_ones_their_states(tmp_path):
+    root = Path(__file__).parents[3]
+    cube, arm = (living(name, root) for name in ("cube", "arm"))
+    found = lessons.with_script_files(cube + arm + cube, tmp_path, "there")
+    sources = re.findall(r'<script src="there/([^"]+)"></script>', found)
+    assert len(sources) == 6
+    assert len(set(sources)) == 3
+    assert sources[0] == "display.js"
+    assert {path.name for path in (tmp_path / "pictures").iterdir()} == set(sources)
+    for shown, name in zip((cube, arm, cube), sources[1::2], strict=True):
+        states = (tmp_path / "pictures" / name).read_text("utf-8")
+        assert states.startswith("for (const image of")
+        assert states in shown
+        assert states not in found
+    assert found.count("<figcaption>") == 3
 
 
 def test_a_caption_links_its_files_and_a_still_its_picture():
