@@ -36,7 +36,8 @@ MAY_IMPORT = {  # the parts, beside itself, that a part of the packages may impo
     "rbclassroom.course": {"rbclassroom"},  # not even the mathematics
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbclassroom.course", "rbcourse.draw"},
-    "rbclassroom.book": {"rbclassroom.course", "rbclassroom.lecture", "rbclassroom.assignments"},
+    "rbclassroom.book": {"rbclassroom.course", "rbclassroom.lecture", "rbclassroom.assignments"}
+    | {"rbcourse.draw"},
 }
 PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))} | {
     "report",

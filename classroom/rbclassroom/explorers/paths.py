@@ -31,7 +31,7 @@ ANGLES = np.array([[-60.0, 0, 0], [-10, 40, 0], [50, -20, 30], [90, 20, 0]])
 """Yaw, pitch and roll of four orientations, in degrees."""
 KINDS = {"parabolas": "z", "spline": "path"}
 _STEEPEST = 8.0
-_BETWEEN = np.linspace(0, 1, 41)
+_BETWEEN = np.linspace(0, 1, 25)
 
 
 def spline_explorer() -> Explorer:
@@ -69,7 +69,7 @@ def spline_explorer() -> Explorer:
         "ends": widgets.choice("ends", ["natural", "at rest"]),
         "pitch": widgets.slider("third pitch (°)", -40.0, -60.0, 60.0, 5.0),
         "third": widgets.slider("third time (s)", 2.0, 2.0, 3.0, 0.1),
-        "t": widgets.stepped("time t (s)", 0.0, 0.0, 4.0, 0.04),
+        "t": widgets.stepped("time t (s)", 0.0, 0.0, 4.0, 0.05),
     }
 
     def show(ends: str, pitch: float, third: float, t: float) -> dict[str, str]:
@@ -82,7 +82,7 @@ def spline_explorer() -> Explorer:
         curves = rb.chain(times, R, w), rb.projected_spline_so3(times, R, rest)
         starts, h = times[:-1, None], np.diff(times)[:, None]
         inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()  # both sides of each joint
-        inside[::41] = times[:-1]
+        inside[:: len(_BETWEEN)] = times[:-1]
         said, costs = {}, []
         for kind, curve in zip(KINDS, curves, strict=True):
             path, now, a = curve(inside), curve(t), np.linalg.norm(curve(inside, 2), axis=-1)

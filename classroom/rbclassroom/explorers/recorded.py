@@ -40,9 +40,9 @@ MOVED: dict[str, tuple[str, Sequence[Any]]] = {
     "random": ("sampler", ["three angles", "uniform"]),
     "rotation": ("gamma", range(-140, 176, 45)),
     "screw": ("tilt", range(0, 91, 15)),
-    "spline": ("pitch", range(-60, 61, 20)),
+    "spline": ("pitch", [-60, -40, -20, 20, 60]),
     "theta": ("angle", range(10, 171, 10)),
-    "timing": ("acceleration", [0.5, 1, 1.5, 2, 3, 4, 6]),
+    "timing": ("acceleration", [0.5, 1, 2, 4, 6]),
 }
 """Of each explorer the control that is recorded beside what plays, and which of its values."""
 

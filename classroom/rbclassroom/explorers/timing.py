@@ -55,12 +55,12 @@ def timing_explorer() -> Explorer:
         "angular_speed": widgets.slider("ω at most (rad/s)", 1.0, 0.5, 3.0, 0.1),
         "speed": widgets.slider("v at most (m/s)", 1.5, 0.5, 3.0, 0.1),
         "acceleration": widgets.slider("a at most (m/s²)", 2.0, 0.5, 6.0, 0.1),
-        "t": widgets.stepped("time t/T", 0.0, 0.0, 1.0, 0.01),
+        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
     }
 
     @lru_cache(maxsize=16)
     def timed(*most: float) -> tuple[rb.Timed, float, dict[str, rb.Array]]:
-        limits = dict(zip(LIMITS, most, strict=True))
+        limits: dict[str, Any] = dict(zip(LIMITS, most, strict=True))
         used = rb.limits_used(path, **limits)
         even = max(x if name.endswith("speed") else x**0.5 for name, (x, _) in used.items())
         s = np.linspace(0, 3, 241)

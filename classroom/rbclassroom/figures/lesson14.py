@@ -106,7 +106,8 @@ def draw_accelerations(ax: Axes, data: Table, knots: ArrayLike) -> None:
         ax.axvline(knot, color=COLOURS["reference"], lw=0.8, ls=":")
     for name, _, values in _profiles(data):
         ax.plot(data[_TIME], values, label=name, **_CURVES[name])
-    ax.set(xlabel="time (s)", ylabel="ω′ about one axis (rad/s²)", xlim=(knots[0], knots[-1]))
+    t = np.asarray(data[_TIME])
+    ax.set(xlabel="time (s)", ylabel="ω′ about one axis (rad/s²)", xlim=(t[0], t[-1]))
     ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
 
@@ -156,7 +157,7 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
 
 def describe_turns(data: Table) -> str:
     """Return in words what `draw_turns` shows."""
-    names, values = list(data)[1::2], list(data.values())
+    names, values = list(data)[1::2], [np.asarray(x) for x in data.values()]
     said = (
         f"{name.removesuffix(' [rad]')} to {in_words(x[-1], 10)} rad, at most "
         f"{in_words(np.abs(bend).max(), 1)} rad off the straight line"

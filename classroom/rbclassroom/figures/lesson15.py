@@ -37,56 +37,54 @@ def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, 
 
     `limits` are norms, named as in `LIMITS`; the rate is infinite where nothing limits it.
     """
-    halves = [path(s, order).reshape(len(s), -1, 3) for order in (1, 2)]
-    squares = {1: [np.zeros(len(s))], 2: list[Array]()}
-    a, b = [], []
+    velocity, bend = (path(s, order).reshape(len(s), -1, 3) for order in (1, 2))
+    squares, a, b = [np.zeros(len(s))], list[Array](), list[Array]()
     for name, most in limits.items():
         order, half, _ = LIMITS[name]
         if order == 1:
-            squares[1].append(np.sum(halves[0][:, half] ** 2, axis=1) / most**2)
+            squares.append(np.sum(velocity[:, half] ** 2, axis=1) / most**2)
         else:
-            a.append(halves[0][:, half] / most)
-            b.append(halves[1][:, half] / most)
+            a.append(velocity[:, half] / most)
+            b.append(bend[:, half] / most)
     with np.errstate(divide="ignore"):
-        speeds = np.max(squares[1], axis=0) ** -0.5
+        speeds = np.max(squares, axis=0) ** -0.5
         return {"accelerations": _least(a, b) ** -0.25, "speeds": speeds}
 
 
 def _least(a: list[Array], b: list[Array]) -> Array:
     """Return the least max ‖a r + b‖² over r, at each place; a and b have a row for each limit."""
-    parts = [
-        [np.sum(x * y, axis=-1) for x, y in ((p, p), (p, q), (q, q))]
-        for p, q in zip(a, b, strict=True)
-    ]
-    if not parts:
+    if not a:
         return np.zeros(1)
-    aa, ab, bb = np.moveaxis(parts, 1, 0)
+    A, B = np.array(a), np.array(b)
+    aa, ab, bb = (np.sum(x * y, axis=-1) for x, y in ((A, A), (A, B), (B, B)))
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = list(-ab / aa)
         for i, j in combinations(range(len(aa)), 2):  # where two limits are equal
             p, q, r = (x[i] - x[j] for x in (aa, ab, bb))
             root = np.sqrt(q * q - p * r)
             trials += [(-q + root) / p, (-q - root) / p]
-    trials = np.nan_to_num(trials, nan=0, posinf=0, neginf=0)
-    return np.min(np.max(aa * trials[:, None] ** 2 + 2 * ab * trials[:, None] + bb, 1), 0)
+    r = np.nan_to_num(np.array(trials), nan=0, posinf=0, neginf=0)[:, None]
+    least: Array = np.min(np.max(aa * r**2 + 2 * ab * r + bb, axis=1), axis=0)
+    return least
 
 
 def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
     """Return over s the limit curves, the rate of a timing in `even` seconds, and the fastest.
 
-    Rates are cut at three times the largest of the fastest timing.
+    Rates above twice the largest of the fastest timing are left out.
     """
     s = np.linspace(*timed.curve.domain, 601)
     rates = highest_rates(timed.curve, s, limits)
     rates |= {"one rate": np.full(len(s), np.ptp(s) / even)}
     rates |= {"fastest": np.interp(s, timed.s, timed.rate**2) ** 0.5}
-    highest = 3 * rates["fastest"].max()
-    return {"s [s]": s, **{f"{name} [1]": np.minimum(x, highest) for name, x in rates.items()}}
+    highest = 2 * rates["fastest"].max()
+    shown = {f"{name} [1]": np.where(x <= highest, x, np.nan) for name, x in rates.items()}
+    return {"s [s]": s, **shown}
 
 
 def draw_phase_plane(ax: Axes, data: Table, knots: ArrayLike) -> None:
     """Draw a `phase_table`, with a dotted line at each pose."""
-    s, *columns = data.values()
+    s, *columns = (np.asarray(x) for x in data.values())
     for knot in np.asarray(knots):
         ax.axvline(knot, color="0.7", lw=1, ls=":")
     for (name, look), rate in zip(_LOOKS.items(), columns, strict=True):
@@ -121,7 +119,7 @@ def share_table(motion: Curve, limits: dict[str, float]) -> Table:
 
 def draw_shares(ax: Axes, data: Table) -> None:
     """Draw a `share_table`."""
-    t, *shares = data.values()
+    t, *shares = (np.asarray(x) for x in data.values())
     for name, share in zip(list(data)[1:], shares, strict=True):
         label = name.removesuffix(" [1]")
         ax.plot(t, share, label=label, **_SHARES[label.replace(" ", "_")])
@@ -158,7 +156,7 @@ def two_passes(highest: ArrayLike, step: float) -> tuple[Array, Array]:
 
 def draw_passes(ax: Axes, data: Table) -> None:
     """Draw the three columns of x over the place: the limits, and both passes."""
-    s, highest, back, both = data.values()
+    s, highest, back, both = (np.asarray(x) for x in data.values())
     ax.plot(s, highest, color=COLOURS["z"], ls="", marker="_", ms=22, mew=3, label="speed limit")
     ax.plot(s, back, color=COLOURS["reference"], ls="--", marker="o", label="from the end")
     ax.plot(s, both, color=COLOURS["optimum"], lw=2.5, marker="o", label="then from the start")
@@ -171,7 +169,8 @@ def draw_passes(ax: Axes, data: Table) -> None:
 
 def describe_passes(data: Table) -> str:
     """Return in words what `draw_passes` shows."""
-    _, highest, back, both = ([f"{x:g}" for x in column] for column in data.values())
+    columns = [np.asarray(x).tolist() for x in data.values()]
+    _, highest, back, both = ([f"{x:g}" for x in column] for column in columns)
     return (
         "The squared speeds at nine places of a straight path. Speed limits: "
         f"{', '.join(highest)}; after the pass from the end {', '.join(back)}; after the pass from "
