@@ -74,7 +74,7 @@ def timing_explorer() -> Explorer:
         artists["acceleration limit"].set_data(s, highest["accelerations"])
         artists["speed limits"].set_data(s, highest["speeds"])
         artists["one rate"].set_data([0, 3], [rate, rate])
-        artists["fastest"].set_data(fastest.s[::5], fastest.rate[::5])
+        artists["fastest"].set_data(fastest.s, fastest.rate)
         here = fastest.progress(now)
         artists["now"].set_data([here[0]], [here[1]])
         move_box(artists["box"], fastest(now), _EDGES)
