@@ -50,7 +50,7 @@ def spline_explorer() -> Explorer:
             draw_sphere(ax)
             ax.view_init(elev=20, azim=12)
             below = fig.add_axes((0.11 + 0.48 * i, 0.15, 0.38, 0.24))
-            below.set(xlim=(0, 4), ylim=(0, _STEEPEST), xticks=[0, 1, 2, 3, 4], yticks=[0, 4, 8])
+            below.set(xlim=(0, 4), ylim=(0, _STEEPEST), xticks=[0, 1, 2, 3, 4], yticks=[0, 3, 6])
             below.set_xlabel("time (s)")
             below.tick_params(labelleft=i == 0)
             fig.text(0.3 + 0.48 * i, 0.94, kind, ha="center")
