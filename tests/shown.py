@@ -166,7 +166,7 @@ def lost_columns(file, pools):
         if share:
             pool = pools[name_for(column, pools)]
             values = np.unique(cells[rows].astype(float))
-            values = values[np.isfinite(values)]  # what is nan is not drawn
+            values = values[np.isfinite(values)]  # nan is not drawn
             lost = [v for v in values if not (held(pool, v) or held(pool, np.degrees(v)))]
             if len(lost) > (1 - share) * len(values):
                 yield f"{place}: {len(lost)} of {len(values)} are not in the picture"

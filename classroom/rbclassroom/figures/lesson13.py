@@ -133,7 +133,7 @@ def describe_normal(data: Table) -> str:
 
 
 def _by_kind(data: Table) -> dict[str, list[Array]]:
-    """Return the motions of a `normal_table`, shape (times, 2), in lists by what they are."""
+    """Return the motions of a `normal_table`, shape (times, 2), by their kind."""
     found: dict[str, list[Array]] = {}
     for name, motion in vectors(_FREE, data, "xy").items():
         found.setdefault(name.rpartition(" ")[0], []).append(motion)
