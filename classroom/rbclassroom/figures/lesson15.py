@@ -108,12 +108,15 @@ def describe_phase_plane(data: Table) -> str:
 
 
 def share_table(motion: Curve, limits: dict[str, float]) -> Table:
-    """Return which share of each limit a motion uses, over time."""
+    """Return which share of each limit a motion uses, over time, to four decimals."""
     rates = {order: profile_table(motion, order, 1201) for order in (1, 2)}
     shares = {name: np.asarray(rates[LIMITS[name][0]][LIMITS[name][2]]) for name in limits}
     return {
         "t [s]": rates[1]["t [s]"],
-        **{f"{name.replace('_', ' ')} [1]": x / limits[name] for name, x in shares.items()},
+        **{
+            f"{name.replace('_', ' ')} [1]": np.round(x / limits[name], 4)
+            for name, x in shares.items()
+        },
     }
 
 
