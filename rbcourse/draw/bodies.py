@@ -84,13 +84,15 @@ def draw_centre_path(ax: Any, places: Array) -> Any:
     return ax.plot(*places.T, "*-", color=COLOURS["optimum"], ms=7, lw=0.8)[0]
 
 
-def set_space(ax: Any, places: Array, side: float, view: tuple[float, float] = (18, -22)) -> None:
+def set_space(
+    ax: Any, places: Array, side: float, view: tuple[float, float] = (18, -22), zoom: float = 1.0
+) -> None:
     """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it.
 
     `view` has the elevation and the azimuth in degrees.
     """
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
-    ax.fit(low, high, zoom=0.9)
+    ax.fit(low, high, zoom)
     ax.view_init(*view)
     draw_room(ax, low, high)
 
@@ -137,7 +139,13 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
         for tick in ticks[k]:
             place = start + (tick - start[k]) * along + beside[k]
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
-        ax.text(*(end + 0.09 * np.max(high - low) * along), f"{name} (m)", **centred)
+        if name == "z":
+            place = end + 0.09 * np.max(high - low) * along
+        else:  # beyond the numbers, and between two of them
+            marks = np.array([start[k], *ticks[k], end[k]])
+            widest = np.diff(marks).argmax()
+            place = start + (marks[widest : widest + 2].mean() - start[k]) * along + 3 * beside[k]
+        ax.text(*place, f"{name} (m)", **centred)
 
 
 def _ticks(low: float, high: float) -> list[float]:
@@ -175,8 +183,8 @@ def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
     paths = np.array([poses[:, :3, 3].T for poses in ways.values()])
     places = np.concatenate(paths, axis=1).T
     tips = [A[:3, 3] + A[:3, :3].T for A in frames]
-    set_space(ax, np.concatenate([places, *tips]), 1.5, _across(paths))
-    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.1))
+    set_space(ax, np.concatenate([places, *tips]), 1.2, _across(paths), 1.0)
+    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.05))
     return lines
 
 
@@ -250,7 +258,8 @@ def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
     artists = []
     for axis, direction in zip("xyz", R.T, strict=True):
         artists.append(draw_arrow(ax, origin, direction, COLOURS[axis]))
-        ax.text(*(origin + 1.15 * direction), f"${axis}_{name}$", color=COLOURS[axis])
+        letter: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
+        ax.text(*(origin + 1.4 * direction), f"${axis}_{name}$", **letter)
     return artists
 
 

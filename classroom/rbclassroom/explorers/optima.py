@@ -80,7 +80,7 @@ def cube_explorer() -> Explorer:
     with new_figure() as fig:
         artists: dict[str, Any] = {}
         for (way, dash), left in zip(_WAYS.items(), (0.0, 0.5), strict=True):
-            ax: Any = fig.add_axes((left - 0.09, -0.05, 0.65, 1.0), projection="space")
+            ax: Any = fig.add_axes((left - 0.09, 0.03, 0.65, 0.95), projection="space")
             ax.fit(_LOW, _HIGH, zoom=1.04)
             ax.view_init(elev=18, azim=-22)
             draw_ground(ax, _LOW, _HIGH)

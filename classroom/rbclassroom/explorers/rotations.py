@@ -136,11 +136,11 @@ def random_explorer() -> Explorer:
         fig.text(0.26, 0.91, "images of e₁", ha="center")
         pink = {"color": COLOURS["projection"]}
         artists: dict[str, Any] = {"points": new_line(ax, **pink, marker="o", ls="", ms=4, mew=0)}
-        side = fig.add_axes((0.62, 0.19, 0.36, 0.69))
-        side.set(xlim=(0, 3.2), ylim=(-1, 1), title="their heights", xlabel="density")
+        side = fig.add_axes((0.62, 0.25, 0.36, 0.63))
+        side.set(xlim=(0, 3.2), ylim=(-1, 1), title="their heights")
+        side.set_xlabel("density\n(dashed: uniform)")
         side.set_yticks([-1, -0.5, 0, 0.5, 1])
         side.axvline(0.5, color="black", ls="--", lw=1.5)
-        side.text(0.85, 0, "dashed:\nuniform", va="center")
         fig.text(0.26, 0.02, "pale: the far side", ha="center")
         steps: Any = {"orientation": "horizontal", "lw": 2, **pink}
         artists["histogram"] = side.stairs(np.zeros(20), _BINS, **steps)

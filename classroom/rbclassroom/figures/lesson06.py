@@ -80,7 +80,7 @@ def draw_chord(ax: Axes, data: Table) -> None:
     steps, marks = "equal steps on the chord", "their projections on the circle"
     ax.plot(x, y, "s-", color=COLOURS["optimum"], ms=5, label=steps)
     ax.plot(*projected, "o", color=COLOURS["projection"], ms=8, label=marks)
-    for k, offset in ((0, (-16, -22)), (len(x) // 2, (8, 8)), (-1, (-54, -4))):
+    for k, offset in ((0, (-16, -22)), (len(x) // 2, (8, 8)), (-1, (-50, 6))):
         ax.annotate(f"t = {t[k]:g}", (x[k], y[k]), offset, textcoords="offset points")
     ax.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.16, 1.08))
     ax.set(xlabel="real part", ylabel="imaginary part")

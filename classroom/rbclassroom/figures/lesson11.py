@@ -59,11 +59,11 @@ def moving_casteljau(
         outward = given - given.mean(axis=0)
         outward *= 0.12 * np.ptp(given) / np.linalg.norm(outward, axis=-1, keepdims=True)
         for word, place in zip(_NAMES[name], given + outward, strict=True):
-            ax.text(*place, word, ha="center", va="center", zorder=9)
+            ax.text(*place, word, ha="center", va="center", zorder=9, fontsize=16)
         lines += ax.plot(*levels[3][0].T, color=COLOURS["z"], lw=4, zorder=7)
         lines += ax.plot(*levels[3][0].T, "o", color=COLOURS["optimum"], ms=12, zorder=8)
         panels.append((levels[3][:, 0], legs[1:], lines[1:]))
-    clock = plane.text(0.02, 0.02, "", transform=plane.transAxes)
+    clock = plane.text(0.02, 0.02, "", transform=plane.transAxes, fontsize=16)
 
     def update(i: int) -> list[Any]:
         clock.set_text(f"t = {t[i]:.2f}")

@@ -16,11 +16,12 @@ async () => {
       if (left < body.left - room || right > body.right + room) say(`too wide: ${part.tagName} ${part.textContent}`);
       if (top < body.top - 2 * room || bottom > body.bottom + 2 * room) say(`too high: ${part.tagName} ${part.textContent}`);
     }
-    for (const part of section.querySelectorAll("figure > :is(img, canvas), figure > div > div:not(.rbcourse-view)")) {
+    const cut = () => [...section.querySelectorAll("figure > :is(img, canvas), figure > div > div:not(.rbcourse-view)")].filter((part) => {
       const { left, right, bottom } = box(part), margin = part.parentElement.dataset.crop ? 1e9 : 3 * scale;
-      if (seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin))
-        say(`picture cut: ${part.tagName}`);
-    }
+      return seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin);
+    });
+    for (let wait = 0; wait < 120 && cut().length; wait++) await frame();  // a living picture gets its size late
+    for (const part of cut()) say(`picture cut: ${part.tagName}`);
     const texts = document.createTreeWalker(section, NodeFilter.SHOW_TEXT);
     while (texts.nextNode()) {
       const part = texts.currentNode.parentElement, apart = "aside, script, sup, sub, mjx-container, .rbcourse-view, [role=status]";

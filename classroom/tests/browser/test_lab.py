@@ -43,9 +43,24 @@ def opened(home, lab, page):
         shutil.copy(path, path.with_stem(name))
         open_in_lab(page, lab(f"workspaces/{name}/tree/{name}.ipynb"))
         page.get_by_text(IDLE).wait_for()
+        show_all(page, path)
         return path.with_stem(name)
 
     return open_
+
+
+def show_all(page, path):
+    """Wait until the last cell is there.
+
+    On a busy machine JupyterLab may stop before, until its window has another height.
+    """
+    last = len(nbformat.read(path, as_version=4).cells) - 1
+    for more in range(100):
+        if page.locator(f".jp-Cell[data-windowed-list-index='{last}']").count():
+            return
+        page.set_viewport_size({"width": 1280, "height": 30_000 + 10 * more})
+        page.evaluate(FRAMES, 30)
+    raise AssertionError("JupyterLab does not show all cells")
 
 
 def run_explorer(page, path):
@@ -86,6 +101,8 @@ def test_a_stored_lesson_is_whole_and_its_explorer_lives_as_long_as_its_kernel(o
     page.evaluate(f"{PANEL}.context.save()")
     page.wait_for_function(f"!{DIRTY}")
     page.reload()
+    page.locator(".jp-NotebookPanel .jp-Cell").first.wait_for()
+    show_all(page, path)
     page.wait_for_function(WHOLE, arg=stored)
     still = page.get_by_role("img", name=re.compile(r"^The line and its shadow\. θ\(t\): "))
     expect(still).to_have_js_property("tagName", "IMG")
