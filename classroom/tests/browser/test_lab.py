@@ -3,10 +3,12 @@
 import html
 import re
 import shutil
+from contextlib import suppress
 
 import nbformat
 import pytest
 from pages import FRAMES, IDLE, SEEN, open_in_lab, wait_for
+from playwright.sync_api import TimeoutError as TooLate
 from playwright.sync_api import expect
 
 PANEL = "jupyterapp.shell.currentWidget"
@@ -54,12 +56,12 @@ def show_all(page, path):
 
     On a busy machine JupyterLab may stop before, until its window has another height.
     """
-    last = len(nbformat.read(path, as_version=4).cells) - 1
-    for more in range(100):
-        if page.locator(f".jp-Cell[data-windowed-list-index='{last}']").count():
-            return
+    number = len(nbformat.read(path, as_version=4).cells) - 1
+    last = page.locator(f".jp-Cell[data-windowed-list-index='{number}']")
+    for more in range(1, 60):
+        with suppress(TooLate):
+            return last.wait_for(state="attached", timeout=5_000)
         page.set_viewport_size({"width": 1280, "height": 30_000 + 10 * more})
-        page.evaluate(FRAMES, 30)
     raise AssertionError("JupyterLab does not show all cells")
 
 
