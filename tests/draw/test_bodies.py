@@ -75,6 +75,32 @@ def test_ways_are_the_paths_with_the_frame_at_the_start_and_once_at_each_end(axe
     axes[0].sight()  # though the way is in no plane
 
 
+@pytest.mark.parametrize("view", [(18, -22), (32, -65), (60, 140)])
+def test_names_of_axes_are_beyond_the_numbers_and_apart_from_all_texts(view, axes):
+    ax, places = axes[0], np.array([[0, 0, 0], [8, 10, 12.0]])
+    ax.figure.set_size_inches(13, 5)
+    bodies.set_space(ax, places, 2.0, view)
+    seen = ax.sight()
+    at = np.array([text.get_position_3d() for text in ax.texts])
+    found, words = seen.flat(seen.scale * (at - seen.middle)), [x.get_text() for x in ax.texts]
+    low, high = places.min(axis=0) - 1.8, places.max(axis=0) + 1.8
+    numbers = 0.1 * np.max(high - low)
+    for i in (words.index(f"{name} (m)") for name in "xyz"):
+        across, up = np.abs(np.delete(found, i, axis=0) - found[i]).T
+        assert ((across > 30) | (up > 12)).all(), words[i]
+    assert at[words.index("x (m)"), 1] < low[1] - numbers
+    assert at[words.index("y (m)"), 0] > high[0] + numbers
+
+
+def test_letters_of_a_frame_are_beyond_its_arrows(axes):
+    R, origin = A1[:3, :3], A1[:3, 3]
+    bodies.draw_triad(axes[0], origin, R, "M")
+    for text, direction in zip(axes[0].texts, R.T, strict=True):
+        beyond = text.get_position_3d() - origin
+        assert np.abs(np.cross(beyond, direction)).max() < 1e-14
+        assert beyond @ direction > 1.1
+
+
 def test_descriptions_give_numbers():
     bump = 4 * TIMES * (1 - TIMES) ** 2  # most at 1/3, of the six times at 0.4
     turns = rb.exp_so3(np.radians(50) * np.outer(bump, [0, 0.6, 0.8]))

@@ -23,7 +23,8 @@ POSES = rb.pose_from_coordinates(
 SHARES = np.array([0.0, 0.35, 0.65, 1.0])
 """When each is reached, of the whole time."""
 JOINED = ["geodesics", "cubics, parabolas", "cubics, spline", "the optimum"]
-_EDGES = np.array([0.9, 0.6, 0.3])
+EDGES = np.array([0.9, 0.6, 0.3])
+"""Of the box, in m."""
 _LONGEST = 12.0
 _WAYS = {"angular speed (rad/s)": 2.5, "speed (m/s)": 3.5}
 
@@ -119,7 +120,7 @@ def chain_explorer() -> Explorer:
         artists: dict[str, Any] = {
             "way": new_line(space, color=COLOURS["path"]),
             "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
-            "box": draw_box(space, POSES[0], _EDGES),
+            "box": draw_box(space, POSES[0], EDGES),
         }
         artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
         for i, (name, high) in enumerate(_WAYS.items()):
@@ -142,7 +143,7 @@ def chain_explorer() -> Explorer:
         motion, best = _joined(curve, knots), _joined(JOINED[-1], knots)
         times, now = np.linspace(0, duration, 241), t * duration
         artists["way"].set_data_3d(*motion(times)[:, :3, 3].T)
-        move_box(artists["box"], motion(now), _EDGES)
+        move_box(artists["box"], motion(now), EDGES)
         speeds, here = _norms(motion(times, 1)), _norms(motion(now, 1))
         for i, (name, high) in enumerate(_WAYS.items()):
             artists[name].set_data(times, speeds[:, i])

@@ -8,13 +8,12 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
-from rbclassroom.explorers.paths import POSES
+from rbclassroom.explorers.paths import EDGES, POSES
 from rbclassroom.figures.lesson15 import highest_rates
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 
 LIMITS = "angular_speed", "speed", "acceleration"
-_EDGES = np.array([0.9, 0.6, 0.3])
 _HIGHEST = 2.0
 _IN_USE = 0.995
 
@@ -34,7 +33,7 @@ def timing_explorer() -> Explorer:
         artists: dict[str, Any] = {
             "way": new_line(space, color=COLOURS["path"]),
             "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
-            "box": draw_box(space, POSES[0], _EDGES),
+            "box": draw_box(space, POSES[0], EDGES),
         }
         artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
         artists["way"].set_data_3d(*path(np.linspace(0, 3, 121))[:, :3, 3].T)
@@ -77,7 +76,7 @@ def timing_explorer() -> Explorer:
         artists["fastest"].set_data(fastest.s, fastest.rate)
         here = fastest.progress(now)
         artists["now"].set_data([here[0]], [here[1]])
-        move_box(artists["box"], fastest(now), _EDGES)
+        move_box(artists["box"], fastest(now), EDGES)
         V, A = fastest(now, 1), fastest(now, 2)
         used = np.linalg.norm([V[:3], V[3:], A[3:]], axis=1) / most
         names = [n for n, x in zip(("ω", "v", "a"), used, strict=True) if x > _IN_USE]

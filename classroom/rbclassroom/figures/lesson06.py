@@ -82,7 +82,7 @@ def draw_chord(ax: Axes, data: Table) -> None:
     ax.plot(*projected, "o", color=COLOURS["projection"], ms=8, label=marks)
     for k, offset in ((0, (-16, -22)), (len(x) // 2, (8, 8)), (-1, (-50, 6))):
         ax.annotate(f"t = {t[k]:g}", (x[k], y[k]), offset, textcoords="offset points")
-    ax.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-0.16, 1.08))
+    ax.set(aspect="equal", xlim=(-1.24, 1.12), ylim=(-0.16, 1.08))
     ax.set(xlabel="real part", ylabel="imaginary part")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
 

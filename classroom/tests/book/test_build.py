@@ -44,19 +44,15 @@ def test_the_sources_have_all_parts(written):
     )
     assert {
         *("index.md", "install.md", "ledger.md", "figures.md", "references.md", "conventions.md"),
-        *(
-            "changelog.md",
-            "contributing.md",
-            "museum.md",
-            "lessons/index.md",
-            "lessons/06_geodesics.ipynb",
-        ),
+        *("changelog.md", "contributing.md", "museum.md"),
+        *("lessons/index.md", "lessons/06_geodesics.ipynb"),
         *("teach/06_geodesics.md", "teach/questions.md", "teach/problem_sets.md"),
         *("problems/ps1.ipynb", "package/index.md", "package/draw.save.rst"),
         "files/LICENSE",
     } <= sources
     assert {"figures/paper_fig5a.csv", "code/tests/test_so3.html"} <= extra
     assert {f"{name}.html" for name in MOVED} <= extra
+    assert "lessons/14_take_it_away.html" in extra
     assert {f"lessons/{path.name}" for path in LESSONS} <= extra
     assert "figures/explorers" not in extra
 
@@ -174,6 +170,7 @@ def row(page, anchor):
 
 def test_the_gallery_has_all_figures_with_their_files(source):
     page = source("figures.md")
+    assert '<a id="lesson16_marks"></a><a id="lesson14_marks"></a>' in page
     assert page.count("<img ") == len(list(FIGURES.glob("*.png")))
     for path in FIGURES.glob("*.*"):
         assert f'href="figures/{path.name}"' in page
