@@ -1,6 +1,12 @@
 """Pictures: artists on axes that the caller owns, and figures and animations as files."""
 
+from pathlib import Path
+
+from matplotlib import font_manager
+
 from rbcourse.draw.animate import save_animation
 from rbcourse.draw.save import named_tables, save_figure, save_table
+
+font_manager.fontManager.addfont(Path(__file__).with_name("CourseSans.ttf"))  # for the styles
 
 __all__ = ["named_tables", "save_animation", "save_figure", "save_table"]
