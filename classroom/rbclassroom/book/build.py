@@ -12,7 +12,7 @@ import webbrowser
 from collections import defaultdict
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from jinja2 import Environment, FileSystemLoader
 
 from rbclassroom.assignments.handout import pack, release
 from rbclassroom.book import lessons, places, reference
+from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.course import ledger
 from rbclassroom.course.notebooks import lesson_paths, living
@@ -55,6 +56,11 @@ class Sources:
     repository: str = ""
     shown: dict[str, Any] = field(default_factory=dict)
 
+    @cached_property
+    def works(self) -> dict[str, str]:
+        """How the works that the course cites are called."""
+        return names(self.read("notebooks/REFERENCES.bib"))
+
     def read(self, path: str) -> str:
         """Return a file of the course."""
         return (self.root / path).read_text(encoding="utf-8")
@@ -76,6 +82,8 @@ class Sources:
     def put_lessons(self) -> None:
         """Write the lessons, their run sheets and their slides."""
         figures, works, shown = list[lessons.Figure](), defaultdict(list), []
+        readme = self.read("README.md")
+        decks = {path.stem: deck_of(path) for path in lesson_paths(self.root / "notebooks")}
         pictures = sorted((self.root / "figures").glob("*.png"))
         known = {path.read_bytes(): f"../figures/{path.name}" for path in pictures}
         for path in lesson_paths(self.root / "notebooks"):
@@ -85,13 +93,31 @@ class Sources:
             figures += lessons.figures_of(path.name, notebook)
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
-            sheet = lessons.prepared(notebook, path.name, self.root, known, self.extra / "lessons")
+            picture = decks[path.stem].sections[0][0].picture
+            lead = picture.html.partition("<script")[0] if picture else ""
+            where = self.extra / "lessons"
+            sheet = lessons.prepared(notebook, path.name, self.root, known, where, lead)
             lessons.add_buttons(notebook, path.name, self.repository)
             self.put(page, nbformat.writes(notebook))
             if sheet:
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
-            short = f"{path.stem[:2]} {title.partition(':')[0]}"
-            shown.append({"stem": path.stem, "short": short, "sheet": sheet})
+            row = re.search(rf"^\| \[.*\]\(.*{path.name}\) \| (.*) \| (.*) \|$", readme, re.M)
+            question, minutes = row.groups() if row else ("", "")
+            card = CONTENTS["cards"].get(path.stem[:2])
+            drawn = re.search(
+                r'<figure class="lead"><img [^>]*src="([^"]+)"', notebook.cells[0].source
+            )
+            shown.append(
+                {
+                    "stem": path.stem,
+                    "number": path.stem[:2],
+                    "name": title.partition(":")[0],
+                    "sheet": sheet,
+                    "question": question,
+                    "minutes": minutes,
+                    "picture": f"../figures/{card}.png" if card else drawn[1] if drawn else "",
+                }
+            )
         self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
         beside = {
             content: re.sub("^pictures", "../lessons/pictures", to) for content, to in known.items()
@@ -99,7 +125,6 @@ class Sources:
         ready = partial(
             lessons.with_picture_files, known=beside, folder=self.extra / "slides", loading="eager"
         )
-        decks = {path.stem: deck_of(path) for path in lesson_paths(self.root / "notebooks")}
         write_decks(decks, self.extra / "slides", ready)
 
     def put_problem_sets(self) -> None:
@@ -138,12 +163,11 @@ class Sources:
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
-                rows = re.findall(r"^\| \[\d\d .*", text, re.MULTILINE)
-                self.shown["table"] = relinked("\n".join(rows), path, "lessons/index.md")
-                self.shown["run"] = relinked(text[text.index("## Start") :], path, page)
+                self.shown["run"] = relinked(text[text.index("| to learn |") :], path, page)
                 continue  # there is a template for the page
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
+            text = with_citations(text, self.works, listed(text), "references.html")
             self.put(page, relinked(text, path, page))
 
     def put_course(self) -> None:
@@ -167,12 +191,13 @@ class Sources:
 
     def put_fronts(self) -> None:
         """Write the start page and the pages that lead to others."""
-        cube = living("cube", self.root)
+        cube = living("cube", self.root).replace("<figure>", '<figure class="hero">', 1)
         where = self.extra / "lessons", "lessons/pictures"
         self.put("scene.html", lessons.with_script_files(cube, *where))
         for path in (HERE / "pages").rglob("*.md"):
             page = path.relative_to(HERE / "pages").as_posix()
-            self.put(page, self.rendered(page))
+            text = self.rendered(page)
+            self.put(page, with_citations(text, self.works, listed(text), "references.html"))
 
 
 def _write(path: Path, text: str) -> None:

@@ -1,6 +1,8 @@
 """What Sphinx is to do with the sources of the book; it reads this file itself."""
 
+import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ extensions += ["numpydoc"]
 
 nb_execution_mode = "off"
 nb_merge_streams = True
+nb_code_prompt_show, nb_code_prompt_hide = "Show the code", "Hide the code"
 myst_enable_extensions = ["amsmath", "dollarmath"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
@@ -25,11 +28,13 @@ toc_object_entries = False  # the navigation of each page would hold them all
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["book.css"]
+html_js_files = ["book.js"]
 exclude_patterns = ["files"]
 html_favicon = "static/favicon.svg"
 html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
-html_show_search_summary = False  # pages of a folder may not read each other
+html_show_search_summary = False  # pages of a folder may not read each other: see `write_texts`
 mathjax_path = "tex-svg.js"
+mathjax3_config = {"svg": {"scale": 0.97, "mtextInheritFont": True}}
 
 
 def name_sections(_app: Any, doctree: Any) -> None:
@@ -80,6 +85,21 @@ def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
     return f"../code/{file.removesuffix('.py')}.html#{name}"
 
 
+def write_texts(app: Any, failed: Exception | None) -> None:
+    """Write the words of all pages that can be found, for excerpts beside what a search finds."""
+    if failed:
+        return
+    texts = {}
+    for name in sorted(app.env.found_docs):
+        if "nosearch" not in app.env.metadata[name]:
+            leaves = app.env.get_doctree(name).findall(lambda node: not node.children)
+            apart = {"comment", "math", "math_block", "raw"}
+            shown = [x.astext() for x in leaves if not {x.tagname, x.parent.tagname} & apart]
+            texts[name] = re.sub(r"\s+", " ", " ".join(shown))
+    text = f"window.texts = {json.dumps(texts, ensure_ascii=False, separators=(',', ':'))};\n"
+    (Path(app.outdir) / "_static" / "texts.js").write_text(text, encoding="utf-8", newline="\n")
+
+
 def setup(app: Any) -> None:
     """Add MathJax, and what these functions do, before the contents of a page are collected."""
     app.config.html_static_path.append(str(mathjax()))
@@ -89,3 +109,4 @@ def setup(app: Any) -> None:
     app.connect("doctree-read", name_sections, priority=400)
     app.connect("autodoc-process-docstring", join_ledger, priority=900)
     app.connect("missing-reference", find_anywhere)
+    app.connect("build-finished", write_texts)

@@ -1,28 +1,35 @@
-"""A stored lesson as a page: outputs are kept, answers folded, the run sheet is split off."""
+"""A stored lesson as a page: its picture first, polls to answer, code and answers folded.
+
+Outputs are kept, and the run sheet is split off.
+"""
 
 import base64
 import copy
 import hashlib
+import io
 import re
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
+from PIL import Image
 
+from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.places import relinked, with_keys
+from rbclassroom.book.polls import voted
 from rbclassroom.course.notebooks import lesson_paths, living, split_sheet
 from rbcourse.draw.display import ENGINE
+from rbcourse.draw.save import caption
 
 _PICTURE = re.compile(r'(<img\b[^>]*?) src="data:image/png;base64,([^"]+)"')
 _PLAYER = re.compile(r"<script>\{\n.*?\n(for \(const image of [^\n]*)\n\}</script>", re.DOTALL)
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
-_APART = re.compile(r"(the lecturer's) (run sheets?) (is|are) at the end")
+_SHEET = re.compile(r"; the lecturer's (run sheets?) (?:is|are) at the end")
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
 _LESSON = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|<[^>]*>|\b(lesson (\d+))\b")
-_CONTROL = re.compile(r'\{"label":"([^"]+)"')
 _EXPLORER = re.compile(r"explorers\.(\w+)_explorer\(\)")
 
 
@@ -31,13 +38,17 @@ class Figure:
     """A figure of a lesson.
 
     Its files have its `name`. The lesson and the section that draw it are its `place`, such as
-    ``06_geodesics.ipynb, 3``, with these `lines`. The `text` describes it.
+    ``06_geodesics.ipynb, 3``. The `text` describes it.
     """
 
     name: str
     place: str
-    lines: str
     text: str
+
+    @property
+    def caption(self) -> str:
+        """What stands below it, as HTML."""
+        return re.sub("</?figcaption>", "", caption(self.text))
 
 
 def figures_of(lesson: str, notebook: NotebookNode) -> list[Figure]:
@@ -51,7 +62,7 @@ def figures_of(lesson: str, notebook: NotebookNode) -> list[Figure]:
             shown = [t.partition(": ")[2] for t in texts if t.startswith(f"{name}: ")]
             if not shown:
                 raise ValueError(f"{lesson}: {name} has no stored output")
-            found.append(Figure(name, f"{lesson}, {section}", cell.source, shown[0]))
+            found.append(Figure(name, f"{lesson}, {section}", shown[0]))
     return found
 
 
@@ -94,6 +105,7 @@ def with_picture_files(
     """Return HTML whose pictures are files, by default loaded when they come into sight.
 
     Those that are not `known`, as addresses by contents, are written to ``pictures`` in a folder.
+    Where a wide one can be cut between its panels is in the attribute ``data-cuts``.
     """
 
     def put(match: re.Match[str]) -> str:
@@ -102,11 +114,32 @@ def with_picture_files(
             known[content] = f"pictures/{hashlib.sha256(content).hexdigest()[:16]}.png"
             (folder / "pictures").mkdir(parents=True, exist_ok=True)
             (folder / known[content]).write_bytes(content)
-        width, height = struct.unpack(">II", content[16:24])
+        with Image.open(io.BytesIO(content)) as still:
+            (width, height), cuts = still.size, cuts_of(still)
         before = match[1].replace('style="', f'style="aspect-ratio: {width}/{height}; ', 1)
+        if cuts:
+            before += f' data-cuts="{" ".join(map(str, cuts))}"'
         return f'{before} loading="{loading}" src="{known[content]}"'
 
     return _PICTURE.sub(put, shown)
+
+
+def cuts_of(still: Image.Image) -> list[float]:
+    """Return where a wide still can be cut between its panels, as shares of its width.
+
+    The cuts are in the middle of blank columns, near those of equal parts that are up to half
+    as wide again as they are high.
+    """
+    width, height = still.size
+    if width < 1.8 * height:
+        return []
+    parts = round(width / height / 1.3)
+    blank = (np.asarray(still.convert("L")) > 245).all(axis=0)
+    gaps = np.flatnonzero(np.diff(blank, prepend=False, append=False)).reshape(-1, 2)
+    middles = gaps[np.diff(gaps)[:, 0] > 0.008 * width].mean(axis=1) / width
+    inner = middles[(middles > 0.2) & (middles < 0.8)]
+    near = [inner[np.abs(inner - k / parts).argmin()] for k in range(1, parts) if inner.size]
+    return sorted({round(float(cut), 4) for cut in near})
 
 
 def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
@@ -142,39 +175,68 @@ def with_files(shown: str) -> str:
     return _FILES.sub(put, shown)
 
 
+def with_lead(text: str, picture: str) -> str:
+    """Return the first cell of a lesson with its picture after the question."""
+    question, table, rest = text.partition("\n| | |\n")
+    return f'{question}\n<figure class="lead">{picture}</figure>\n{table}{rest}'
+
+
+def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
+    """Return cells with those of code ahead of the first section, the imports, at the end."""
+    first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
+    imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
+    others = [cell for cell in cells if not any(cell is each for each in imports)]
+    text = new_markdown_cell("The code of this lesson begins with these imports.")
+    return [*others, text, *imports] if imports else others
+
+
+def hide_code(cells: list[NotebookNode]) -> None:
+    """Fold the code of cells, but for that which is in a folded answer."""
+    inside = False
+    for cell in cells:
+        if cell.cell_type == "markdown" and re.match("</?details", cell.source):
+            inside = cell.source.startswith("<details")
+        elif cell.cell_type == "code" and not inside:
+            cell.metadata.tags = [*cell.metadata.get("tags", []), "hide-input"]
+
+
 def prepared(
-    notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path
+    notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path, lead: str
 ) -> str:
     """Prepare the notebook of a lesson for the book, and return its run sheet.
 
-    Its pictures become files, see `with_picture_files`.
+    Its pictures become files, see `with_picture_files`; the one that it begins with is `lead`.
     """
     path, page, sheet_page = f"notebooks/{name}", f"lessons/{name}", f"teach/{Path(name).stem}.md"
-    names = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
+    lessons = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
+    works = names((root / "notebooks" / "REFERENCES.bib").read_text("utf-8"))
+    cells, sheet = split_sheet(notebook)
+    here = {key for cell in cells for key in listed(cell.source)}
 
     def to_lesson(match: re.Match[str]) -> str:
-        found = names.get(int(match[2] or -1))
+        found = lessons.get(int(match[2] or -1))
         return f"[{match[1]}]({found})" if found else match[0]
 
-    cells, sheet = split_sheet(notebook)
+    cells[0].source = with_lead(cells[0].source, with_picture_files(lead, known, folder))
+    voted(cells)
     for cell in cells:
         if cell.cell_type == "markdown":
             lines = cell.source.split("\n")
             keyed = [with_keys(x, page) if x.startswith("<small>") else x for x in lines]
             text = relinked(_LESSON.sub(to_lesson, "\n".join(keyed)), path, page)
-            cell.source = _APART.sub(rf"\1 [\2](../{sheet_page}) \3 apart", text)
+            text = _SHEET.sub(rf" · [\1 for lecturers](../{sheet_page})", text)
+            cell.source = with_citations(text, works, here, "../references.html")
             continue
         explorer = _EXPLORER.search(cell.source)
         for shown in (
             output.data for output in cell.outputs if "text/html" in output.get("data", {})
         ):
             if explorer:
-                figure = living(explorer[1], root)
-                moved = " and ".join(f"<b>{label}</b>" for label in _CONTROL.findall(figure))
-                shown["text/html"] = f"<p>Of its controls these move here: {moved}.</p>{figure}"
+                shown["text/html"] = living(explorer[1], root)
             shown["text/html"] = with_files(with_picture_files(shown["text/html"], known, folder))
             shown["text/html"] = with_script_files(shown["text/html"], folder)
-    notebook.cells = folded(cells)
+    notebook.cells = folded(in_order(cells))
+    hide_code(notebook.cells)
     return relinked(sheet, path, sheet_page)
 
 
@@ -185,6 +247,7 @@ def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
     ways = [
         f'<a href="{slides}">Present</a>',
         f'<a download href="{name}">Download the notebook</a>',
+        '<button type="button" id="all-code" aria-pressed="false">Show all code</button>',
     ]
     if repository:
         lesson = quote(f"notebooks/{name}", safe="")

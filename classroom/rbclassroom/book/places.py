@@ -111,7 +111,19 @@ def to_section(place: str, page: str = "ledger.md") -> str:
     """Return a link to a section of a lesson, from its name in the ledger."""
     file, section = place.split(".ipynb, ", 1)
     text = f"{file[:2]} {'§ ' * section.isdigit()}{section}"
-    return link(f"lessons/{file}.html#{fragment(section)}", page, text)
+    return link(f"lessons/{lesson_of(place)}", page, text)
+
+
+def lesson_of(place: str) -> str:
+    """Return the address of a section of a lesson, within ``lessons``, from its name.
+
+    Examples
+    --------
+    >>> lesson_of("06_geodesics.ipynb, 3")
+    '06_geodesics.html#s3'
+    """
+    file, section = place.split(".ipynb, ", 1)
+    return f"{file}.html#{fragment(section)}"
 
 
 def with_keys(text: str, page: str = "ledger.md") -> str:

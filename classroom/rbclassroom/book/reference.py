@@ -4,6 +4,7 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +32,32 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def module(name: str, root: Path) -> dict[str, Any]:
-    """Return a module's names, its summary, and its public functions and classes."""
+    """Return a module's names, its summary, and its public members: constants are the last."""
     tree = ast.parse((root / file_of(name)).read_text(encoding="utf-8"))
     kinds = ast.FunctionDef | ast.ClassDef
     public = [node.name for node in tree.body if isinstance(node, kinds) and node.name[0] != "_"]
+    members = [
+        (node.name, "class" if isinstance(node, ast.ClassDef) else "function")
+        for node in tree.body
+        if isinstance(node, kinds) and node.name in public
+    ]
+    members += [(name, "data") for name in _documented(tree)]
     about = (ast.get_docstring(tree) or "").partition("\n")[0]
-    return {"name": name, "full": full_name(name), "about": about, "public": public}
+    full = full_name(name)
+    return {"name": name, "full": full, "about": about, "public": public, "members": members}
+
+
+def _documented(tree: ast.Module) -> list[str]:
+    """Return the public constants of a module with a text below them."""
+    found = []
+    for node, after in pairwise(tree.body):
+        match node, after:
+            case (
+                ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str())),
+            ) if name[0] != "_" and name != "ENGINE":
+                found.append(name)
+    return found
 
 
 def shown_code(root: Path) -> list[str]:

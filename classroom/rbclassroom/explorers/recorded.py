@@ -1,9 +1,10 @@
-"""Explorers for pages without Python: the states of one control and of what plays, recorded."""
+"""Explorers for pages without Python: the states of some controls, recorded."""
 
 import argparse
 import html
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -14,6 +15,7 @@ from rbclassroom.course.notebooks import regenerate
 from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
 from rbcourse.draw.display import Player
+from rbcourse.draw.save import FORMS
 
 _PAGE = Template("""\
 <!doctype html>
@@ -27,55 +29,77 @@ _PAGE = Template("""\
 $figure</html>
 """)
 
-_LESSON = "In the lesson, with Python, every control moves, with all of its steps."
-MOVED: dict[str, tuple[str, Sequence[Any]]] = {
-    "arm": ("theta1", range(-180, 181, 30)),
-    "body": ("turn", range(25, 176, 25)),
-    "chain": ("curve", JOINED),
-    "cube": ("spin", range(-5, 6, 2)),
-    "flip": ("axis", ["axis 1", "axis 2", "axis 3"]),
-    "minimum_acceleration": ("size", [tenths / 10 for tenths in range(2, 15, 2)]),
-    "planar": ("omega1", range(-90, 91, 15)),
-    "projection": ("e12", [fifths / 5 for fifths in range(-5, 6)]),
-    "random": ("sampler", ["three angles", "uniform"]),
-    "rotation": ("gamma", range(-140, 176, 45)),
-    "screw": ("tilt", range(0, 91, 15)),
-    "spline": ("pitch", [-60, -40, -20, 20, 60]),
-    "theta": ("angle", range(10, 171, 10)),
-    "timing": ("acceleration", [0.5, 1, 2, 4, 6]),
+_ABOUT = "A recording: in the lesson, with Python, every control moves, with all of its steps."
+MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
+    "arm": ({"theta0": range(-170, 131, 60), "theta1": range(-180, 181, 60)}, 4),
+    "body": (
+        {
+            "about": ["z, through the covers", "the diagonal x + y + z"],
+            "turn": [90, 110, 115, 130, 150],
+            "thickness": [3, 15],
+        },
+        2,
+    ),
+    "chain": ({"curve": JOINED}, 1),
+    "cube": ({"spin": range(-5, 6, 2)}, 1),
+    "flip": ({"axis": ["axis 1", "axis 2", "axis 3"]}, 1),
+    "minimum_acceleration": ({"rival": list(FORMS), "size": [0.5, 1, 1.5]}, 2),
+    "planar": ({"omega1": range(-90, 91, 45), "omega2": range(-90, 91, 45)}, 2),
+    "projection": ({"e12": [fifths / 5 for fifths in range(-5, 6)]}, 1),
+    "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
+    "rotation": ({"alpha": range(-150, 151, 60), "gamma": range(-140, 161, 60)}, 5),
+    "screw": ({"tilt": range(0, 91, 15)}, 1),
+    "spline": ({"pitch": [-60, -40, -20, 20, 60]}, 1),
+    "theta": ({"angle": range(10, 171, 10)}, 1),
+    "timing": ({"acceleration": [0.5, 1, 2, 4, 6]}, 1),
 }
-"""Of each explorer the control that is recorded beside what plays, and which of its values."""
+"""Of each explorer the recorded values of controls, and of how many steps of what plays one is."""
 
 
-def record(explorer: Explorer, name: str, moved: str, values: Sequence[Any]) -> Player:
+def record(
+    explorer: Explorer, name: str, moved: Mapping[str, Sequence[Any]], stride: int = 1
+) -> Player:
     """Return an explorer as a figure that moves without Python, in exactly these states.
 
-    `values` are those of the control `moved`, its present value among them; what plays has all of
-    its steps, and the other controls stay as they are.
+    `moved` has values of controls, their present ones among them. Of what plays, every `stride`-th
+    step is recorded, the present one among them. The other controls stay as they are.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
     label = {each: control.description for each, control in explorer.controls.items()}
-    stays = [f"{label[each]} = {_text(now[each])}" for each in now if each not in (moved, plays)]
+    stays = [f"{label[each]} = {_text(now[each])}" for each in now if each not in {*moved, plays}]
     fixed = f" Here these stay: {'; '.join(stays)}." if stays else ""
-    caption = f"{explorer.name}, recorded.{fixed} {_LESSON}"
+    caption = (
+        f"{html.escape(explorer.name)} <details><summary>About this picture</summary>"
+        f"{html.escape(_ABOUT + fixed)}</details>"
+    )
     shown = explorer.state()
     still = explorer.draw(shown.shown, zoom=2)  # before the artists move on
-    states = [explorer.state(**{moved: x, plays: t}) for x in values for t in explorer.steps]
-    first = values.index(now[moved])
-    controls = [
-        {"label": label[moved], "values": [_text(value) for value in values], "first": first},
-        {"label": label[plays], "values": list(time._options_labels), "first": time.index},
+    start = time.index % stride
+    steps = explorer.steps[start::stride]
+    states = [
+        explorer.state(**dict(zip([*moved, plays], values, strict=True)))
+        for values in product(*moved.values(), steps)
     ]
+    controls = [
+        {
+            "label": label[each],
+            "values": [_text(value) for value in values],
+            "first": list(values).index(now[each]),
+        }
+        for each, values in moved.items()
+    ]
+    labels = list(time._options_labels)[start::stride]
+    first = (time.index - start) // stride
     return Player(
         name,
         shown.texts[-1],
-        f"<figcaption>{html.escape(caption)}</figcaption>",
+        f"<figcaption>{caption}</figcaption>",
         still,
         explorer.background,
         explorer.display,
         [state.drawn for state in states],
-        controls,
-        explorer.play.interval,
+        [*controls, {"label": label[plays], "values": labels, "first": first}],
+        explorer.play.interval * stride,
         [state.texts for state in states],
     )
 

@@ -6,6 +6,7 @@ import io
 import json
 import re
 import zlib
+from itertools import product
 from pathlib import Path
 
 import ipywidgets
@@ -31,14 +32,14 @@ def test_every_explorer_is_recorded_and_together_they_are_small():
 @pytest.mark.parametrize("name", sorted(recorded.MOVED))
 def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
     """At random states."""
-    explorer, (moved, values) = made(name), recorded.MOVED[name]
+    explorer, (moved, stride) = made(name), recorded.MOVED[name]
     explorer.restart()
     page = (FOLDER / f"{name}.html").read_text(encoding="utf-8")
     assert not re.search(r'https?:|(?:src|href)="(?!data:)', page)
     without_scripts, _ = page.split("<script>")
     assert not re.search("<(button|input|canvas)", without_scripts)
     caption = html.unescape(re.search(r"<figcaption>(.*?)</figcaption>", without_scripts)[1])
-    assert "In the lesson, with Python, every control moves" in caption
+    assert "in the lesson, with Python, every control moves" in caption
     ((alt, png),) = re.findall(r'<img .*alt="(.*?)" src="data:image/png;base64,(.*?)"', page)
     assert html.unescape(alt) == repr(explorer)
     still, want = (
@@ -48,41 +49,46 @@ def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
     assert (np.abs(still - want).max(axis=-1) > 64).mean() < 1e-4
 
     data = json.loads(re.search(r"revive\(image, (\{.*\})\);\n", page)[1])
-    recorded_controls = explorer.controls[moved], explorer.time
-    for control, kept in zip(recorded_controls, data["controls"], strict=True):
+    plays, start = explorer.plays, explorer.time.index % stride
+    steps = explorer.steps[start::stride]
+    for each, kept in zip([*moved, plays], data["controls"], strict=True):
+        control = explorer.controls[each]
         assert kept["label"] == control.description
         if isinstance(control, ipywidgets.FloatSlider):
             found = np.array([float(text.replace("−", "-")) for text in kept["values"]])
             assert found[kept["first"]] == control.value
-            steps = (found - control.min) / control.step
-            assert np.abs(steps - np.round(steps)).max() < 1e-9
+            steps_from_least = (found - control.min) / control.step
+            assert np.abs(steps_from_least - np.round(steps_from_least)).max() < 1e-9
         else:
-            assert kept["values"] == list(control._options_labels)
-            assert kept["values"][kept["first"]] == control._options_labels[control.index]
-    for control in explorer.controls.values():
-        assert (f"{control.description} = " in caption) == (control not in recorded_controls)
+            labels = list(control._options_labels)
+            assert kept["values"] == (labels[start::stride] if each == plays else [*moved[each]])
+            assert kept["values"][kept["first"]] == labels[control.index]
+    for each, control in explorer.controls.items():
+        assert (f"{control.description} = " in caption) == (each not in {*moved, plays})
 
     packed, known = (zlib.decompress(base64.b64decode(data[key])) for key in ("states", "known"))
-    (styles, texts), states, steps = json.loads(known), split(packed), explorer.steps
-    assert len(states) == len(texts) == len(values) * len(steps)
+    (styles, texts), states = json.loads(known), split(packed)
+    places = list(product(*moved.values(), steps))
+    assert len(states) == len(texts) == len(places)
     for k in np.random.default_rng(1).choice(len(states), 12, replace=False):
-        now = {moved: values[k // len(steps)], explorer.plays: steps[k % len(steps)]}
+        now = dict(zip([*moved, plays], places[k], strict=True))
         state = explorer.state(**now)
         assert texts[k] == json.loads(json.dumps(state.texts)), now
         pairs = polygons(state.drawn, list(explorer.display.styles)), polygons(states[k], styles)
-        for (style, more, places), (kept, goes_on, found) in zip(*pairs, strict=True):
+        for (style, more, points), (kept, goes_on, found) in zip(*pairs, strict=True):
             assert json.loads(json.dumps(style)) == kept
             assert more == goes_on
-            assert np.abs(places - found).max() < 0.2  # pixels
+            assert np.abs(points - found).max() < 0.2  # pixels
 
 
 def test_a_record_has_its_states_in_order_the_same_bytes_each_time_and_its_first_value():
     theta = made("theta")
     theta.restart()
-    one, other = (recorded.record(theta, "theta", "angle", [60.0, 120.0]) for _ in "ab")
+    moved = {"angle": [60.0, 120.0]}
+    one, other = (recorded.record(theta, "theta", moved) for _ in "ab")
     assert one._repr_html_() == other._repr_html_()
     for k, angle in enumerate((60.0, 120.0)):
         assert one.texts[101 * k + 30] == theta.state(angle=angle, t=0.3).texts
     assert "Here these stay" not in one.caption
     with pytest.raises(ValueError, match="120"):
-        recorded.record(theta, "theta", "angle", [60.0])
+        recorded.record(theta, "theta", {"angle": [60.0]})

@@ -1,0 +1,57 @@
+"""Citations: the keys of works in a text become names with years that lead to the work."""
+
+import re
+import unicodedata
+from collections.abc import Mapping
+
+_ACCENTS = {"'": "\N{COMBINING ACUTE ACCENT}", "v": "\N{COMBINING CARON}"}
+_KEY = r"[A-Z]\w*\d{4}"
+_CITED = re.compile(rf"\[({_KEY}(?:[,;] {_KEY})*)\]")
+_WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
+
+
+def names(bibliography: str) -> dict[str, str]:
+    r"""Return how each work of a BibTeX file is called in a text, by its key.
+
+    Examples
+    --------
+    >>> names("@article{Noakes2011,\n author = {Noakes, Lyle},\n year = {2011}\n}\n")
+    {'Noakes2011': 'Noakes (2011)'}
+    """
+    plain = re.sub(
+        r"\\(['v])\{(\w)\}|\{\\(['v])(\w)\}",
+        lambda x: unicodedata.normalize("NFC", (x[2] or x[4]) + _ACCENTS[x[1] or x[3]]),
+        bibliography,
+    )
+    found = {}
+    for entry in re.finditer(r"@\w+\{(\w+),(.*?)\n\}", plain, re.DOTALL):
+        authors, year = (
+            re.search(rf"\b{name} = \{{(.*)\}}", entry[2]) for name in ("author", "year")
+        )
+        if not authors or not year:
+            raise ValueError(f"{entry[1]} has no author or no year")
+        last = [author.partition(",")[0] for author in authors[1].split(" and ")]
+        who = f"{last[0]} et al." if len(last) > 2 else " and ".join(last)
+        found[entry[1]] = f"{who} ({year[1]})"
+    return found
+
+
+def with_citations(text: str, known: Mapping[str, str], here: set[str], elsewhere: str) -> str:
+    """Return a text with its citations as links, and the works of its list as their targets.
+
+    Those not in the list of this page, whose keys are `here`, lead to the page `elsewhere`.
+    """
+
+    def put(match: re.Match[str]) -> str:
+        keys = re.split("[,;] ", match[1])
+        links = [
+            f'<a href="{"" if key in here else elsewhere}#{key}">{known[key]}</a>' for key in keys
+        ]
+        return f"[{', '.join(links)}]"
+
+    return _CITED.sub(put, _WORK.sub(r'- <a id="\1"></a>', text))
+
+
+def listed(text: str) -> set[str]:
+    """Return the keys of the works that a page lists."""
+    return set(_WORK.findall(text))

@@ -1,0 +1,64 @@
+"""Polls of a lesson whose options can be chosen: each shows the line on its own idea, no other."""
+
+import re
+
+from nbformat import NotebookNode
+
+_OPTION = re.compile(r"^- \*\*([A-Z])\*\* · (.*)$", re.MULTILINE)
+_ITEM = re.compile(r"^- (?=\*\*[A-Z]\*\*)(.*(?:\n .*)*)", re.MULTILINE)
+_IDEA = re.compile(r"(?:(?<=[.?!)] )|^)(?=\*\*[A-Z]\*\*)", re.MULTILINE)
+
+
+def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
+    r"""Return the right letter of a poll, and the line on each letter, from the texts of an answer.
+
+    A paragraph has the right one, in bold letters; the others are items of a list.
+
+    Examples
+    --------
+    >>> ideas(["It turns: **B**.\n\n- **A** slides. **C** stops."])
+    ('B', {'B': 'It turns: **B**.', 'A': '**A** slides.', 'C': '**C** stops.'})
+    """
+    outside = "\n\n".join(_ITEM.sub("", text) for text in texts)
+    right = re.search(r"^(?:.* )?\*\*([A-Z])\*\*.*$", outside, re.MULTILINE)
+    if not right:
+        raise ValueError("no paragraph of the answer has its letter")
+    found = {right[1]: re.sub(r":$", ".", right[0].partition("*Look for")[0].strip())}
+    for item in (match[1] for text in texts for match in _ITEM.finditer(text)):
+        for idea in (part.strip() for part in _IDEA.split(item) if part):
+            found.setdefault(idea[2], idea)
+    return right[1], found
+
+
+def voted(cells: list[NotebookNode]) -> None:
+    """Make the options of all polls among the cells of a lesson buttons, with their lines."""
+    texts = [cell.source if cell.cell_type == "markdown" else "" for cell in cells]
+    headings = [i for i, text in enumerate(texts) if text.startswith("#")] + [len(cells)]
+    for k in headings[:-1]:
+        poll = re.match(r"### (Poll \d+)\b", texts[k])
+        if not poll:
+            continue
+        answer = f"### Answer to {poll[1].lower()}"
+        start = next((i for i in headings[:-1] if i > k and texts[i].startswith(answer)), k)
+        right, lines = ideas(texts[start : headings[headings.index(start) + 1]])
+        letters = {option[1] for option in _OPTION.finditer(texts[k])}
+        if missing := letters - set(lines):
+            raise ValueError(f"{poll[1]}: the answer has no line on {', '.join(sorted(missing))}")
+        cells[k].source = _with_buttons(texts[k], poll[1], right, lines)
+
+
+def _with_buttons(text: str, name: str, right: str, lines: dict[str, str]) -> str:
+    def put(option: re.Match[str]) -> str:
+        letter, words = option[1], option[2]
+        is_right = letter == right
+        line = lines[letter].replace("\n", "\n  ")
+        return (
+            f'- <button type="button" aria-expanded="false">**{letter}** {words}</button>\n\n'
+            f'  <div role="status"><div class="idea{" right" * is_right}" hidden>\n\n'
+            f"  *{'Right.' if is_right else 'Not quite.'}* {line}\n\n  </div></div>\n"
+        )
+
+    options = _OPTION.sub(put, text)
+    first = options.index("- <button")
+    group = f'<div class="poll" role="group" aria-label="{name}">'
+    return f"{options[:first]}{group}\n\n{options[first:]}\n</div>"

@@ -1,0 +1,101 @@
+// What pages of the book do: polls, folded code, formulas that fit, panels on phones, excerpts.
+addEventListener("DOMContentLoaded", () => {
+  const all = (selector, from = document) => [...from.querySelectorAll(selector)];
+
+  // An option of a poll shows its own line and hides the others.
+  for (const poll of all(".poll")) {
+    const buttons = all("button", poll), line = (button) => button.closest("li").querySelector(".idea");
+    for (const button of buttons) {
+      button.onclick = () => {
+        const open = button.ariaExpanded !== "true";
+        for (const each of buttons) {
+          each.ariaExpanded = open && each === button;
+          line(each).hidden = each.ariaExpanded !== "true";
+        }
+      };
+    }
+  }
+
+  const code = document.querySelector("#all-code");
+  code?.addEventListener("click", () => {
+    const shown = code.ariaPressed !== "true";
+    code.ariaPressed = shown;
+    for (const each of all("details.hide")) each.open = shown;
+  });
+
+  // Formulas that are too wide become smaller, down to four fifths; others scroll, by keys as well.
+  const fit = () => {
+    for (const formula of all('mjx-container[display="true"]')) {
+      formula.style.fontSize = "";
+      const share = formula.clientWidth / formula.scrollWidth;
+      if (share < 1) formula.style.fontSize = `${Math.max(80, Math.floor(99 * share))}%`;
+    }
+    for (const each of all('mjx-container[display="true"], .content pre, .content table')) {
+      if (each.scrollWidth > each.clientWidth + 1) each.tabIndex = 0;
+    }
+  };
+  window.MathJax?.startup?.promise?.then(fit);
+  addEventListener("load", () => window.MathJax?.startup?.promise?.then(fit));
+  addEventListener("resize", fit);
+
+  // The panels of a wide still, below one another; CSS shows them on phones.
+  for (const still of all("img[data-cuts]")) {
+    const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
+    const [wide, high] = still.style.aspectRatio.split("/").map(Number);
+    panels.className = "panels";
+    for (let k = 1; k < ends.length; k++) {
+      const [from, share] = [ends[k - 1], ends[k] - ends[k - 1]], panel = document.createElement("span");
+      panel.style.aspectRatio = `${share * wide} / ${high}`;
+      const part = Object.assign(new Image(), { src: still.src, alt: k > 1 ? "" : still.alt, loading: "lazy" });
+      part.style = `width: ${100 / share}% !important; left: ${(-100 * from) / share}%`;
+      panel.append(part);
+      panels.append(panel);
+    }
+    still.after(panels);
+  }
+
+  // "drag to turn" goes when it is done.
+  addEventListener("pointerdown", ({ target }) => target.closest("figure")?.classList.add("touched"));
+
+  // The picture of the start page plays once when it is seen; all but its slider is behind "more".
+  const hero = document.querySelector("figure.hero");
+  const ready = new MutationObserver(() => {
+    const canvas = hero.querySelector("canvas"), slider = all("input", hero).at(-1);
+    if (!canvas || !slider) return;
+    ready.disconnect();
+    const panel = slider.parentNode.parentNode, more = document.createElement("details");
+    more.innerHTML = "<summary>More: turn it, change it, numbers</summary>";
+    more.append(...[...panel.children].filter((child) => child !== slider.parentNode), ...all("figcaption", hero));
+    panel.append(more);
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    const button = slider.parentNode.querySelector("button");
+    const seen = new IntersectionObserver(([{ isIntersecting }]) => {
+      if (!isIntersecting) return;
+      seen.disconnect();
+      button.click();
+      const end = () => {
+        if (button.textContent === "▶") return; // somebody has paused it
+        if (slider.value === slider.max) button.click();
+        else requestAnimationFrame(end);
+      };
+      end();
+    }, { threshold: 0.6 });
+    seen.observe(canvas);
+  });
+  if (hero) ready.observe(hero, { childList: true, subtree: true });
+
+  // Excerpts below what a search finds, from the words of all pages.
+  const results = document.querySelector("#search-results");
+  if (!results) return;
+  const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/).filter(Boolean);
+  const tell = () => {
+    for (const link of all("li:not(:has(.excerpt)) > a", results)) {
+      const name = link.getAttribute("href").replace(/\.html.*/, ""), text = window.texts?.[name] ?? "";
+      const at = Math.max(0, text.toLowerCase().indexOf(words[0])), from = at < 60 ? 0 : text.indexOf(" ", at - 60) + 1;
+      const said = `${from ? "… " : ""}${text.slice(from, text.indexOf(" ", from + 180))} …`;
+      if (text) link.after(Object.assign(document.createElement("p"), { className: "excerpt", textContent: said }));
+    }
+  };
+  document.head.append(Object.assign(document.createElement("script"), { src: "_static/texts.js", onload: tell }));
+  new MutationObserver(tell).observe(results, { childList: true, subtree: true });
+});
