@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
+from posixpath import normpath
 from typing import Any
 
 import nbformat
@@ -103,10 +104,10 @@ class Sources:
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
             row = re.search(rf"^\| \[.*\]\(.*{path.name}\) \| (.*) \| (.*) \|$", readme, re.M)
             question, minutes = row.groups() if row else ("", "")
-            card = CONTENTS["cards"].get(path.stem[:2])
-            drawn = re.search(
-                r'<figure class="lead"><img [^>]*src="([^"]+)"', notebook.cells[0].source
-            )
+            drawn = re.search(r' src="([^"]+)"', notebook.cells[0].source)
+            card = normpath(f"lessons/{drawn[1]}") if drawn else ""
+            if own := CONTENTS["cards"].get(path.stem[:2]):
+                card = f"figures/{own}.png"
             shown.append(
                 {
                     "stem": path.stem,
@@ -115,16 +116,20 @@ class Sources:
                     "sheet": sheet,
                     "question": question,
                     "minutes": minutes,
-                    "picture": f"../figures/{card}.png" if card else drawn[1] if drawn else "",
+                    "picture": card,
                 }
             )
         self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
         beside = {
             content: re.sub("^pictures", "../lessons/pictures", to) for content, to in known.items()
         }
-        ready = partial(
-            lessons.with_picture_files, known=beside, folder=self.extra / "slides", loading="eager"
-        )
+
+        def ready(deck: str) -> str:
+            stills = lessons.with_picture_files(
+                deck, beside, self.extra / "slides", loading="eager"
+            )
+            return lessons.with_script_files(stills, self.extra / "lessons", "../lessons/pictures")
+
         write_decks(decks, self.extra / "slides", ready)
 
     def put_problem_sets(self) -> None:
@@ -132,20 +137,32 @@ class Sources:
         assignments = self.root / "notebooks" / "assignments"
         names = sorted(path.stem for path in assignments.glob("source/ps*/ps*.ipynb"))
         for name in names:
+            group = CONTENTS["sets"][name].split()
+            card = next(each for each in self.shown["lessons"] if each["number"] == group[-1])
             released = release(name, assignments)[f"{name}.ipynb"].decode()
             notebook = nbformat.reads(released, as_version=4)
             title, _, rest = notebook.cells[0].source.partition("\n")
-            notebook.cells[0].source = f"{title}\n{_TO_READ.format(name=name)}{rest}"
+            image = f'<img alt="" src="../{card["picture"]}">'
+            told = f'{_TO_READ.format(name=name)}\n<figure class="lead">{image}</figure>\n'
+            notebook.cells[0].source = f"{title}\n{told}{rest}"
             self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
         self.shown["sets"] = names
 
     def put_package(self) -> None:
         """Write the pages of modules and code, and the figures."""
         modules = reference.modules(self.root)
-        for title, module in ((title, each) for title, some in modules.items() for each in some):
-            page = self.rendered("module.rst.j2", title=title, module=module)
+        for module in (each for some in modules.values() for each in some):
+            page = self.rendered("module.rst.j2", module=module)
             self.put(f"package/{module['name']}.rst", page)
-        for old, new in MOVED.items():
+        home = Path("classroom", "rbclassroom")
+        apart = set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}
+        paths = [path for room in apart for path in (self.root / home / room).glob("[a-z]*.py")]
+        coded = {
+            f"package/{path.parent.name}.{path.stem}": f"../code/{home.as_posix()}/"
+            f"{path.parent.name}/{path.stem}"
+            for path in paths
+        }
+        for old, new in (MOVED | coded).items():
             moved = self.rendered("moved.html.j2", page=f"{new}.html")
             _write(self.extra / f"{old}.html", moved)
         for path in reference.shown_code(self.root):
@@ -163,7 +180,7 @@ class Sources:
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
-                self.shown["run"] = relinked(text[text.index("| to learn |") :], path, page)
+                self.shown["run"] = relinked(text[text.index("| to learn |") : text.index("<!--")], path, page)
                 continue  # there is a template for the page
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)

@@ -5,7 +5,7 @@ import unicodedata
 from collections.abc import Mapping
 
 _ACCENTS = {"'": "\N{COMBINING ACUTE ACCENT}", "v": "\N{COMBINING CARON}"}
-_KEY = r"[A-Z]\w*\d{4}"
+_KEY = r"[A-Za-z]+\d{4}"
 _CITED = re.compile(rf"\[({_KEY}(?:[,;] {_KEY})*)\]")
 _WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
 

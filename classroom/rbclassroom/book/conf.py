@@ -91,11 +91,10 @@ def write_texts(app: Any, failed: Exception | None) -> None:
         return
     texts = {}
     for name in sorted(app.env.found_docs):
-        if "nosearch" not in app.env.metadata[name]:
-            leaves = app.env.get_doctree(name).findall(lambda node: not node.children)
-            apart = {"comment", "math", "math_block", "raw"}
-            shown = [x.astext() for x in leaves if not {x.tagname, x.parent.tagname} & apart]
-            texts[name] = re.sub(r"\s+", " ", " ".join(shown))
+        leaves = app.env.get_doctree(name).findall(lambda node: not node.children)
+        apart = {"comment", "math", "math_block", "raw"}
+        shown = [x.astext() for x in leaves if not {x.tagname, x.parent.tagname} & apart]
+        texts[name] = re.sub(r"\s+", " ", " ".join(shown))
     text = f"window.texts = {json.dumps(texts, ensure_ascii=False, separators=(',', ':'))};\n"
     (Path(app.outdir) / "_static" / "texts.js").write_text(text, encoding="utf-8", newline="\n")
 

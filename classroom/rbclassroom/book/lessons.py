@@ -25,7 +25,11 @@ from rbcourse.draw.display import ENGINE
 from rbcourse.draw.save import caption
 
 _PICTURE = re.compile(r'(<img\b[^>]*?) src="data:image/png;base64,([^"]+)"')
-_PLAYER = re.compile(r"<script>\{\n.*?\n(for \(const image of [^\n]*)\n\}</script>", re.DOTALL)
+_PLAYER = re.compile(
+    r"<script>\{\n.*?\n(for \(const image of [^\n]*revive\(image, )(\{[^\n]*\})\);\n\}</script>",
+    re.DOTALL,
+)
+_DATA = re.compile(r'<script type="application/json">(.*?)</script>', re.DOTALL)
 _SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
 _SHEET = re.compile(r"; the lecturer's (run sheets?) (?:is|are) at the end")
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
@@ -145,20 +149,36 @@ def cuts_of(still: Image.Image) -> list[float]:
 def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
     """Return HTML whose living pictures have their states, and what draws them, in files.
 
-    The files are written to ``pictures`` in a folder, whose address is `to`; each once.
+    The files are written to ``pictures`` in a folder, whose address is `to`; each once. Pages of
+    lessons draw by themselves; those of slides have data for their own script.
     """
 
-    def put(match: re.Match[str]) -> str:
-        states = f"{hashlib.sha256(match[1].encode()).hexdigest()[:16]}.js"
+    def kept(data: str) -> tuple[str, str]:
+        """Write data to a file; return its name, and the tag that loads it."""
+        name = hashlib.sha256(data.encode()).hexdigest()[:16]
+        text = f'(window.rbcourseStates ??= {{}})["{name}"] = {data};\n'
+        _put(folder / "pictures" / f"{name}.js", text)
+        return name, f'<script src="{to}/{name}.js"></script>'
+
+    def put_player(match: re.Match[str]) -> str:
         engine = (
             f"window.rbcourseDisplay ??= (() => {{\n{ENGINE}\nreturn rbcourseDisplay;\n}})();\n"
         )
-        (folder / "pictures").mkdir(parents=True, exist_ok=True)
-        for name, text in (("display.js", engine), (states, match[1])):
-            (folder / "pictures" / name).write_text(text, encoding="utf-8", newline="\n")
-        return "".join(f'<script src="{to}/{name}"></script>' for name in ("display.js", states))
+        _put(folder / "pictures" / "display.js", engine)
+        name, tag = kept(match[2])
+        start = f'<script>{match[1]}rbcourseStates["{name}"]);</script>'
+        return f'<script src="{to}/display.js"></script>{tag}{start}'
 
-    return _PLAYER.sub(put, shown)
+    def put_data(match: re.Match[str]) -> str:
+        name, tag = kept(match[1])
+        return f'{tag}<script type="application/json">"{name}"</script>'
+
+    return _DATA.sub(put_data, _PLAYER.sub(put_player, shown))
+
+
+def _put(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def with_files(shown: str) -> str:

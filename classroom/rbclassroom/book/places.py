@@ -48,8 +48,8 @@ def file_of(module: str) -> str:
 
 
 def has_page(module: str) -> bool:
-    """Tell whether a module has a page besides its code: no private one, nor lesson figures."""
-    return not re.search(r"\b(_|conf$|figures\b)", module)
+    """Tell whether a module has a page besides its code: no private one, none for maintainers."""
+    return not re.search(r"\b_|^(?:figures|course|lecture|assignments|book)\b", module)
 
 
 def anchor(key: str) -> str:
@@ -137,10 +137,12 @@ def with_keys(text: str, page: str = "ledger.md") -> str:
 
 
 def relinked(text: str, path: str, page: str) -> str:
-    """Return Markdown of a file for a page of the book.
+    r"""Return Markdown of a file for a page of the book.
 
     Links to what has a page lead there, others to a copy of the file in the folder ``files``.
+    The transposed of a matrix has the sign ``\top``, which the font of formulas has.
     """
+    text = re.sub(r"\\mathsf(?: T|\{T\})", r"\\top", text)
 
     def put(match: re.Match[str]) -> str:
         if not match[1]:

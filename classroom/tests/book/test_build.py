@@ -118,7 +118,10 @@ def test_the_page_of_a_lesson_has_all_of_it_but_its_run_sheet(path, source):
     code, page_code = (
         [x.source for x in some if x.cell_type == "code"] for some in (stored, cells)
     )
-    assert page_code == code
+    first = next(i for i, cell in enumerate(stored) if cell.source.startswith("## "))
+    imports = sum(cell.cell_type == "code" for cell in stored[:first])
+    assert page_code == code[imports:] + code[:imports]
+    assert cells[0].source.index("<figure") < cells[0].source.index("| Time |")
     text = "\n".join(cell.source for cell in cells)
     assert "Run sheet for the lecturer" not in text
     assert "at the end |" not in text
@@ -127,7 +130,7 @@ def test_the_page_of_a_lesson_has_all_of_it_but_its_run_sheet(path, source):
     assert text.count('class="answer"') == answers
     assert "mybinder.org/v2/gh/us/course" in text
     if path.stem != "00_start_here":
-        assert re.search(rf"\[run sheets?\]\(\.\./teach/{path.stem}\.md\) (is|are) apart", text)
+        assert re.search(rf" · \[run sheets? for lecturers\]\(\.\./teach/{path.stem}\.md\)", text)
         sheet = source(f"teach/{path.stem}.md")
         assert sheet.startswith("# Run sheet: ")
         assert stored[-1].source.split()[-1] in sheet
@@ -140,7 +143,7 @@ def test_lessons_that_are_named_are_linked_and_explorers_live(source):
     cells = nbformat.reads(text, as_version=4).cells
     (explorer,) = [cell for cell in cells if "explorers.theta_explorer()" in cell.source]
     shown = explorer.outputs[0].data["text/html"]
-    assert shown.startswith("<p>Of its controls these move here: <b>")
+    assert shown.startswith("<figure>")
     assert shown.rstrip().endswith("</figure>")
 
 
@@ -170,13 +173,14 @@ def row(page, anchor):
 
 def test_the_gallery_has_all_figures_with_their_files(source):
     page = source("figures.md")
-    assert '<a id="lesson16_marks"></a><a id="lesson14_marks"></a>' in page
+    assert '<div id="lesson16_marks"><a id="lesson14_marks"></a>' in page
     assert page.count("<img ") == len(list(FIGURES.glob("*.png")))
     for path in FIGURES.glob("*.*"):
         assert f'href="figures/{path.name}"' in page
-    headings = "### Paper, Figure 1: paper_fig1", "### Report, Figure 4: report_fig4"
-    places = [page.index(f"{heading}\n") for heading in (*headings, "### lesson00_cubes")]
+    names = "paper_fig1", "report_fig4", "lesson00_cubes"
+    places = [page.index(f'<div id="{name}">') for name in names]
     assert places == sorted(places)
+    assert '<a href="lessons/06_geodesics.html#s1">' in page[places[0] : page.index("Figure 2a")]
 
 
 def test_works_are_listed_once_with_all_their_lessons(source):
@@ -186,6 +190,7 @@ def test_works_are_listed_once_with_all_their_lessons(source):
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.source.startswith("## References"):
                 for work in re.findall("^- (.*)", cell.source, re.MULTILINE):
+                    work = re.sub(r"^\[(\w+)\] ", r'<a id="\1"></a>', work)
                     link = f'<a href="lessons/{path.stem}.html#references">{path.stem[:2]}</a>'
                     cited[work] += ", " * bool(cited[work]) + link
     assert listed == cited
@@ -200,12 +205,13 @@ def test_answers_of_questions_are_folded(source):
     )
 
 
-def test_the_index_of_the_package_has_modules_with_their_summaries(source):
+def test_the_package_has_pages_that_begin_with_functions_and_none_for_maintainers(source, written):
     page = source("package/index.md")
     assert "| [so3](so3.rst) | " in page
     assert "```{toctree}\n:hidden:\n\nso3\nquaternion\n" in page
-    assert "\nbook.build\n" not in page
-    assert ":orphan:\n:nosearch:\n" in source("package/book.build.rst")
+    assert "book.build" not in page
     so3 = source("package/so3.rst")
     assert '<a href="#rbcourse.so3.exp_so3"><code>exp_so3</code></a>' in so3
-    assert ".. automodule:: rbcourse.so3\n" in so3
+    assert so3.index("autofunction:: rbcourse.so3.exp_so3\n") < so3.index(".. autodata:: ")
+    moved = (written / "extra/package/book.build.html").read_text("utf-8")
+    assert "../code/classroom/rbclassroom/book/build.html" in moved

@@ -63,10 +63,14 @@ def test_living_pictures_share_what_draws_them_and_equal_ones_their_states(tmp_p
     assert {path.name for path in (tmp_path / "pictures").iterdir()} == set(sources)
     for shown, name in zip((cube, arm, cube), sources[1::2], strict=True):
         states = (tmp_path / "pictures" / name).read_text("utf-8")
-        assert states.startswith("for (const image of")
-        assert states in shown
-        assert states not in found
-    assert found.count("<figcaption>") == 3
+        data = re.fullmatch(r'\(window\.rbcourseStates \?\?= {}\)\["\w+"\] = (.*);\n', states)[1]
+        assert data in shown
+        assert data not in found
+    data = re.search(r"revive\(image, (.*)\);\n", cube)[1]
+    slide = f'<script type="application/json">{data}</script>'
+    found = lessons.with_script_files(slide, tmp_path, "there")
+    assert re.findall(r'src="there/([^"]+)"', found) == [sources[1]]
+    assert f'"{sources[1].removesuffix(".js")}"</script>' in found
 
 
 def test_a_caption_links_its_files_and_a_still_its_picture():
@@ -82,14 +86,14 @@ def test_a_caption_links_its_files_and_a_still_its_picture():
     assert linked in player
 
 
-def test_the_figures_of_a_lesson_have_their_sections_and_lines():
+def test_the_figures_of_a_lesson_have_their_sections():
     lines = 'save_animation(\n    fig, "lesson01_way", data, alt)'
     data = {"text/plain": "lesson01_way: A way.", "text/html": "…"}
     drawn = new_code_cell(lines, outputs=[new_output("execute_result", data=data)])
     cells = [*markdown("# Title", "## 3 · Ways"), new_code_cell("x = 1"), drawn]
     (figure,) = lessons.figures_of("01_plane.ipynb", new_notebook(cells=cells))
     place = "01_plane.ipynb, 3"
-    assert figure == lessons.Figure("lesson01_way", place, lines, "A way.")
+    assert figure == lessons.Figure("lesson01_way", place, "A way.")
     drawn.outputs.clear()
     with pytest.raises(ValueError, match=r"01_plane\.ipynb: lesson01_way has no stored output"):
         lessons.figures_of("01_plane.ipynb", new_notebook(cells=cells))
@@ -107,3 +111,40 @@ def test_a_lesson_can_be_downloaded_and_with_a_repository_be_run(repository):
     address = "https://mybinder.org/v2/gh/us/course/HEAD?labpath=notebooks%2F01_plane.ipynb"
     assert (address in first) == ("mybinder" in first) == bool(repository)
     assert lessons.without_outputs(notebook).cells[1].outputs == []
+
+
+def test_a_wide_still_is_cut_between_its_panels_and_one_that_is_not_wide_is_whole():
+    def still(*panels, size=(900, 400)):
+        shown = Image.new("RGB", size, "white")
+        for left, right in panels:
+            shown.paste("grey", (left, 20, right, 380))
+        return shown
+
+    assert lessons.cuts_of(still((10, 430), (470, 890))) == [0.5]
+    first, second = lessons.cuts_of(still((10, 290), (310, 590), (610, 890), size=(900, 230)))
+    assert 290 / 900 < first < 310 / 900
+    assert 590 / 900 < second < 610 / 900
+    assert lessons.cuts_of(still((10, 890))) == []
+    assert lessons.cuts_of(still((10, 430), (470, 690), size=(700, 400))) == []
+
+
+def test_imports_come_last_and_code_outside_of_answers_is_folded():
+    cells = [*markdown("# A", "## 1"), *markdown("### Answer to poll 1"), *markdown("## 2")]
+    cells.insert(1, new_code_cell("import numpy as np"))
+    cells.insert(3, new_code_cell("1 + 1"))
+    cells.insert(5, new_code_cell("2 + 2"))
+    cells = lessons.folded(lessons.in_order(cells))
+    lessons.hide_code(cells)
+    sources = [cell.source for cell in cells]
+    assert sources[-1] == "import numpy as np"
+    hidden = {cell.source for cell in cells if "hide-input" in cell.metadata.get("tags", [])}
+    assert hidden == {"1 + 1", "import numpy as np"}
+
+
+def test_a_lesson_begins_with_its_question_and_a_picture():
+    text = "# A\n\n**Question.** Why?\n\n| | |\n|---|---|\n| Time | 1 |"
+    found = lessons.with_lead(text, "<img>")
+    assert found == (
+        '# A\n\n**Question.** Why?\n\n<figure class="lead"><img></figure>\n\n'
+        "| | |\n|---|---|\n| Time | 1 |"
+    )

@@ -34,9 +34,9 @@ addEventListener("DOMContentLoaded", () => {
       if (each.scrollWidth > each.clientWidth + 1) each.tabIndex = 0;
     }
   };
-  window.MathJax?.startup?.promise?.then(fit);
-  addEventListener("load", () => window.MathJax?.startup?.promise?.then(fit));
+  addEventListener("load", () => Promise.resolve(window.MathJax?.startup?.promise).then(fit));
   addEventListener("resize", fit);
+  addEventListener("toggle", fit, { capture: true }); // something folded is open now
 
   // The panels of a wide still, below one another; CSS shows them on phones.
   for (const still of all("img[data-cuts]")) {

@@ -43,8 +43,9 @@ const settle = (section) => {
 
 // Pictures come to life when their slide is next; on paper they stay stills.
 const revive = async (section) => {
-  for (const script of section ? all("figure > script", section) : []) {
-    const figure = script.parentElement, image = figure.querySelector("img"), data = JSON.parse(script.text);
+  for (const script of section ? all("figure > script[type]", section) : []) {
+    const figure = script.parentElement, image = figure.querySelector("img"), own = JSON.parse(script.text);
+    const data = window.rbcourseStates?.[own] ?? own; // the book has them in files
     script.remove();
     figure.dataset.ratio = data.size[0] / data.size[1];
     await rbcourseDisplay.revive(image, data);

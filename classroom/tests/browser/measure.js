@@ -1,0 +1,54 @@
+// What is wrong with the page as it is laid out now: a list of texts.
+() => {
+  const faults = [], content = document.querySelector(".content"), page = document.documentElement;
+  const shown = (element) => element.checkVisibility({ visibilityProperty: true }) && element.getClientRects().length;
+  const name = (element) => `${element.tagName} ${element.className?.baseVal ?? element.className}: ${element.textContent.trim().slice(0, 40)}`;
+  const colour = (text) => text.match(/[\d.]+/g).map(Number);
+  const light = ([r, g, b]) => [0.2126, 0.7152, 0.0722].reduce((sum, share, i) => {
+    const part = [r, g, b][i] / 255;
+    return sum + share * (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
+  }, 0);
+
+  if (page.scrollWidth > page.clientWidth) faults.push(`the page is ${page.scrollWidth} wide`);
+  for (const element of content.querySelectorAll("*")) {
+    if (!shown(element) || element.scrollWidth <= element.clientWidth + 2 || !element.clientWidth) continue;
+    const { overflowX, backgroundImage, display } = getComputedStyle(element);
+    if (overflowX === "visible" || display === "inline" || element.closest(".panels, [role=status], mjx-assistive-mml")) continue;
+    if (!backgroundImage.includes("gradient") || overflowX !== "auto") faults.push(`cut: ${name(element)}`);
+    else if (element.tabIndex < 0) faults.push(`scrolls by mouse only: ${name(element)}`);
+  }
+
+  // Texts: places, contrast, letters in a line.
+  const walker = document.createTreeWalker(content, NodeFilter.SHOW_TEXT), boxes = [];
+  for (let node; (node = walker.nextNode()); ) {
+    const element = node.parentElement;
+    if (!node.data.trim() || !shown(element) || element.closest("mjx-container, script, style, svg, pre, .headerlink, figure [role=status]")) continue;
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    for (const { left, top, right, bottom } of range.getClientRects()) {
+      if (right - left > 2 && getComputedStyle(element).clipPath === "none" && !element.closest('[style*="clip-path"]')) boxes.push({ left, top, right, bottom, element });
+    }
+    let ground = [0, 0, 0, 0];
+    for (let each = element; each && (ground[3] ?? 1) < 1; each = each.parentElement) ground = colour(getComputedStyle(each).backgroundColor);
+    const { color, opacity } = getComputedStyle(element), [one, two] = [light(colour(color)), light(ground)].sort((a, b) => b - a);
+    const contrast = (one + 0.05) / (two + 0.05);
+    if (contrast < 4.5 || opacity < 1) faults.push(`contrast ${contrast.toFixed(1)}: ${name(element)}`);
+  }
+  boxes.sort((a, b) => a.top - b.top);
+  boxes.forEach((one, i) => {
+    for (let j = i + 1; j < boxes.length && boxes[j].top < one.bottom - 4; j++) {
+      const two = boxes[j], wide = Math.min(one.right, two.right) - Math.max(one.left, two.left);
+      const high = Math.min(one.bottom, two.bottom) - Math.max(one.top, two.top);
+      if (wide > 3 && high > 6) faults.push(`over one another: ${name(one.element)} | ${name(two.element)}`);
+    }
+  });
+  if (innerWidth > 1000) {
+    for (const paragraph of content.querySelectorAll("section > p")) {
+      if (!shown(paragraph) || paragraph.querySelector("mjx-container, img, code, button")) continue;
+      const lines = Math.round(paragraph.clientHeight / parseFloat(getComputedStyle(paragraph).lineHeight));
+      const letters = paragraph.innerText.length / lines;
+      if (lines > 3 && (letters > 80 || letters < 60)) faults.push(`${letters.toFixed(0)} letters in a line: ${name(paragraph)}`);
+    }
+  }
+  return faults;
+}
