@@ -180,7 +180,9 @@ class Sources:
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
-                self.shown["run"] = relinked(text[text.index("| to learn |") : text.index("<!--")], path, page)
+                self.shown["run"] = relinked(
+                    text[text.index("| to learn |") : text.index("<!--")], path, page
+                )
                 continue  # there is a template for the page
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)

@@ -10,6 +10,7 @@
   }, 0);
 
   if (page.scrollWidth > page.clientWidth) faults.push(`the page is ${page.scrollWidth} wide`);
+  if (!content) return faults; // a page of code
   for (const element of content.querySelectorAll("*")) {
     if (!shown(element) || element.scrollWidth <= element.clientWidth + 2 || !element.clientWidth) continue;
     const { overflowX, backgroundImage, display } = getComputedStyle(element);

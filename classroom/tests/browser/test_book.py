@@ -18,10 +18,14 @@ ROOT = Path(__file__).parents[3]
 BOOK = ROOT / "book"
 PAGES = sorted(path.relative_to(BOOK).as_posix() for path in BOOK.rglob("*.html"))
 MOVED = {f"{old}.html": f"{posixpath.dirname(old)}/{new}.html" for old, new in places.MOVED.items()}
+LESSONS = sorted((BOOK / "lessons").glob("[0-9]*.html"))
+LESSONS = [path for path in LESSONS if f"lessons/{path.name}" not in MOVED]
+MEASURE = Path(__file__).with_name("measure.js").read_text("utf-8")
 KINDS = [
     *("index.html", "ledger.html", "figures.html", "install.html", "search.html"),
     *("lessons/06_geodesics.html", "teach/06_geodesics.html", "teach/questions.html"),
     *("problems/ps1.html", "package/index.html", "package/so3.html", "code/rbcourse/so3.html"),
+    *("lessons/index.html", "lessons/12_how_near_optimal.html", "near_optimal.html"),
 ]
 
 
@@ -132,16 +136,71 @@ def test_all_formulas_of_the_book_can_be_set(parsed, page):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_page_of_each_kind_fits_on_every_screen(name, page):
-    """Light and dark, on a desk and on a phone."""
+def test_a_page_of_each_kind_can_be_read_on_every_screen(name, page):
+    """Light and dark: nothing is cut or pale, texts are apart, lines are neither long nor short."""
     page.goto((BOOK / name).as_uri())
     page.evaluate("window.MathJax?.startup.promise")
-    wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
     for scheme in ("dark", "light"):
         page.emulate_media(color_scheme=scheme)
-        for width in (390, 1280):
+        for width in (390, 1280, 1920):
             page.set_viewport_size({"width": width, "height": 800})
-            assert page.evaluate(wide) == 0, (width, scheme)
+            page.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
+            assert page.evaluate(MEASURE) == [], (width, scheme)
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
+def test_the_first_picture_of_a_lesson_is_seen_at_once(path, page):
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto(path.as_uri())
+    box = page.locator(".content img").first.bounding_box()
+    assert box["height"] > 100
+    assert box["y"] + box["height"] < 800
+
+
+def test_an_option_of_a_poll_shows_its_own_line_and_no_other(page):
+    """By mouse and by keys; what a screen reader is told of it."""
+    page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
+    poll = page.get_by_role("group", name="Poll 1")
+    ideas = poll.locator(".idea")
+    assert poll.get_by_role("button").count() == ideas.count() == 4
+    expect(poll.locator(".idea:visible")).to_have_count(0)
+    for letter, said in {"B": "linear in, linear out", "C": "Right.", "D": "upside down"}.items():
+        button = poll.get_by_role("button", name=re.compile(f"^{letter} "))
+        button.focus()
+        page.keyboard.press("Enter" if letter == "C" else "Space")
+        expect(button).to_have_attribute("aria-expanded", "true")
+        expect(poll.locator("[aria-expanded=true]")).to_have_count(1)
+        expect(poll.locator(".idea:visible")).to_have_count(1)
+        expect(poll.get_by_role("status").filter(visible=True, has_text=said)).to_have_count(1)
+        assert not page.locator("#answer-to-poll-1").evaluate("(answer) => answer.open")
+    button.click()
+    expect(poll.locator(".idea:visible")).to_have_count(0)
+
+
+def test_code_is_folded_until_it_is_asked_for(page):
+    page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
+    code = page.locator(".cell_input pre")
+    expect(code.locator("visible=true")).to_have_count(0)
+    page.get_by_role("button", name="Show all code").press("Enter")
+    assert code.locator("visible=true").count() > 20
+
+
+@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+def test_the_picture_of_the_start_page_plays_once_where_motion_is_wanted(motion, page):
+    page.emulate_media(reduced_motion=motion)
+    page.goto((BOOK / "index.html").as_uri())
+    hero = page.locator("figure.hero")
+    time, play = hero.get_by_label("time t"), hero.get_by_role("button", name="play or pause")
+    if motion == "no-preference":
+        expect(play).to_have_text("❚❚")
+        expect(time).to_have_js_property("value", time.get_attribute("max"))
+    expect(play).to_have_text("▶")
+    expect(hero.locator("input:visible")).to_have_count(1)
+    hero.get_by_text("More").click()
+    expect(hero.locator("input:visible")).to_have_count(2)
+    play.click()
+    expect(play).to_have_text("❚❚")
 
 
 def test_a_page_that_moved_leads_to_its_new_address(page):
@@ -186,6 +245,8 @@ def test_search_finds(page):
         links = page.locator("#search-results li a").evaluate_all("(all) => all.map((a) => a.href)")
         found = [re.sub(r".*/book/|\?[^#]*", "", link) for link in links[:10]]
         assert any(link.startswith(wanted) for link in found), found
+        excerpt = page.locator("#search-results .excerpt").first
+        assert len(excerpt.inner_text()) > 60
 
 
 def test_the_ledger_is_filtered(page):
