@@ -164,13 +164,10 @@ def describe_cube_motion(poses: Array) -> str:
     )
 
 
-def draw_ways(
-    ax: Any, ways: Mapping[str, Array], view: tuple[float, float] = (40, -60)
-) -> list[Any]:
+def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
     """Draw the paths of the origin in up to three motions, and its frame at the start and the ends.
 
-    The motions begin at one pose; the frame has its letters there. `view` has the elevation and
-    the azimuth in degrees. Return a line for each (BK 2.6).
+    The motions begin at one pose; the frame has its letters there. Return a line for each (BK 2.6).
     """
     looks: list[dict[str, Any]] = [
         {"color": COLOURS["optimum"], "ls": "-", "lw": 2},
@@ -192,7 +189,7 @@ def draw_ways(
             draw_arrow(ax, pose[:3, 3], direction, COLOURS[axis])
     places = [poses[:, :3, 3] for poses in ways.values()]
     tips = [A[:3, 3] + A[:3, :3].T for A in frames]
-    set_space(ax, np.concatenate([*places, *tips]), 0.6, view)
+    set_space(ax, np.concatenate([*places, *tips]), 0.6, view=(32, -65), zoom=0.95)
     return lines
 
 
