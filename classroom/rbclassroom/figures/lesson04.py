@@ -55,7 +55,7 @@ def draw_drift(ax: Axes, data: Table) -> None:
     for (name, defect), (colour, dash) in zip(ways, looks, strict=True):
         label = name.replace("ω̂", r"$\hat{ω}$")
         ax.loglog(steps, defect, color=colour, ls=dash, label=label)
-    ax.set(xlabel="products", ylabel="defect ‖RᵀR − I‖", xlim=(1, steps[-1]))
+    ax.set(xlabel="products", ylabel="defect ‖R$^T$R − I‖", xlim=(1, steps[-1]))
     ax.legend()
 
 
@@ -85,7 +85,7 @@ def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
     style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.025, "zorder": 3}
     for ax, (name, M) in zip(axes, matrices.items(), strict=True):
-        title = f"{name}\n{_sense(M)}"
+        title = f"{name.replace('ᵀ', '$^T$')}\n{_sense(M)}"
         if M is not given:
             ax.quiver([0, 0], [0, 0], *given, color=PALE, **style)
             ax.plot(*np.stack([given, M], axis=1), color="black", ls=":", zorder=4)

@@ -80,7 +80,7 @@ def describe_speeds(data: Table) -> str:
 _FREE = "{} {} [rad]"
 _STRAIGHT = "straight"
 _COORDINATES = {
-    "exponential coordinates": "y = log(R₀ᵀR)",
+    "exponential coordinates": "y = log(R₀$^T$R)",
     "normal coordinates": "x, to second order",
 }
 
