@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse import Array
 from rbcourse.arm import LINKS, arm_forward_kinematics
-from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
 
@@ -33,12 +33,12 @@ def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     Return the links; then for each link its two axes (RR 4).
     """
     joints, headings = _joints(q, lengths), np.append(0, np.cumsum(q))
-    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.6)
+    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.75)
     for i, (joint, before, after) in enumerate(
         zip(joints[:-1], headings[:-1], headings[1:], strict=True)
     ):
-        ax.annotate(f"J{i}", joint, (-8, -22), textcoords="offset points", ha="right")
-        ax.plot(*np.transpose([joint, joint + 0.9 * _towards(before)]), color="0.6", lw=1, ls="--")
+        ax.annotate(f"J{i}", joint, (4, -24), textcoords="offset points")
+        ax.plot(*np.transpose([joint, joint + 0.9 * _towards(before)]), color=PALE, lw=1, ls="--")
         low, high = sorted(np.degrees([before, after]))
         ax.add_patch(Arc(joint, 1.2, 1.2, theta1=low, theta2=high, lw=1.5, color="0.3"))
         x, y = joint + 0.8 * _towards((before + after) / 2)
@@ -59,7 +59,7 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
     """
     show_reach(ax, lengths)
     joints = _joints(q, lengths)
-    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.6)
+    artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.75)
     for i, column in enumerate(_columns(joints).T):
         colour = _LOOKS[i % len(_LOOKS)][0]
         artists.append(_draw_arrow(ax, joints[-1], column / 2, colour, f"motor {i} runs"))
@@ -77,7 +77,7 @@ def moving_arm(
     joints = _joints(path, lengths)
     show_reach(ax, lengths)
     for i in shown:
-        ax.plot(*joints[i].T, "o-", color="0.82", lw=3, ms=6, zorder=1.5)
+        ax.plot(*joints[i].T, "o-", color=PALE, lw=2, ms=5, zorder=1.5)
     (links,) = ax.plot([], [], "o-", color=COLOURS["z"], lw=4, ms=8, zorder=3)
     (way,) = ax.plot([], [], color=COLOURS["path"], lw=2.5, zorder=4)
 
@@ -98,9 +98,10 @@ def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LIN
     show_reach(ax, lengths)
     joints = _joints(last, lengths)
     for i in (0, len(joints) // 2, -1):
-        ax.plot(*joints[i].T, "o-", color="0.75", lw=4, ms=8, zorder=1.5)
+        ax.plot(*joints[i].T, "o-", color=PALE, lw=3, ms=6, zorder=1.5)
     for i, word in ((0, "start"), (-1, "goal")):
-        ax.annotate(word, joints[i, -1], (0, -18), textcoords="offset points", ha="center")
+        place, side = ((-12, -18), "right") if joints[i, -1, 0] > 0 else ((12, -18), "left")
+        ax.annotate(word, joints[i, -1], place, textcoords="offset points", ha=side)
     return [
         ax.plot(*_joints(path, lengths)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
         for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)

@@ -167,36 +167,30 @@ def describe_cube_motion(poses: Array) -> str:
 def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
     """Draw the paths of the origin in up to three motions, and its frame at the start and the ends.
 
-    The motions begin at one pose. Return a line for each (BK 2.6).
+    The motions begin at one pose; the frame has its letters there. Return a line for each (BK 2.6).
     """
-    looks = [(COLOURS["optimum"], "-"), (COLOURS["screw"], "--"), (COLOURS["reference"], ":")]
+    looks: list[dict[str, Any]] = [
+        {"color": COLOURS["optimum"], "ls": "-", "lw": 2},
+        {"color": COLOURS["screw"], "ls": "--", "lw": 2.5},
+        {"color": COLOURS["reference"], "ls": ":", "lw": 4, "zorder": 1},  # seen under the others
+    ]
     lines = [
-        ax.plot(*poses[:, :3, 3].T, color=colour, ls=dash, lw=2.5, label=name)[0]
-        for (name, poses), (colour, dash) in zip(ways.items(), looks, strict=False)
+        ax.plot(*poses[:, :3, 3].T, label=name, **look)[0]
+        for (name, poses), look in zip(ways.items(), looks, strict=False)
     ]
     frames = [next(iter(ways.values()))[0]]
     for poses in ways.values():
         if all(np.abs(poses[-1] - other).max() > 1e-9 for other in frames[1:]):
             frames.append(poses[-1])
-    for pose, name in zip(frames, "0111", strict=False):
-        draw_triad(ax, pose[:3, 3], pose[:3, :3], name)
-    paths = np.array([poses[:, :3, 3].T for poses in ways.values()])
-    places = np.concatenate(paths, axis=1).T
+    first, *others = frames
+    draw_triad(ax, first[:3, 3], first[:3, :3], "0")
+    for pose in others:
+        for axis, direction in zip("xyz", pose[:3, :3].T, strict=True):
+            draw_arrow(ax, pose[:3, 3], direction, COLOURS[axis])
+    places = [poses[:, :3, 3] for poses in ways.values()]
     tips = [A[:3, 3] + A[:3, :3].T for A in frames]
-    set_space(ax, np.concatenate([places, *tips]), 1.2, _across(paths), 1.0)
-    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.05))
+    set_space(ax, np.concatenate([*places, *tips]), 0.6, view=(32, -65), zoom=0.95)
     return lines
-
-
-def _across(paths: Array) -> tuple[float, float]:
-    """Return from where the plane is seen in which paths, shape (n, 3, times), leave the chord."""
-    chord = paths[0, :, -1] - paths[0, :, 0]
-    from_start = (paths - paths[:, :, :1]).transpose(0, 2, 1).reshape(-1, 3)
-    off = from_start - np.outer(from_start @ chord, chord) / (chord @ chord)
-    x, y, z = np.cross(off[np.linalg.norm(off, axis=-1).argmax()], chord)
-    up = 1 if z >= 0 else -1
-    elevation, azimuth = np.arctan2(up * z, np.hypot(x, y)), np.arctan2(up * y, up * x)
-    return float(np.degrees(elevation)), float(np.degrees(azimuth))
 
 
 def describe_ways(ways: Mapping[str, Array]) -> str:
@@ -206,8 +200,8 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
         steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1)
         lengths.append(f"{name} {steps.sum():.2f} m")
     return (
-        "The paths of a frame's origin from one pose, and the frame at their ends: "
-        f"{'; '.join(ways)}. Lengths of the paths: {'; '.join(lengths)}."
+        "Paths of a frame's origin from the same pose, and its axes at the start and at the ends: "
+        f"x orange, y green, z blue. Lengths of the paths: {'; '.join(lengths)}."
     )
 
 

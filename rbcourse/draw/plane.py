@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from rbcourse import Array
-from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 from rbcourse.planar import compose_planar
 
 _OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
@@ -35,7 +35,7 @@ def draw_route(ax: Axes, path: Array, length: float, shown: Iterable[int]) -> li
     for i in shown:
         artists += draw_body(ax, path[i], length, COLOURS["z"])
     for word, (x, y, _) in {"start": path[0], "goal": path[-1]}.items():
-        ax.annotate(word, (x, y), (0, 3), textcoords="offset points", ha="center")
+        ax.annotate(word, (x, y + 0.56 * length), (0, 2), textcoords="offset points", ha="center")
     show_plane(ax, [path], length)
     return artists
 
@@ -74,7 +74,7 @@ def moving_route(
     returns the artists that move (RR 3.3, RR Fig. 6, RR Fig. 7).
     """
     for i in shown:
-        draw_body(ax, path[i], length, "0.75", fill="none")
+        draw_body(ax, path[i], length, PALE, fill="none")
     (way,) = ax.plot([], [], color=COLOURS["path"], zorder=2)
     body = draw_body(ax, path[0], length, COLOURS["z"])
     for artist in body:

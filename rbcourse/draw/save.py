@@ -46,12 +46,14 @@ COLOURS = {
     "y": "#009E73",
     "z": "#0072B2",
     "optimum": "#000000",
-    "projection": "#CC79A7",
+    "projection": "#C2649A",
     "screw": "#8821D9",
     "reference": "#585858",
     "path": "#BB0000",
 }
 """The same meaning has the same colour everywhere; all can be told apart when colour-blind."""
+PALE = "#8F8F8F"
+"""The colour of what stands behind; this one too has a contrast of 3 on white."""
 FORMS: dict[str, Callable[..., Curve]] = {
     "projection": projected_cubic_so3,
     "exponential": exponential_cubic_so3,

@@ -57,6 +57,14 @@ def test_colours_can_be_told_apart_by_all_eyes(eye):
         assert np.linalg.norm(seen(one, matrix) - seen(other, matrix)) > 16.9, (one, other)
 
 
+def test_all_colours_have_a_contrast_of_3_on_white():
+    """That of WCAG 2, for graphical objects; the Y of Lab is the relative luminance."""
+    for colour in [*save.COLOURS.values(), save.PALE]:
+        lightness, *_ = seen(colour, np.eye(3))
+        luminance = max((lightness + 16) / 116, 6 / 29) ** 3
+        assert 1.05 / (luminance + 0.05) >= 3, colour
+
+
 def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RBCOURSE_FIGURES", raising=False)

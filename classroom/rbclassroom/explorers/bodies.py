@@ -10,6 +10,7 @@ from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
 from rbclassroom.figures.lesson13 import LOOKS, torques
 from rbcourse.draw.bodies import draw_box, move_box
+from rbcourse.draw.save import PALE
 
 _TIMES = np.linspace(0, 1, 61)
 _LENGTH, _WIDTH = 0.30, 0.20
@@ -36,10 +37,10 @@ def body_explorer() -> Explorer:
             space = new_space(fig, (k / 3 - 0.05, 0.41, 0.43, 0.53), 0.8)
             artists[law] = draw_box(space, np.eye(4), 1.0)
             fig.text((k + 0.5) / 3, 0.92, law, color=style["color"], ha="center")
-        ax = fig.add_axes((0.13, 0.15, 0.83, 0.28))
+        ax = fig.add_axes((0.13, 0.18, 0.83, 0.26))
         ax.set(xlim=(0, 1), ylim=(0, 0.3), xlabel="time (s)", ylabel="torque (N m)")
         ax.set_yticks([0, 0.1, 0.2, 0.3])
-        artists["now"] = ax.axvline(0, color="0.6", lw=1)
+        artists["now"] = ax.axvline(0, color=PALE, lw=1)
         artists |= {f"{law} torque": new_line(ax, **style) for law, style in LOOKS.items()}
     controls = {
         "about": widgets.menu("turned about", list(_AXES)),

@@ -34,10 +34,11 @@ def theta_explorer() -> Explorer:
         ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
         ax.set(xlim=(-1.12, 1.12), ylim=(-0.35, 1.25), aspect="equal")
         ax.set_axis_off()
-        side = fig.add_axes((0.57, 0.16, 0.4, 0.76))
+        side = fig.add_axes((0.57, 0.18, 0.39, 0.74))
         side.plot([0, 1], [0, 1], color=COLOURS["reference"], lw=1)
         side.set(xlim=(0, 1), ylim=(0, 1), xlabel="time t", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
         black, pink = ({"color": COLOURS[name]} for name in ("optimum", "projection"))
+        side.tick_params("y", pad=8)  # beyond the dots
         dot: dict[str, Any] = {"marker": "o", "ms": 10, "ls": ""}
         artists = {
             "arc": new_line(ax, **black, lw=2.5),
@@ -163,7 +164,7 @@ def flip_explorer() -> Explorer:
         for i, half in enumerate(_EDGES / 2):
             ends = np.outer(R[k, :, i], half * np.array([-1, 1]) + [-0.055, 0.055])
             artists[f"axis {i + 1}"].set_data_3d(*ends)
-            artists[f"number {i + 1}"].set_position_3d((half + 0.072) * R[k, :, i])
+            artists[f"number {i + 1}"].set_position_3d((half + 0.085) * R[k, :, i])
             artists[f"w{i + 1}"].set_data(_SPIN_TIMES[: k + 1], w[: k + 1, i])
         artists["now"].set_xdata([t, t])
         itself = w[: k + 1, _SPINS[axis]]

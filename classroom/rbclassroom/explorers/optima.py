@@ -9,7 +9,7 @@ import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
-from rbcourse.draw.save import COLOURS, FORMS
+from rbcourse.draw.save import COLOURS, FORMS, PALE
 
 Solved = tuple[list[rb.Curve], dict[str, str]]
 
@@ -32,8 +32,9 @@ def minimum_acceleration_explorer() -> Explorer:
     4).
     """
     with new_figure() as fig:
-        ax = fig.add_axes((0.12, 0.16, 0.46, 0.71))
+        ax = fig.add_axes((0.12, 0.18, 0.46, 0.69))
         ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
+        ax.set(xticks=[0, 0.5, 1], yticks=[-1, 0, 1, 2])
         artists: dict[str, Any] = {}
         for way, name, dash in (("optimum", "optimum", "-"), ("rival", "closed form", "--")):
             for axis in "xyz":
@@ -42,7 +43,7 @@ def minimum_acceleration_explorer() -> Explorer:
         for axis, number in zip("xyz", "₁₂₃", strict=True):
             artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", color=COLOURS[axis], va="center")
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
-        artists["now"] = ax.axvline(0, color="0.6", lw=1)
+        artists["now"] = ax.axvline(0, color=PALE, lw=1)
         space = new_space(fig, (0.63, 0.24, 0.41, 0.6), 1.0)
         for way in ("optimum", "rival"):
             artists[f"{way} box"] = draw_box(space, np.eye(4), _BOX)
@@ -62,7 +63,8 @@ def minimum_acceleration_explorer() -> Explorer:
                 artists[f"{way} {axis}"].set_data(_TIMES, line)
             move_box(artists[f"{way} box"], rb.pose_from_components(curve(t), np.zeros(3)), _BOX)
         artists["now"].set_xdata([t, t])
-        for number, height in zip("₁₂₃", size * _SIGMA, strict=True):
+        heights = size * _SIGMA[1] + max(size, 0.5) * (_SIGMA - _SIGMA[1])  # apart from each other
+        for number, height in zip("₁₂₃", heights, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
         return {**said, "apart at most": apart(*(curve(_TIMES) for curve in curves))}
 
@@ -84,9 +86,9 @@ def cube_explorer() -> Explorer:
             ax.fit(_LOW, _HIGH, zoom=1.04)
             ax.view_init(elev=18, azim=-22)
             draw_ground(ax, _LOW, _HIGH)
-            for name, end in zip("xyz", 5 * np.eye(3), strict=True):
-                ax.plot(*np.outer(end, [0, 1]), color="0.7", lw=1.5, zorder=0)
-                ax.text(*(1.2 * end), name, color="0.5", ha="center", va="center")
+            for name, end, far in zip("xyz", 5 * np.eye(3), (1.5, 1.2, 1.2), strict=True):
+                ax.plot(*np.outer(end, [0, 1]), color=PALE, lw=1.5, zorder=0)
+                ax.text(*(far * end), name, color="0.5", ha="center", va="center")
             artists[f"{way} way"] = new_line(ax, color="black", lw=1, ls=dash)
             artists |= {name: draw_box(ax, np.eye(4), _SIDE) for name in (f"{way} goal", way)}
             artists[f"{way} goal"].set_alpha(0.25)

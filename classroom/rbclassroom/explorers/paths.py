@@ -8,7 +8,7 @@ import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, move_box
-from rbcourse.draw.save import COLOURS
+from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 
 POSES = rb.pose_from_coordinates(
@@ -50,20 +50,21 @@ def spline_explorer() -> Explorer:
             ax: Any = fig.add_axes((0.48 * i + 0.06, 0.4, 0.48, 0.54), projection="space")
             draw_sphere(ax)
             ax.view_init(elev=20, azim=12)
-            below = fig.add_axes((0.11 + 0.48 * i, 0.15, 0.38, 0.24))
+            below = fig.add_axes((0.11 + 0.48 * i, 0.18, 0.38, 0.21))
             below.set(xlim=(0, 4), ylim=(0, _STEEPEST), xticks=[0, 1, 2, 3, 4], yticks=[0, 3, 6])
             below.set_xlabel("time (s)")
             below.tick_params(labelleft=i == 0)
             fig.text(0.3 + 0.48 * i, 0.94, kind, ha="center")
             look: Any = {"color": COLOURS[colour]}
+            dot: Any = {"color": "black", "marker": "o", "ls": "", "clip_on": False}
             artists |= {
                 f"{kind} path": new_line(ax, **look, lw=2),
                 f"{kind} given": new_line(ax, color=COLOURS["reference"], marker="o", ls="", ms=7),
                 f"{kind} up": new_line(ax, color="black", lw=2.5),
                 f"{kind} now": new_line(ax, color="black", marker="o", ls="", ms=5),
-                f"{kind} joints": below.vlines([], 0, _STEEPEST, color="0.7", lw=1, ls=":"),
+                f"{kind} joints": below.vlines([], 0, _STEEPEST, color=PALE, lw=1, ls=":"),
                 f"{kind} ‖ω′‖": new_line(below, **look),
-                f"{kind} ‖ω′‖ now": new_line(below, color="black", marker="o", ls=""),
+                f"{kind} ‖ω′‖ now": new_line(below, **dot),
             }
         fig.text(0.02, 0.42, "‖ω′‖ (rad/s²)")
     controls = {
@@ -116,7 +117,7 @@ def chain_explorer() -> Explorer:
     whole in s; and the time ``t`` in [0, 1], as a share of it, which plays (BK 6.3, beyond BK 14).
     """
     with new_figure() as fig:
-        space = new_space(fig, (-0.08, -0.1, 0.74, 1.2), 2.05)
+        space = new_space(fig, (-0.06, -0.1, 0.74, 1.2), 2.15)
         artists: dict[str, Any] = {
             "way": new_line(space, color=COLOURS["path"]),
             "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
@@ -124,12 +125,12 @@ def chain_explorer() -> Explorer:
         }
         artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
         for i, (name, high) in enumerate(_WAYS.items()):
-            ax = fig.add_axes((0.66, 0.62 - 0.48 * i, 0.32, 0.29))
+            ax = fig.add_axes((0.66, 0.64 - 0.46 * i, 0.31, 0.27))
             ax.set(xlim=(0, _LONGEST), ylim=(0, high), xticks=[0, 4, 8, 12], title=name)
             artists |= {
-                f"{name} joints": ax.vlines([], 0, high, color="0.7", lw=1, ls=":"),
+                f"{name} joints": ax.vlines([], 0, high, color=PALE, lw=1, ls=":"),
                 name: new_line(ax, color=COLOURS["path"]),
-                f"{name} now": new_line(ax, color=COLOURS["optimum"], marker="o", ls=""),
+                f"{name} now": new_line(ax, color="black", marker="o", ls="", clip_on=False),
             }
         ax.set_xlabel("time (s)")
     controls = {

@@ -10,7 +10,7 @@ from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, numbe
 from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics, interpolate_joints
 from rbcourse.draw.arm import show_reach
 from rbcourse.draw.plane import draw_body, move_body
-from rbcourse.draw.save import COLOURS
+from rbcourse.draw.save import COLOURS, PALE
 
 _STEPS = 80
 _LASTS = 2.0  # each command, in s
@@ -33,13 +33,13 @@ def planar_explorer() -> Explorer:
     (18), RR (19)).
     """
     with new_figure() as fig:
-        ax = fig.add_axes((0.12, 0.15, 0.87, 0.73))
+        ax = fig.add_axes((0.12, 0.18, 0.87, 0.7))
         ax.set(xlim=(-7.75, 7.75), ylim=(-4.9, 4.9), xlabel="x (m)", ylabel="y (m)")
         ax.set_aspect("equal")
         artists: dict[str, Any] = {}
         for frame, (colour, fill, ls) in _FRAMES.items():
             look, label = {"color": colour, "ls": ls}, f"axes of the {frame}"
-            artists[f"{frame} plan"] = new_line(ax, **look, lw=1, alpha=0.4)
+            artists[f"{frame} plan"] = new_line(ax, **look, lw=1)
             artists[f"{frame} way"] = new_line(ax, **look, label=label)
             outline, nose = draw_body(ax, np.zeros(3), _BODY, colour, fill=fill, ls=ls)
             artists |= {f"{frame} outline": outline, f"{frame} nose": nose}
@@ -76,9 +76,9 @@ def arm_explorer() -> Explorer:
     goal is set, the arm is shown there (RR 4, RR 4.1, RR (20), RR (21)).
     """
     with new_figure() as fig:
-        ax = fig.add_axes((0.12, 0.15, 0.63, 0.84))
+        ax = fig.add_axes((0.12, 0.18, 0.63, 0.81))
         show_reach(ax)
-        ax.plot(*arm_forward_kinematics(_START).joints.T, "o-", color="0.75", lw=4, ms=8)
+        ax.plot(*arm_forward_kinematics(_START).joints.T, "o-", color=PALE, lw=4, ms=8)
         red, cross = {"color": COLOURS["path"]}, {"marker": "x", "ls": "", "ms": 12, "mew": 3}
         artists: dict[str, Any] = {
             "way": new_line(ax, **red, lw=2.5, label="its way"),

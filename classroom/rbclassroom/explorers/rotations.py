@@ -9,7 +9,7 @@ import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, move_box
-from rbcourse.draw.save import COLOURS
+from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 from rbcourse.sampling import sample_rotation_naive, uniformity_tests
 
@@ -50,11 +50,11 @@ def rotation_explorer() -> Explorer:
         second = rb.matrix_from_zyx(angles * [1, 0, 0])[:, 1]
         turns = {"first turn": np.array([0, 0, 1]), "second turn": second, "third turn": R[:, 0]}
         for name, axis in turns.items():
-            artists[name].set_data_3d(*np.outer(axis, [-1.25, 1.05]))
+            artists[name].set_data_3d(*np.outer(axis, [-1.05, 1.05]))
         r = rb.log_so3(R)
         angle = float(np.linalg.norm(r))
         axis = r / angle if angle > 0 else np.zeros(3)
-        artists["axis"].set_data_3d(*np.outer(axis, [-1.25, 1.25]))
+        artists["axis"].set_data_3d(*np.outer(axis, [-1.05, 1.05]))
         said = {
             "matrix": _lines(R),
             "quaternion": numbers(rb.quaternion_from_matrix(R), 2),
@@ -78,15 +78,15 @@ def projection_explorer() -> Explorer:
     plays (BK 4, BK Prop. 2, RR 1.4).
     """
     with new_figure() as fig:
-        ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.5)
+        ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.2)
         artists = {
-            **_axes_of(ax, "M", "0.75", ls="-", lw=7, zorder=1),
+            **_axes_of(ax, "M", PALE, ls="-", lw=7, zorder=1),
             **_axes_of(ax, "nearest", ls="-", lw=3.5),
             **_axes_of(ax, "Gram–Schmidt", ls="--", lw=2),
         }
         for name in ("M", "nearest", "Gram–Schmidt"):
             artists[f"{name} z"].set_label(name)
-        fig.legend(loc="lower left", ncols=2, handlelength=1.6, columnspacing=1)
+        fig.legend(loc="lower left", ncols=3, handlelength=1.6, columnspacing=1)
     controls = {
         "e12": widgets.slider("y leans", 0.8, -1.0, 1.0, 0.05),
         "e23": widgets.slider("z leans", 0.0, -1.0, 1.0, 0.05),
@@ -136,14 +136,14 @@ def random_explorer() -> Explorer:
         fig.text(0.26, 0.91, "images of e₁", ha="center")
         pink = {"color": COLOURS["projection"]}
         artists: dict[str, Any] = {"points": new_line(ax, **pink, marker="o", ls="", ms=4, mew=0)}
-        side = fig.add_axes((0.62, 0.25, 0.36, 0.63))
+        side = fig.add_axes((0.62, 0.27, 0.36, 0.61))
         side.set(xlim=(0, 3.2), ylim=(-1, 1), title="their heights")
         side.set_xlabel("density\n(dashed: uniform)")
         side.set_yticks([-1, -0.5, 0, 0.5, 1])
         side.axvline(0.5, color="black", ls="--", lw=1.5)
         fig.text(0.26, 0.02, "pale: the far side", ha="center")
         steps: Any = {"orientation": "horizontal", "lw": 2, **pink}
-        artists["histogram"] = side.stairs(np.zeros(20), _BINS, **steps)
+        artists["histogram"] = side.stairs(np.zeros(20), _BINS, baseline=None, **steps)
     controls = {
         "sampler": widgets.choice("sampler", list(_SAMPLERS)),
         "number": widgets.stepped("rotations", 40.0, 20.0, _MOST, 20.0),
@@ -188,7 +188,7 @@ def _move_axes(artists: dict[str, Any], name: str, M: rb.Array) -> None:
     for axis, column in zip("xyz", M.T, strict=True):
         artists[f"{name} {axis}"].set_data_3d(*np.outer(column, [0, 1]))
         if f"{name} {axis} letter" in artists:
-            artists[f"{name} {axis} letter"].set_position_3d(1.15 * column)
+            artists[f"{name} {axis} letter"].set_position_3d(1.2 * column)
 
 
 def _lines(M: rb.Array) -> str:

@@ -11,7 +11,7 @@ from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_s
 from rbclassroom.explorers.paths import EDGES, POSES
 from rbclassroom.figures.lesson15 import highest_rates
 from rbcourse.draw.bodies import draw_box, move_box
-from rbcourse.draw.save import COLOURS
+from rbcourse.draw.save import COLOURS, PALE
 
 LIMITS = "angular_speed", "speed", "acceleration"
 _HIGHEST = 2.0
@@ -37,10 +37,10 @@ def timing_explorer() -> Explorer:
         }
         artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
         artists["way"].set_data_3d(*path(np.linspace(0, 3, 121))[:, :3, 3].T)
-        ax = fig.add_axes((0.53, 0.15, 0.45, 0.5))
+        ax = fig.add_axes((0.53, 0.18, 0.45, 0.46))
         ax.set(xlim=(0, 3), ylim=(0, _HIGHEST), xticks=[0, 1, 2, 3], xlabel="s", ylabel="rate ṡ")
         for knot in (1, 2):
-            ax.axvline(knot, color="0.7", lw=1, ls=":")
+            ax.axvline(knot, color=PALE, lw=1, ls=":")
         looks: dict[str, Any] = {
             "acceleration limit": {"color": COLOURS["x"], "lw": 1.5},
             "speed limits": {"color": COLOURS["z"], "lw": 1.5, "ls": "-."},
@@ -48,7 +48,7 @@ def timing_explorer() -> Explorer:
             "fastest": {"color": COLOURS["optimum"], "lw": 2.5},
         }
         artists |= {name: new_line(ax, label=name, **look) for name, look in looks.items()}
-        artists["now"] = new_line(ax, color=COLOURS["optimum"], marker="o", ls="")
+        artists["now"] = new_line(ax, color="black", marker="o", ls="", clip_on=False)
         ax.legend(loc="lower right", bbox_to_anchor=(1.02, 1.0), handlelength=1.8)
     controls = {
         "angular_speed": widgets.slider("ω at most (rad/s)", 1.0, 0.5, 3.0, 0.1),

@@ -20,10 +20,11 @@ def draw_angles(axes: Sequence[Axes], data: Table) -> None:
         for k, (letter, (colour, dash)) in enumerate(_LOOKS.items()):
             degrees = np.degrees(angles[:, k])
             ax.plot(data["t [1]"], degrees, color=colour, ls=dash, label=letter)
-        ax.set(xlabel="time t", title=name, xlim=(0, 1), xticks=[0, 0.5, 1])
+        ax.set(xlabel="time t", title=name, xlim=(0, 1))
+        ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
         ax.set_yticks([-180, -90, 0, 90, 180])
     axes[0].set_ylabel("angle (degrees)")
-    axes[0].legend()
+    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
 
 def describe_angles(data: Table) -> str:

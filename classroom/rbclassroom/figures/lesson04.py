@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns, named
 from rbcourse import Array, orthonormalize_gram_schmidt, project_so
-from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.save import COLOURS, PALE, Table
 
 Repair = Callable[[Array], Array]
 
@@ -53,8 +53,9 @@ def draw_drift(ax: Axes, data: Table) -> None:
     (_, steps), *ways = named(" [1]", data).items()
     looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
     for (name, defect), (colour, dash) in zip(ways, looks, strict=True):
-        ax.loglog(steps, defect, color=colour, ls=dash, label=name)
-    ax.set(xlabel="products", ylabel="defect ‖RᵀR − I‖", xlim=(1, steps[-1]))
+        label = name.replace("ω̂", r"$\hat{ω}$")
+        ax.loglog(steps, defect, color=colour, ls=dash, label=label)
+    ax.set(xlabel="products", ylabel="defect ‖R$^T$R − I‖", xlim=(1, steps[-1]))
     ax.legend()
 
 
@@ -84,13 +85,13 @@ def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
     style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.025, "zorder": 3}
     for ax, (name, M) in zip(axes, matrices.items(), strict=True):
-        title = f"{name}\n{_sense(M)}"
+        title = f"{name.replace('ᵀ', '$^T$')}\n{_sense(M)}"
         if M is not given:
-            ax.quiver([0, 0], [0, 0], *given, color="0.7", **style)
+            ax.quiver([0, 0], [0, 0], *given, color=PALE, **style)
             ax.plot(*np.stack([given, M], axis=1), color="black", ls=":", zorder=4)
             title += f", misses {np.linalg.norm(M - given):.2f}"
         ax.quiver([0, 0], [0, 0], *M, color=[COLOURS["x"], COLOURS["y"]], **style)
-        ax.add_patch(Circle((0, 0), 1, fill=False, color="0.8", lw=1))
+        ax.add_patch(Circle((0, 0), 1, fill=False, color=PALE, lw=1))
         ax.set(aspect="equal", title=title, xlabel="x", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
         ax.set(xlim=(-edge, edge), ylim=(-edge, edge))
     axes[0].set_ylabel("y")
@@ -141,7 +142,7 @@ def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> None:
     circle = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
     for ax, (name, colour) in zip(axes, _COLOURS.items(), strict=True):
         ways = np.stack([points["M"], points[name]])
-        ax.plot(circle.real, circle.imag, color="0.6", lw=1)
+        ax.plot(circle.real, circle.imag, color=PALE, lw=1)
         ax.plot(*ways[0].T, "o", ms=5, color=colour)
         ax.plot(*ways.transpose(2, 0, 1), color=colour, lw=1.5)
         ax.plot(*ways[1].T, "o", ms=4, mfc="white", mec=colour)

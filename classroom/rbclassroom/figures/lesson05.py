@@ -54,14 +54,16 @@ def draw_histograms(axes: Sequence[Axes], bins: Bins) -> None:
     for ax, (column, (label, limits, law)) in zip(axes, _LAWS.items(), strict=True):
         edges, densities = bins[column]
         for (name, density), look in zip(densities.items(), ("projection", "z"), strict=True):
-            ax.stairs(density, edges, color=COLOURS[look], lw=2, label=name)
+            ax.stairs(density, edges, baseline=None, color=COLOURS[look], lw=2, label=name)
         fine = np.linspace(*limits, 201)
         density, middle = np.diff(law(fine)) / np.diff(fine), (fine[:-1] + fine[1:]) / 2
-        ax.plot(middle, density, color="black", ls="--", lw=1.5, label="the law")
+        ax.plot(middle, density, color="black", ls="--", lw=1.5, label="law of uniform rotations")
+        ax.set_xticks(np.linspace(*limits, 3))
         ax.set(xlabel=label, xlim=limits, ylim=(0, None))
     axes[0].set_xticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
     axes[0].set_ylabel("density")
-    axes[0].legend()
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(handles, labels, loc="outside upper center", ncols=3)
 
 
 def describe_histograms(bins: Bins) -> str:

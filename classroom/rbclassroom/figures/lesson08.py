@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rbclassroom.figures import columns, vectors
 from rbcourse import Array, pose_from_components
 from rbcourse.draw.bodies import draw_box, move_box
-from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.save import COLOURS, PALE, Table
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION, draw_sphere
 
 
@@ -24,7 +24,7 @@ def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> No
     for ax, (name, w) in zip(axes, spins.items(), strict=True):
         for axis, number, part, dash in zip("xyz", "₁₂₃", w.T, ("-", "--", "-."), strict=True):
             ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"ω{number}")
-        times = np.linspace(t[0], t[-1], 5)
+        times = np.linspace(t[0], t[-1], 3)
         ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]), xticks=times)
     axes[0].set_ylabel("rad per unit time")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
@@ -38,8 +38,8 @@ def describe_spins(spins: Mapping[str, Array]) -> str:
         flips = np.count_nonzero(np.diff(main > 0))
         said.append(f"{name}: it changes its sign {flips} times" if flips else f"{name}: it stays")
     return (
-        "The three components of the angular velocity of a free body over time, for spins that "
-        f"start nearly about one axis. What becomes of the largest component: {'; '.join(said)}."
+        "Angular velocity ω(t), in body axes, of a free body that first spins nearly about "
+        f"{', '.join(spins)}. The largest component of each: {'; '.join(said)}."
     )
 
 
@@ -71,7 +71,7 @@ def draw_momenta(ax: Any, directions: Array) -> None:
         axis, near_axis_2 = _course(path)
         look = "optimum" if near_axis_2 else "xyz"[axis]
         ax.plot(*path.T, color=COLOURS[look], lw=2)
-    for name, end in zip("123", 1.1 * np.eye(3), strict=True):
+    for name, end in zip("123", np.diag([1.3, 1.1, 1.1]), strict=True):
         for place in (end, -end):
             ax.text(*place, name, ha="center", va="center")
 
@@ -80,9 +80,9 @@ def describe_momenta(directions: Array) -> str:
     """Return in words what `draw_momenta` shows."""
     rounds, near = zip(*map(_course, directions), strict=True)
     return (
-        f"{len(rounds)} paths of the angular momentum on a sphere that is fixed in the body: "
-        f"{rounds.count(0)} go round axis 1, {rounds.count(2)} round axis 3, "
-        f"{rounds.count(1) or 'none'} round axis 2. "
+        "Paths of the angular momentum of a free body, on a sphere that is fixed in the body, with "
+        f"the numbers of the axes. Of {len(rounds)} paths {rounds.count(0)} go round axis 1, "
+        f"{rounds.count(2)} round axis 3, {rounds.count(1) or 'none'} round axis 2. "
         f"Black: the {sum(near)} that pass close to axis 2."
     )
 
@@ -106,7 +106,7 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
     """
     poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
-    ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color="0.75", lw=1.5)
+    ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color=PALE, lw=1.5)
     label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
     ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
@@ -131,7 +131,10 @@ def describe_book(t: Array, R: Array) -> str:
     start = "up" if height[0] > 0 else "down"
     over = ", ".join(f"{x:.1f}" for x in t[1:][np.diff(height > 0)])
     fate = f"turns over at t = {over}" if over else "stays there"
-    return f"A book spins freely, with a pin in its middle axis. It starts {start}, and {fate}."
+    return (
+        "A book that spins freely, with a pin in its middle axis and a line along its angular "
+        f"momentum. It starts {start}, and {fate}."
+    )
 
 
 CARRIED = {
@@ -173,7 +176,7 @@ def describe_carried(turned: Array) -> str:
     """Return in words what `draw_carried` shows."""
     angles = ", ".join(f"{np.degrees(angle):.0f}" for angle in turned)
     return (
-        f"A body turns in the plane, by {angles} degrees, and carries an arrow three ways: "
-        "constant in the room it stays, constant in the body it turns along, and parallel it turns "
-        "by half as much."
+        f"An arrow that a body carries in three ways while it turns in the plane. After {angles} "
+        "degrees the one that is constant in the room has not turned, the one that is constant in "
+        "the body has turned with it, and the parallel one has turned by half as much."
     )

@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns
 from rbcourse import Array, Ends, angle_between, exp_so3, geodesic_so3
-from rbcourse.draw.save import COLOURS
+from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 
 _SHARES = np.linspace(0, 1, 33)  # where a leg is drawn
-_LOOKS = ("0.7", 2), ("0.45", 2), (COLOURS["optimum"], 3)
+_LOOKS = (PALE, 2), ("0.35", 2), (COLOURS["optimum"], 3)
 """Colour and width of the legs between the points of each level."""
 _NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v", "B₂v", "R₁v"]}
 
@@ -82,12 +82,12 @@ def describe_casteljau(ends: Sequence[ArrayLike]) -> str:
     B = _controls(ends)
     legs = ", ".join(f"{x:.0f}" for x in np.degrees(angle_between(B[:-1], B[1:])))
     return (
-        "De Casteljau's construction divides straight legs in the plane, and geodesics on SO(3), "
-        "in the same ratio. Four control points have three legs; the points that divide these have "
-        "two, the points that divide those have one, and the point that divides it draws the "
-        "curve. On the right the rotations are shown by the images of a vector v on the unit "
-        "sphere; B₁ is R₀ exp(ω₀/3), and B₂ is R₁ exp(−ω₁/3). From one control rotation to the "
-        f"next are {legs} degrees."
+        "De Casteljau's construction of a cubic, which divides legs in the ratio t: straight legs "
+        "in the plane (left), and geodesics on SO(3) (right). Four control points have three legs; "
+        "the points that divide these have two, the points that divide those have one, and the "
+        "point that divides it draws the curve. On SO(3) the rotations are shown by the images of "
+        "a vector v on the unit sphere; B₁ is R₀ exp(ω₀/3), and B₂ is R₁ exp(−ω₁/3). From one "
+        f"control rotation to the next are {legs} degrees."
     )
 
 

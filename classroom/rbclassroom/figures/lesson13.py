@@ -36,10 +36,10 @@ def draw_torques(axes: Sequence[Axes], data: Table) -> None:
     t, laws = data["t [s]"], vectors("{} {} [N m]", data)
     for ax, (law, torque) in zip(axes, laws.items(), strict=True):
         ax.axhline(0, color="0.8", lw=1, zorder=0)
-        for axis, column in zip("xyz", torque.T, strict=True):
-            ax.plot(t, column, color=COLOURS[axis], label=f"about {axis}")
+        for axis, column, dash in zip("xyz", torque.T, ("-", "--", "-."), strict=True):
+            ax.plot(t, column, color=COLOURS[axis], ls=dash, label=f"about {axis}")
         ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="‖τ‖")
-        ax.set(title=law, xlabel="time (s)")
+        ax.set(title=law, xlabel="time (s)", xticks=[0, 0.5, 1])
     axes[0].set_ylabel("torque in body axes (N m)")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
@@ -50,8 +50,11 @@ def describe_torques(data: Table) -> str:
     for law, torque in vectors("{} {} [N m]", data).items():
         largest = np.linalg.norm(torque, axis=-1).max()
         each = ", ".join(f"{x:.2g}" for x in np.abs(torque).max(axis=0))
-        said.append(f"{law}: at most {largest:.2g} N m, about x, y, z at most {each}")
-    return f"The torque on a body over time, turned by several laws. {'; '.join(said)}."
+        said.append(f"{law}: {largest:.2g} N m, about x, y, z {each}")
+    return (
+        "Torque on a body over time, in body axes, and its norm, for several laws by which the "
+        f"body is turned. The largest values: {'; '.join(said)}."
+    )
 
 
 def speed_table(t: Array, curves: Mapping[str, Curve]) -> dict[str, Array]:
@@ -71,13 +74,13 @@ def draw_speeds(ax: Axes, data: Table) -> None:
 def describe_speeds(data: Table) -> str:
     """Return in words what `draw_speeds` shows."""
     said = (f"{name} at most {np.max(data[f'{name} [rad]']):.1f}" for name in _SPEEDS)
-    return f"Angular speeds over time, in rad per unit time: {', '.join(said)}."
+    return f"Angular speed over time. In rad per unit time: {', '.join(said)}."
 
 
 _FREE = "{} {} [rad]"
 _STRAIGHT = "straight"
 _COORDINATES = {
-    "exponential coordinates": "y = log(R₀ᵀR)",
+    "exponential coordinates": "y = log(R₀$^T$R)",
     "normal coordinates": "x, to second order",
 }
 
@@ -111,7 +114,7 @@ def draw_normal(axes: Sequence[Axes], data: Table) -> None:
             ax.plot(*motion.T, markevery=[middle, -1], label=label, **look)
         reach = 1.1 * np.abs([lines[1], motions]).max()
         ax.set(title=f"{kind}\n{_COORDINATES[kind]}", xlabel="about x (rad)", aspect="equal")
-        ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
+        ax.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes[0].set_ylabel("about y (rad)")
     handles, labels = axes[0].get_legend_handles_labels()
     axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=2)
@@ -126,9 +129,9 @@ def describe_normal(data: Table) -> str:
         off = np.degrees(np.abs(np.angle(y / x))).max()
         said.append(f"in {kind} by up to {off:.0f} degrees")
     return (
-        f"{len(lines)} free motions of a body from one rotation, in two coordinates, beside "
-        "straight lines with the same start. Seen from the start the end of a motion is off its "
-        f"line {', '.join(said)}."
+        f"{len(lines)} free motions of a body from one rotation, and straight lines with the same "
+        f"start, in {' and '.join(kind for kind, _ in kinds)}. Seen from the start the end of a "
+        f"motion is off its line {', '.join(said)}."
     )
 
 

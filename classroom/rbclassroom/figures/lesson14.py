@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 import rbcourse as rb
 from rbcourse import Array, Curve
-from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 RATES = {
     1: ("angular speed [rad/s]", "speed [m/s]"),
@@ -74,14 +74,14 @@ def describe_profiles(data: Table, knots: ArrayLike) -> str:
     t = np.asarray(data[_TIME])
     parts, labels = [], []
     for label, unit, values in _profiles(data):
-        labels.append(f"{label} ({unit})")
+        labels.append(label)
         scale, largest = np.abs(values).max(), int(np.argmax(np.round(values, 9)))
         low = f"from {in_words(values.min(), scale)} " if values.min() < -0.01 * scale else ""
         parts.append(f"{label} {low}up to {in_words(values[largest], scale)} {unit}")
         parts[-1] += f" at {in_words(t[largest], t[-1])} s"
     when = ", ".join(in_words(knot, t[-1]) for knot in np.asarray(knots))
     return (
-        f"Over time, with dotted lines where poses are reached: {', '.join(labels)}. "
+        f"The {' and the '.join(labels)} over time, with a dotted line where a pose is reached. "
         f"They go: {'; '.join(parts)}. The poses are reached at {when} s."
     )
 
@@ -119,8 +119,9 @@ def describe_accelerations(data: Table, knots: ArrayLike) -> str:
         steps = [np.interp(k + 0.01, t, values) - np.interp(k - 0.01, t, values) for k in inner]
         parts.append(f"{name} by {', '.join(in_words(x, 1) for x in steps)} rad/s²")
     return (
-        "One component of the angular acceleration of curves over time, with dotted lines where "
-        f"rotations are reached. Within 0.02 s at the inner ones they change: {'; '.join(parts)}."
+        "One component of the angular acceleration over time, of curves that reach the same "
+        "rotations at the dotted lines. Within 0.02 s at the inner ones they change: "
+        f"{'; '.join(parts)}."
     )
 
 
@@ -145,7 +146,7 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
     for clock, angle in zip(_CLOCK, _ANGLES, strict=True):
         dots = angle + 2 * np.pi * np.arange(-20, 20)
         dots = dots[(dots > low) & (dots < high)]
-        axes[0].plot(np.full(len(dots), clock), dots, "o", color="0.7", ms=4, zorder=0)
+        axes[0].plot(np.full(len(dots), clock), dots, "o", color=PALE, ms=4, zorder=0)
     names = list(data)[1::2]
     for name, angle, bend, look in zip(names, columns[::2], columns[1::2], _TURNS, strict=True):
         for ax, values in zip(axes, (angle, bend), strict=True):
@@ -164,8 +165,9 @@ def describe_turns(data: Table) -> str:
         for name, x, bend in zip(names, values[1::2], values[2::2], strict=True)
     )
     return (
-        "Cubic splines through three rotations about one axis, with more and more whole turns: the "
-        f"angle over time, and its difference from a straight line. {'; '.join(said)}."
+        "Cubic splines through three rotations about one axis, with different whole turns: the "
+        "angle over time (left), and its difference from a straight line (right). They go: "
+        f"{'; '.join(said)}."
     )
 
 
@@ -223,6 +225,7 @@ def describe_excesses(data: Table) -> str:
         for name, x in zip(EXCESSES, columns, strict=True)
     )
     return (
-        "The excess over the cheapest curve through ten rotations, over the turn of a leg, both "
-        f"axes logarithmic. From {legs[0]:.0f} to {legs[-1]:.0f} degrees: {'; '.join(said)}."
+        "Excess of curves through ten rotations over the cheapest one, over the turn of a leg. "
+        f"Both axes are logarithmic. From {legs[0]:.0f} to {legs[-1]:.0f} degrees: "
+        f"{'; '.join(said)}."
     )

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rbclassroom.figures.lesson14 import profile_table
 from rbcourse import Array, Curve, Timed
-from rbcourse.draw.save import COLOURS, Table, in_words
+from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 LIMITS = {
     "angular_speed": (1, 0, "angular speed [rad/s]"),
@@ -86,7 +86,7 @@ def draw_phase_plane(ax: Axes, data: Table, knots: ArrayLike) -> None:
     """Draw a `phase_table`, with a dotted line at each pose."""
     s, *columns = (np.asarray(x) for x in data.values())
     for knot in np.asarray(knots):
-        ax.axvline(knot, color="0.7", lw=1, ls=":")
+        ax.axvline(knot, color=PALE, lw=1, ls=":")
     for (name, look), rate in zip(_LOOKS.items(), columns, strict=True):
         ax.plot(s, rate, **{"label": name, **look})
     ax.set(xlabel="path parameter s (s)", ylabel="rate ṡ", xlim=(s[0], s[-1]))
@@ -99,11 +99,11 @@ def describe_phase_plane(data: Table) -> str:
     _, accelerations, speeds, even, best = (np.asarray(x) for x in data.values())
     at_speeds, at_bends = (np.mean(best > 0.995 * x) for x in (speeds, accelerations))
     return (
-        "The phase plane: the rate of the fastest timing over the path parameter, below the limits "
-        f"of accelerations and of speeds. The rate goes up to {in_words(best.max(), 1)}; it is "
-        f"{in_words(even[0], 1)} if it is the same everywhere. The fastest timing is on the limit "
-        f"of speeds on {100 * at_speeds:.0f} % of the path, on that of accelerations on "
-        f"{100 * at_bends:.0f} %."
+        "The phase plane of a path: the rate of the fastest timing over the path parameter, and "
+        "the limits of accelerations and of speeds. The rate goes up to "
+        f"{in_words(best.max(), 1)}; it is {in_words(even[0], 1)} if it is the same everywhere. "
+        f"The fastest timing is on the limit of speeds on {100 * at_speeds:.0f} % of the path, on "
+        f"that of accelerations on {100 * at_bends:.0f} %."
     )
 
 
@@ -126,7 +126,7 @@ def draw_shares(ax: Axes, data: Table) -> None:
     for name, share in zip(list(data)[1:], shares, strict=True):
         label = name.removesuffix(" [1]")
         ax.plot(t, share, label=label, **_SHARES[label.replace(" ", "_")])
-    ax.axhline(1, color="0.7", lw=1, zorder=0)
+    ax.axhline(1, color=PALE, lw=1, zorder=0)
     ax.set(xlabel="time (s)", ylabel="share of the limit", ylim=(0, 1.08), xlim=(t[0], t[-1]))
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
 
@@ -137,7 +137,7 @@ def describe_shares(data: Table) -> str:
     said = (f"{name} {100 * np.mean(x > 0.99):.0f} %" for name, x in shares.items())
     some = np.mean(np.max(list(shares.values()), axis=0) > 0.99)
     return (
-        "Which share of each limit a motion uses, over time. The part of the time during which a "
+        "Share of each limit that a motion uses, over time. The part of the time during which a "
         f"limit is used to 99 % or more: {', '.join(said)}; one of them {100 * some:.0f} %."
     )
 
@@ -175,7 +175,8 @@ def describe_passes(data: Table) -> str:
     columns = [np.asarray(x).tolist() for x in data.values()]
     _, highest, back, both = ([f"{x:g}" for x in column] for column in columns)
     return (
-        "The squared speeds at nine places of a straight path. Speed limits: "
+        "Squared speeds along a straight path: their limits, the values after a pass from the end, "
+        "and those after a second pass, from the start. Speed limits: "
         f"{', '.join(highest)}; after the pass from the end {', '.join(back)}; after the pass from "
         f"the start {', '.join(both)}."
     )

@@ -48,15 +48,16 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> None:
     """Draw for a family a heat map of each closed form: a colour for each power of ten.
 
     A dashed line runs at 10 %. `data` is what `rbclassroom.surveys.atlas.cell_table` gives; its
-    `quantile` is named beside the colours (BK 1, BK 7).
+    `quantile` is named beside the colours, which fill the upper right corner (BK 1, BK 7).
     """
     axes = fig.subplots(2, 4, sharex=True, sharey=True)
     cells = of_family(data, family)
-    for ax, way in zip(axes.flat, WAYS, strict=False):
+    corner = axes[0, -1]
+    for ax, way in zip(axes[axes != corner], WAYS, strict=True):
         drawn = _heat_map(ax, way, cells[f"{way} excess [1]"])
-    axes[-1, -1].set_axis_off()
-    axes[0, -1].tick_params(labelbottom=True)
-    _label(fig, axes, drawn, f"{family} the axis", quantile, aspect=15)
+    corner.set_axis_off()
+    bar = fig.colorbar(drawn, cax=corner.inset_axes((0.1, 0, 0.1, 1)))
+    _label(fig, bar, f"{family} the axis", quantile)
 
 
 def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
@@ -72,7 +73,7 @@ def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None
         for ax, (curve, title) in zip(row, curves.items(), strict=True):
             heading = title if ax in axes[0] else ""
             drawn = _heat_map(ax, heading, cells[f"{curve} median [1]"])
-    _label(fig, axes, drawn, "in any direction", "median", aspect=25)
+    _label(fig, fig.colorbar(drawn, ax=axes, aspect=25), "in any direction", "median")
 
 
 def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
@@ -82,15 +83,18 @@ def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
         shares = {x: _shares(cells[f"{x} median [1]"], [_TENTH]) for x in titles}
         said.append(f"{body}: {', '.join(f'{titles[x]} {share}' for x, share in shares.items())}")
     return (
-        "What curves cost above the optimum of three bodies, median. A heat map for each body and "
-        "curve: to the right the displacement grows from 0 to 180 degrees, and upwards the end "
-        "velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
+        "Median of the cost over the optimum minus 1, with a row for each body and a column for "
+        "each curve. In each heat map, to the right the displacement grows from 0 to 180 degrees, "
+        "and upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
         f"{'; '.join(said)}."
     )
 
 
 def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
-    """Draw the excess in each cell, in their order, and a dashed line at 10 %."""
+    """Draw the excess in each cell, in their order, and a dashed line at 10 %.
+
+    A map on which it is below all levels says so.
+    """
     turns, speeds = (np.linspace(0, end, CELLS + 1) for end in (180, FASTEST))
     x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
     excess = np.asarray(excess).reshape(CELLS, CELLS).T
@@ -100,15 +104,18 @@ def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
         powers = np.log10(np.maximum(excess, min(_LEVELS)))
         line: Any = {"linestyles": "--", "linewidths": 2.5, "colors": "black"}
         ax.contour(x, y, powers, [np.log10(_TENTH)], **line)
+    if np.max(excess) < min(_LEVELS):
+        said = f"< {_percents(_LEVELS)[0]}\neverywhere"
+        ax.text(0.5, 0.5, said, transform=ax.transAxes, ha="center", va="center")
     ax.set(title=title, xticks=[0, 60, 120, 180], yticks=[0, 3, 6, 9])
     return drawn
 
 
-def _label(fig: Figure, axes: Any, drawn: Any, ways: str, quantile: str, aspect: int) -> None:
-    """Label the axes of heat maps, and put the colours beside them."""
+def _label(fig: Figure, bar: Any, ways: str, quantile: str) -> None:
+    """Label the axes of heat maps and their bar of colours."""
     fig.supylabel(f"end velocity, {ways} (rad)", fontsize="medium")
     fig.supxlabel("displacement (°)", fontsize="medium")
-    bar = fig.colorbar(drawn, ax=axes, aspect=aspect, label=f"cost / optimum − 1, {quantile}")
+    bar.set_label(f"cost / optimum − 1,\n{quantile}")
     bar.set_ticks(_LEVELS, labels=_percents(_LEVELS))
     bar.ax.axhline(_TENTH, color="black", lw=2.5, ls="--")
 
@@ -119,6 +126,10 @@ def _set_percents(ax: Axes, levels: list[float]) -> None:
 
 
 def _percents(levels: list[float]) -> list[str]:
+    """Return levels in percent; if any is far from 1 %, all are powers of ten."""
+    powers = np.log10(levels).round().astype(int) + 2
+    if np.abs(powers).max() > 4:
+        return [f"$10^{{{power}}}$ %" for power in powers]
     return [f"{100 * level:,.9g} %" for level in levels]
 
 
@@ -128,10 +139,10 @@ def describe_atlas(data: Table, family: str, quantile: str) -> str:
     levels = 0.01, _TENTH, 1
     said = "; ".join(f"{way} {_shares(cells[f'{way} excess [1]'], levels)}" for way in WAYS)
     return (
-        f"What seven closed forms cost above the optimum, {quantile}, where the end velocities are "
-        f"{family} the axis of the displacement. A heat map each: to the right the displacement "
-        "grows from 0 to 180 degrees, and upwards the end velocity from 0 to 9 rad. Share of the "
-        f"cells below 1, 10 and 100 %, in percent: {said}."
+        f"Cost of closed forms over the optimum minus 1, {quantile}, for end velocities {family} "
+        "the axis of the displacement. In each heat map, to the right the displacement grows from "
+        "0 to 180 degrees, and upwards the end velocity from 0 to 9 rad. Share of the cells below "
+        f"1, 10 and 100 %, in percent: {said}."
     )
 
 
@@ -166,8 +177,8 @@ def describe_growth(data: Table) -> str:
         for way, x in _medians(data).items()
     )
     return (
-        "What closed forms cost above the optimum over the size of the excursion, the median "
-        "and the 90 % quantile, on logarithmic axes. While the size grows from "
+        "Cost of closed forms over the optimum minus 1, over the size of the excursion: median and "
+        "90 % quantile. Both axes are logarithmic. While the size grows from "
         f"{size[0]:g} to {size[-1]:g} rad, the median of the cost over the optimum minus 1 grows: "
         f"{said}."
     )
@@ -185,7 +196,7 @@ def draw_margins(axes: Sequence[Axes], data: Table) -> None:
     same in both panels. A line of slope −3 runs beside the projections.
     """
     for ax, (way, (name, ticks)) in zip(axes, _MARGINS.items(), strict=True):
-        dots: Any = {"color": COLOURS[_LOOKS[way][0]], "alpha": 0.6, "rasterized": True}
+        dots: Any = {"color": COLOURS[_LOOKS[way][0]], "ms": 4, "rasterized": True}
         marks: Any = [{"color": "black", "mec": "white", "ms": size} for size in (17, 9)]
         looks = zip(_groups(data, "family").items(), ".*D", [dots, *marks], strict=False)
         for (family, rows), mark, style in looks:
@@ -209,8 +220,8 @@ def describe_margins(data: Table) -> str:
         pairs = zip(*_margins(rows, "projection"), strict=True)
         said += f" {family}: {', '.join(f'{100 * y:.0f} % at {x:.3f}' for x, y in pairs)}."
     return (
-        "A small margin condemns, a large one certifies nothing: the cost over the optimum minus 1 "
-        "over the margin, a dot for each problem, on logarithmic axes. Of the projection the "
+        "Cost over the optimum minus 1 of each problem, over its margin: of the projection (left), "
+        "and of the quaternion cubic (right). Both axes are logarithmic. Of the projection the "
         f"median is {low:.1e} where the margin is below 0.2, and {high:.1e} where it is above 1; "
         f"beside the dots runs a line of slope minus three.{said} The least margin of the "
         f"quaternions is {np.min(data['quaternion margin [1]']):.2f}."
@@ -235,7 +246,7 @@ def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
             style: Any = {"color": COLOURS[colour], "marker": mark, "markevery": 10}
             ax.plot(data["t [1]"], data[name], label=way, **style)
         ax.axhline(0, color="0.8", lw=1, zorder=0)
-        ax.set(title=title, xlabel="time t")
+        ax.set(title=title, xlabel="time t", xticks=[0, 0.5, 1])
     axes[0].set_ylabel("deviation / (‖σ‖² ‖d or e‖)")
     axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
@@ -246,7 +257,8 @@ def describe_deviations(data: Table) -> str:
         f"{name[:-4]} {np.abs(data[name]).max():.1e}" for name in data if name != "t [1]"
     )
     return (
-        "By what closed forms differ from the optimum over time, near a geodesic, for a difference "
-        "d and a mean e of the end velocities across the axis, over the square of the displacement "
-        f"and d or e. Largest: {largest}."
+        "Deviation of closed forms from the optimum over time, near a geodesic, for a difference d "
+        "(left) and a mean e (right) of the end velocities. Both are across the axis, and the "
+        "deviation is divided by the square of the displacement and by d or e. "
+        f"Largest: {largest}."
     )

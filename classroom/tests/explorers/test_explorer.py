@@ -211,6 +211,12 @@ def test_each_explorer_has_units_large_letters_its_artists_and_a_range_to_play(n
     for text in explorer._fig.findobj(Text):
         if text.get_visible() and text.get_text().strip():
             assert text.get_fontsize() >= LABELS, text.get_text()
+    fig = explorer._fig
+    fig.draw_without_rendering()
+    flat = [ax for ax in fig.axes if ax.name == "rectilinear"]
+    for box in (part.get_tightbbox() for part in [*flat, *fig.legends, *fig.texts]):
+        assert (box.min >= 0).all(), box
+        assert (box.max <= fig.bbox.max).all(), box
     artists = list(explorer.artists.values())
     assert len({id(artist) for artist in artists}) == len(artists)
     assert all(artist.get_figure() is explorer._fig for artist in artists)

@@ -215,7 +215,7 @@ def test_the_book_and_its_spin():
             assert off(high, (BOOK[i] / 2 + 0.055) * R[k, :, i]) < 1e-9
             assert np.abs(low + high).max() < 1e-15
             place = artists[f"number {i + 1}"].get_position_3d()
-            assert off(place, (BOOK[i] / 2 + 0.072) * R[k, :, i]) < 1e-9
+            assert off(place, (BOOK[i] / 2 + 0.085) * R[k, :, i]) < 1e-9
         assert reads(said["ω"], w[k])
         assert reads(said[f"of {v['axis']} itself"], w[k, int(v["axis"][-1]) - 1])
         momentum = R[k] @ (MOMENTS * w[k])
@@ -279,7 +279,9 @@ def test_an_optimum_its_rivals_and_their_costs():
                 assert np.abs(np.diff(drawn, axis=0)).max() < 0.5  # never round a ball of radius π
                 assert_within(drawn, *[artists["σ₁"].axes.get_ylim()] * 3)
         heights = [artists[f"σ{number}"].get_position()[1] for number in "₁₂₃"]
-        assert off(heights, sigma) < 1e-15
+        assert min(np.diff(heights)) > 0.25  # the labels do not overlap
+        if v["size"] >= 0.5:
+            assert off(heights, sigma) < 1e-15
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
@@ -531,7 +533,7 @@ def test_matrices_and_their_repairs():
         assert off(S, S.T) < 1e-14  # nearest, by definition
         assert np.linalg.eigvalsh(S)[:2].sum() > -1e-14
         assert np.linalg.det(R) > 0
-        assert off(letter.get_position_3d(), 1.15 * R[:, 0]) < 1e-14
+        assert off(letter.get_position_3d(), 1.2 * R[:, 0]) < 1e-14
         assert reads(said["singular values"], np.linalg.svd(M, compute_uv=False))
         assert reads(said["determinant"], det)
         assert reads(said["M to nearest"], np.linalg.norm(M - R))
