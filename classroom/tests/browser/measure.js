@@ -40,16 +40,14 @@
     for (let j = i + 1; j < boxes.length && boxes[j].top < one.bottom - 4; j++) {
       const two = boxes[j], wide = Math.min(one.right, two.right) - Math.max(one.left, two.left);
       const high = Math.min(one.bottom, two.bottom) - Math.max(one.top, two.top);
-      if (wide > 3 && high > 6) faults.push(`over one another: ${name(one.element)} | ${name(two.element)}`);
+      if (wide > 3 && high > 6 && one.element !== two.element) faults.push(`over one another: ${name(one.element)} | ${name(two.element)}`);
     }
   });
-  if (innerWidth > 1000) {
-    for (const paragraph of content.querySelectorAll("section > p")) {
-      if (!shown(paragraph) || paragraph.querySelector("mjx-container, img, code, button")) continue;
-      const lines = Math.round(paragraph.clientHeight / parseFloat(getComputedStyle(paragraph).lineHeight));
-      const letters = paragraph.innerText.length / lines;
-      if (lines > 3 && (letters > 80 || letters < 60)) faults.push(`${letters.toFixed(0)} letters in a line: ${name(paragraph)}`);
-    }
+  for (const paragraph of innerWidth > 1000 ? content.querySelectorAll("section > p") : []) {
+    if (!shown(paragraph) || paragraph.querySelector("mjx-container, img, code, button")) continue;
+    const own = boxes.filter(({ element }) => paragraph.contains(element));
+    const letters = (paragraph.innerText.length * paragraph.clientWidth) / own.reduce((sum, { left, right }) => sum + right - left, 0);
+    if (own.length > 3 && paragraph.clientWidth > 500 && (letters > 80 || letters < 60)) faults.push(`${letters.toFixed(0)} letters in a line: ${name(paragraph)}`);
   }
   return faults;
 }
