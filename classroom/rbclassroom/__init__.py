@@ -3,4 +3,4 @@
 It uses only the names that `rbcourse` exports.
 """
 
-__version__ = "0.31.0"
+__version__ = "0.32.0"

@@ -51,7 +51,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "screw": ({"tilt": range(0, 91, 15)}, 1),
     "spline": ({"pitch": [-60, -40, -20, 20, 60]}, 1),
     "theta": ({"angle": range(10, 171, 10)}, 1),
-    "timing": ({"acceleration": [0.5, 1, 2, 4, 6]}, 1),
+    "timing": ({"angular_speed": [0.5, 1, 2], "acceleration": [0.5, 1, 2, 4, 6]}, 4),
 }
 """Of each explorer the recorded values of controls, and of how many steps of what plays one is."""
 

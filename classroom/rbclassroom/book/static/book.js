@@ -38,19 +38,18 @@ addEventListener("DOMContentLoaded", () => {
   addEventListener("resize", fit);
   addEventListener("toggle", fit, { capture: true }); // something folded is open now
 
-  // The panels of a wide still, below one another; CSS shows them on phones.
-  for (const still of all("img[data-cuts]")) {
+  // The panels of a wide still, below one another and equally large; CSS shows them on phones.
+  for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
     const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
-    const [wide, high] = still.style.aspectRatio.split("/").map(Number);
+    const shares = ends.slice(1).map((end, k) => end - ends[k]), [wide, high] = still.style.aspectRatio.split("/").map(Number);
     panels.className = "panels";
-    for (let k = 1; k < ends.length; k++) {
-      const [from, share] = [ends[k - 1], ends[k] - ends[k - 1]], panel = document.createElement("span");
-      panel.style.aspectRatio = `${share * wide} / ${high}`;
-      const part = Object.assign(new Image(), { src: still.src, alt: k > 1 ? "" : still.alt, loading: "lazy" });
-      part.style = `width: ${100 / share}% !important; left: ${(-100 * from) / share}%`;
+    shares.forEach((share, k) => {
+      const panel = document.createElement("span"), part = Object.assign(new Image(), { src: still.src, alt: k ? "" : still.alt, loading: "lazy" });
+      panel.style = `aspect-ratio: ${share * wide} / ${high}; width: ${(100 * share) / Math.max(...shares)}%`;
+      part.style = `width: ${100 / share}% !important; left: ${(-100 * ends[k]) / share}%`;
       panel.append(part);
       panels.append(panel);
-    }
+    });
     still.after(panels);
   }
 
