@@ -26,7 +26,7 @@ const rbcourseScene = {
   },
 
   // So many pixels parts overlap where an opaque piece is cut, or its background would be seen.
-  overlap: 1.2,
+  overlap: 0.9,
 
   // Give `put` the parts above a plane (1), which go on below it by the overlap, in it (0), and below (-1).
   cut(piece, height, put) {

@@ -16,8 +16,8 @@ OVER = 10
 """What has this zorder, or a higher one, is seen through everything."""
 NEAR = 0.2
 """A piece that is nearer to a plane than this, in pixels, lies in it."""
-OVERLAP = 1.2
-"""So many pixels parts overlap where an opaque piece is cut, or its background would be seen."""
+OVERLAP = 0.55
+"""So many points parts overlap where an opaque piece is cut, or its background would be seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +61,11 @@ class Piece:
         ends = np.column_stack([[*self.places, self.places[0]], np.zeros(len(self.places) + 1)])
         return replace(self, kind="line", places=ends, fill=None, normal=None)
 
-    def cut(self, height: Array) -> "list[tuple[int, Piece]]":
+    def cut(self, height: Array, overlap: float = 0.0) -> "list[tuple[int, Piece]]":
         """Return the parts above a plane (1), in it (0), and below (-1).
 
         `height` is that of the places over the plane, shape (n,). The parts above it go on below it
-        for the `OVERLAP`, unless this is seen: of what is transparent, and of dashes.
+        for the overlap, in pixels, unless this is seen: of what is transparent, and of dashes.
         """
         side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
         if self.marker:
@@ -84,7 +84,7 @@ class Piece:
             if s * side[j] < 0 and (closed or j):
                 q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)
                 below = (p if s < 0 else self.places[j]) - q
-                more = opaque * min(1.0, OVERLAP / float(np.linalg.norm(below[:3])))
+                more = opaque * min(1.0, overlap / float(np.linalg.norm(below[:3])))
                 ends = {-1: q, 1: q + more * below}
                 parts[s][-1].append(ends[s])
                 if not closed:
@@ -98,17 +98,18 @@ class Piece:
         ]
 
 
-def in_sight(pieces: list[Piece], eye: Array) -> list[Piece]:
+def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces in the order in which they are drawn; `eye` is the direction to the eye.
 
+    Parts of one that is cut overlap by so many pixels, see `Piece.cut`.
     A face has become two: what fills it, and its edge, which is not drawn where the face is cut.
     """
     parts = [part for piece in pieces for part in _filling_and_edge(piece)]
     hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
-    return [*in_order(hidden, eye), *sorted(seen, key=lambda piece: piece.zorder)]
+    return [*in_order(hidden, eye, overlap), *sorted(seen, key=lambda piece: piece.zorder)]
 
 
-def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
+def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
     The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
@@ -137,7 +138,7 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
             for piece in group:
                 if piece is not wall:
                     height = (piece.places[:, :3] - wall.places[0]) @ normal
-                    for side, part in piece.cut(height):
+                    for side, part in piece.cut(height, overlap):
                         sides[side].append(part)
             inside = sorted(sides[0], key=lambda piece: piece.zorder)
             top = max(i for i, piece in enumerate(inside, 1) if piece.kind in ("face", "ball"))

@@ -25,7 +25,15 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import ArrayLike
 
 from rbcourse import Array
-from rbcourse.draw.scene import Piece, context, crossings, in_sight, normal_of, whole_pixels
+from rbcourse.draw.scene import (
+    OVERLAP,
+    Piece,
+    context,
+    crossings,
+    in_sight,
+    normal_of,
+    whole_pixels,
+)
 
 LIGHT = np.array([0.48, -0.36, 0.8])
 """Where the light comes from: a unit vector."""
@@ -154,7 +162,8 @@ class Scene(Artist):
     def draw(self, renderer: Any) -> None:
         """Draw all that is visible."""
         sight, written = self.axes.sight(), set()
-        for piece in in_sight(self.pieces(renderer), sight.eye):
+        overlap = renderer.points_to_pixels(OVERLAP)
+        for piece in in_sight(self.pieces(renderer), sight.eye, overlap):
             if piece.text:
                 if piece.text not in written:  # all of its lines at once
                     piece.text.draw(renderer)

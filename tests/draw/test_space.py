@@ -113,8 +113,7 @@ def covers(face, places, sight):
 
 
 @pytest.mark.parametrize("make", [book, tangle, ball])
-def test_each_part_is_drawn_before_the_faces_that_hide_it(ax, make, monkeypatch):
-    monkeypatch.setattr(scene, "OVERLAP", 0)
+def test_each_part_is_drawn_before_the_faces_that_hide_it(ax, make):
     make(ax)
     for side in SIDES[::2]:
         ax.view_init(*side)
@@ -148,17 +147,18 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
 def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
     square = np.array([[[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]]])
     ax.add_artist(space.Faces(square, ["red"]))
-    for alpha, overlap in ((1, scene.OVERLAP), (0.5, 0)):
+    for alpha, overlap in ((1, 2), (0.5, 0)):
         (line,) = ax.plot([-1, 1], [0, 0], [0, 0], lw=3, alpha=alpha)
-        parts = [part.places[:, 0] for part in drawn(ax)[0] if part.gc.get_linewidth() == 3]
+        pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
+        found = scene.in_sight(pieces, ax.sight().eye, 2)
+        parts = [part.places[:, 0] for part in found if part.gc.get_linewidth() == 3]
         far, near = sorted(parts, key=np.mean)  # seen from +x
         assert far.max() - near.min() == pytest.approx(overlap)
         line.remove()
 
 
-def test_bodies_that_pass_through_each_other_have_an_outline_where_they_meet(ax, monkeypatch):
+def test_bodies_that_pass_through_each_other_have_an_outline_where_they_meet(ax):
     """The corner of a cube in that of another one: six lines, which end at one another."""
-    monkeypatch.setattr(scene, "OVERLAP", 0)
     corners, apart = bodies.draw_box(ax, np.eye(4), 1.0).corners[:6], np.array([0.4, 0.3, 0.2])
     ax.artists[0].remove()
     cube, other = (ax.add_artist(space.Faces(c, 6 * ["0.9"])) for c in (corners, corners + apart))

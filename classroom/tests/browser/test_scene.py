@@ -11,8 +11,9 @@ from playwright.sync_api import expect
 from test_recorded import FOLDER
 
 import rbcourse as rb
-from rbcourse.draw import animate, bodies, save_figure, scene, spheres
+from rbcourse.draw import animate, bodies, save_figure, spheres
 from rbcourse.draw.display import ENGINE, Display
+from rbcourse.draw.scene import in_sight
 
 GOAL = rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1])
 SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
@@ -99,12 +100,11 @@ def test_a_turned_scene_equals_the_drawing_from_there(make, sides, page, tmp_pat
         check_alike(shown(canvas), full.getvalue(), player.background)
 
 
-def test_the_browser_cuts_and_orders_as_python_does(page, monkeypatch):
+def test_the_browser_cuts_and_orders_as_python_does(page):
     """The same parts, one after the other, at the same places, dashes as far along their line.
 
     They do not overlap here: rounding would decide whether the next plane cuts what is beyond.
     """
-    monkeypatch.setattr(scene, "OVERLAP", 0)
     fig, ax = plt.subplots(**SIZE)
     crossing(ax)
     display = Display(fig)
@@ -115,7 +115,7 @@ def test_the_browser_cuts_and_orders_as_python_does(page, monkeypatch):
     for side, found in zip(SIDES, page.evaluate(SEEN, known), strict=True):
         ax.view_init(*side)
         sight = ax.sight()
-        want = scene.in_sight(ax.scene.pieces(display), sight.eye)
+        want = in_sight(ax.scene.pieces(display), sight.eye)
         for part, piece in zip(found, want, strict=True):
             assert (part["style"][0] is None) == (piece.fill is None)
             flat = sight.flat(piece.places[:, :3]) * [1, -1] + [0, display.height]
