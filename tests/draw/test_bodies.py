@@ -39,6 +39,9 @@ def test_cubes_with_a_square_on_one_face_are_where_the_poses_are(axes):
     for cube, A in zip(cubes, SCREW, strict=True):
         assert off(cube, A, in_body) < 1e-14
     assert np.array_equal(stars.get_data_3d(), SCREW[:, :3, 3].T)
+    bodies.draw_cube_motion(axes[1], SCREW, 2.0, compared=GEODESIC[1:3])
+    for outline, A in zip(axes[1].artists[1:3], GEODESIC[1:3], strict=True):
+        assert off(outline, A, in_body) < 1e-14
     low, high = np.array([axes[0].get_xlim(), axes[0].get_ylim(), axes[0].get_zlim()]).T
     drawn = np.concatenate([cube.corners.reshape(-1, 3) for cube in cubes])
     assert np.all((drawn.min(axis=0) > low) & (drawn.max(axis=0) < high))
