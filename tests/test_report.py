@@ -187,17 +187,18 @@ def test_paths_are_shown(states, pale):
     figure, animation = rr.visualize_path(path)
     arm, arm_animation = rr.visualize_arm_path(arm_path)
     _, other = rr.visualize_arm_path(path[:1], lengths=[1, 2, 3])
-    assert "links of 1, 2 and 3 m" in other.alt
+    assert "links are 1, 2 and 3 m long" in other.alt
     assert np.allclose(edges_of(rr.visualize_path(path[:1], length=0.3)[0]), [0.3, 0.15] * 2)
     for shown, player in ((figure, animation), (arm, arm_animation)):
         assert isinstance(shown, Figure)
         assert len(player.pictures) == len(player.states) == states
-    assert animation.alt.startswith("A rectangle goes from (")
+    assert animation.alt.startswith("Path of the centre of a rectangle")
     *others, body = figure.axes[0].patches
     centres = [patch.get_xy()[:4].mean(axis=0) for patch in (*others, body)]
     assert np.abs(centres - path[[*pale, -1], :2]).max() < 1e-14
-    assert all(body.get_zorder() > other.get_zorder() for other in figure.axes[0].lines[:-1])
-    assert arm_animation.alt.startswith("An arm with links of 2 and 1.5 m turns its joints from")
+    *noses, way, _ = figure.axes[0].lines
+    assert max(nose.get_zorder() for nose in noses) < body.get_zorder() < way.get_zorder()
+    assert arm_animation.alt.startswith("Motion of an arm from joint angles of ")
     *others, links, way = (np.transpose(line.get_data()) for line in arm.axes[0].lines)
     joints = rb.arm.arm_forward_kinematics(arm_path).joints
     assert np.array_equal(way, joints[:, -1])

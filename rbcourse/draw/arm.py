@@ -133,9 +133,9 @@ def describe_posture(q: Array, lengths: ArrayLike = LINKS) -> str:
     """Return in words what `draw_posture` shows."""
     places = ", ".join(_said(place, np.sum(lengths)) for place in _joints(q, lengths))
     return (
-        "An arm, each link with the x and y axes of its frame at its centre. Its joint angles are "
-        f"{_degrees(q)} degrees, each measured from the link before; its joints, and "
-        f"then its tip, are at {places} m."
+        "Joint angles of an arm and the frames of its links. Each frame, with its axes x and y, is "
+        f"at the centre of its link. The joint angles are {_degrees(q)} degrees, each measured "
+        f"from the link before. The joints, and then the tip, are at {places} m."
     )
 
 
@@ -148,8 +148,9 @@ def describe_ways(paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> str
     ]
     start, goal = map(_degrees, next(iter(paths.values()))[[0, -1]])
     return (
-        f"Ways of an arm from joint angles of {start} to {goal} degrees: of its tip in the room, "
-        f"and in the plane of the angles. How long they are: {'; '.join(said)}."
+        f"Motions of an arm: paths of its tip (left) and of its joint angles (right), "
+        f"{', '.join(paths)}. The angles go from {start} to {goal} degrees. "
+        f"Lengths of the paths: {'; '.join(said)}."
     )
 
 
@@ -159,10 +160,11 @@ def describe_arm(path: Array, lengths: ArrayLike = LINKS) -> str:
     turned = np.abs(np.diff(path, axis=0)).sum(axis=0)
     start, end = (_said(place, reach) for place in tip[[0, -1]])
     return (
-        f"An arm with links of {_listed(in_words(x, x) for x in np.asarray(lengths))} m turns its "
-        f"joints from {_degrees(path[0])} to {_degrees(path[-1])} degrees, by {_degrees(turned)} "
-        f"degrees in all. From state to state its tip covers {in_words(_length(tip), reach)} m, "
-        f"from {start} to {end} m; its way is drawn in red."
+        f"Motion of an arm from joint angles of {_degrees(path[0])} degrees to "
+        f"{_degrees(path[-1])} degrees; the path of its tip is red. The links are "
+        f"{_listed(in_words(x, x) for x in np.asarray(lengths))} m long. The joints turn by "
+        f"{_degrees(turned)} degrees in all. From state to state the tip covers "
+        f"{in_words(_length(tip), reach)} m, from {start} to {end} m."
     )
 
 
@@ -173,8 +175,9 @@ def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = 
         x, y = _columns(_joints(q, lengths))
         said.append(f"{name}, to {_degrees(np.arctan2(y, x))} degrees")
     return (
-        "An arm, with an arrow at its tip for each joint: how fast the tip goes when only the "
-        f"motor of that joint runs, at half its length. The arrows point, {'; '.join(said)}."
+        f"Velocity of the tip of an arm when one motor runs alone: {', '.join(postures)}. There "
+        "is an arrow for each joint, half as long as the tip goes for each radian. Directions of "
+        f"the arrows: {'; '.join(said)}."
     )
 
 

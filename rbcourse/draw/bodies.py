@@ -67,13 +67,18 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
     box.corners = _box_faces(pose, edges)
 
 
-def draw_cube_motion(ax: Any, poses: Array, side: float) -> list[Any]:
+def draw_cube_motion(
+    ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
+) -> list[Any]:
     """Draw a cube of edge `side` in m at each pose, and over them stars along its centre's path.
 
+    Cubes at the poses `compared` are blue outlines, which are seen where they stand out.
     Return the cubes, then the stars (BK Fig. 5).
     """
+    for pose in compared:
+        draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["z"], zorder=-1)
     cubes = [draw_box(ax, pose, side) for pose in poses]
-    set_space(ax, poses[:, :3, 3], side)
+    set_space(ax, poses[:, :3, 3], side, zoom=1.1)
     stars = draw_centre_path(ax, poses[:, :3, 3])
     stars.set_zorder(OVER)
     return [*cubes, stars]
@@ -125,12 +130,12 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
     """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
-    # where each axis begins, and in which direction its numbers stand beside it
+    # where each axis begins, and where its numbers stand beside it; below, too, as seen from low
     azimuth = np.radians(ax.azim)
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
     corners = [low, np.array([high[0], *low[1:]]), farthest]
-    beside = 0.06 * np.max(high - low) * np.array([[0, -1, 0], [1, 0, 0], left])
+    beside = 0.06 * np.max(high - low) * np.array([[0, -1, -0.4], [1, 0, -0.4], left])
     centred: Any = {"ha": "center", "va": "center", "zorder": 3}
     for k, name in enumerate("xyz"):
         start, along = corners[k], np.eye(3)[k]
@@ -141,10 +146,10 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # beyond the numbers, and between two of them
+        else:  # beyond the numbers, and between two of them: the last ones, far from the other axes
             marks = np.array([start[k], *ticks[k], end[k]])
-            widest = np.diff(marks).argmax()
-            place = start + (marks[widest : widest + 2].mean() - start[k]) * along + 3 * beside[k]
+            last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
+            place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
         ax.text(*place, f"{name} (m)", **centred)
 
 
@@ -158,8 +163,8 @@ def describe_cube_motion(poses: Array) -> str:
     steps = np.degrees(angle_between(poses[:-1, :3, :3], poses[1:, :3, :3]))
     ends = " to ".join("(" + ", ".join(f"{x:.3g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
     return (
-        f"A cube with a square on one face, at {len(poses)} times on its way from {ends} m, its "
-        f"centre starred. From one to the next it turns by "
+        f"Motion of a cube from {ends} m, drawn at {len(poses)} times. A square marks one of its "
+        f"faces, and a star its centre. From one time to the next it turns by "
         f"{', '.join(f'{step:.0f}' for step in steps)} degrees."
     )
 
@@ -235,7 +240,7 @@ def moving_boxes(
 def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
     """Return in words what `moving_boxes` shows; the poses are those of the times t."""
     (first, poses), *others = motions.items()
-    said = f"Boxes with a rectangle on one face move side by side: {'; '.join(motions)}."
+    said = f"Motions of a box: {', '.join(motions)}. A rectangle marks one of its faces."
     for name, other in others:
         apart = np.degrees(angle_between(poses[:, :3, :3], other[:, :3, :3]))
         said += (
@@ -247,24 +252,23 @@ def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
     return said
 
 
-def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> list[Any]:
+def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> None:
     """Draw the columns of R as arrows x, y, z from the origin, labelled with the name."""
-    artists = []
     for axis, direction in zip("xyz", R.T, strict=True):
-        artists.append(draw_arrow(ax, origin, direction, COLOURS[axis]))
+        draw_arrow(ax, origin, direction, COLOURS[axis])
         letter: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
         ax.text(*(origin + 1.4 * direction), f"${axis}_{name}$", **letter)
-    return artists
 
 
-def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> Any:
-    """Draw an arrow from a place, shape (3,), with four barbs, so that it is one from each side."""
+def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> None:
+    """Draw an arrow from a place, shape (3,), with a cone as its head."""
     tip, length = start + along, float(np.linalg.norm(along))
-    size, across = 0.12 * min(1.0, length), np.linalg.svd(along[None])[2][1:]
-    foot = tip - size / length * along
-    barbs = [foot + side * size / 3 * u for u in across for side in (1, -1)]
-    places = [start, tip, *(place for barb in barbs for place in (barb, tip))]
-    return ax.plot(*np.transpose(places), color=color, lw=2.5)[0]
+    size, across = 0.14 * min(1.0, length), np.linalg.svd(along[None])[2][1:]
+    foot, turn = tip - size / length * along, np.linspace(0, 2 * np.pi, 32)
+    rim = foot + size / 3 * np.stack([np.cos(turn), np.sin(turn)], axis=-1) @ across
+    cone = np.stack([np.broadcast_to(tip, rim[1:].shape), rim[:-1], rim[1:]], axis=1)
+    ax.plot(*np.transpose([start, foot]), color=color, lw=2.5)
+    ax.plot(*cone.reshape(-1, 3).T, color=color, lw=1)
 
 
 def _box_faces(pose: Array, edges: float | Array) -> Array:

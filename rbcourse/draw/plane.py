@@ -75,7 +75,7 @@ def moving_route(
     """
     for i in shown:
         draw_body(ax, path[i], length, PALE, fill="none")
-    (way,) = ax.plot([], [], color=COLOURS["path"], zorder=2)
+    (way,) = ax.plot([], [], color=COLOURS["path"], zorder=4)
     body = draw_body(ax, path[0], length, COLOURS["z"])
     for artist in body:
         artist.set_zorder(3)
@@ -84,7 +84,7 @@ def moving_route(
     def update(i: int) -> list[Any]:
         way.set_data(*path[: i + 1, :2].T)
         move_body(body, path[i], length)
-        return [way, *body]
+        return [*body, way]  # the way is drawn over the body
 
     return update
 
@@ -134,8 +134,9 @@ def describe_route(path: Array) -> str:
     way = np.hypot(steps[:, 0], steps[:, 1]).sum() if extent else 0.0
     start, end = (_said(pose, extent or 1.0) for pose in path[[0, -1]])
     return (
-        f"A rectangle goes from {start}, to {end}. From state to state its centre covers "
-        f"{in_words(way, way)} m, and it turns by {' and '.join(said) or 'less than a degree'}."
+        f"Path of the centre of a rectangle, and some of its poses. The rectangle goes from "
+        f"{start}, to {end}. From state to state its centre covers {in_words(way, way)} m, and it "
+        f"turns by {' and '.join(said) or 'less than a degree'}."
     )
 
 
@@ -147,15 +148,15 @@ def describe_compared(panels: Mapping[str, Mapping[str, Array]]) -> str:
         apart = in_words(np.linalg.norm(one - other, axis=1).max(), extent_of(one))
         said.append(f"{title}: {' and '.join(paths)}, the centres apart by {apart} m at most")
     return (
-        f"A rectangle on two ways beside each other, the second dashed: {'; '.join(panels)}. "
-        f"The ways of each pair: {'; '.join(said)}."
+        f"Paths of a rectangle in pairs, the second path dashed: {', '.join(panels)}. "
+        f"The paths of each pair: {'; '.join(said)}."
     )
 
 
 def describe_routes(paths: Mapping[str, Array]) -> str:
     """Return in words how rectangles go, with the names of their ways."""
     said = " ".join(f"{name}: {describe_route(path)}" for name, path in paths.items())
-    return f"A rectangle on its way from start to goal: {'; '.join(paths)}. In turn, {said}"
+    return f"Paths of a rectangle from start to goal: {', '.join(paths)}. In turn, {said}"
 
 
 def _placed(pose: Array, length: float) -> tuple[Array, Array]:

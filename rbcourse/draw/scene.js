@@ -25,9 +25,13 @@ const rbcourseScene = {
     return n.map((x) => x / size);
   },
 
-  // Give `put` the parts above a plane (1), in it (0), and below (-1).
+  // So many pixels parts overlap where an opaque piece is cut, or its background would be seen.
+  overlap: 0.9,
+
+  // Give `put` the parts above a plane (1), which go on below it by the overlap, in it (0), and below (-1).
   cut(piece, height, put) {
-    const { places, kind } = piece, heights = places.map(height);
+    const { places, kind, style: [fill, stroke, , dashes] } = piece, heights = places.map(height);
+    const overlap = (fill ?? stroke ?? "").endsWith("ff") && !dashes.length ? rbcourseScene.overlap : 0;
     const sides = heights.map((h) => (Math.abs(h) < 0.2 ? 0 : Math.sign(h)));
     if (kind === "mark" || kind === "ball") {
       for (const side of new Set(sides)) put(side, { ...piece, places: places.filter((_, i) => sides[i] === side) });
@@ -42,22 +46,39 @@ const rbcourseScene = {
       if (sides[i] * sides[j] >= 0 || (kind === "line" && !j)) return;
       const share = heights[i] / (heights[i] - heights[j]);
       const q = p.map((x, k) => x + share * (places[j][k] - x));
-      parts[sides[i]].at(-1).push(q);
+      const below = (sides[i] < 0 ? p : places[j]).map((x, k) => x - q[k]);
+      const more = Math.min(1, overlap / Math.hypot(...below.slice(0, 3)));
+      const ends = { "-1": q, 1: q.map((x, k) => x + more * below[k]) };
+      parts[sides[i]].at(-1).push(ends[sides[i]]);
       if (kind === "line") parts[sides[i]].push([]);
-      parts[sides[j]].at(-1).push(q);
+      parts[sides[j]].at(-1).push(ends[sides[j]]);
     });
     const least = kind === "line" ? 2 : 3;
     for (const t of [-1, 1]) for (const run of parts[t]) if (run.length >= least) put(t, { ...piece, places: run });
   },
 
+  // The face whose plane cuts the fewest faces and lines.
+  wall(pieces, eye) {
+    const { dot } = rbcourseScene, whole = pieces.filter(({ kind }) => kind === "face" || kind === "line");
+    const walls = pieces.filter(({ kind }) => kind === "face" || kind === "ball");
+    const cuts = walls.map(({ normal, places: [place] }) => {
+      const n = normal ?? eye, level = dot(place, n);
+      return whole.filter(({ places }) => {
+        const heights = places.map((p) => dot(p, n) - level);
+        return Math.min(...heights) <= -0.2 && Math.max(...heights) >= 0.2;
+      }).length;
+    });
+    return walls[cuts.indexOf(Math.min(...cuts))];
+  },
+
   // Pieces from the farthest to the nearest, cut where they pass through faces: what the plane of a face
-  // hides, what is in it, and what is on the side of the eye; on both sides so with the next face.
+  // hides, faces in it, and what is over them or on the side of the eye; on both sides so with the next face.
   order(pieces, eye) {
-    const { dot, cut, pixels } = rbcourseScene, drawn = [], todo = [[false, pieces]];
+    const { dot, cut, pixels, wall: first } = rbcourseScene, drawn = [], todo = [[false, pieces]];
     const mean = ({ places }) => pixels(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
     while (todo.length) {
       const [ready, group] = todo.pop();
-      const wall = group.find(({ kind }) => kind === "face" || kind === "ball");
+      const wall = first(group, eye);
       if (ready) drawn.push(...group);
       else if (!wall) {
         const known = group.map((piece) => [piece.zorder, mean(piece), piece]);
@@ -69,7 +90,8 @@ const rbcourseScene = {
           if (piece !== wall) cut(piece, (p) => dot(p, n) - level, (side, part) => sides[side].push(part));
         }
         sides[0].sort((a, b) => a.zorder - b.zorder);
-        todo.push([false, sides[1]], [true, sides[0]], [false, sides[-1]]);
+        const over = sides[0].splice(sides[0].findLastIndex(({ kind }) => kind === "face" || kind === "ball") + 1);
+        todo.push([false, [...over, ...sides[1]]], [true, sides[0]], [false, sides[-1]]);
       }
     }
     return drawn;
@@ -79,14 +101,13 @@ const rbcourseScene = {
   seen(pieces, { origin }, view) {
     const { dot, order, sight, normal, pixels } = rbcourseScene, { right, up, eye } = sight(view);
     const flat = (p) => [origin[0] + dot(p, right), origin[1] - dot(p, up)];
-    // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut. An opaque
-    // one is a trifle larger, so that nothing shines through there.
+    // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut.
     const parts = pieces.flatMap((piece) => {
       const { kind, style, places } = piece, [fill, stroke, width, ...rest] = style;
       if (kind !== "face") return [piece];
-      const own = fill.endsWith("ff") ? fill : null, edge = [...places, places[0]];
+      const edge = [...places, places[0]];
       return [
-        { ...piece, normal: normal(places), style: [fill, own, 0.7, ...rest] },
+        { ...piece, normal: normal(places), style: [fill, null, 0, ...rest] },
         { ...piece, kind: "line", style: [null, stroke, width, ...rest], places: edge },
       ];
     });

@@ -16,6 +16,8 @@ OVER = 10
 """What has this zorder, or a higher one, is seen through everything."""
 NEAR = 0.2
 """A piece that is nearer to a plane than this, in pixels, lies in it."""
+OVERLAP = 0.55
+"""So many points parts overlap where an opaque piece is cut, or its background would be seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +61,11 @@ class Piece:
         ends = np.column_stack([[*self.places, self.places[0]], np.zeros(len(self.places) + 1)])
         return replace(self, kind="line", places=ends, fill=None, normal=None)
 
-    def cut(self, height: Array) -> "list[tuple[int, Piece]]":
+    def cut(self, height: Array, overlap: float = 0.0) -> "list[tuple[int, Piece]]":
         """Return the parts above a plane (1), in it (0), and below (-1).
 
-        `height` is that of the places over the plane, shape (n,).
+        `height` is that of the places over the plane, shape (n,). The parts above it go on below it
+        for the overlap, in pixels, unless this is seen: of what is transparent, and of dashes.
         """
         side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
         if self.marker:
@@ -71,6 +74,7 @@ class Piece:
         if low * high == 0:
             return [(low + high, self)]
         closed = self.kind == "face"
+        opaque = (self.fill or self.gc.get_rgb())[3] == 1 and self.gc.get_dashes()[1] is None
         parts: dict[int, list[list[Array]]] = {-1: [[]], 1: [[]]}
         for i, (p, s) in enumerate(zip(self.places, side, strict=True)):
             for t in (-1, 1):
@@ -79,10 +83,13 @@ class Piece:
             j = (i + 1) % len(side)
             if s * side[j] < 0 and (closed or j):
                 q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)
-                parts[s][-1].append(q)
+                below = (p if s < 0 else self.places[j]) - q
+                more = opaque * min(1.0, overlap / float(np.linalg.norm(below[:3])))
+                ends = {-1: q, 1: q + more * below}
+                parts[s][-1].append(ends[s])
                 if not closed:
                     parts[s].append([])
-                parts[int(side[j])][-1].append(q)
+                parts[-s][-1].append(ends[-s])
         return [
             (t, replace(self, places=np.array(run)))
             for t, runs in parts.items()
@@ -91,29 +98,33 @@ class Piece:
         ]
 
 
-def in_sight(pieces: list[Piece], eye: Array) -> list[Piece]:
+def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces in the order in which they are drawn; `eye` is the direction to the eye.
 
+    Parts of one that is cut overlap by so many pixels, see `Piece.cut`.
     A face has become two: what fills it, and its edge, which is not drawn where the face is cut.
     """
     parts = [part for piece in pieces for part in _filling_and_edge(piece)]
     hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
-    return [*in_order(hidden, eye), *sorted(seen, key=lambda piece: piece.zorder)]
+    return [*in_order(hidden, eye, overlap), *sorted(seen, key=lambda piece: piece.zorder)]
 
 
-def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
+def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
     The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
     then what is in the plane, by its zorder, then what is on the side of the eye; and so on with
-    the next face, on both sides. What no face parts is drawn by its zorder, then by its mean depth
-    in `whole_pixels`, and then in the given order. `eye` is the direction to the eye, shape (3,).
+    the next face, on both sides. What is over the faces in the plane, such as an edge, is drawn
+    with what is on the side of the eye, so that the next faces do not cover half of it. The first
+    face is the one whose plane cuts the fewest faces and lines. What no face parts is drawn by its
+    zorder, then by its mean depth in `whole_pixels`, and then in the given order. `eye` is the
+    direction to the eye, shape (3,).
     """
     drawn: list[Piece] = []
     todo = [(False, pieces)]  # whether they are in order, the next ones last
     while todo:
         ready, group = todo.pop()
-        wall = next((piece for piece in group if piece.kind in ("face", "ball")), None)
+        wall = _wall(group, eye)
         if ready:
             drawn += group
         elif wall is None:
@@ -127,11 +138,27 @@ def in_order(pieces: list[Piece], eye: Array) -> list[Piece]:
             for piece in group:
                 if piece is not wall:
                     height = (piece.places[:, :3] - wall.places[0]) @ normal
-                    for side, part in piece.cut(height):
+                    for side, part in piece.cut(height, overlap):
                         sides[side].append(part)
             inside = sorted(sides[0], key=lambda piece: piece.zorder)
-            todo += [(False, sides[1]), (True, inside), (False, sides[-1])]
+            top = max(i for i, piece in enumerate(inside, 1) if piece.kind in ("face", "ball"))
+            todo += [(False, inside[top:] + sides[1]), (True, inside[:top]), (False, sides[-1])]
     return drawn
+
+
+def _wall(group: list[Piece], eye: Array) -> Piece | None:
+    """Return the face whose plane cuts the fewest faces and lines, if there is a face."""
+    walls = [piece for piece in group if piece.kind in ("face", "ball")]
+    if len(walls) < 2:
+        return walls[0] if walls else None
+    whole = [piece.places[:, :3] for piece in group if piece.kind in ("face", "line")]
+    starts = np.cumsum([0, *map(len, whole[:-1])])
+    normals = np.array([eye if wall.normal is None else wall.normal for wall in walls])
+    levels = np.array([wall.places[0] for wall in walls]) * normals
+    height = np.concatenate(whole) @ normals.T - levels.sum(axis=1)
+    above = np.maximum.reduceat(height, starts) >= NEAR
+    below = np.minimum.reduceat(height, starts) <= -NEAR
+    return walls[(above & below).sum(axis=0).argmin()]
 
 
 def whole_pixels(depth: Any) -> Any:
@@ -145,9 +172,7 @@ def whole_pixels(depth: Any) -> Any:
 def _filling_and_edge(piece: Piece) -> list[Piece]:
     if piece.kind != "face":
         return [piece]
-    # an opaque face is a trifle larger, so that nothing shines through where it is cut
-    own = piece.fill if piece.fill[3] == 1 else None
-    return [replace(piece, gc=context(own, 0.5 if own else 0)), piece.edge]
+    return [replace(piece, gc=context(None, 0)), piece.edge]
 
 
 def normal_of(corners: Array) -> Array:
@@ -165,3 +190,21 @@ def context(colour: Any, width: float) -> GraphicsContextBase:
     gc.set_linewidth(width)
     gc.set_joinstyle("round")
     return gc
+
+
+def crossings(one: Piece, other: Piece) -> list[Piece]:
+    """Return where two faces pass through each other, as a line with the look of an edge."""
+    normal: Any = other.normal
+    height = (one.places - other.places[0]) @ normal
+    i = np.flatnonzero(height * np.roll(height, -1) < 0)
+    if len(i) != 2:
+        return []
+    j = (i + 1) % len(height)
+    share = (height[i] / (height[i] - height[j]))[:, None]
+    ends = np.column_stack([(1 - share) * one.places[i] + share * one.places[j], np.zeros(2)])
+    parts = [replace(one.edge, places=ends)]
+    for corner, edge in zip(other.places, np.roll(other.places, -1, 0) - other.places, strict=True):
+        inward = np.cross(normal, edge / np.linalg.norm(edge))
+        cut = (part.cut((part.places[:, :3] - corner) @ inward) for part in parts)
+        parts = [part for some in cut for side, part in some if side > 0]
+    return parts

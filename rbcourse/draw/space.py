@@ -6,6 +6,7 @@ body. Here all artists become pieces of a scene, which are cut where they pass t
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import combinations, product
 from numbers import Integral
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -24,7 +25,15 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from numpy.typing import ArrayLike
 
 from rbcourse import Array
-from rbcourse.draw.scene import Piece, context, in_sight, normal_of, whole_pixels
+from rbcourse.draw.scene import (
+    OVERLAP,
+    Piece,
+    context,
+    crossings,
+    in_sight,
+    normal_of,
+    whole_pixels,
+)
 
 LIGHT = np.array([0.48, -0.36, 0.8])
 """Where the light comes from: a unit vector."""
@@ -125,12 +134,18 @@ class Scene(Artist):
         return [artist for artist in self.axes.get_children() if isinstance(artist, IN_SPACE)]
 
     def pieces(self, renderer: Any) -> list[Piece]:
-        """Return what is visible, whole, as it is seen from where the axes are seen."""
+        """Return what is visible, whole, as it is seen from where the axes are seen.
+
+        Of two bodies that pass through each other there are also the lines where they meet.
+        """
         found: list[Piece] = []
+        bodies: list[list[Piece]] = []
         sight = self.axes.sight()
         for artist in [artist for artist in self.artists if artist.get_visible()]:
             if isinstance(artist, Faces | Ball):
-                found += artist.pieces(sight.scale, sight.middle)
+                body = list(artist.pieces(sight.scale, sight.middle))
+                bodies.append([piece for piece in body if piece.kind == "face"])
+                found += body
                 continue
             known, made = self._known.get(artist, (None, []))
             if artist.stale or known != sight.key:
@@ -140,12 +155,15 @@ class Scene(Artist):
                 made = [piece for piece in make(artist, looks, sight) if len(piece.places)]
                 self._known[artist] = sight.key, made
             found += made
+        for one, other in combinations(bodies, 2):
+            found += [line for faces in product(one, other) for line in crossings(*faces)]
         return found
 
     def draw(self, renderer: Any) -> None:
         """Draw all that is visible."""
         sight, written = self.axes.sight(), set()
-        for piece in in_sight(self.pieces(renderer), sight.eye):
+        overlap = renderer.points_to_pixels(OVERLAP)
+        for piece in in_sight(self.pieces(renderer), sight.eye, overlap):
             if piece.text:
                 if piece.text not in written:  # all of its lines at once
                     piece.text.draw(renderer)

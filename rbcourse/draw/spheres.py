@@ -7,6 +7,7 @@ import numpy as np
 
 from rbcourse import Array
 from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.scene import OVER
 from rbcourse.draw.space import Ball
 
 Images = Mapping[str, tuple[Array, Array]]
@@ -56,8 +57,9 @@ def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[A
     panels = []
     for ax, (name, pair) in zip(axes, images.items(), strict=True):
         draw_sphere(ax)
-        ax.plot([0, 0], [0, 0], [1, 1.2], color=COLOURS["z"], lw=2)
-        ax.text(0, 0, 1.07, "  z", color=COLOURS["z"])
+        for axis, direction in zip("xyz", np.eye(3), strict=True):
+            ax.plot(*np.outer(direction, [1, 1.2]), color=COLOURS[axis], lw=2)
+            ax.text(*(1.18 * direction), f"  {axis}", color=COLOURS[axis], va="center", zorder=OVER)
         ax.set_title(name)
         gaps = np.full_like(pair[0], np.nan)  # between one stroke and the next
         strokes = np.stack([*pair, gaps], axis=1)
@@ -81,7 +83,7 @@ def describe_images(images: Images) -> str:
         f"{name}: {(np.abs(v0[:, 2]) < 0.5).sum()}" for name, (v0, _) in images.items()
     )
     return (
-        f"The images of the pole of a sphere under {count} random rotations, a stroke at each "
-        "image showing how it is turned. How many lie in the middle half of the height, which is "
-        f"half of the area: {said}."
+        f"Images of the pole of a sphere under {count} random rotations: {', '.join(images)}. A "
+        "stroke at each image shows the turn about it. Numbers of images in the middle half of the "
+        f"height, which is half of the area: {said}."
     )

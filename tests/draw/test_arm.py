@@ -70,7 +70,7 @@ def test_the_arrows_at_the_tip_are_the_columns_of_the_jacobian(axes, q):
         assert off([arrow.U[0], arrow.V[0]], complex(x, y) / 2) < 1e-14
     first = np.degrees(np.arctan2(J[1, 0], J[0, 0]))
     said = arm.describe_tip_velocities({"here": np.array(q)}, lengths)
-    assert f"The arrows point, here, to {first:.0f}" in said
+    assert f"Directions of the arrows: here, to {first:.0f}" in said
 
 
 @pytest.mark.parametrize(
@@ -111,10 +111,11 @@ def test_descriptions_give_numbers():
     said = arm.describe_arm(PATH) + arm.describe_arm(np.zeros((1, 2)), [1e-3, 1000])
     said += arm.describe_posture(np.array([-0.5, np.pi / 2])) + arm.describe_ways({"one": PATH})
     for words in (
-        "links of 2 and 1.5 m turns its joints from 11 and 29 to 229 and 6 degrees",
+        "from joint angles of 11 and 29 degrees to 229 and 6 degrees",
+        "links are 2 and 1.5 m long",
         f"by {first:.0f} and {second:.0f} degrees in all",
-        f"its tip covers {covered:.2f} m, from ({tips[0].real:.2f}, {tips[0].imag:.2f}) to (",
-        "links of 0.001 and 1000 m",
+        f"the tip covers {covered:.2f} m, from ({tips[0].real:.2f}, {tips[0].imag:.2f}) to (",
+        "links are 0.001 and 1000 m long",
         "joint angles are -29 and 90 degrees",
         f"at (0, 0), ({2 * np.cos(0.5):.2f}, {-2 * np.sin(0.5):.2f}), (",
         f"one: {covered:.1f} m and {np.degrees(np.linalg.norm(steps, axis=1).sum()):.0f} degrees.",

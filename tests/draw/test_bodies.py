@@ -39,6 +39,9 @@ def test_cubes_with_a_square_on_one_face_are_where_the_poses_are(axes):
     for cube, A in zip(cubes, SCREW, strict=True):
         assert off(cube, A, in_body) < 1e-14
     assert np.array_equal(stars.get_data_3d(), SCREW[:, :3, 3].T)
+    bodies.draw_cube_motion(axes[1], SCREW, 2.0, compared=GEODESIC[1:3])
+    for outline, A in zip(axes[1].artists[1:3], GEODESIC[1:3], strict=True):
+        assert off(outline, A, in_body) < 1e-14
     low, high = np.array([axes[0].get_xlim(), axes[0].get_ylim(), axes[0].get_zlim()]).T
     drawn = np.concatenate([cube.corners.reshape(-1, 3) for cube in cubes])
     assert np.all((drawn.min(axis=0) > low) & (drawn.max(axis=0) < high))
@@ -111,9 +114,9 @@ def test_descriptions_give_numbers():
         said += bodies.describe_moving_boxes(TIMES, pair)
     for words in (
         f"geodesic {np.linalg.norm(A1[:3, 3]):.2f} m",
-        "at 6 times on its way from (0, 0, 0) to (4, 5, 3) m",
+        "from (0, 0, 0) to (4, 5, 3) m, drawn at 6 times.",
         ", ".join([f"{angle / 5:.0f}"] * 5),
-        "side by side: one; two. The orientations of one and two agree at all times.",
+        "The orientations of one and two agree at all times.",
         f"upright and bent differ most at t = 0.40, by {50 * bump.max():.0f} degrees.",
     ):
         assert words in said

@@ -48,8 +48,9 @@ def test_rectangles_stand_at_the_poses_of_the_table_and_move_along_their_way(ax)
     for ghost, nose, i in zip(ax.patches[:2], ax.lines[:2], (1, 3), strict=True):
         assert_body(ghost, nose, PATH[i], 0.8)
     for i in (0, 3, 2, 1):
-        way, outline, nose = update(i)
+        outline, nose, way = update(i)
         assert_body(outline, nose, PATH[i], 0.8)
+        assert way.get_zorder() > outline.get_zorder()  # the end of the way is seen
         assert np.array_equal(way_of(way), PATH[: i + 1, :2])
 
 
@@ -67,8 +68,8 @@ def test_two_ways_are_compared(ax):
     way = plane.draw_compared(ax, pair, 1, shown=[1])[3]
     assert np.abs(way_of(way) - raised[:, :2]).max() < 1e-14
     assert plane.describe_compared({"here": pair}) == (
-        "A rectangle on two ways beside each other, the second dashed: here. "
-        "The ways of each pair: here: one and other, the centres apart by 2 m at most."
+        "Paths of a rectangle in pairs, the second path dashed: here. "
+        "The paths of each pair: here: one and other, the centres apart by 2 m at most."
     )
 
 
@@ -81,5 +82,5 @@ def test_the_description_says_from_where_to_where_and_how_it_turns():
     assert "from (1, 0) m, heading 0 degrees" in still
     assert "it turns by less than a degree." in still
     both = plane.describe_routes({"one": PATH, "two": PATH})
-    assert both.startswith("A rectangle on its way from start to goal: one; two. In turn, one: ")
+    assert both.startswith("Paths of a rectangle from start to goal: one, two. In turn, one: ")
     assert both.endswith(f"one: {said} two: {said}")

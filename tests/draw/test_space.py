@@ -125,7 +125,7 @@ def test_each_part_is_drawn_before_the_faces_that_hide_it(ax, make):
             if face.kind in ("face", "ball"):
                 normal = sight.eye if face.normal is None else face.normal
                 height = (places - face.places[0]) @ normal * np.sign(normal @ sight.eye)
-                over = covers(face, places, sight) & (np.abs(height) > 2 * scene.NEAR)
+                over = covers(face, places, sight) & (np.abs(height) > 4 * scene.NEAR)
                 assert np.array_equal(height[over] > 0, number[over] > i), side
                 hidden += (height[over] < 0).sum()
         assert hidden > 100
@@ -142,6 +142,50 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
         assert np.abs(one[-1] - after[0]).max() < 1e-9
     steps = np.linalg.norm(np.diff(sight.flat(sight.scale * corners), axis=0), axis=1)
     assert max(places[-1, 3] for places in line) == pytest.approx(steps.sum())
+
+
+def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
+    square = np.array([[[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]]])
+    ax.add_artist(space.Faces(square, ["red"]))
+    for alpha, overlap in ((1, 2), (0.5, 0)):
+        (line,) = ax.plot([-1, 1], [0, 0], [0, 0], lw=3, alpha=alpha)
+        pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
+        found = scene.in_sight(pieces, ax.sight().eye, 2)
+        parts = [part.places[:, 0] for part in found if part.gc.get_linewidth() == 3]
+        far, near = sorted(parts, key=np.mean)  # seen from +x
+        assert far.max() - near.min() == pytest.approx(overlap)
+        line.remove()
+
+
+def test_bodies_that_pass_through_each_other_have_an_outline_where_they_meet(ax):
+    """The corner of a cube in that of another one: six lines, which end at one another."""
+    corners, apart = bodies.draw_box(ax, np.eye(4), 1.0).corners[:6], np.array([0.4, 0.3, 0.2])
+    ax.artists[0].remove()
+    cube, other = (ax.add_artist(space.Faces(c, 6 * ["0.9"])) for c in (corners, corners + apart))
+    pieces, scale = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer()), ax.sight().scale
+    lines = np.array([piece.places[:, :3] / scale for piece in pieces if piece.kind == "line"])
+    for centre in (0, apart):  # of a cube: the lines are on its faces
+        assert np.abs(np.abs(lines - centre).max(axis=-1) - 0.5).max() < 1e-12
+    ends, counts = np.unique(lines.reshape(-1, 3).round(9), axis=0, return_counts=True)
+    assert (len(lines), len(ends), set(counts)) == (6, 6, {2})
+    other.corners = cube.corners + np.array([1.1, 0, 0])
+    pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
+    assert {piece.kind for piece in pieces} == {"face"}
+
+
+def test_edges_are_drawn_after_both_faces_that_they_bound(ax):
+    bodies.draw_box(ax, np.eye(4), np.array([1.0, 0.8, 0.6]))
+    for side in SIDES:
+        ax.view_init(*side)
+        parts, sight = drawn(ax)
+        lines = [(i, part.places[:, :3]) for i, part in enumerate(parts) if part.kind == "line"]
+        for i, face in enumerate(parts):
+            centre = face.places[:, :3].mean(axis=0)
+            if face.kind == "face" and (centre @ face.normal) * (face.normal @ sight.eye) > 0:
+                for edge in zip(face.places, np.roll(face.places, -1, axis=0), strict=True):
+                    off = [np.abs(ends - p).max(axis=1).min() for p in edge for _, ends in lines]
+                    on = np.reshape(off, (2, -1)).max(axis=0) < 1e-9
+                    assert max(np.array([k for k, _ in lines])[on]) > i
 
 
 def test_the_zorder_decides_in_the_plane_of_a_face_and_over_everything(ax):
@@ -212,7 +256,7 @@ def test_faces_without_area_part_nothing_and_faces_that_are_not_flat_are_drawn(a
     ax.plot([-1, 1], [0, 0], [-0.6, -0.6], lw=3)
     ax.view_init(20, -60)
     kinds = [(part.kind, part.gc.get_linewidth()) for part in drawn(ax)[0]]
-    assert kinds.index(("line", 3)) < kinds.index(("face", 0.5))
+    assert kinds.index(("line", 3)) < kinds.index(("face", 0))
     plate.remove()
     ax.add_artist(space.Faces(np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, 0]]]), ["red"]))
     ax.add_artist(space.Faces(np.full((1, 3, 3), np.nan), ["red"]))

@@ -29,5 +29,5 @@ def test_the_first_images_are_marked_listed_and_counted():
     assert list(table)[:6] == [f"one {v} {axis} [1]" for v in ("v0", "v1") for axis in "xyz"]
     assert np.array_equal(table["other v1 y [1]"], -V1[:, 1])
     inside = (np.abs(V0[:, 2]) < 0.5).sum()
-    assert "under 50 random rotations, a stroke at each image showing how it is turned." in said
+    assert said.startswith("Images of the pole of a sphere under 50 random rotations: one, other.")
     assert f"area: one: {inside}, other: {inside}." in said

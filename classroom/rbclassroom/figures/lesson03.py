@@ -39,7 +39,7 @@ def describe_angles(data: Table) -> str:
             f"α's change takes {100 * (late - early):.1f} % of the time"
         )
     return (
-        f"ZYX angles over time of bodies that turn steadily: {'; '.join(motions)}. "
+        f"ZYX angles over time of bodies that turn steadily: {', '.join(motions)}. "
         f"In turn, {'; '.join(said)}."
     )
 
@@ -69,4 +69,4 @@ def describe_turns(names: Sequence[str], R: Array) -> str:
         nearest = zip("xyz", np.abs(turned).argmax(axis=0), turned.T, strict=True)
         ways = [f"{x} along {'+−'[int(v[k] < 0)]}{'xyz'[k]}" for x, k, v in nearest]
         said.append(f"{name}: {', '.join(ways)}")
-    return f"A box with its axes: {'; '.join(names)}. Where they point: {'; '.join(said)}."
+    return f"Orientations of a box: {', '.join(names)}. Directions of its axes: {'; '.join(said)}."

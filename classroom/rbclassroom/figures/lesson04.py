@@ -63,8 +63,8 @@ def describe_drift(data: Table) -> str:
     """Return in words what `draw_drift` shows."""
     (_, steps), *ways = named(" [1]", data).items()
     return (
-        "The defect of matrices that are multiplied again and again, over the number of products, "
-        f"both axes logarithmic. After {steps[-1]:.0f} products it is, "
+        "Defect ‖RᵀR − I‖ of products of many rotation matrices over their number, on logarithmic "
+        f"axes. After {steps[-1]:.0f} products it is, "
         f"{'; '.join(f'{name}: {defect[-1]:.0e}' for name, defect in ways)}."
     )
 
@@ -156,10 +156,9 @@ def describe_shadows(points: Mapping[str, Array]) -> str:
     start, found = (points[name] @ [1, 1j] for name in ("M", "Gram–Schmidt"))
     off = np.degrees(np.abs(np.angle(found / start))).max()
     return (
-        f"{len(start)} matrices as dots in a plane in which the rotations are the unit circle, "
-        "and lines from each to what a repair makes of it. To the nearest rotation the lines run "
-        "along the rays from the origin. With Gram–Schmidt they miss the ray by up to "
-        f"{off:.0f} degrees."
+        f"Repairs of {len(start)} matrices: a line leads from each matrix to a rotation, which is "
+        "on the unit circle. To the nearest rotation the lines run along the rays from the origin. "
+        f"With Gram–Schmidt they miss the ray by up to {off:.0f} degrees."
     )
 
 

@@ -75,7 +75,7 @@ def describe_histograms(bins: Bins) -> str:
             off = np.abs(density * np.diff(edges) - np.diff(law(edges))).sum() / 2
             said.append(f"{label.split(' (')[0]}, {name}: {100 * off:.0f} %")
     return (
-        "Histograms of random rotations, of their angles and of the heights of two images, beside "
-        "the law of uniform ones. The share of the draws that lies in the wrong bins: "
-        f"{'; '.join(said)}."
+        "Histograms of the angles of random rotations and of the heights of the images of e₁ and "
+        "e₃, with the law of uniform rotations. The share of the draws that lies in the wrong "
+        f"bins: {'; '.join(said)}."
     )

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Arc
+from matplotlib.ticker import MaxNLocator
 
 from rbclassroom.figures import columns
 from rbcourse import Array, angle_between
@@ -44,13 +45,16 @@ def draw_family(ax: Axes, data: Table) -> None:
 def draw_surface(ax: Any, data: Table) -> None:
     """Draw such a table as a surface, with the colours of the curves (BK Fig. 2, BK Fig. 3)."""
     (p_label, p), (x_label, x), (y_label, y) = _columns(data)
-    look = {"facecolors": _COLOURS(p / np.pi), "shade": False, "lw": 0.3, "edgecolor": "white"}
-    ax.plot_surface(x, p, y, rcount=24, ccount=34, **look)
-    ax.set(xticks=[0, 0.5, 1])
-    ax.set_xlabel(x_label, labelpad=7)
+    mesh: Any = {"lw": 0.4, "edgecolor": (0, 0, 0, 0.25)}  # the surface shows through it
+    look = {"facecolors": _COLOURS(p / np.pi), "shade": False}
+    ax.plot_surface(x, p, y, rcount=24, ccount=25, **look, **mesh)
+    ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+    ax.set_xlabel(x_label, labelpad=10)
     ax.set_ylabel(p_label, labelpad=13)
     ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
-    ax.text2D(0.06, 0.88, y_label, transform=ax.transAxes)
+    ax.zaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    (left, _), (_, far), (_, top) = ax.get_xlim(), ax.get_ylim(), ax.get_zlim()
+    ax.text(left, far, 1.1 * top, y_label, ha="center")  # over the upright axis
     ax.view_init(elev=24, azim=-128)
     ax.set_box_aspect((1, 1, 0.75), zoom=0.95)
 
@@ -66,8 +70,9 @@ def describe_family(data: Table) -> str:
     ]
     times = ", ".join(f"{value:g}" for value in x[0, at])
     return (
-        f"{y_label} over the time t, for {len(p)} angles a, as a surface and as "
-        f"curves, a colour for each angle. At the times {times} {'; '.join(ends)}."
+        f"{y_label} over the time t for angles a from {_pi_fraction(p[0, 0])} to "
+        f"{_pi_fraction(p[-1, 0])}: a surface (left) and some of its sections (right). There are "
+        f"{len(p)} angles, with a colour for each. At the times {times} {'; '.join(ends)}."
     )
 
 
@@ -92,9 +97,10 @@ def describe_chord(data: Table) -> str:
     _, _, _, x, y = (np.asarray(column) for column in data.values())
     steps = np.degrees(np.diff(np.unwrap(np.arctan2(y, x))))
     return (
-        f"A chord of the unit circle over {steps.sum():.0f} degrees, cut into {len(steps)} equal "
-        "steps, and rays from the centre through the cuts to the circle. The first step on the "
-        f"circle spans {steps[0]:.0f} degrees, the widest, in the middle, {steps.max():.0f}."
+        "Equal steps on a chord of the unit circle and their projections on the circle. The chord "
+        f"spans {steps.sum():.0f} degrees and is cut into {len(steps)} steps; rays lead from the "
+        f"centre through the cuts to the circle. The first step on the circle spans {steps[0]:.0f} "
+        f"degrees, the widest, in the middle, {steps.max():.0f}."
     )
 
 
@@ -140,9 +146,9 @@ def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> s
             f"{speed[-1]:.2f} at the end"
         )
     return (
-        f"The paths of one point on a sphere, {' and '.join(_MOTIONS)}, marked at equal times, and "
-        "beside them the angular speeds over time. Speeds are in rad per unit time. Between the "
-        f"marks {'; '.join(said)}."
+        f"Paths of a point on a sphere, marked at equal times (left), and angular speeds (right): "
+        f"{' and '.join(_MOTIONS)}. Speeds are in rad per unit time. Between the marks "
+        f"{'; '.join(said)}."
     )
 
 
@@ -165,14 +171,16 @@ def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
     `names` and `poses`, shape (2, 4, 4), are those of the two frames.
     """
     d, R = poses[:, :3, 3], poses[:, :3, :3]
-    draw_box(ax, poses[1], np.array([1.4, 1.0, 0.7])).set_alpha(0.5)
-    for name, origin, axes in zip(names, d, R, strict=True):
+    draw_box(ax, poses[1], np.array([1.1, 0.8, 0.6])).set_alpha(0.5)
+    for name, point, origin, axes in zip(names, ("O", "O′"), d, R, strict=True):
         draw_triad(ax, origin, axes, name)
-        ax.text(*(origin - [0, 0, 0.4]), f"{{{name}}}", ha="center", zorder=OVER)
+        ax.text(*(origin + axes @ [0, 0.75, 0.75]), f"{{{name}}}", ha="center", va="center")
+        ax.plot(*origin[:, None], "o", ms=5, color="black", zorder=OVER)
+        ax.text(*(origin - [-0.1, 0, 0.2]), point, ha="center", va="center", zorder=OVER)
     draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
-    ax.text(*(d.mean(axis=0) - [0, 0, 0.25]), "d", fontstyle="italic")
-    ax.fit(d.min(axis=0) - 0.4, d.max(axis=0) + 1, zoom=1.3)
-    ax.view_init(elev=20, azim=-60)
+    ax.text(*(d.mean(axis=0) - [0, 0, 0.15]), "d", ha="center", va="center")
+    ax.fit(d.min(axis=0) - 0.3, d.max(axis=0) + 1, zoom=1.95)
+    ax.view_init(elev=30, azim=-75)
 
 
 def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
@@ -181,7 +189,7 @@ def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
     place = ", ".join(f"{x:g}" for x in poses[1, :3, 3])
     turn = np.degrees(angle_between(np.eye(3), poses[1, :3, :3]))
     return (
-        f"The fixed frame {{{fixed}}} with its axes x, y, z, and a box that carries the moving "
-        f"frame {{{moving}}}. Its origin is at ({place}) m, the tip of the vector d, and it is "
-        f"turned by {turn:.0f} degrees against the fixed one."
+        f"The fixed frame {{{fixed}}} and the frame {{{moving}}} that moves with a body; d is the "
+        "vector from the origin O of the first to the origin O′ of the second. The body is a box. "
+        f"O′ is at ({place}) m, and the second frame is turned by {turn:.0f} degrees."
     )

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
@@ -39,34 +38,34 @@ def draw_comparison(fig: Figure, data: Table) -> None:
     for name, style in _STYLES.items():
         for axis, part in zip("xyz", sigma[name].T, strict=True):
             axes["b"].plot(t, part, color=COLOURS[axis], clip_on=False, **style)
-    looks = zip("xyz", ("-", "--", ":"), ("σ₁", "σ₂", "σ₃"), strict=True)
+    looks = zip("xyz", ("-", "-.", ":"), ("σ₁", "σ₂", "σ₃"), strict=True)
     for k, (axis, dash, label) in enumerate(looks):
         axes["b"].text(1.04, sigma["optimum"][-1, k], label, color=COLOURS[axis], va="center")
         difference = sigma["projection"][:, k] - sigma["optimum"][:, k]
         axes["c"].plot(t, difference, color=COLOURS[axis], ls=dash, label=label)
-    axes["b"].set(xlabel="time t", ylabel="σ (rad)", xlim=(0, 1))
-    handles = [Line2D([], [], color="0.3", label=name, **s) for name, s in _STYLES.items()]
-    axes["b"].legend(handles=handles)
+    axes["b"].set(ylabel="σ (rad)", xlim=(0, 1))
+    axes["b"].tick_params(labelbottom=False)
     axes["c"].set(xlabel="time t", ylabel="Δσ (rad)", xlim=(0, 1))
-    beside: Any = {"loc": "center left", "bbox_to_anchor": (1, 0.5), "handlelength": 1.5}
-    axes["c"].legend(title="projection\n− optimum", **beside)
+    axes["c"].set_title("projection − optimum", loc="left")
+    handles = [*axes["a"].lines, *axes["c"].lines]
+    fig.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 
 def _draw_paths(ax: Any, sigma: Mapping[str, Array]) -> None:
     for name, style in _STYLES.items():
         ax.plot(*sigma[name].T, color=COLOURS[name], label=name, **style)
     start, end = sigma["optimum"][[0, -1]]
-    ax.text(*start, "   t = 0", va="top")
-    ax.text(*end, "t = 1   ", va="bottom", ha="right")
+    above = np.array([0, 0, 0.08 * np.ptp(sigma["optimum"][:, 2])])
+    ax.text(*(start + above), "t = 0     ", ha="right")
+    ax.text(*(end + above), "t = 1", ha="center")
     ax.set_xlabel("σ₁ (rad)", labelpad=11)
     ax.set_ylabel("σ₂ (rad)", labelpad=11)
     ax.zaxis.set_rotate_label(False)
-    ax.set_zlabel("σ₃ (rad)", rotation=90)
+    ax.set_zlabel("σ₃ (rad)", rotation=90, labelpad=9)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-        axis.set_major_locator(MaxNLocator(4))
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     ax.view_init(elev=22, azim=-62)
     ax.set_box_aspect((1, 1, 0.9), zoom=0.9)
-    ax.legend(loc="upper left", bbox_to_anchor=(0, 1.06))
 
 
 def describe_coordinates(data: Table) -> str:
@@ -75,8 +74,8 @@ def describe_coordinates(data: Table) -> str:
     apart = np.linalg.norm(best - near, axis=-1)
     start, end = (", ".join(f"{x:.3g}" for x in best[k].round(9) + 0.0) for k in (0, -1))
     said = (
-        "The optimum and the projection in exponential coordinates: their paths, marked at equal "
-        "times, the coordinates over time, and by how much they differ. "
+        "Optimum and projection in exponential coordinates σ: their paths, marked at equal times "
+        "(left), the coordinates over time and the differences (right). "
         f"Both run from ({start}) to ({end}) rad. "
     )
     if apart.max() < 1e-9:
@@ -104,7 +103,7 @@ def describe_excess(data: Table) -> str:
     scale, families = np.asarray(data["scale [1]"]), named(" excess [1]", data)
     ends = "; ".join(f"{name} from {x[0]:.1e} to {x[-1]:.2g}" for name, x in families.items())
     return (
-        "What the projection costs above the optimum, as a share, over the size of the excursion, "
-        f"on logarithmic axes. From size {scale.min():g} to {scale.max():g} it goes: {ends}. "
+        "Cost of the projection above the optimum, as a share, over the size of the excursion, on "
+        f"logarithmic axes. From size {scale.min():g} to {scale.max():g} it goes: {ends}. "
         "All follow a line of slope four where they are small."
     )

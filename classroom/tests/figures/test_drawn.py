@@ -126,7 +126,14 @@ def test_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
         chosen = faces[..., 1].min(axis=1) == angle[row, 0]
         colours = space.collections[0]._facecolor3d[chosen]
         assert np.array_equal(colours, np.tile(line.get_color(), (4, 1)))
-    words = "for 22 angles", "for the largest angle, 11π/12 rad, it is 0, 0.0439, 0.5, 0.956, 1."
+    for line in ax.lines:  # the contrast of WCAG against white
+        rgb = np.array(line.get_color()[:3])
+        linear = np.where(rgb > 0.04045, ((rgb + 0.055) / 1.055) ** 2.4, rgb / 12.92)
+        assert 1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05) > 3
+    words = (
+        "from π/24 to 11π/12: a surface (left)",
+        "for the largest angle, 11π/12 rad, it is 0, 0.0439, 0.5, 0.956, 1.",
+    )
     check_said(lesson06.describe_family(table), *words)
     lesson06.draw_family(other, {name: column[5:6] for name, column in table.items()})
     assert [line.get_label() for line in other.lines] == ["π/4"]
@@ -150,6 +157,8 @@ def test_lines_that_are_in_no_table_have_their_labels(axes):
     best, near = vectors("{} sigma{} [rad]", sigma, "123").values()
     held = {("", f"σ{'₁₂₃'[i]}"): [part] for i, part in enumerate((near - best).T)}
     check_held(fig.axes, held | {("", "_"): [*best.T, *near.T]})  # over time
+    (legend,) = [*fig.legends, *(ax.get_legend() for ax in fig.axes if ax.get_legend())]
+    assert [text.get_text() for text in legend.get_texts()][:3] == ["optimum", "projection", "σ₁"]
 
 
 def test_descriptions_of_curves():
@@ -169,7 +178,7 @@ def test_descriptions_of_curves():
     speeds = {name: table[f"{name} speed [rad]"] for name in paths}
     words = f"the geodesic takes the steps {', '.join(['15'] * 10)} degrees; its speed is 2.57 at"
     check_said(lesson06.describe_paths(paths, speeds), words)
-    check_said(lesson06.describe_chord(numbers("lesson06_chord")), "over 150 degrees, cut into")
+    check_said(lesson06.describe_chord(numbers("lesson06_chord")), "spans 150 degrees")
     torques = numbers("lesson13_torques")
     largest = np.linalg.norm(vectors("{} {} [N m]", torques)["least torque"], axis=-1).max()
     words = f"least torque: {largest:.2g} N m"
