@@ -41,7 +41,10 @@ const rbcourseScene = {
     if (!low || !high) return put(low + high, piece);
     const parts = { "-1": [[]], 1: [[]] };
     places.forEach((p, i) => {
-      for (const t of [-1, 1]) if (sides[i] === t || !sides[i]) parts[t].at(-1).push(p);
+      for (const t of [-1, 1]) {
+        if (sides[i] === t || !sides[i]) parts[t].at(-1).push(p);
+        else if (kind === "line" && parts[t].at(-1).length) parts[t].push([]); // it has left in a point of the plane
+      }
       const j = (i + 1) % places.length;
       if (sides[i] * sides[j] >= 0 || (kind === "line" && !j)) return;
       const share = heights[i] / (heights[i] - heights[j]);

@@ -80,6 +80,8 @@ class Piece:
             for t in (-1, 1):
                 if s in (t, 0):
                     parts[t][-1].append(p)
+                elif not closed and parts[t][-1]:
+                    parts[t].append([])  # the line has left this side in a point of the plane
             j = (i + 1) % len(side)
             if s * side[j] < 0 and (closed or j):
                 q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)

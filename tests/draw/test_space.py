@@ -144,6 +144,16 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     assert max(places[-1, 3] for places in line) == pytest.approx(steps.sum())
 
 
+def test_a_line_that_leaves_a_side_and_returns_in_points_of_the_plane_is_two_lines_there(ax):
+    corners = np.array([[0, 0, 5], [1, 0, 0], [2, 0, -5], [3, 0, 0], [4, 0, 5.0]])
+    ax.plot(*corners.T, lw=3)
+    pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
+    (line,) = [piece for piece in pieces if piece.gc.get_linewidth() == 3]
+    parts = line.cut(corners[:, 2])
+    assert [side for side, _ in parts] == [-1, 1, 1]
+    assert [len(part.places) for _, part in parts] == [3, 2, 2]
+
+
 def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
     square = np.array([[[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]]])
     ax.add_artist(space.Faces(square, ["red"]))
