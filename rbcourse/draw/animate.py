@@ -118,7 +118,7 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
 
 
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
-    """Return pictures with one palette: the 64 commonest colours of eight of them.
+    """Return pictures with one palette: the 96 commonest colours of eight of them.
 
     Pillow looks colours up by the first 6 bits of each channel, as if the others were 0. Of those
     that agree in them the commonest stands for all.
@@ -132,8 +132,8 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     for _, colour in sorted(counted, reverse=True):
         distinct.setdefault(tuple(level // 4 * 4 for level in colour), colour)
     looked_up = Image.new("P", (1, 1))
-    looked_up.putpalette([level for key in list(distinct)[:64] for level in key])
-    shown = [level for colour in list(distinct.values())[:64] for level in colour]
+    looked_up.putpalette([level for key in list(distinct)[:96] for level in key])
+    shown = [level for colour in list(distinct.values())[:96] for level in colour]
     found = [picture.quantize(palette=looked_up, dither=Image.Dither.NONE) for picture in pictures]
     for picture in found:
         picture.putpalette(shown)
