@@ -57,7 +57,7 @@ LIBRARIES = {
     | {"segno", "tornado"},
     "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
     | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
-    "rbclassroom.book": {"jinja2", "nbformat", "pygments", "sphinx"},
+    "rbclassroom.book": {"PIL", "jinja2", "nbformat", "pygments", "sphinx"},
 }
 
 
