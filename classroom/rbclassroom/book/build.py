@@ -142,7 +142,7 @@ class Sources:
             released = release(name, assignments)[f"{name}.ipynb"].decode()
             notebook = nbformat.reads(released, as_version=4)
             title, _, rest = notebook.cells[0].source.partition("\n")
-            image = f'<img alt="" src="../{card["picture"]}">'
+            image = f'<img alt="" role="presentation" src="../{card["picture"]}">'
             told = f'{_TO_READ.format(name=name)}\n<figure class="lead">{image}</figure>\n'
             notebook.cells[0].source = f"{title}\n{told}{rest}"
             self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
@@ -187,6 +187,8 @@ class Sources:
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
+            tagged = r"\$\$(.*?\\tag\{\d+\})\$\$"  # Sphinx does not number what is in `split`
+            text = re.sub(tagged, r"\\begin{equation}\n\1\n\\end{equation}", text)
             self.put(page, relinked(text, path, page))
 
     def put_course(self) -> None:

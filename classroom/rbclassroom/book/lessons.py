@@ -210,12 +210,24 @@ def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
     return [*others, text, *imports] if imports else others
 
 
+def joined(cells: list[NotebookNode]) -> list[NotebookNode]:
+    """Return cells with code that has no output together with the code that follows it."""
+    result: list[NotebookNode] = []
+    for cell in cells:
+        last = result[-1] if result else None
+        if last and cell.cell_type == last.cell_type == "code" and not last.outputs:
+            cell.source = f"{last.source}\n\n{cell.source}"
+            result.pop()
+        result.append(cell)
+    return result
+
+
 def hide_code(cells: list[NotebookNode]) -> None:
-    """Fold the code of cells, but for that which is in a folded answer."""
+    """Fold the code of cells, but for that which is the answer to an exercise."""
     inside = False
     for cell in cells:
         if cell.cell_type == "markdown" and re.match("</?details", cell.source):
-            inside = cell.source.startswith("<details")
+            inside = 'id="answer-to-exercise' in cell.source
         elif cell.cell_type == "code" and not inside:
             cell.metadata.tags = [*cell.metadata.get("tags", []), "hide-input"]
 
@@ -238,7 +250,6 @@ def prepared(
         return f"[{match[1]}]({found})" if found else match[0]
 
     cells[0].source = with_lead(cells[0].source, with_picture_files(lead, known, folder))
-    voted(cells)
     for cell in cells:
         if cell.cell_type == "markdown":
             lines = cell.source.split("\n")
@@ -255,7 +266,8 @@ def prepared(
                 shown["text/html"] = living(explorer[1], root)
             shown["text/html"] = with_files(with_picture_files(shown["text/html"], known, folder))
             shown["text/html"] = with_script_files(shown["text/html"], folder)
-    notebook.cells = folded(in_order(cells))
+    voted(cells)
+    notebook.cells = folded(joined(in_order(cells)))
     hide_code(notebook.cells)
     return relinked(sheet, path, sheet_page)
 

@@ -49,11 +49,12 @@ def voted(cells: list[NotebookNode]) -> None:
 
 def _with_buttons(text: str, name: str, right: str, lines: dict[str, str]) -> str:
     def put(option: re.Match[str]) -> str:
-        letter, words = option[1], option[2]
+        letter, words = option[1], re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", option[2])
         is_right = letter == right
         line = lines[letter].replace("\n", "\n  ")
+        button = f'<button type="button" aria-expanded="false">**{letter}** <span>{words}</span>'
         return (
-            f'- <button type="button" aria-expanded="false">**{letter}** {words}</button>\n\n'
+            f"- {button}</button>\n\n"
             f'  <div role="status"><div class="idea{" right" * is_right}" hidden>\n\n'
             f"  *{'Right.' if is_right else 'Not quite.'}* {line}\n\n  </div></div>\n"
         )

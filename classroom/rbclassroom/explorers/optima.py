@@ -95,7 +95,7 @@ def cube_explorer() -> Explorer:
             fig.text(left + 0.25, 0.94, way, ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
         artists["difference"].set(**_OUTLINE)
-        fig.text(0.5, 0.02, "axes: 5 m; pink: where the optimum is now", ha="center")
+        fig.text(0.5, 0.02, "axes: 5 m long; pink outline: the optimum", ha="center")
     controls = {
         "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
         "spin": widgets.slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),

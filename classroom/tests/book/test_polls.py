@@ -13,7 +13,7 @@ from rbclassroom.lecture.slides import deck_of
 
 PATHS = lesson_paths(Path(__file__).parents[3] / "notebooks")
 OPTION = re.compile(
-    r'^- <button type="button" aria-expanded="false">\*\*([A-Z])\*\* .+</button>\n\n'
+    r'^- <button type="button" aria-expanded="false">\*\*([A-Z])\*\* <span>.+</span></button>\n\n'
     r'  <div role="status"><div class="idea( right)?" hidden>\n\n'
     r"  (.*(?:\n.*)*?)\n\n  </div></div>$",
     re.MULTILINE,

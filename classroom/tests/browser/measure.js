@@ -11,6 +11,8 @@
 
   if (page.scrollWidth > page.clientWidth) faults.push(`the page is ${page.scrollWidth} wide`);
   if (!content) return faults; // a page of code
+  if (content.scrollWidth > content.clientWidth + 1) faults.push(`the text is ${content.scrollWidth} wide`);
+  for (const fault of content.querySelectorAll("[data-mjx-error]")) faults.push(`formula: ${fault.dataset.mjxError}`);
   for (const element of content.querySelectorAll("*")) {
     if (!shown(element) || element.scrollWidth <= element.clientWidth + 2 || !element.clientWidth) continue;
     const { overflowX, backgroundImage, display } = getComputedStyle(element);

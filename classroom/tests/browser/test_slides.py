@@ -46,14 +46,14 @@ def test_every_slide_fits_and_can_be_read_from_the_last_row(context, path):
             assert faults == []
             assert len(thin) <= 3, thin
     cells = nbformat.read(path, as_version=4).cells
-    small = {  # letters of 12 points at 100 pixels per inch, of 13 at 80
+    small = {  # numbers of 13.5 points at 100 pixels per inch, letters of 14.5 at 80
         output.data["text/plain"].partition(": ")[2]
         for cell in cells
         for output in cell.get("outputs", [])
         if "text/html" in output.get("data", {}) and re.search(r'dpi"?[=:] ?80', cell.source)
     }
     for number, alt, natural, width in pictures:
-        points, dpi = (13, 80) if alt in small else (12, 100)
+        points, dpi = (14.5, 80) if alt in small else (13.5, 100)
         letters = points / 72 * width / (natural / 2 / dpi)
         assert letters > 0.025 * 1080, (number, alt, letters)
 

@@ -23,6 +23,21 @@ addEventListener("DOMContentLoaded", () => {
     for (const each of all("details.hide")) each.open = shown;
   });
 
+  // A formula stays on one line with the marks around it.
+  const join = () => {
+    for (const formula of all("span.math:has(> mjx-container)")) {
+      const before = formula.previousSibling, after = formula.nextSibling, whole = document.createElement("span");
+      const start = before?.nodeType === 3 ? before.data.match(/[^\s]{0,3}$/)[0] : "";
+      const end = after?.nodeType === 3 ? after.data.match(/^[^\s\p{L}]{0,4}/u)[0] : "";
+      if (!end && !/[(“‘]$/.test(start)) continue;
+      whole.className = "whole";
+      formula.replaceWith(whole);
+      if (/[(“‘]$/.test(start)) { before.data = before.data.slice(0, -start.length); whole.append(start); }
+      whole.append(formula, end);
+      if (end) after.data = after.data.slice(end.length);
+    }
+  };
+
   // Formulas that are too wide become smaller, down to four fifths; others scroll, by keys as well.
   const fit = () => {
     for (const formula of all('mjx-container[display="true"]')) {
@@ -30,13 +45,21 @@ addEventListener("DOMContentLoaded", () => {
       const share = formula.clientWidth / formula.scrollWidth;
       if (share < 1) formula.style.fontSize = `${Math.max(80, Math.floor(99 * share))}%`;
     }
-    for (const each of all('mjx-container[display="true"], .content pre, .content table')) {
+    for (const formula of all('span.math > mjx-container:not([display])')) {
+      const room = formula.closest("p, li, td, dd, summary")?.clientWidth;
+      formula.classList.toggle("scrolls", Boolean(room) && formula.firstElementChild.clientWidth > room);
+    }
+    for (const each of all('mjx-container[display="true"], .scrolls, .content pre, .content table')) {
       if (each.scrollWidth > each.clientWidth + 1) each.tabIndex = 0;
     }
   };
-  addEventListener("load", () => Promise.resolve(window.MathJax?.startup?.promise).then(fit));
+  addEventListener("load", () => Promise.resolve(window.MathJax?.startup?.promise).then(join).then(fit));
   addEventListener("resize", fit);
   addEventListener("toggle", fit, { capture: true }); // something folded is open now
+
+  // The page that is shown is in sight in the list of pages.
+  const current = all(".sidebar-tree .current-page").at(-1), list = document.querySelector(".sidebar-scroll");
+  if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
 
   // The panels of a wide still, below one another and equally large; CSS shows them on phones.
   for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
@@ -74,8 +97,10 @@ addEventListener("DOMContentLoaded", () => {
       button.click();
       const end = () => {
         if (button.textContent === "▶") return; // somebody has paused it
-        if (slider.value === slider.max) button.click();
-        else requestAnimationFrame(end);
+        if (slider.value !== slider.max) return requestAnimationFrame(end);
+        button.click();
+        slider.value = slider.max / 2; // where the cubes differ
+        slider.dispatchEvent(new Event("input", { bubbles: true }));
       };
       end();
     }, { threshold: 0.6 });

@@ -46,7 +46,7 @@ const revive = async (section) => {
   for (const script of section ? all("figure > script[type]", section) : []) {
     const figure = script.parentElement, image = figure.querySelector("img"), own = JSON.parse(script.text);
     const data = window.rbcourseStates?.[own] ?? own; // the book has them in files
-    script.remove();
+    for (const each of all("script", figure)) each.remove();
     figure.dataset.ratio = data.size[0] / data.size[1];
     await rbcourseDisplay.revive(image, data);
     const asked = section.parentElement.querySelector(".title, .poll") && !section.dataset.told;
