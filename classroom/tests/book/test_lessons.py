@@ -128,17 +128,24 @@ def test_a_wide_still_is_cut_between_its_panels_and_one_that_is_not_wide_is_whol
     assert lessons.cuts_of(still((10, 430), (470, 690), size=(700, 400))) == []
 
 
-def test_imports_come_last_and_code_outside_of_answers_is_folded():
-    cells = [*markdown("# A", "## 1"), *markdown("### Answer to poll 1"), *markdown("## 2")]
+def test_imports_come_last_neighbours_are_joined_and_code_is_folded_but_answers_to_exercises():
+    shown = [new_output("stream", text="2")]
+    cells = markdown("# A", "## 1", "### Answer to poll 1", "### Answer to exercise 1", "## 2")
     cells.insert(1, new_code_cell("import numpy as np"))
-    cells.insert(3, new_code_cell("1 + 1"))
-    cells.insert(5, new_code_cell("2 + 2"))
-    cells = lessons.folded(lessons.in_order(cells))
+    cells[3:3] = [new_code_cell("a = 1"), new_code_cell("a + 1", outputs=shown)]
+    cells.insert(6, new_code_cell("2 + 2", outputs=shown))
+    cells.insert(8, new_code_cell("3 + 3", outputs=shown))
+    cells = lessons.folded(lessons.joined(lessons.in_order(cells)))
     lessons.hide_code(cells)
-    sources = [cell.source for cell in cells]
-    assert sources[-1] == "import numpy as np"
-    hidden = {cell.source for cell in cells if "hide-input" in cell.metadata.get("tags", [])}
-    assert hidden == {"1 + 1", "import numpy as np"}
+    code = [cell for cell in cells if cell.cell_type == "code"]
+    assert [cell.source for cell in code] == [
+        "a = 1\n\na + 1",
+        "2 + 2",
+        "3 + 3",
+        "import numpy as np",
+    ]
+    hidden = ["hide-input" in cell.metadata.get("tags", []) for cell in code]
+    assert hidden == [True, True, False, True]
 
 
 def test_a_lesson_begins_with_its_question_and_a_picture():
