@@ -65,7 +65,7 @@ class Piece:
         """Return the parts above a plane (1), in it (0), and below (-1).
 
         `height` is that of the places over the plane, shape (n,). The parts above it go on below it
-        for the overlap, in pixels, unless this is seen: of what is transparent, and of dashes.
+        for the overlap, in pixels, unless the piece is transparent or dashed.
         """
         side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
         if self.marker:
@@ -103,8 +103,8 @@ class Piece:
 def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces in the order in which they are drawn; `eye` is the direction to the eye.
 
-    Parts of one that is cut overlap by so many pixels, see `Piece.cut`.
-    A face has become two: what fills it, and its edge, which is not drawn where the face is cut.
+    The parts of a cut piece overlap by this number of pixels, see `Piece.cut`. A face has become
+    two pieces: its filling, and its edge, which is not drawn where the face is cut.
     """
     parts = [part for piece in pieces for part in _filling_and_edge(piece)]
     hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
@@ -114,13 +114,13 @@ def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
 def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
-    The plane of a face has the eye on one of its sides. What is on the other side is drawn first,
-    then what is in the plane, by its zorder, then what is on the side of the eye; and so on with
-    the next face, on both sides. What is over the faces in the plane, such as an edge, is drawn
-    with what is on the side of the eye, so that the next faces do not cover half of it. The first
-    face is the one whose plane cuts the fewest faces and lines. What no face parts is drawn by its
-    zorder, then by its mean depth in `whole_pixels`, and then in the given order. `eye` is the
-    direction to the eye, shape (3,).
+    The plane of a face has the eye on one of its sides. Pieces on the other side are drawn first,
+    then pieces in the plane, by their zorder, then pieces on the side of the eye; and so on with
+    the next face, on both sides. A piece in the plane and over the faces there, such as an edge,
+    is drawn with those on the side of the eye, so that the next faces do not cover half of it. The
+    first face is the one whose plane cuts the fewest faces and lines. Pieces that no face parts are
+    drawn by their zorder, then by their mean depth in `whole_pixels`, and then in the given order.
+    `eye` is the direction to the eye, shape (3,).
     """
     drawn: list[Piece] = []
     todo = [(False, pieces)]  # whether they are in order, the next ones last

@@ -134,7 +134,7 @@ class Scene(Artist):
         return [artist for artist in self.axes.get_children() if isinstance(artist, IN_SPACE)]
 
     def pieces(self, renderer: Any) -> list[Piece]:
-        """Return what is visible, whole, as it is seen from where the axes are seen.
+        """Return all visible pieces, uncut, in the view of the axes.
 
         Of two bodies that pass through each other there are also the lines where they meet.
         """

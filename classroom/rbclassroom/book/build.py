@@ -187,7 +187,8 @@ class Sources:
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
-            tagged = r"\$\$(.*?\\tag\{\d+\})\$\$"  # Sphinx does not number what is in `split`
+            # Sphinx makes `split` of such a formula, where no number is allowed
+            tagged = r"\$\$(.*?\\tag\{\d+\})\$\$"
             text = re.sub(tagged, r"\\begin{equation}\n\1\n\\end{equation}", text)
             self.put(page, relinked(text, path, page))
 

@@ -86,7 +86,7 @@ def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
 
 
 def write_texts(app: Any, failed: Exception | None) -> None:
-    """Write the words of all pages that can be found, for excerpts beside what a search finds."""
+    """Write the words of all pages, for excerpts beside search results."""
     if failed:
         return
     texts = {}

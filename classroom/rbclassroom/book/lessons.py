@@ -51,7 +51,7 @@ class Figure:
 
     @property
     def caption(self) -> str:
-        """What stands below it, as HTML."""
+        """Its caption, as HTML."""
         return re.sub("</?figcaption>", "", caption(self.text))
 
 

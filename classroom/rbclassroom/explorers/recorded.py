@@ -61,8 +61,8 @@ def record(
 ) -> Player:
     """Return an explorer as a figure that moves without Python, in exactly these states.
 
-    `moved` has values of controls, their present ones among them. Of what plays, every `stride`-th
-    step is recorded, the present one among them. The other controls stay as they are.
+    `moved` has values of controls, their present ones among them. Of the control that plays, every
+    `stride`-th step is recorded, the present one among them. The other controls stay as they are.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
     label = {each: control.description for each, control in explorer.controls.items()}

@@ -160,7 +160,7 @@ def test_the_first_picture_of_a_lesson_is_seen_at_once(path, page):
 
 
 def test_an_option_of_a_poll_shows_its_own_line_and_no_other(page):
-    """By mouse and by keys; what a screen reader is told of it."""
+    """By mouse and by keys, with the names and states that screen readers use."""
     page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
     poll = page.get_by_role("group", name="Poll 1")
     ideas = poll.locator(".idea")
