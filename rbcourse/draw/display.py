@@ -173,7 +173,8 @@ def _alpha(colour: Any, forced: float | None) -> float:
 
 
 def _steps(points: Any) -> NDArray[np.int_]:
-    whole = np.clip(np.round(PARTS * points), -FAR, FAR).astype(int)
+    exact = np.round(PARTS * points, 6)  # so that halves are rounded alike on every processor
+    whole = np.clip(np.round(exact), -FAR, FAR).astype(int)
     return np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).ravel()
 
 
