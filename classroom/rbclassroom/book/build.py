@@ -189,7 +189,7 @@ class Sources:
             text = with_citations(text, self.works, listed(text), "references.html")
             # Sphinx makes `split` of such a formula, where no number is allowed
             tagged = r"\$\$(.*?\\tag\{\d+\})\$\$"
-            text = re.sub(tagged, r"\\begin{equation}\n\1\n\\end{equation}", text)
+            text = re.sub(tagged, r"\\begin{equation*}\n\1\n\\end{equation*}", text)
             self.put(page, relinked(text, path, page))
 
     def put_course(self) -> None:

@@ -184,7 +184,7 @@ def test_code_is_folded_until_it_is_asked_for(page):
     code = page.locator(".cell_input pre")
     expect(code.locator("visible=true")).to_have_count(0)
     page.get_by_role("button", name="Show all code").press("Enter")
-    assert code.locator("visible=true").count() > 20
+    assert code.locator("visible=true").count() > 15
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
@@ -195,8 +195,11 @@ def test_the_picture_of_the_start_page_plays_once_where_motion_is_wanted(motion,
     time, play = hero.get_by_label("time t"), hero.get_by_role("button", name="play or pause")
     if motion == "no-preference":
         expect(play).to_have_text("❚❚")
-        expect(time).to_have_js_property("value", time.get_attribute("max"))
+        middle = str(int(time.get_attribute("max")) // 2)
+        expect(time).to_have_value(middle)  # where it rests at the end, and passes before
     expect(play).to_have_text("▶")
+    if motion == "no-preference":
+        assert time.input_value() == middle
     expect(hero.locator("input:visible")).to_have_count(1)
     hero.get_by_text("More").click()
     expect(hero.locator("input:visible")).to_have_count(2)
