@@ -34,7 +34,7 @@ TEMPLATES = Environment(
     loader=FileSystemLoader(HERE / "pages"), trim_blocks=True, keep_trailing_newline=True
 )
 TEMPLATES.globals |= {"ledger": ledger, "places": places, "reference": reference}
-_KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|txt|typed)")
+_KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|ttf|txt|typed)")
 _TO_READ = """
 *This page is for reading. Get the problem set as a zip from your teacher; teachers make it \
 with* `python3 course.py handout {name}`.

@@ -73,6 +73,8 @@ def test_the_course_comes_along_without_outputs_and_the_notebooks_of_teachers(wr
         names = {name.removeprefix("rbcourse/") for name in archive.namelist()}
         lesson = json.loads(archive.read("rbcourse/notebooks/06_geodesics.ipynb"))
     assert set(CONTENTS["course"]["files"]) <= names
+    needed = {path for path in (ROOT / "rbcourse").rglob("*.*") if "__pycache__" not in path.parts}
+    assert {path.relative_to(ROOT).as_posix() for path in needed if path.is_file()} <= names
     assert {"rbcourse/py.typed", "classroom/rbclassroom/book/pages/index.md"} <= names
     assert not any(name.startswith(("notebooks/assignments", "tests", "figures")) for name in names)
     assert all(cell.get("outputs", []) == [] for cell in lesson["cells"])

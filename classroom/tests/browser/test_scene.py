@@ -103,7 +103,7 @@ def test_a_turned_scene_equals_the_drawing_from_there(make, sides, page, tmp_pat
 def test_the_browser_cuts_and_orders_as_python_does(page):
     """The same parts, one after the other, at the same places, dashes as far along their line.
 
-    They do not overlap here: rounding would decide whether the next plane cuts what is beyond.
+    They do not overlap here: rounding would decide whether the next plane cuts the piece beyond it.
     """
     fig, ax = plt.subplots(**SIZE)
     crossing(ax)
