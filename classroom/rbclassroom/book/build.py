@@ -154,15 +154,12 @@ class Sources:
         for module in (each for some in modules.values() for each in some):
             page = self.rendered("module.rst.j2", module=module)
             self.put(f"package/{module['name']}.rst", page)
-        home = Path("classroom", "rbclassroom")
-        apart = set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}
-        paths = [path for room in apart for path in (self.root / home / room).glob("[a-z]*.py")]
-        coded = {
-            f"package/{path.parent.name}.{path.stem}": f"../code/{home.as_posix()}/"
-            f"{path.parent.name}/{path.stem}"
-            for path in paths
-        }
-        for old, new in (MOVED | coded).items():
+        addresses = dict(MOVED)
+        for room in set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}:  # without pages
+            for path in (self.root / "classroom" / "rbclassroom" / room).glob("[a-z]*.py"):
+                code = f"../code/classroom/rbclassroom/{room}/{path.stem}"
+                addresses[f"package/{room}.{path.stem}"] = code
+        for old, new in addresses.items():
             moved = self.rendered("moved.html.j2", page=f"{new}.html")
             _write(self.extra / f"{old}.html", moved)
         for path in reference.shown_code(self.root):

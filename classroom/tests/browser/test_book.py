@@ -200,6 +200,9 @@ def test_the_picture_of_the_start_page_plays_once_where_motion_is_wanted(motion,
     expect(play).to_have_text("▶")
     if motion == "no-preference":
         assert time.input_value() == middle
+    else:
+        page.wait_for_timeout(1000)
+        assert time.input_value() == "0"
     expect(hero.locator("input:visible")).to_have_count(1)
     hero.get_by_text("More").click()
     expect(hero.locator("input:visible")).to_have_count(2)
