@@ -156,9 +156,9 @@ class Sources:
             self.put(f"package/{module['name']}.rst", page)
         addresses = dict(MOVED)
         for room in set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}:  # without pages
-            for path in (self.root / "classroom" / "rbclassroom" / room).glob("[a-z]*.py"):
-                code = f"../code/classroom/rbclassroom/{room}/{path.stem}"
-                addresses[f"package/{room}.{path.stem}"] = code
+            for file in (self.root / "classroom" / "rbclassroom" / room).glob("[a-z]*.py"):
+                address = f"../code/classroom/rbclassroom/{room}/{file.stem}"
+                addresses[f"package/{room}.{file.stem}"] = address
         for old, new in addresses.items():
             moved = self.rendered("moved.html.j2", page=f"{new}.html")
             _write(self.extra / f"{old}.html", moved)
