@@ -46,7 +46,7 @@ TASKS = {  # task: environment, commands, of which the last takes the further wo
     "test": ("test", [PYTEST], "run the tests and the lessons"),
     "releases": ("test", ["rbclassroom.course.releases"], "test oldest or newest releases"),
     "hostile": ("test", [PYTEST + " classroom/tests/hostile"], "grade harmful submissions"),
-    "browser": ("test", ["rbclassroom.book.build", BROWSER], "test pages in Chromium"),
+    "browser": ("test", ["rbclassroom.book.build --live", BROWSER], "test pages in Chromium"),
     "figures": ("lessons", ["rbclassroom.explorers.recorded"], "run lessons again; store changes"),
     "ledger": ("test", ["rbclassroom.course.ledger"], "write docs/ledger.md"),
     "atlas": ("lessons", ["rbclassroom.surveys.body_atlas"], "compute the atlas of real bodies"),

@@ -413,6 +413,7 @@ def distributions_for(requirements):
 
 NEEDS_PAGES = ["course.lab", "lecture", "book"]
 NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
+NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # what is installed, and the modules that need more

@@ -36,8 +36,9 @@ MAY_IMPORT = {  # the parts, beside itself, that a part of the packages may impo
     "rbclassroom.course": {"rbclassroom"},  # not even the mathematics
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbclassroom.course", "rbcourse.draw"},
+    "rbclassroom.live": {"rbclassroom.assignments"},
     "rbclassroom.book": {"rbclassroom.course", "rbclassroom.lecture", "rbclassroom.assignments"}
-    | {"rbcourse.draw"},
+    | {"rbclassroom.live", "rbcourse.draw"},
 }
 PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))} | {
     "report",
@@ -51,12 +52,13 @@ LIBRARIES = {
     "rbclassroom": set(),
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "rbclassroom.figures": {"matplotlib"},
-    "rbclassroom.surveys": {"IPython", "matplotlib", "threadpoolctl"},
+    "rbclassroom.surveys": {"matplotlib", "threadpoolctl"},
     "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
     "rbclassroom.lecture": {"PIL", "markdown_it", "mdit_py_plugins", "nbformat"}
     | {"segno", "tornado"},
     "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
     | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
+    "rbclassroom.live": {"nbformat"},
     "rbclassroom.book": {"PIL", "jinja2", "nbformat", "pygments", "sphinx"},
 }
 

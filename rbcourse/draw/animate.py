@@ -1,6 +1,7 @@
 """Animations: GIFs, and players for notebooks that work without a network."""
 
 import io
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,6 +42,8 @@ class Animation(Player):
 
     def save(self, path: str | Path) -> None:
         """Write the animation to a file, as a GIF that starts again when it ends."""
+        if not self.pictures:
+            raise ValueError("RBCOURSE_FIGURES is empty: the frames for a file were not drawn")
         Path(path).write_bytes(gif(self.pictures, self.seconds))
 
 
@@ -58,7 +61,8 @@ def animate(
         raise ValueError(f"name: a word of letters, digits and _ wanted, got {name!r}")
     if not 0 < frames <= 50 * seconds:
         raise ValueError(f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s")
-    pictures = tuple(indexed(render(fig, update, frames)))
+    files = os.environ.get("RBCOURSE_FIGURES") != ""  # or there are none, see `save_figure`
+    pictures = tuple(indexed(render(fig, update, frames))) if files else ()
     fig.set_layout_engine("none")  # all stays where it is
     display = Display(fig)
     states = [display.record(update(i)) for i in range(frames)]
@@ -99,9 +103,9 @@ def save_animation(
     csv_text(data)  # before anything is written
     animation = animate(fig, name, alt, update, frames, seconds, still)
     save_figure(fig, name, data, alt)
-    folder = figures_folder()
-    animation.save(folder / f"{name}.gif")
-    (folder / f"{name}.png").write_bytes(animation.shown)
+    if folder := figures_folder():
+        animation.save(folder / f"{name}.gif")
+        (folder / f"{name}.png").write_bytes(animation.shown)
     return replace(animation, caption=caption(alt, f"{name}.gif, .png, .pdf, .csv"))
 
 

@@ -117,17 +117,18 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
 
     What is in a `Space` can be turned in the notebook; the files show it as it is seen at first.
-    The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, or else
-    to ``figures`` in the current folder. The same input gives the same bytes. The PNG has 256
-    colours, which nobody misses and which make it a third as large.
+    The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, by default
+    to ``figures`` in the current folder; if it is empty, no files are written. The same input gives
+    the same bytes. The PNG has 256 colours, which nobody misses and which make it a third as large.
     """
     save_table(name, data)
     folder = figures_folder()
     content = io.BytesIO()
     fig.savefig(content, format="png")
-    fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
     picture = png(few_colours(Image.open(content)))
-    (folder / f"{name}.png").write_bytes(picture)
+    if folder:
+        fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+        (folder / f"{name}.png").write_bytes(picture)
     shown = _turning(fig, name, alt) if scenes(fig) else None
     plt.close(fig)
     return shown or Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
@@ -145,14 +146,17 @@ def _turning(fig: Figure, name: str, alt: str) -> Player:
 def save_table(name: str, data: Table) -> None:
     """Save numbers as a CSV, in the folder of `save_figure`."""
     text = csv_text(data)
-    (figures_folder() / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+    if folder := figures_folder():
+        (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
 
 
-def figures_folder() -> Path:
+def figures_folder() -> Path | None:
     """Return the folder for figures, see `save_figure`; it is made if it is not there."""
-    folder = Path(os.environ.get("RBCOURSE_FIGURES", "figures"))
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    named = os.environ.get("RBCOURSE_FIGURES", "figures")
+    if not named:
+        return None
+    Path(named).mkdir(parents=True, exist_ok=True)
+    return Path(named)
 
 
 def csv_text(data: Table) -> str:

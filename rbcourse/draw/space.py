@@ -322,7 +322,7 @@ class Space(Axes3D):  # type: ignore[misc]
         finally:
             for artist in inside:
                 artist.set_visible(True)
-        if not self.scene.get_animated() or self.get_figure(root=True).canvas.is_saving():
+        if not self.scene.get_animated() or self.get_figure().canvas.is_saving():
             self.scene.draw(renderer)
 
 

@@ -45,6 +45,17 @@ def saved(tmp_path_factory):
     return made
 
 
+def test_without_files_no_frames_are_drawn_and_the_player_is_the_same(saved, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RBCOURSE_FIGURES", "")
+    fig, update = cube()
+    player = animate.save_animation(fig, "cube", TABLE, 'a "cube"', update, 12, seconds=3)
+    assert player._repr_html_() == saved[0][0]._repr_html_()
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(ValueError, match="RBCOURSE_FIGURES is empty"):
+        player.save("cube.gif")
+
+
 def held(page):
     """The data in the script of a player."""
     return json.loads(re.search(r"revive\(image, (\{.*\})\);\n", page)[1])

@@ -72,6 +72,15 @@ def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
     assert (tmp_path / "figures" / "empty.csv").exists()
 
 
+def test_no_files_are_written_where_none_are_wanted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RBCOURSE_FIGURES", "")
+    fig, ax = plt.subplots()
+    ax.plot([0, 1])
+    assert "<img" in save.save_figure(fig, "none", TABLE, "A line.")._repr_html_()
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("alt", "sentence"),
     [

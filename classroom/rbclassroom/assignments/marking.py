@@ -2,7 +2,7 @@
 
 A right function is accepted; for any other `NotYet` is raised, with one hint as its text. The data
 of a problem are numbers: inputs, right answers, and the results of functions that make a known
-mistake. A student's function that agrees with one of these on all inputs gets its hint.
+mistake. A student's function that agrees with one of these on each input gets its hint.
 """
 
 import copy
@@ -84,7 +84,8 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            if any(all(map(self.same, given, results)) for results in mistake.results):
+            trials = zip(given, *mistake.results, strict=True)  # at each input one or another
+            if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""
 

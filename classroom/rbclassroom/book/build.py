@@ -2,6 +2,7 @@
 
 import argparse
 import http.server
+import json
 import os
 import re
 import shutil
@@ -28,6 +29,7 @@ from rbclassroom.course import ledger
 from rbclassroom.course.notebooks import lesson_paths, living
 from rbclassroom.lecture.deck import write as write_decks
 from rbclassroom.lecture.slides import deck_of
+from rbclassroom.live import engine, pages
 
 HERE = Path(__file__).parent
 TEMPLATES = Environment(
@@ -39,6 +41,13 @@ _TO_READ = """
 *This page is for reading. Get the problem set as a zip from your teacher; teachers make it \
 with* `python3 course.py handout {name}`.
 """
+_TO_SOLVE = """
+**Solve it here**, with nothing to install: write your answers, press *Check*, which tells you \
+what is wrong, and at the end download `{name}.ipynb`, the file to hand in. For Jupyter, your \
+teacher has the set as a zip.
+"""
+LIVE = "_static/live"
+"""The folder of the book with what it takes to run Python in its pages."""
 MADE = "made-by-course.txt"
 """A file in the book by which it is known as one."""
 
@@ -47,14 +56,15 @@ MADE = "made-by-course.txt"
 class Sources:
     """Writes the sources of pages to `folder`, and files that are copied to the book to `extra`.
 
-    `repository` is where Binder finds the lessons on GitHub, ``owner/name``, or empty; `shown` is
-    the data of the templates in ``pages/``.
+    `repository` is where Binder finds the lessons on GitHub, ``owner/name``, or empty; `live` is
+    whether Python runs in the pages; `shown` is the data of the templates in ``pages/``.
     """
 
     root: Path
     folder: Path
     extra: Path
     repository: str = ""
+    live: bool = False
     shown: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -74,6 +84,10 @@ class Sources:
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(self.root / name, target)
 
+    def put_data(self, name: str, data: dict[str, Any]) -> None:
+        """Write the data of a page in which Python runs."""
+        _write(self.extra / LIVE / "pages" / f"{name}.json", json.dumps(data, ensure_ascii=False))
+
     def rendered(self, template: str, **further: Any) -> str:
         """Return a template in ``pages/`` with its data."""
         return TEMPLATES.get_template(template).render(
@@ -91,6 +105,7 @@ class Sources:
             page, notebook = f"lessons/{path.name}", nbformat.read(path, as_version=4)
             _write(self.extra / page, nbformat.writes(lessons.without_outputs(notebook)) + "\n")
             title = notebook.cells[0].source.splitlines()[0].removeprefix("# ")
+            cells = pages.cells_of(notebook)
             figures += lessons.figures_of(path.name, notebook)
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
@@ -99,6 +114,9 @@ class Sources:
             where = self.extra / "lessons"
             sheet = lessons.prepared(notebook, path.name, self.root, known, where, lead)
             lessons.add_buttons(notebook, path.name, self.repository)
+            if self.live:
+                pages.mark_lesson(notebook, path.stem)
+                self.put_data(path.stem, {"cells": cells})
             self.put(page, nbformat.writes(notebook))
             if sheet:
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
@@ -139,12 +157,17 @@ class Sources:
         for name in names:
             group = CONTENTS["sets"][name].split()
             card = next(each for each in self.shown["lessons"] if each["number"] == group[-1])
-            released = release(name, assignments)[f"{name}.ipynb"].decode()
-            notebook = nbformat.reads(released, as_version=4)
+            files = {path: data.decode() for path, data in release(name, assignments).items()}
+            released = files.pop(f"{name}.ipynb")
+            given, notebook = (nbformat.reads(released, as_version=4) for _ in range(2))
             title, _, rest = notebook.cells[0].source.partition("\n")
             image = f'<img alt="" role="presentation" src="../{card["picture"]}">'
-            told = f'{_TO_READ.format(name=name)}\n<figure class="lead">{image}</figure>\n'
+            told = (_TO_SOLVE if self.live else _TO_READ).format(name=name)
+            told = f'{told}\n<figure class="lead">{image}</figure>\n'
             notebook.cells[0].source = f"{title}\n{told}{rest}"
+            if self.live:
+                pages.mark_problems(notebook)
+                self.put_data(name, {"notebook": given, "files": files})
             self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
         self.shown["sets"] = names
 
@@ -224,9 +247,16 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_sources(root: Path, folder: Path, extra: Path, repository: str = "") -> None:
-    """Write all that the book is made of to two folders, see `Sources`."""
-    sources = Sources(root, folder, extra, repository)
+def write_sources(
+    root: Path, folder: Path, extra: Path, repository: str = "", pyodide: Path | None = None
+) -> None:
+    """Write all that the book is made of to two folders, see `Sources`.
+
+    With the files of Pyodide, in a folder, Python runs in its pages.
+    """
+    sources = Sources(root, folder, extra, repository, live=pyodide is not None)
+    if pyodide:
+        engine.write(root, extra / LIVE, pyodide)
     sources.put_lessons()
     sources.put_problem_sets()
     sources.put_package()
@@ -235,14 +265,17 @@ def write_sources(root: Path, folder: Path, extra: Path, repository: str = "") -
     sources.put_fronts()
 
 
-def build(root: Path, book: Path, repository: str = "") -> None:
-    """Make the book of a course, in a folder that is not there or is an older book."""
+def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = None) -> None:
+    """Make the book of a course, in a folder that is not there or is an older book.
+
+    `pyodide` is a folder with the files of Pyodide, for a book in which Python runs.
+    """
     if book.exists() and not (book / MADE).exists():
         raise ValueError(f"{book} is no book that was made here: move it away or delete it")
     with tempfile.TemporaryDirectory(dir=book.absolute().parent, prefix=".book-") as folder:
         sources, extra, pages = (Path(folder, name) for name in ("sources", "extra", "pages"))
         print("Reading the lessons ...", flush=True)
-        write_sources(root, sources, extra, repository)
+        write_sources(root, sources, extra, repository, pyodide)
         print("Making the pages ...", flush=True)
         words = ["-b", "html", "-W", "--keep-going", "-q", "-j", "2", "-c", str(HERE)]
         subprocess.run(
@@ -282,14 +315,15 @@ def main() -> None:
     """Make the book, in the folder of the course."""
     parser = argparse.ArgumentParser(prog="python -m rbclassroom.book.build")
     parser.add_argument("--serve", action="store_true", help="show it in the browser")
+    parser.add_argument("--live", action="store_true", help="Python runs in its pages (+ 40 MB)")
     parser.add_argument("--repository", default="", help="owner/name on GitHub, for Binder")
     asked = parser.parse_args()
     if not re.fullmatch(r"([\w.-]+/[\w.-]+)?", asked.repository):
         parser.error(f"--repository: owner/name wanted, got {asked.repository}")
     book = Path("book")
     try:
-        build(Path(), book, asked.repository)
-    except (OSError, ValueError) as error:
+        build(Path(), book, asked.repository, engine.fetch() if asked.live else None)
+    except (OSError, ValueError, engine.EngineError) as error:
         sys.exit(str(error))
     except subprocess.CalledProcessError:
         sys.exit("The pages could not be made; what Sphinx says stands above.")

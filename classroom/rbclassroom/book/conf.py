@@ -99,6 +99,15 @@ def write_texts(app: Any, failed: Exception | None) -> None:
     (Path(app.outdir) / "_static" / "texts.js").write_text(text, encoding="utf-8", newline="\n")
 
 
+def add_python(app: Any, name: str, _template: str, _context: Any, _doctree: Any) -> None:
+    """Let Python run in the pages of lessons and problem sets, where the book has it."""
+    live = Path(os.environ["RBCOURSE_BOOK_EXTRA"], "_static", "live")
+    if live.exists() and name.startswith(("lessons/", "problems/")):
+        app.add_css_file("live/live.css")
+        for script in ("engine", "live"):
+            app.add_js_file(f"live/{script}.js")
+
+
 def setup(app: Any) -> None:
     """Add MathJax, and what these functions do, before the contents of a page are collected."""
     app.config.html_static_path.append(str(mathjax()))
@@ -108,4 +117,5 @@ def setup(app: Any) -> None:
     app.connect("doctree-read", name_sections, priority=400)
     app.connect("autodoc-process-docstring", join_ledger, priority=900)
     app.connect("missing-reference", find_anywhere)
+    app.connect("html-page-context", add_python)
     app.connect("build-finished", write_texts)

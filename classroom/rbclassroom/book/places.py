@@ -13,7 +13,7 @@ CONTENTS: dict[str, Any] = tomllib.loads(
 )
 PAGES: dict[str, str] = CONTENTS["pages"]
 MOVED: dict[str, str] = CONTENTS["moved"]
-CLASSROOM = "explorers", "figures", "surveys", "course", "lecture", "assignments", "book"
+CLASSROOM = "explorers", "figures", "surveys", "course", "lecture", "assignments", "live", "book"
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
 
 _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")

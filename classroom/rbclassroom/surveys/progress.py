@@ -1,11 +1,9 @@
 """A progress bar for notebooks, which ends as a line of text."""
 
 import html
+import sys
 from collections.abc import Callable
 from typing import Any
-
-from IPython import get_ipython
-from IPython.display import display
 
 
 def bar(what: str) -> Callable[[int, int], None]:
@@ -24,10 +22,11 @@ def bar(what: str) -> Callable[[int, int], None]:
         line = f"{what}: {done:,} of {total:,}"
         bar = f'<progress max="{total}" value="{done}"></progress> ' if done < total else ""
         stage = {"text/plain": line, "text/html": f"<div>{bar}{html.escape(line)}</div>"}
-        if get_ipython() is None:
+        shell = sys.modules.get("IPython")
+        if shell is None or shell.get_ipython() is None:
             print(line, end="\r" if done < total else "\n", flush=True)
         elif handle is None:
-            handle = display(stage, raw=True, display_id=True)
+            handle = shell.display.display(stage, raw=True, display_id=True)
         else:
             handle.update(stage, raw=True)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from inspect import signature
@@ -152,7 +153,7 @@ def _in_chunks(
     chunks = [problems.take(slice(first, first + CHUNK)) for first in firsts]
     parts: list[Array] = [np.empty((len(measures), 0))]
     with ExitStack() as stack:
-        if executor is None and len(chunks) > 1:
+        if executor is None and len(chunks) > 1 and sys.platform != "emscripten":
             try:
                 pickle.dumps(work)
             except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -190,6 +191,8 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     block, and when this process is killed. When an error or Ctrl-C ends the block, the chunks that
     have not begun are dropped.
     """
+    from concurrent.futures import ProcessPoolExecutor  # the Python of web pages does not have it
+
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent)
     try:
         yield pool

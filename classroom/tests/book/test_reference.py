@@ -17,7 +17,7 @@ def test_every_public_module_has_a_page_but_those_for_maintainers():
     listed = [module["name"] for some in reference.modules(ROOT).values() for module in some]
     assert len(listed) == len(set(listed))
     names.add("optimum")  # a package with public functions of its own
-    apart = "assignments.", "book.", "course.", "figures.", "lecture."
+    apart = "assignments.", "book.", "course.", "figures.", "lecture.", "live."
     hidden = {name for name in names if name.startswith(apart)}
     assert set(listed) == names - hidden
     shown = reference.shown_code(ROOT)

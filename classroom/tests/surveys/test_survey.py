@@ -196,9 +196,9 @@ def test_the_tables_of_the_atlas_are_those_of_the_first_seed_and_of_all(tmp_path
 def test_a_bar_grows_and_ends_as_a_line(monkeypatch):
     stages = []
     handle = SimpleNamespace(update=lambda stage, raw: stages.append(stage))
-    shown = {"display": lambda stage, **_: stages.append(stage) or handle, "get_ipython": object}
-    for name, function in shown.items():
-        monkeypatch.setattr(progress, name, function)
+    shown = {"display": lambda stage, **_: stages.append(stage) or handle}
+    ipython = SimpleNamespace(get_ipython=object, display=SimpleNamespace(**shown))
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
     report = progress.bar("A < B")
     report(5000, 20_000)
     report(20_000, 20_000)

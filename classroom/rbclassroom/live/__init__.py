@@ -1,0 +1,1 @@
+"""Python in the pages of the book: cells of lessons to edit and run, problem sets to solve."""

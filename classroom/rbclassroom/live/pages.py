@@ -1,0 +1,56 @@
+"""What the pages of the book have for Python: which cells can be tried, and where answers go."""
+
+import html
+import re
+import tomllib
+from functools import cache
+from pathlib import Path
+
+from nbformat import NotebookNode
+from nbformat.v4 import new_markdown_cell
+
+from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test
+
+
+@cache
+def left_out() -> dict[str, dict[str, str]]:
+    """Return, for each lesson, the cells that cannot be tried in a page, and why."""
+    return tomllib.loads(Path(__file__).with_name("left_out.toml").read_text("utf-8"))
+
+
+def cells_of(notebook: NotebookNode) -> list[dict[str, str]]:
+    """Return the code of a lesson in its order, without that of explorers, which need Jupyter.
+
+    Code without an output belongs to the code that follows it, as in the pages.
+    """
+    found, last = list[dict[str, str]](), None
+    for cell in notebook.cells:
+        if cell.cell_type == "code" and not re.search(r"explorers\.\w+_explorer\(", cell.source):
+            joins = last is not None and last.cell_type == "code" and not last.outputs
+            before = f"{found.pop()['source']}\n\n" if joins else ""
+            found.append({"id": cell.id, "source": before + cell.source})
+        last = cell
+    return found
+
+
+def mark_lesson(notebook: NotebookNode, name: str) -> None:
+    """Mark the cells of a lesson that can be tried."""
+    can = {each["id"] for each in cells_of(notebook)} - left_out().get(name, {}).keys()
+    for cell in notebook.cells:
+        if cell.id in can and cell.cell_type == "code":
+            cell.metadata.tags = [*cell.metadata.get("tags", []), f"try-{cell.id}"]
+
+
+def mark_problems(notebook: NotebookNode) -> None:
+    """Mark the answers and the tests of a problem set."""
+    for at, cell in enumerate(notebook.cells):
+        name = grade_id(cell)
+        if is_test(cell):
+            cell.metadata.tags = ["test"]
+        elif is_answer(cell) and cell.cell_type == "code":
+            cell.metadata.tags = [f"answer-{name}"]
+        elif is_answer(cell):
+            text = html.escape(cell.source)
+            notebook.cells[at] = new_markdown_cell(
+                f'<div class="answer-in-words" id="{name}">{text}</div>'
+            )

@@ -1,0 +1,58 @@
+// The interface between the pages and Python: start, run and stop. Nothing is loaded before a start.
+window.rbcourseEngine = (() => {
+  const folder = document.currentScript.src.replace(/[^/]*$/, "");
+  const facts = FACTS;
+  let draws = false, worker, started, hear, finish, leave, turn = Promise.resolve();
+
+  // Why Python cannot run here, or an empty text.
+  function missing() {
+    if (location.protocol === "file:") return "This page was opened from a file. Python runs in it when a web server sends it, as on the web, or by: python3 course.py book --live --serve";
+    const old = ["Worker", "WebAssembly", "DecompressionStream", "indexedDB"].find((name) => !window[name]);
+    return old ? `This browser is too old to run Python: it has no ${old}.` : "";
+  }
+
+  // Load Python, once; show("loaded", bytes) tells how much has come.
+  function start(show) {
+    hear = show;
+    started ??= new Promise((resolve, reject) => {
+      const fail = (text) => { reject(new Error(text)); finish?.("failed", text); stop(); };
+      leave = () => resolve("stopped");
+      worker = new Worker(`${folder}worker.js`);
+      worker.onerror = (event) => fail(event.message || "The files of Python could not be loaded.");
+      worker.onmessage = ({ data: [kind, content] }) => {
+        if (kind === "ready") resolve("ready");
+        else if (kind === "failed") fail(content);
+        else if (kind === "done") finish?.("done");
+        else hear(kind, content);
+        // While Python starts there is time to load what it takes to draw; the worker finds it in the cache.
+        if (draws && kind === "loaded" && content > 0.95e6 * facts.start) {
+          draws = false;
+          for (const file of facts.drawing) fetch(folder + file).then((answer) => answer.arrayBuffer()).catch(() => {});
+        }
+      };
+    });
+    return started;
+  }
+
+  // Run a cell, { above, source, files }, when those before it are done. Return "done" or "stopped";
+  // its outputs are shown by show(kind, content), of the kinds text, html, hint, error and clear.
+  function run(cell, show) {
+    draws ||= /\bplt\./.test(cell.source);
+    const next = turn.then(() => start(show)).then((how) => how === "stopped" ? how : new Promise((resolve, reject) => {
+      finish = (end, text) => { finish = null; end === "failed" ? reject(new Error(text)) : resolve(end); };
+      worker.postMessage(cell);
+    }));
+    turn = next.catch(() => {});
+    return next;
+  }
+
+  // End what runs, and Python with it; the next run starts another.
+  function stop() {
+    worker?.terminate();
+    worker = started = null;
+    leave?.();
+    finish?.("stopped");
+  }
+
+  return { facts, folder, missing, start, run, stop };
+})();

@@ -1,0 +1,279 @@
+"""Python in the pages of the book, sent by a web server: lessons to try, problem sets to solve."""
+
+import base64
+import csv
+import html
+import io
+import re
+import shutil
+import zipfile
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from textwrap import indent
+from threading import Thread
+
+import nbformat
+import pytest
+from pages import watched
+from playwright.sync_api import expect
+from test_problems import SETS, SOURCE, TABLES, TESTS, cells, head
+from test_sets_graded import regions
+
+from rbclassroom.assignments.check import check
+from rbclassroom.assignments.collect import collect
+from rbclassroom.assignments.grade import grade
+from rbclassroom.assignments.handout import release
+from rbclassroom.live import engine
+from rbclassroom.live.pages import cells_of, left_out
+
+ROOT = Path(__file__).parents[3]
+BOOK = ROOT / "book"
+LIVE = BOOK / "_static" / "live"
+LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
+RUN = """async ([cell, page]) => {
+  const set = page && (await (await fetch(`${rbcourseEngine.folder}pages/${page}.json`)).json());
+  let out = [];
+  await rbcourseEngine.run({ files: set?.files, ...cell }, (kind, content) => {
+    if (kind === "clear") out = [];
+    else if (kind !== "loaded") out.push([kind, content]);
+  });
+  return out.map(([kind, content]) =>
+    [kind, kind === "html" ? /alt="([^"]*)"/.exec(content)?.[1] ?? "" : content]);
+}"""
+OUTPUTS = ":is(.outputs pre, .outputs .hint, .outputs figure)"
+
+
+class Handler(SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="session")
+def address():
+    """Where the book is, served from this machine."""
+    handler = partial(Handler, directory=str(BOOK))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def run(context, address):
+    """Run a cell by the interface of the engine: ``run(above, source, page)``, its outputs."""
+    with watched(context) as page:
+        page.goto(f"{address}/lessons/00_start_here.html")
+        yield lambda above, source, name="": page.evaluate(
+            RUN, [{"above": above, "source": source}, name]
+        )
+
+
+def shown(text):
+    """Text as a terminal shows it: after a carriage return a line begins again."""
+    return "\n".join(line.rstrip("\r").rpartition("\r")[2] for line in text.split("\n")).strip()
+
+
+def told(outputs):
+    """The texts of stored outputs, and the descriptions of stored pictures."""
+    texts, pictures = "", []
+    for output in outputs:
+        data = output.get("data", {})
+        picture = re.search(r'alt="([^"]*)"', data.get("text/html", ""))
+        if picture:
+            pictures.append(html.unescape(picture[1]))
+        else:
+            texts += output.text if output.output_type == "stream" else data["text/plain"]
+    return shown(texts), pictures
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
+def test_each_cell_gives_its_stored_text_but_for_those_left_out(run, path):
+    """What is listed as left out does differ, so that the list is exact; but for the slow ones."""
+    notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
+    stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
+    differ = set()
+    for at, cell in enumerate(cells):
+        if listed.get(cell["id"], "").startswith("takes"):
+            differ.add(cell["id"])
+            continue
+        found = run([each["source"] for each in cells[:at]], cell["source"])
+        text = shown("".join(content for kind, content in found if kind not in ("html",)))
+        pictures = [html.unescape(content) for kind, content in found if kind == "html"]
+        if (text, pictures) != told(stored[cell["id"]].outputs):
+            differ.add(cell["id"])
+            print(cell["id"], repr(text[-300:]), pictures)
+    assert differ == listed.keys()
+
+
+def test_at_least_250_cells_can_be_tried():
+    pages = [path.read_text("utf-8") for path in (BOOK / "lessons").glob("[0-9]*.html")]
+    assert sum(len(re.findall(r"\btag_try-", page)) for page in pages) >= 250
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
+    setup = cells(name)["setup"].source, TABLES[name]["helpers"]
+    answers = {key: cell.source for key, cell in cells(name).items() if key.endswith("-answer")}
+    code = [text for key, text in answers.items() if cells(name)[key].cell_type == "code"]
+    missed = {}
+    for slug in (slug for of, slug in TESTS if of == name):
+        test, (start, _) = cells(name)[f"{slug}-test"].source, head(name, slug)
+        found = run([*setup, *code], f"{answers[f'{slug}-answer']}\n{test}", name)
+        kinds = {kind for kind, _ in found}
+        if kinds - {"html"} != {"text"}:
+            missed[slug, "reference"] = found
+        visible = re.sub(r"### BEGIN HIDDEN TESTS.*### END HIDDEN TESTS", "", test, flags=re.DOTALL)
+        for mistake in TABLES[name][slug]["mistakes"]:
+            for body in mistake["code"]:
+                wrong = start + indent(body.strip(), "    ")
+                found = run([*setup, *code], f"{wrong}\n\n{visible}", name)
+                if ["hint", mistake["hint"]] not in found:
+                    missed[slug, mistake["hint"]] = found
+    assert missed == {}
+
+
+def opened(page, address, name):
+    page.goto(f"{address}/{name}")
+    page.wait_for_load_state("networkidle")
+    return page
+
+
+def test_nothing_is_loaded_before_the_reader_acts_and_little_then(page, address):
+    """At most 10 MB to the first result, at most 20 to the first figure, from this server alone."""
+    asked = []
+    page.on("request", lambda request: asked.append(request))
+    page.on("dialog", lambda dialog: dialog.accept())
+    opened(page, address, "lessons/01_plane.html")
+    assert {Path(r.url).name.partition("?")[0] for r in asked if "/live/" in r.url} == {
+        *("live.css", "engine.js", "live.js")
+    }
+    sizes = {path.name: path.stat().st_size for path in LIVE.glob("*.*")}
+    page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
+    for cell, most in (("cell-13", 10e6), ("cell-14", 20e6)):
+        part = page.locator(f".tag_try-{cell}")
+        part.get_by_role("button", name="Try it").click()
+        part.locator(OUTPUTS).first.wait_for()
+        names = {Path(each.url).name.partition("?")[0] for each in asked if "/live/" in each.url}
+        assert sum(sizes.get(name, 0) for name in names) < most
+    expect(page.locator(".differences")).to_have_count(1)
+    expect(page.locator(".differences")).to_contain_text("32 bits")
+
+
+def test_a_cell_is_changed_stopped_and_reset_and_its_stored_output_stays(page, address):
+    opened(page, address, "lessons/10_rigid_body_motion.html")
+    page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
+    part = page.locator(".tag_try-cell-16")
+    before = part.locator(".cell_output").inner_html()
+    part.get_by_role("button", name="Try it").click()
+    expect(part.locator(".outputs figure canvas")).to_be_visible()  # it can be turned
+    expect(part.locator(".cell_output canvas")).to_be_visible()
+    code = part.locator(".cm-content")
+    code.press("ControlOrMeta+a")
+    page.keyboard.insert_text("while True:\n    print(1, end='')")
+    part.get_by_role("button", name="Run").click()
+    part.locator(".outputs pre").wait_for()
+    part.get_by_role("button", name="Stop").click()
+    expect(part.locator(".outputs .error")).to_have_text("Stopped.")
+    part.get_by_role("button", name="Reset").click()
+    code.press("Shift+Enter")
+    expect(part.locator(".outputs figure canvas")).to_be_visible()
+    stored = part.locator(".cell_output").first
+    assert stored.get_by_role("button").count() == before.count("<button")
+
+
+def test_below_file_addresses_the_buttons_say_what_is_missing(page):
+    page.goto((BOOK / "problems/ps1.html").as_uri())
+    page.get_by_role("button", name="Check").first.click()
+    expect(page.locator(".outputs .error").first).to_contain_text("web server")
+    page.goto((BOOK / "lessons/04_nearest_rotation.html").as_uri())
+    page.locator(".try:visible").first.click()
+    expect(page.locator(".outputs .error")).to_contain_text("book --live --serve")
+
+
+def write(page, number, text):
+    """Write an answer, as its `number`th editor."""
+    area = page.locator(".editor").nth(number)
+    area.get_by_role("textbox").focus()
+    area.locator(".cm-content").press("ControlOrMeta+a")
+    page.keyboard.insert_text(text)
+
+
+def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
+    page, address, tmp_path, capsys
+):
+    """The road of a class: wrong once, then right; `check`, `collect` and `grade` take the file."""
+    sources = {key: cell.source for key, cell in cells("ps1").items() if key.endswith("-answer")}
+    right = [re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text) for text in sources.values()]
+    opened(page, address, "problems/ps1.html")
+    assert page.locator(".editor").count() == len(right)
+    start, _ = head("ps1", "pose-matrix")
+    body = TABLES["ps1"]["pose-matrix"]["mistakes"][0]["code"][0]
+    write(page, 0, start + indent(body.strip(), "    "))
+    checks = page.get_by_role("button", name="Check")
+    checks.first.click()
+    expect(page.locator(".hint")).to_contain_text("The body turns the wrong way")
+    for number, text in enumerate(right):
+        write(page, number, text.strip())
+    checks.first.click()
+    expect(page.locator(".outputs.right")).to_contain_text("As it should be")
+    checks.nth(5).click()
+    expect(page.get_by_alt_text("The figure that the cell draws")).to_be_visible()
+    expect(page.locator(".kept")).to_contain_text("kept in this browser")
+    page.reload()
+    expect(page.locator(".editor textarea").first).to_have_value(re.compile("cosine"))
+    with page.expect_download() as downloading:
+        page.get_by_role("button", name="Download ps1.ipynb").click()
+    downloading.value.save_as(tmp_path / "ps1.ipynb")
+    expect(page.locator(".kept")).to_contain_text("that you downloaded")
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.get_by_role("button", name="Reset").first.click()
+    expect(page.locator(".editor textarea").first).to_have_value(re.compile("NotImplemented"))
+    page.get_by_label("Open a downloaded file").set_input_files(tmp_path / "ps1.ipynb")
+    expect(page.locator(".editor textarea").first).to_have_value(re.compile("cosine"))
+    capsys.readouterr()
+    shutil.copytree(SOURCE, tmp_path / "course" / "source")
+    shutil.copy(SOURCE.parent / "nbgrader_config.py", tmp_path / "course")
+    original = tmp_path / "original" / "ps1.ipynb"
+    original.parent.mkdir()
+    files = release("ps1", tmp_path / "course")
+    original.write_bytes(files["ps1.ipynb"])
+    (tmp_path / "ps1.json").write_bytes(files["ps1.json"])
+    submitted = check(tmp_path / "ps1.ipynb")
+    assert "7 of 7 visible tests passed" in capsys.readouterr().out
+    uploaded = tmp_path / "downloads" / "Ada Lovelace_123_assignsubmission_file" / "ps1.ipynb"
+    for file in (tmp_path / "ps1.ipynb", submitted):  # with and without a check
+        uploaded.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, uploaded)
+        collect(tmp_path / "downloads", tmp_path / "course")
+    grade(["ps1"], tmp_path / "course")
+    with (tmp_path / "course" / "ps1-grades.csv").open(encoding="utf-8-sig", newline="") as table:
+        (row,) = csv.DictReader(table)
+    assert (row["automatic"], row["by hand"], row["remarks"]) == ("17", "tip-words-answer", "")
+
+
+def test_no_file_of_the_site_gives_a_set_away():
+    """Hidden tests, mark schemes and model answers: as they are, backwards, and as base64."""
+    kinds = "SOLUTION|HIDDEN TESTS|MARK SCHEME"
+    secrets = {line for name in SETS for line in regions(name, kinds) if len(line) >= 30}
+    code = [*ROOT.glob("rbcourse/**/*.py"), *ROOT.glob("classroom/rbclassroom/**/*.py")]
+    public = "\n".join(path.read_text("utf-8") for path in [*code, *LESSONS])
+    secrets = {line for line in secrets if line not in public}
+    assert len(secrets) > 200
+    forms = {way for line in secrets for way in (line.encode(), line.encode()[::-1])}
+    shifts = [(b"xyz"[:k] + line.encode(), k) for line in secrets for k in range(3)]
+    forms |= {base64.b64encode(text)[4 if k else 0 : -8] for text, k in shifts}
+    others = {*engine.files(), *map("{}.packed".format, engine.PACKED)}
+    for path in BOOK.rglob("*.*"):
+        if path.is_file() and path.suffix not in (".png", ".gif") and path.name not in others:
+            content = path.read_bytes()
+            if path.suffix == ".zip":
+                with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                    content = b"\n".join(map(archive.read, archive.namelist()))
+            assert [form for form in forms if form in content] == [], path
+
+
+def test_the_files_of_pyodide_are_the_official_ones():
+    for name, digest in engine.files().items():
+        if name not in engine.PACKED:
+            assert engine._digest((LIVE / name).read_bytes()) == digest, name
