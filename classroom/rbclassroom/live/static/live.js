@@ -32,7 +32,7 @@ addEventListener("DOMContentLoaded", () => {
           extensions: [
             Prec.highest(keymap.of(["Shift-Enter", "Mod-Enter"].map((key) => ({ key, run: () => (go(), true) })))),
             keymap.of([...more.defaultKeymap, ...more.historyKeymap, more.indentWithTab]),
-            more.history(), more.lineNumbers(), more.bracketMatching(), more.indentOnInput(), python(),
+            more.history(), more.lineNumbers(), more.bracketMatching(), more.indentOnInput(), python(), EditorView.lineWrapping,
             more.indentUnit.of("    "), more.syntaxHighlighting(more.classHighlighter),
             EditorView.contentAttributes.of({ "aria-label": `${label}; Escape, then Tab leaves it` }),
             EditorView.updateListener.of((update) => update.docChanged && changed(view.state.doc.toString())),
@@ -102,6 +102,7 @@ addEventListener("DOMContentLoaded", () => {
     };
     try {
       if ((await engine.run(await read(), first)) === "stopped") first("error", "Stopped.");
+      document.body.classList.add("python-is-there"); // buttons tell no size any more
     } catch (error) {
       first("error", `Python has ended: ${error.message}. Run it again to start afresh.`);
     }
@@ -150,7 +151,7 @@ addEventListener("DOMContentLoaded", () => {
       const { part: edited, upgrade, edit } = editor(source, "Code of this cell", (text) => texts.set(id, text), go);
       bar.append(button("Reset", () => edit(stored)));
       code.querySelector(".highlight").replaceWith(edited);
-      differences(edited);
+      differences(code);
       upgrade().catch(() => {});
       await ran;
     });
