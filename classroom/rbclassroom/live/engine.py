@@ -120,9 +120,11 @@ def write(root: Path, folder: Path, source: Path) -> None:
         if name in PACKED:
             name, content = f"{name}.packed", gzip.compress(content, mtime=0)
         (folder / name).write_bytes(content)
-    served = {key: lock()[key] for key in ("info", "packages")}
-    for package in served["packages"].values():
-        package["depends"] = [each for each in package["depends"] if each not in APART]
+    packages = {
+        name: {**each, "depends": sorted({*each["depends"]} - APART)}
+        for name, each in lock()["packages"].items()
+    }
+    served = {"info": lock()["info"], "packages": packages}
     (folder / "pyodide-lock.json").write_text(json.dumps(served))
     (folder / "rbcourse.zip").write_bytes(pack(_own(root)))
     for path in [*STATIC.glob("*.*"), *(STATIC / "vendor").glob("*.js")]:

@@ -11,6 +11,12 @@ from nbformat.v4 import new_markdown_cell
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test
 
+_IN_PAGES = {  # what a set says of Jupyter, and what its page says instead
+    r"Below each answer is a test: run it, and it tells": "*Check*, below each answer, tells",
+    r"Save\. Then run `rbclassroom\.assignments\.check .*": "Press *Check* below each answer once "
+    "more. Then download the file, and hand it in where your teacher collects it.",
+}
+
 
 @cache
 def left_out() -> dict[str, dict[str, str]]:
@@ -49,6 +55,9 @@ def mark_problems(notebook: NotebookNode) -> None:
             cell.metadata.tags = ["test"]
         elif is_answer(cell) and cell.cell_type == "code":
             cell.metadata.tags = [f"answer-{name}"]
+        elif cell.cell_type == "markdown" and not is_answer(cell):
+            for jupyter, here in _IN_PAGES.items():
+                cell.source = re.sub(jupyter, here, cell.source)
         elif is_answer(cell):
             text = html.escape(cell.source)
             notebook.cells[at] = new_markdown_cell(

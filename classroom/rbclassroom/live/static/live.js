@@ -11,7 +11,8 @@ addEventListener("DOMContentLoaded", () => {
   const script = (file) => new Promise((resolve, reject) =>
     document.head.append(make("script", { src: engine.folder + file, onload: resolve, onerror: reject })));
   let data, editors, count = 0;
-  const page = () => (data ??= fetch(`${engine.folder}pages/${name}.json`).then((answer) => answer.json()));
+  const page = () => (data ??= fetch(`${engine.folder}pages/${name}.json`).then((answer) => answer.json())
+    .catch((error) => { data = null; throw error; }));
 
   // A text area that becomes CodeMirror; edit(text) replaces what is in it.
   function editor(text, label, changed, go) {
@@ -88,7 +89,7 @@ addEventListener("DOMContentLoaded", () => {
   // Run a cell below its editor; the buttons tell and stop it. Return whether it ran without an error.
   async function perform(read, bar, shown, show) {
     const wrong = engine.missing(), [go, halt] = all("button", bar);
-    shown.replaceChildren();
+    show("clear");
     if (wrong) return show("error", wrong), false;
     let whole = true;
     engine.start(show).catch(() => {}); // run tells

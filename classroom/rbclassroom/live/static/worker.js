@@ -79,7 +79,10 @@ async function start() {
   return { python, imports: new Map(names), run: python.pyimport("rbclassroom.live.cells").run };
 }
 const ready = start();
-ready.then(() => tell("ready"), (error) => tell("failed", String(error.message ?? error)));
+ready.then(() => tell("ready"), async (error) => {
+  await memory("readwrite", (store) => store.clear()); // or what is damaged would stay
+  tell("failed", String(error.message ?? error));
+});
 
 self.onmessage = async ({ data: { above, source, files = {} } }) => {
   try {
