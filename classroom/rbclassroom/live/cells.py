@@ -30,7 +30,7 @@ def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> lis
     """Return the statements above a cell, in cells too, that its names depend on.
 
     A statement is needed if it binds a name that is wanted below, or may change its object: by an
-    assignment to a part, by a method, as the first argument of a call whose result nobody keeps,
+    assignment to a part, by a method, as the first argument of a call whose result is not kept,
     or, a random generator, wherever it stands.
     """
     generators = {
@@ -73,7 +73,7 @@ def parsed(source: str, name: str) -> list[ast.stmt]:
 
 
 def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> str:
-    """Run a cell with what it needs of the cells above it, and show its outputs.
+    """Run a cell after the statements above it that it needs, and show its outputs.
 
     Return the name of a package that is missing and `known`: to be loaded, for the cell to be run
     again; or an empty string.
@@ -104,7 +104,7 @@ def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> 
 
 
 class _Written(io.TextIOBase):
-    """Shows what is printed, up to `CUT` characters; nothing without `show`."""
+    """Shows printed text, up to `CUT` characters; nothing without `show`."""
 
     def __init__(self, show: Show | None) -> None:
         self._show, self._room = show, CUT

@@ -141,7 +141,7 @@ def _own(root: Path) -> dict[str, bytes]:
 
 
 def _facts(folder: Path) -> dict[str, Any]:
-    """Return what the pages know: versions, how much is loaded to start, in MB, and to draw."""
+    """Return facts for the pages: versions, the MB that a start loads, the files for drawing."""
     start = "*.packed", "pyodide.js", "*.json", "python_stdlib.zip", "rbcourse.zip", "numpy-*.whl"
     size = sum(path.stat().st_size for form in start for path in folder.glob(form))
     packages = lock()["packages"]

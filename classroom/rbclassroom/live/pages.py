@@ -1,4 +1,4 @@
-"""What the pages of the book have for Python: which cells can be tried, and where answers go."""
+"""Marks in the pages of the book: cells that can be tried, answers and tests of problem sets."""
 
 import html
 import re
@@ -11,7 +11,7 @@ from nbformat.v4 import new_markdown_cell
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test
 
-_IN_PAGES = {  # what a set says of Jupyter, and what its page says instead
+_IN_PAGES = {  # sentences about Jupyter, and those that stand in their places
     r"Below each answer is a test: run it, and it tells": "*Check*, below each answer, tells",
     r"Save\. Then run `rbclassroom\.assignments\.check .*": "Press *Check* below each answer once "
     "more. Then download the file, and hand it in where your teacher collects it.",

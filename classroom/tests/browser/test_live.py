@@ -89,7 +89,7 @@ def told(outputs):
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
 def test_each_cell_gives_its_stored_text_but_for_those_left_out(run, path):
-    """What is listed as left out does differ, so that the list is exact; but for the slow ones."""
+    """Cells that are left out do differ, so that the list is exact; slow ones are not run."""
     notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
     stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
     differ = set()

@@ -1,4 +1,4 @@
-"""Cells run with what they need of those above, whatever was run before."""
+"""Cells run after the statements above that they need, in whatever order."""
 
 import ast
 import sys

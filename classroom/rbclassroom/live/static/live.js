@@ -126,7 +126,7 @@ addEventListener("DOMContentLoaded", () => {
     part.before(make("p", { className: "differences", textContent:
       `This is Python ${about.python} with NumPy ${about.numpy}, in your browser. It differs from Python on your machine: integers have 32 bits, `
       + "so larger ones overflow; divisions by zero give no warning; there are no threads and no processes. "
-      + "A cell runs with what it needs of the cells above, as they stand on this page." }));
+      + "A cell runs after the statements above it that it needs, as they stand on this page." }));
   }
 
   // Lessons: "Try it" turns a cell into an editor and runs it. The stored output stays.
