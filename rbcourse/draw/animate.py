@@ -61,8 +61,9 @@ def animate(
         raise ValueError(f"name: a word of letters, digits and _ wanted, got {name!r}")
     if not 0 < frames <= 50 * seconds:
         raise ValueError(f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s")
-    files = os.environ.get("RBCOURSE_FIGURES") != ""  # or there are none, see `save_figure`
-    pictures = tuple(indexed(render(fig, update, frames))) if files else ()
+    files = os.environ.get("RBCOURSE_FIGURES") != ""  # see `save_figure`
+    rendered = render(fig, update, frames if files else 0)  # this gives all its place
+    pictures = tuple(indexed(rendered)) if rendered else ()
     fig.set_layout_engine("none")  # all stays where it is
     display = Display(fig)
     states = [display.record(update(i)) for i in range(frames)]

@@ -56,6 +56,23 @@ def test_without_files_no_frames_are_drawn_and_the_player_is_the_same(saved, tmp
         player.save("cube.gif")
 
 
+def test_without_files_the_layout_is_that_of_the_frames(tmp_path, monkeypatch):
+    """The label of an axis has its place when the frames are drawn, or when they would be."""
+    pages = []
+    for folder in (str(tmp_path), ""):
+        monkeypatch.setenv("RBCOURSE_FIGURES", folder)
+        fig, ax = plt.subplots(figsize=(4, 2), layout="constrained")
+        ax.set(xlim=(0, 9), xlabel="x (m)", ylabel="y (m)", title="A title")
+        (dot,) = ax.plot([0], [0], "o")
+
+        def update(i, dot=dot):
+            dot.set_xdata([i])
+            return [dot]
+
+        pages.append(animate.save_animation(fig, "dot", TABLE, "a dot", update, 8)._repr_html_())
+    assert pages[0] == pages[1]
+
+
 def held(page):
     """The data in the script of a player."""
     return json.loads(re.search(r"revive\(image, (\{.*\})\);\n", page)[1])

@@ -43,8 +43,8 @@ with* `python3 course.py handout {name}`.
 """
 _TO_SOLVE = """
 **Solve it here**, with nothing to install: write your answers, press *Check*, which tells you \
-what is wrong, and at the end download `{name}.ipynb`, the file to hand in. For Jupyter, your \
-teacher has the set as a zip.
+what is wrong, and at the end download `{name}.ipynb`, the file to hand in. Until then this \
+browser keeps your answers. For Jupyter, your teacher has the set as a zip.
 """
 LIVE = "_static/live"
 """The folder of the book with what it takes to run Python in its pages."""

@@ -159,7 +159,7 @@ def _told(error: BaseException) -> str:
         for frame, line in traceback.walk_tb(error.__traceback__)
         if frame.f_code.co_filename.startswith(("<cell ", "<this cell"))
     ]
-    return "\n".join([*lines, *traceback.format_exception_only(error)]).rstrip()
+    return "\n".join([*lines, "".join(traceback.format_exception_only(error))]).rstrip()
 
 
 def _is_import(statement: ast.stmt) -> bool:

@@ -184,6 +184,33 @@ def test_a_cell_is_changed_stopped_and_reset_and_its_stored_output_stays(page, a
     assert part.locator(".cell_output").first.get_by_role("button").count() == before
 
 
+def test_outputs_go_to_the_cells_that_they_are_of(page, address):
+    """Of two cells that are run at once, and of one that is run twice."""
+    opened(page, address, "problems/ps1.html")
+    for number, code in enumerate(("import time\ntime.sleep(2)\nprint('one')", "print('two')")):
+        write(page, number, code)
+    checks = page.get_by_role("button", name="Check")
+    for _ in range(2):  # while Python is loaded, and when it is there
+        checks.nth(0).click()
+        page.wait_for_timeout(500)
+        checks.nth(1).click()
+        for number, said in enumerate(("one", "two")):
+            shown = page.locator(".outputs").nth(number).locator("pre:not(.error)")
+            expect(shown).to_have_text(said)
+
+
+def test_a_second_visit_works_from_the_memory_of_the_first_and_loads_scipy(context, address):
+    codes = "import scipy.linalg as la; print(la.expm([[0.0]]))", "import rbcourse; print(1)"
+    for visit in range(2):
+        with watched(context) as page:
+            page.goto(f"{address}/lessons/00_start_here.html")
+            for code in codes:
+                found = page.evaluate(RUN, [{"above": [], "source": code}, ""])
+                assert {kind for kind, _ in found} == {"text"}, (visit, found)
+            kept = """async () => (await indexedDB.databases()).map(({ name }) => name)"""
+            assert "rbcourse engine" in page.evaluate(kept)
+
+
 def test_below_file_addresses_the_buttons_say_what_is_missing(page):
     page.goto((BOOK / "problems/ps1.html").as_uri())
     page.get_by_role("button", name="Check").first.click()
@@ -195,9 +222,11 @@ def test_below_file_addresses_the_buttons_say_what_is_missing(page):
 
 def write(page, number, text):
     """Write an answer, as its `number`th editor."""
-    area = page.locator(".editor").nth(number)
-    area.get_by_role("textbox").focus()
-    area.locator(".cm-content").press("ControlOrMeta+a")
+    editor = page.locator(".editor").nth(number)
+    editor.get_by_role("textbox").focus()
+    words = editor.evaluate("(editor) => Boolean(editor.closest('.answer-in-words'))")
+    code = editor.locator("textarea" if words else ".cm-content")
+    code.press("ControlOrMeta+a")
     page.keyboard.insert_text(text)
 
 
@@ -215,19 +244,25 @@ def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     checks = page.get_by_role("button", name="Check")
     checks.first.click()
     expect(page.locator(".hint")).to_contain_text("The body turns the wrong way")
+    write(page, 0, "1")
+    expect(page.locator(".outputs").first).to_have_class(re.compile("stale"))
     for number, text in enumerate(right):
         write(page, number, text.strip())
+    words = page.locator(".answer-in-words").get_by_role("textbox")
+    assert words.evaluate("(area) => area.tagName") == "TEXTAREA"  # it is no code
     checks.first.click()
     expect(page.locator(".outputs.right")).to_contain_text("As it should be")
     checks.nth(5).click()
     expect(page.get_by_alt_text("The figure that the cell draws")).to_be_visible()
     expect(page.locator(".kept")).to_contain_text("kept in this browser")
     page.reload()
+    expect(page.locator(".outputs.right")).to_have_count(2)
     expect(page.locator(".editor textarea").first).to_have_value(re.compile("cosine"))
     with page.expect_download() as downloading:
         page.get_by_role("button", name="Download ps1.ipynb").click()
     downloading.value.save_as(tmp_path / "ps1.ipynb")
     expect(page.locator(".kept")).to_contain_text("that you downloaded")
+    expect(page.locator(".kept")).to_contain_text("5 of 8 are empty, or not checked as right")
     page.on("dialog", lambda dialog: dialog.accept())
     page.get_by_role("button", name="Reset").first.click()
     expect(page.locator(".editor textarea").first).to_have_value(re.compile("NotImplemented"))

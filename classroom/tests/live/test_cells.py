@@ -34,6 +34,7 @@ def test_only_what_a_cell_needs_is_kept_and_each_import_by_itself():
     assert kept(ABOVE, "a + math.pi") == ["import math", "a = 5"]
     assert kept(ABOVE, "a = sep\na") == ["from os import sep"]
     assert kept(ABOVE, "sum(a for a in [1])") == []
+    assert len(kept(["q = 1", "for q in range(2):\n    z = q"], "z")) == 1
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,9 @@ def test_texts_values_pages_and_figures_are_shown():
     page = "class P:\n    def _repr_html_(self):\n        return '<b>x</b>'"
     assert run([page], "P()")[2] == [("html", "<b>x</b>")]
     draw = "import matplotlib.pyplot as plt\n_ = plt.figure()"
-    ((kind, content),) = run([draw], draw)[2]  # but not the figure that is drawn above
+    above = "import matplotlib.pyplot as plt\nfig = plt.figure()"
+    assert run([above], "fig.number")[2] == [("text", "1")]  # not the figure that is drawn above
+    ((kind, content),) = run([], draw)[2]
     assert kind == "html"
     assert content.startswith('<img alt="The figure that the cell draws" src="data:image/png')
     assert len(run([], f"print('x' * {cells.CUT + 5})")[1]) < cells.CUT + 60

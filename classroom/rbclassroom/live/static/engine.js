@@ -13,7 +13,7 @@ window.rbcourseEngine = (() => {
 
   // Load Python, once; show("loaded", bytes) tells how much has come.
   function start(show) {
-    hear = show;
+    if (!started) hear = show;
     started ??= new Promise((resolve, reject) => {
       const fail = (text) => { reject(new Error(text)); finish?.("failed", text); stop(); };
       leave = () => resolve("stopped");
@@ -40,6 +40,7 @@ window.rbcourseEngine = (() => {
     draws ||= /\bplt\./.test(cell.source);
     const next = turn.then(() => start(show)).then((how) => how === "stopped" ? how : new Promise((resolve, reject) => {
       finish = (end, text) => { finish = null; end === "failed" ? reject(new Error(text)) : resolve(end); };
+      hear = show;
       worker.postMessage(cell);
     }));
     turn = next.catch(() => {});

@@ -14,12 +14,14 @@ addEventListener("DOMContentLoaded", () => {
   const page = () => (data ??= fetch(`${engine.folder}pages/${name}.json`).then((answer) => answer.json())
     .catch((error) => { data = null; throw error; }));
 
-  // A text area that becomes CodeMirror; edit(text) replaces what is in it.
+  // A text area, which becomes CodeMirror if there is something to run; edit(text) replaces its text.
   function editor(text, label, changed, go) {
-    const area = make("textarea", { value: text, ariaLabel: label, spellcheck: false, rows: text.split("\n").length + 1 });
+    const area = make("textarea", { value: text, ariaLabel: label, spellcheck: !go });
     const part = make("div", { className: "editor" }, area);
     let view;
-    area.oninput = () => changed(area.value);
+    const grow = () => { area.style.height = "0"; area.style.height = `${area.scrollHeight + 2}px`; };
+    requestAnimationFrame(grow);
+    area.oninput = () => { grow(); changed(area.value); };
     async function upgrade() {
       await (editors ??= script("codemirror.js"));
       if (view) return view;
@@ -44,10 +46,10 @@ addEventListener("DOMContentLoaded", () => {
       if (focused) view.focus();
       return view;
     }
-    area.onfocus = () => upgrade().catch(() => {}); // the text area serves as well
+    if (go) area.onfocus = () => upgrade().catch(() => {}); // the text area serves as well
     const edit = (now) => {
       if (view) view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: now } });
-      else area.value = now;
+      else { area.value = now; grow(); }
       changed(now);
     };
     return { part, upgrade, edit };
@@ -90,6 +92,7 @@ addEventListener("DOMContentLoaded", () => {
   async function perform(read, bar, shown, show) {
     const wrong = engine.missing(), [go, halt] = all("button", bar);
     show("clear");
+    shown.classList.remove("stale");
     if (wrong) return show("error", wrong), false;
     let whole = true;
     engine.start(show).catch(() => {}); // run tells
@@ -113,20 +116,20 @@ addEventListener("DOMContentLoaded", () => {
     halt.hidden = true;
     return whole;
   }
-  const size = () => make("small", { textContent: ` ${about.start} MB` });
+  const size = () => make("small", { textContent: ` loads ${Math.round(about.start)} MB once` });
   function toolbar(word, go, ...more) {
     const halt = make("button", { type: "button", textContent: "Stop", hidden: true, onclick: engine.stop });
-    return make("div", { className: "bar" }, make("button", { type: "button", onclick: go }, word, size()), halt, ...more);
+    return make("div", { className: "bar" }, make("button", { type: "button", className: "act", onclick: go }, word, size()), halt, ...more);
   }
   const button = (textContent, onclick) => make("button", { type: "button", textContent, onclick });
   let told = false;
   function differences(part) {
     if (told) return;
     told = true;
-    part.before(make("p", { className: "differences", textContent:
-      `This is Python ${about.python} with NumPy ${about.numpy}, in your browser. It differs from Python on your machine: integers have 32 bits, `
-      + "so larger ones overflow; divisions by zero give no warning; there are no threads and no processes. "
-      + "A cell runs after the statements above it that it needs, as they stand on this page." }));
+    part.before(make("details", { className: "differences" },
+      make("summary", { textContent: `Python ${about.python} in your browser: how it differs` }),
+      `Integers have 32 bits, so larger ones overflow; divisions by zero give no warning; there are no threads and no processes. NumPy is ${about.numpy}. `
+      + "A cell runs after the statements above it that it needs, as they stand on this page."));
   }
 
   // Lessons: "Try it" turns a cell into an editor and runs it. The stored output stays.
@@ -149,7 +152,10 @@ addEventListener("DOMContentLoaded", () => {
       if (engine.missing()) return go();
       const ran = go(); // Python is loaded while the editor is made
       const { source, stored } = await read();
-      const { part: edited, upgrade, edit } = editor(source, "Code of this cell", (text) => texts.set(id, text), go);
+      const { part: edited, upgrade, edit } = editor(source, "Code of this cell", (text) => {
+        texts.set(id, text);
+        shown.classList.add("stale");
+      }, go);
       bar.append(button("Reset", () => edit(stored)));
       code.querySelector(".highlight").replaceWith(edited);
       differences(code);
@@ -172,13 +178,14 @@ addEventListener("DOMContentLoaded", () => {
   const key = (id) => `${location.pathname} ${id}`;
 
   // Problem sets.
-  const answers = new Map(), fields = all(".cell[class*=tag_answer-], .answer-in-words");
+  const answers = new Map(), restored = [], fields = all(".cell[class*=tag_answer-], .answer-in-words");
   if (!fields.length) return;
   const status = make("p", { className: "kept", role: "status" });
   const others = window.BroadcastChannel && new BroadcastChannel(`rbcourse ${name}`);
   const tell = (downloaded) => {
+    const open = [...answers.values()].filter((answer) => answer.isOpen()).length;
     status.textContent = downloaded
-      ? `Your answers are in the file ${name}.ipynb that you downloaded, and in this browser.`
+      ? `Your answers are in the file ${name}.ipynb that you downloaded, and in this browser.` + (open ? ` ${open} of ${answers.size} are empty, or not checked as right.` : "")
       : "Your answers are kept in this browser, on this machine only, until you clear its data. Download them to hand them in or to move them.";
   };
   const keep = async (id, text) => {
@@ -191,8 +198,11 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
   const changed = (id) => (text) => {
-    if (answers.get(id).text === text) return;
-    answers.get(id).text = text;
+    const answer = answers.get(id);
+    if (answer.text === text) return;
+    answer.text = text;
+    answer.shown.classList.remove("right");
+    answer.shown.classList.add("stale");
     keep(id, text);
     others?.postMessage([id, text]);
   };
@@ -200,6 +210,7 @@ addEventListener("DOMContentLoaded", () => {
     const answer = answers.get(id);
     if (answer.text === text) return;
     answer.text = text;
+    answer.shown.classList.replace("right", "stale");
     answer.edit(text);
   };
   if (others) others.onmessage = ({ data: [id, text] }) => put(id, text);
@@ -216,15 +227,25 @@ addEventListener("DOMContentLoaded", () => {
       const end = cells.findIndex((cell, k) => k > at && isTest(cell)), above = cells.slice(0, at).filter((cell) => !isTest(cell));
       return { above: above.map(now), source: cells.slice(at, end + 1).map(now).join("\n\n"), files };
     };
-    const go = async () => shown.classList.toggle("right", await perform(read, bar, shown, show));
-    const { part: edited, edit } = editor(stub, `Answer to ${heading}`, changed(id), go);
+    const go = async () => {
+      const { text } = answers.get(id), right = (await perform(read, bar, shown, show)) && text === answers.get(id).text;
+      shown.classList.toggle("right", right);
+      if (right) kept().then((store) => done(store.put(text, key(`${id} right`)))).catch(() => {});
+    };
+    const { part: edited, edit } = editor(stub, `Answer to ${heading}`, changed(id), words ? null : go);
     const reset = button("Reset", () => confirm("Delete this answer and begin again?") && edit(stub));
     const bar = words ? make("div", { className: "bar" }, "Graded by a person. ", reset) : toolbar("Check", go, reset);
-    answers.set(id, { text: stub, stub, edit });
+    if (part.nextElementSibling?.matches(".cell:not([class*=tag_])")) bar.append("It draws the picture, too.");
+    answers.set(id, { text: stub, stub, edit, shown, isOpen: () => words ? !answers.get(id).text.trim() : !shown.classList.contains("right") });
     part.classList.add("live");
     part.replaceChildren(edited, bar, shown);
     if (!words) differences(edited);
-    kept().then((store) => done(store.get(key(id)))).then((text) => typeof text === "string" && put(id, text), () => {});
+    restored.push(kept().then((store) => Promise.all([id, `${id} right`].map((each) => done(store.get(key(each)))))).then(([text, right]) => {
+      if (typeof text === "string") put(id, text);
+      if (text === undefined || text !== right || answers.get(id).text !== text) return;
+      shown.className = "outputs right";
+      show("text", "As it should be, when you checked it last.");
+    }, () => {}));
   }
   for (const part of all(".cell[class*=tag_test]")) part.hidden = true; // "Check" runs it
 
@@ -253,5 +274,5 @@ addEventListener("DOMContentLoaded", () => {
   });
   const end = make("div", { className: "hand-in" }, make("div", { className: "bar" }, save, button("Open a downloaded file", () => field.click()), field), status);
   (document.querySelector("#before-you-hand-in") ?? document.querySelector("article")).append(end);
-  kept().then((store) => done(store.get(key("downloaded")))).then(tell, () => tell(false));
+  Promise.all(restored).then(kept).then((store) => done(store.get(key("downloaded")))).then(tell, () => tell(false));
 });
