@@ -119,7 +119,7 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     What is in a `Space` can be turned in the notebook; the files show it as it is seen at first.
     The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, by default
     to ``figures`` in the current folder; if it is empty, no files are written. The same input gives
-    the same bytes. The PNG has 256 colours, which nobody misses and which make it a third as large.
+    the same bytes. The PNG has 256 colours, which makes it a third as large; no difference is seen.
     """
     save_table(name, data)
     folder = figures_folder()

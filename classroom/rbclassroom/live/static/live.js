@@ -235,7 +235,7 @@ addEventListener("DOMContentLoaded", () => {
     const { part: edited, edit } = editor(stub, `Answer to ${heading}`, changed(id), words ? null : go);
     const reset = button("Reset", () => confirm("Delete this answer and begin again?") && edit(stub));
     const bar = words ? make("div", { className: "bar" }, "Graded by a person. ", reset) : toolbar("Check", go, reset);
-    if (part.nextElementSibling?.matches(".cell:not([class*=tag_])")) bar.append("It draws the picture, too.");
+    if (part.nextElementSibling?.matches(".cell:not([class*=tag_])")) bar.append("The picture appears here, too.");
     answers.set(id, { text: stub, stub, edit, shown, isOpen: () => words ? !answers.get(id).text.trim() : !shown.classList.contains("right") });
     part.classList.add("live");
     part.replaceChildren(edited, bar, shown);
