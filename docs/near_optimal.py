@@ -216,6 +216,21 @@ def forms():
     return {**found, "cumulative_bezier_so3": cumulative_energy()}
 
 
+def of_splines():
+    """Return the excess over θ⁴ of three splines: (0, θ, 0) about an axis, natural, even times.
+
+    Of the projected matrix spline, the projected spline and the quaternion spline, all to leading
+    order. With σ = θ p + θ³ r on a leg, p the cubic spline, it is the integral of r''² over that of
+    p''². The tangent of σ is y/x: cosine and sine are splines of their own, or cubics of each leg.
+    """
+    p = (3 * t - t**3) / 2
+    matrix = -p / 6 + p * p / 2 - p**3 / 3
+    tangent = -p / 6 + p * TO_GOAL / 2 - p**3 / 3
+    cost = at(integral(p.diff(t).diff(t) ** 2), 1)
+    found = [at(integral(r.diff(t).diff(t) ** 2), 1) / cost for r in (matrix, tangent)]
+    return [*found, found[1] / 16]
+
+
 def write(table=TABLE):
     """Write the table: powers of the inner products, and whole numbers over a denominator."""
     found = forms()

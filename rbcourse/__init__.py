@@ -60,6 +60,7 @@ from rbcourse.optimum import (
 from rbcourse.optimum.shooting import shoot_minimum_acceleration_so3
 from rbcourse.optimum.splines import (
     OptimalChain,
+    is_local_minimum,
     minimum_acceleration_spline_se3,
     minimum_acceleration_spline_so3,
     minimum_jerk_spline_so3,
@@ -229,6 +230,7 @@ __all__ = [  # noqa: RUF022 - by subject, not by alphabet
     "minimum_acceleration_spline_so3",
     "minimum_acceleration_spline_se3",
     "minimum_torque_spline_so3",
+    "is_local_minimum",
     "minimum_jerk_spline_so3",
     "OptimalChain",
     "fastest",

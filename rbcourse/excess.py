@@ -12,15 +12,17 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._numerics import Array, matvec
+from rbcourse._numerics import Array, blocks
 from rbcourse.bezier import seen_from_the_middle
 from rbcourse.cost import check_curve, summed
 from rbcourse.curves import Curve, Ends
 from rbcourse.optimum.chebyshev import grid, tails
+from rbcourse.optimum.second_variation import on_each_axis, polynomials, products
 from rbcourse.paths import smooth_parts
-from rbcourse.so3 import exp_so3, log_so3
+from rbcourse.so3 import hat, log_so3
 
-_NODES = 33
+_NODES, _BUMPS = 33, 12
+_TOGETHER = 64  # curves whose systems are made together, in the cache
 _SMOOTH = 1e-6  # of w', what its last two Chebyshev coefficients may be
 SPEED_LIMIT = 2.5
 """In rad over the whole time: for a curve that turns as fast there is no estimate."""
@@ -100,7 +102,7 @@ def excess_estimate(curve: Curve) -> Array:
     Parameters
     ----------
     curve : Curve
-        On SO(3), or a stack of them; smooth, with derivatives up to w''.
+        On SO(3), or a stack of them; smooth.
 
     Returns
     -------
@@ -112,13 +114,18 @@ def excess_estimate(curve: Curve) -> Array:
 
     Notes
     -----
-    Domain: ‖w‖ < 2.5 rad over the whole time, and an excess of at most 1. The relative error is of
-    second order in ‖w‖; on random problems it was at most 16 %, up to ‖w‖ = 1 at most 2.1 %. An
-    excess below 1e-13 is lost in rounding.
+    Domain: ‖w‖ < 2.5 rad over the whole time, and an excess of at most 1. On random problems the
+    estimates of closed forms were within 1.4 % of the excess, those of quintics with random end
+    accelerations within 6 %; up to ‖w‖ = 1 within 0.02 % and 1.2 %. An excess below 1e-22 is lost
+    in rounding.
 
-    The residual r = w''' + w × w'', 0 for the optimum, is to leading order the fourth derivative of
-    the deviation δ from it, with δ = δ' = 0 at both ends. So δ'' is the second integral of r less
-    its linear part, and ∫ ‖δ''‖² the excess cost, all carried parallel to the rotation half-way.
+    For a small η with η = η' = 0 at both ends the curve R exp(η̂) costs, to second order,
+    J − 2 g · η + η · H η: with x = η' + w × η
+
+        g · η = −∫ w' · x' dt,    η · H η = ∫ ‖x'‖² − w' · (η × x)' dt.
+
+    The least value, over polynomials η, is g · H⁻¹ g below J. This is the decrement of a step of
+    Newton's method; to leading order it is ∫ ‖δ''‖², with δ the deviation from the optimum.
 
     Examples
     --------
@@ -129,20 +136,30 @@ def excess_estimate(curve: Curve) -> Array:
     """
     check_curve(curve)
     legs = smooth_parts(curve, "excess estimate", 1)
-    t, derivative, integral, _ = grid(_NODES)
-    R, w, a, b = (legs.flat.values(t[:, None], order) for order in range(4))
-    lost = np.isnan(R).any(axis=(0, -2, -1))
-    R[:, lost] = np.eye(3)
-    middle = R[_NODES // 2]
-    r = np.tensordot(derivative, matvec(R, b), axes=1)  # R (w''' + w × w''), as (R w'')'
-    parallel = exp_so3(log_so3(middle.mT @ R) / -2) @ middle.mT
-    bend = np.tensordot(integral @ integral, matvec(parallel, r), axes=1)
-    for line in (np.ones(_NODES), np.sqrt(3) * (2 * t - 1)):  # of norm 1, and orthogonal
-        bend -= np.multiply.outer(line, np.tensordot(integral[-1] * line, bend, axes=1))
-    saved, cost = (integral[-1] @ np.sum(x**2, axis=-1).reshape(_NODES, -1) for x in (bend, a))
-    fast = np.linalg.norm(w, axis=-1).max(axis=0).ravel() >= SPEED_LIMIT
-    rough = tails(np.moveaxis(a.reshape(_NODES, -1, 3), 1, 0)) > _SMOOTH * np.sqrt(cost)
-    saved[fast | rough | lost.ravel() | (saved > cost / 2)] = np.nan
+    t, _, integral, _ = grid(_NODES)
+    w, a = (np.moveaxis(legs.flat.values(t[:, None], order), 1, 0) for order in (1, 2))
+    left_out = ~(np.linalg.norm(w, axis=-1).max(axis=1) < SPEED_LIMIT)
+    w[left_out], a[left_out] = 0, 0
+    cost = np.sum(a**2, axis=-1) @ integral[-1]
+    left_out |= tails(a) > _SMOOTH * np.sqrt(cost)
+    parts = blocks(len(w), _TOGETHER)
+    saved = np.concatenate([np.zeros(0), *(_decrement(w[some], a[some]) for some in parts)])
+    saved[left_out | ~(saved <= cost / 2)] = np.nan
     saved, cost = (summed(curve, x, legs, 3) for x in (saved, cost))
     with np.errstate(invalid="ignore"):  # 0/0
         return saved / (cost - saved)
+
+
+def _decrement(w: Array, a: Array) -> Array:
+    """Return g · H⁻¹ g from w and w' at the nodes, shape (N, n, 3); NaN where H is not positive."""
+    eta, rate, bend = (on_each_axis(x, np.eye(3)) for x in polynomials(_BUMPS, 2, _NODES)[:3])
+    W, A = hat(w), hat(a)
+    x, x_rate = rate + W @ eta, bend + A @ eta + W @ rate
+    weights = grid(_NODES).integral[-1]
+    H = products(weights, x_rate, x_rate)
+    # −w' · (p × q) is p · (w' × q)
+    H += products(weights, rate, A @ x) + products(weights, eta, A @ x_rate)
+    g = products(weights, x_rate, a[..., None])
+    values, vectors = np.linalg.eigh((H + H.mT) / 2)
+    values[values[:, 0] <= 0] = np.nan
+    return np.sum((vectors.mT @ g)[..., 0] ** 2 / values, axis=-1)

@@ -13,9 +13,17 @@ from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 
 ROOT = Path(__file__).parents[1]
-SPEC = importlib.util.spec_from_file_location("near_optimal", ROOT / "docs/near_optimal.py")
-exact = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(exact)
+
+
+def supplement(name):
+    """A module of docs/."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+exact, ordering = supplement("near_optimal"), supplement("ordering")
 FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
 
 
@@ -89,6 +97,41 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
         assert found == factor * ss**2, name
 
 
+@pytest.mark.source("beyond BK 14")
+def test_constants_of_splines_there_and_back():
+    found = Q(309247, 1441440), Q(20711, 180180), Q(20711, 16 * 180180)
+    assert tuple(exact.of_splines()) == found
+
+
+def test_the_order_of_three_closed_forms_is_proven():
+    """With these constants; for these inner products they could not be 2 % larger."""
+    projection, quaternion, bezier = (
+        f"{x}_so3" for x in ("projected_cubic", "quaternion_cubic", "bezier")
+    )
+    proven = {
+        (projection, bezier): (Q(131, 10), (1, Q(14161, 100), Q(1036, 5), Q(-119, 10), 0, 0)),
+        (projection, quaternion): (Q(41, 10), (1, Q(47, 50), 0, Q(27, 100), 0, 0)),
+        (quaternion, bezier): (Q(199, 100), (1, Q(14, 5), 0, Q(3, 100), 0, 0)),
+    }
+    assert ordering.verify() == {pair: ratio for pair, (ratio, _) in proven.items()}
+    for (worse, better), (ratio, inner) in proven.items():
+        at = list(zip(exact.RING.gens, (0, *inner), strict=True))
+        found = FORMS[worse].evaluate(at) / FORMS[better].evaluate(at)
+        assert ratio < found < ratio * Q(51, 50)
+
+
+def test_a_false_order_is_not_proven(tmp_path):
+    """With a larger ratio, and with one entry changed."""
+    rows = (ROOT / "docs/ordering.csv").read_text().splitlines()
+    for k, old, new in ((2, "13.1", "13.2"), (4, "-170000", "-190000000")):
+        changed = [*rows[:k], rows[k].replace(old, new, 1), *rows[k + 1 :]]
+        assert changed != rows
+        table = tmp_path / f"{k}.csv"
+        table.write_text("\n".join(changed))
+        with pytest.raises(ValueError, match=r"^not proven: projected_cubic_so3"):
+            ordering.verify(table)
+
+
 @pytest.mark.source("beyond BK 10")
 def test_the_deviation_in_the_package_is_the_derived_one():
     """Exactly, with fractions, as polynomials in t."""
@@ -148,7 +191,7 @@ def test_the_corrected_curve_has_the_eighth_power():
 
 @pytest.mark.parametrize("name", CURVES)
 @pytest.mark.source("beyond BK 11")
-def test_the_estimate_within_a_fifth_or_none(name):
+def test_the_estimate_within_a_twentieth_or_none(name):
     for size in (0.5, 1, 2):
         curves, true = solved(name, 80, size, 8)
         estimate = rb.excess_estimate(curves)
@@ -156,8 +199,8 @@ def test_the_estimate_within_a_fifth_or_none(name):
         assert np.all(np.isnan(estimate[(fastest > 2.51) | (true > 1.25)]))
         assert np.all(np.isfinite(estimate[(fastest < 2.49) & (true < 0.8)]))
         holds = np.isfinite(estimate)
-        assert size == 2 or holds.sum() > 40
-        assert np.all(np.abs(estimate - true)[holds] < 0.2 * true[holds] + 1e-11)
+        assert size == 2 or holds.sum() > 30
+        assert np.all(np.abs(estimate - true)[holds] < 0.05 * true[holds] + 1e-11)
 
 
 def test_the_correction_turns_the_way_that_bezier_turns():
@@ -184,7 +227,7 @@ def test_stacks_and_durations():
 
 def test_the_estimate_of_the_optimum_is_zero_and_nan_where_it_costs_nothing_or_is_not_found():
     best = rb.minimum_acceleration_so3(*random_problems(50, 0.6, rng=9))
-    assert np.all(np.abs(rb.excess_estimate(best)) < 1e-13)
+    assert np.all(np.abs(rb.excess_estimate(best)) < 1e-22)
     ends = I3, rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
     assert np.isnan(rb.leading_excess("projected_cubic_so3", *ends))
     assert np.isnan(rb.excess_estimate(rb.geodesic_so3(*ends[:2])))

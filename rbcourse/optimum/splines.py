@@ -9,11 +9,8 @@ In a step of Newton's method each leg is solved to first order for a unit of eac
 (`collocation`). The changes of its momenta are a symmetric element of the system for the values at
 the poses, `rbcourse.velocities.KnotSystem`, whose matrix is the second derivative of the cost.
 
-Certificate, for the acceleration of a ball. With ε = R η and ε' = R δw a leg of duration 1 has the
-second variation ¼ δ²J = ∫ ‖δw'‖² − c · (ε' × ε) dt. For δw = 0 at both ends ∫ ‖δw'‖² ≥ π² ∫ ‖ε'‖²,
-and ε is a closed curve, of a length L with L² ≤ ∫ ‖ε'‖² dt: by the isoperimetric inequality
-∫ c · (ε' × ε) dt is at most 2 ‖c‖ L²/4π. So the leg is a strict minimum if ‖c‖ < 2π³; and the
-whole spline is one if the second derivative by the values at the poses is positive definite, too.
+If that matrix is positive definite, and each leg is a strict local minimum among the curves with
+its ends (`second_variation`), the whole spline is a strict local minimum.
 """
 
 from __future__ import annotations
@@ -49,6 +46,7 @@ from rbcourse.optimum.collocation import (
 )
 from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.optimum.guesses import by_eta, cost_at_nodes, rates_of
+from rbcourse.optimum.second_variation import is_positive
 from rbcourse.paths import Chain
 from rbcourse.projection import nearest
 from rbcourse.velocities import (
@@ -61,7 +59,6 @@ from rbcourse.velocities import (
     quaternion_system,
 )
 
-ISOLATED = 2 * np.pi**3
 NODES = 17, 25, 33, 49, 65, 97, 129
 LOWERED = 33  # nodes that carry a curve that is lowered
 STEPS = 20
@@ -280,8 +277,7 @@ class OptimalChain(Chain):
     definite : bool
         Whether the second derivative of the cost by the values at the poses is positive definite.
     certified : bool
-        Whether the curve is proven to be a strict local minimum: it is `definite`, and no leg has
-        a conjugate point, as ‖c‖ h³ < 2π³. Only for the acceleration of a ball.
+        `is_local_minimum` of the chain.
     """
 
     cost: float
@@ -316,9 +312,7 @@ class OptimalChain(Chain):
     @property
     def certified(self) -> bool:
         """Whether it is proven to be a strict local minimum."""
-        of_ball = isinstance(self.rotation.functional, BallAcceleration)
-        size = np.linalg.norm(self.rotation.constant, axis=-1).max()
-        return of_ball and self.definite and bool(size < ISOLATED)
+        return bool(is_local_minimum(self))
 
     def lasting(self, duration: Array) -> Self:
         """Return the chain with another duration, and the same first time."""
@@ -326,6 +320,51 @@ class OptimalChain(Chain):
         share = float(duration) / (end - start)
         power = self.rotation.functional.ends + 1
         return replace(super().lasting(duration), cost=self.cost / share**power)
+
+
+def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.bool_]:
+    """Tell whether an optimum is proven to be a strict local minimum of its cost.
+
+    Source: beyond BK 15.
+
+    Parameters
+    ----------
+    curve : Optimum, OptimalChain or RigidMotion
+        From one of the functions ``minimum_…``, or from `stationary_so3`; or a stack of them.
+
+    Returns
+    -------
+    ndarray of bool, shape curve.batch_shape
+        Whether all curves nearby with the same ends (through the same poses) cost more. False for
+        a saddle, where a curve is NaN, and where neither could be shown.
+
+    Notes
+    -----
+    R p = c makes a curve stationary, not a minimum. This function bounds the second variation from
+    below: by its matrix on polynomials, less a bound of what polynomials leave out, see
+    `rbcourse.optimum.second_variation`. That is a proof except for rounding, and as far as the
+    nodes carry the curve. It does not exclude curves far away that cost less. An eigenvalue below
+    1e-6, as a share of the leading term, counts as 0. For the acceleration of a ball ‖c‖ < 2π³, for
+    the time from 0 to 1, is sufficient (docs/near_optimal.md).
+
+    Examples
+    --------
+    The upright turn of a book, from rest to rest, has the least torque up to 108°. There curves
+    that leave the axis begin to cost less:
+
+    >>> from rbcourse import exp_so3, minimum_torque_so3
+    >>> book, rest = np.diag([1.0, 2.22, 3.18]), [0, 0, 0]
+    >>> R1 = exp_so3([0, 0, np.radians(100)])
+    >>> bool(is_local_minimum(minimum_torque_so3(np.eye(3), R1, rest, rest, book)))
+    True
+    """
+    rotation = getattr(curve, "rotation", curve)
+    if not isinstance(rotation, Optimum):
+        raise ValueError(f"curve: an optimum is wanted, got {curve!r}")
+    found = is_positive(rotation.flat).reshape(rotation.batch_shape)
+    if isinstance(curve, OptimalChain):
+        return np.array(curve.definite and found.all())
+    return found
 
 
 class _Problem(NamedTuple):

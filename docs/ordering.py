@@ -1,0 +1,120 @@
+"""Prove the Proposition of near_optimal.md in rational arithmetic: one closed form costs more.
+
+Its leading excess E is a polynomial in the inner products of sigma, e and d, see near_optimal.py.
+For each pair of closed forms, with the c of ordering.csv,
+
+    E_worse - c E_better = sum_kl M_kl V_k . V_l + share volume^2,
+
+where volume is sigma . (e x d), share >= 0 and M is positive definite. The V are the products of
+an inner product and one of sigma, e and d, except ss sigma. So the difference is positive unless e
+and d are 0. Products V_k . V_l are monomials, and several pairs have the same one: all but one of
+their entries of M are free. ordering.csv has the free ones.
+"""
+
+import csv
+import importlib.util
+from fractions import Fraction
+from pathlib import Path
+
+TABLE = Path(__file__).with_name("ordering.csv")
+UNIT = 10**7  # the share and the entries are whole numbers over this
+
+
+def _load():
+    """Return near_optimal.py as a module."""
+    path = Path(__file__).with_name("near_optimal.py")
+    spec = importlib.util.spec_from_file_location("near_optimal", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+near = _load()
+(ss, se, sd), (_, ee, ed), (_, _, dd) = near.INNER
+VOLUME = ss * ee * dd + 2 * se * sd * ed - ss * ed**2 - ee * sd**2 - dd * se**2
+
+
+def block(odd):
+    """Return the V with an odd number of d, or an even one, by name: "se d" is se times d."""
+    names = [f"{inner} {vector}" for inner in near.NAMES for vector in "sed"]
+    return [name for name in names if name.count("d") % 2 == odd and name != "ss s"]
+
+
+# entries of M between the two are 0: there the product would have an odd number of d
+BLOCKS = [block(0), block(1)]
+
+
+def product(a, b):
+    """Return V_a . V_b, a monomial."""
+    inner = dict(zip(near.NAMES, near.RING.gens[1:], strict=True))
+    (p, i), (q, j) = a.split(), b.split()
+    return inner[p] * inner[q] * near.INNER["sed".index(i)]["sed".index(j)]
+
+
+def entries():
+    """Return the pairs of V, the upper triangles of the blocks of M, by their product."""
+    found = {}
+    for names in BLOCKS:
+        for i, a in enumerate(names):
+            for b in names[i:]:
+                found.setdefault(product(a, b), []).append((a, b))
+    return found
+
+
+def matrix(form, free):
+    """Return the M of a form: free entries, and for each monomial a first one that follows."""
+    upper = {}
+    for monomial, pairs in entries().items():
+        rest = form.coeff(monomial)
+        for pair in pairs[:0:-1]:
+            upper[pair] = near.QQ(free.get(pair, 0))
+            rest -= upper[pair] * (1 + (pair[0] != pair[1]))
+        upper[pairs[0]] = rest / (1 + (pairs[0][0] != pairs[0][1]))
+    return upper
+
+
+def total(upper):
+    """Return the sum of M_kl V_k . V_l."""
+    return sum(x * (1 + (a != b)) * product(a, b) for (a, b), x in upper.items())
+
+
+def is_positive(names, upper):
+    """Return whether a block of M is positive definite: D > 0 in L D L^T."""
+    rows = [[upper.get((a, b)) or upper.get((b, a), 0) for b in names] for a in names]
+    while rows:
+        (pivot, *head), *rows = rows
+        if pivot <= 0:
+            return False
+        rows = [[x - r * y / pivot for x, y in zip(row, head, strict=True)] for r, *row in rows]
+    return True
+
+
+def read(table=TABLE):
+    """Return c, the share and the free entries of M, by worse and better form."""
+    with open(table, newline="", encoding="utf-8") as file:
+        (_, *worse), (_, *better), (_, *ratio), (_, *share), *rows = csv.reader(file)
+    free = [{}, {}, {}]
+    for name, *row in rows:
+        for column, entry in zip(free, row, strict=True):
+            column[tuple(name.split("."))] = Fraction(entry or 0) / UNIT
+    shares = [Fraction(x) / UNIT for x in share]
+    found = zip(map(Fraction, ratio), shares, free, strict=True)
+    return dict(zip(zip(worse, better, strict=True), found, strict=True))
+
+
+def verify(table=TABLE):
+    """Return for each pair a c such that E_worse >= c E_better, or raise a ValueError."""
+    form, proven = near.forms(), {}
+    for (worse, better), (ratio, share, free) in read(table).items():
+        left = form[worse] - near.QQ(ratio) * form[better]
+        upper = matrix(left - near.QQ(share) * VOLUME, free)
+        same = total(upper) + near.QQ(share) * VOLUME == left
+        if not (same and share >= 0 and all(is_positive(names, upper) for names in BLOCKS)):
+            raise ValueError(f"not proven: {worse} >= {float(ratio)} {better}")
+        proven[worse, better] = ratio
+    return proven
+
+
+if __name__ == "__main__":
+    for (worse_form, better_form), least in verify().items():
+        print(f"{worse_form} >= {float(least)} {better_form}")

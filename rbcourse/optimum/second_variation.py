@@ -1,0 +1,135 @@
+"""The second variation of the cost along an optimum of two poses, and a proof that it is positive.
+
+Vary R(t) to R exp(s η̂), with η = 0 at both ends, with as many derivatives as are given there. With
+x = η' + w × η and ε = R η, so that ε' = R x, and R p = c, the second derivative of the cost by s is
+
+    ½ δ² ∫ L dt = ± ∫ δp · x + c · (ε' × ε) dt,    δp = Σ Pᵢ x⁽ⁱ⁾,  Pᵢ = ∂p/∂w⁽ⁱ⁾,
+
+where ± is − for the acceleration and the torque, + for the jerk. It is the integral of
+L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾, with a constant positive M, plus terms with fewer derivatives. The x that
+occur vanish at both ends, with k − 1 derivatives, and ∫ R x dt = 0. If the integral is at least a
+positive multiple of ∫ L(x, x) dt for all of them, the curve is a strict local minimum.
+
+Three steps prove that. (1) `_PENALTY` ‖∫ R x dt‖² is added; then the last condition is not needed.
+(2) x is split into x₁, with x₁⁽ᵏ⁾ a polynomial of a degree below J, and x₂, with x₂⁽ᵏ⁾ orthogonal
+to these. Legendre polynomials make a matrix Q of the form for x₁. For x₂, where each integration
+divides the norm by at least 2J − 1, 2J − 3, …, the terms with fewer derivatives are at most a share
+γ of ∫ L(x₂, x₂) dt. (3) The mixed terms are ∫ x₂⁽ᵏ⁾ · F x₁ dt, and only that part of F x₁ counts
+that is orthogonal to polynomials: with its products E the form is positive if γ < 1 and
+Q − E/(1 − γ) is positive definite.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbcourse._numerics import Array, matvec
+from rbcourse.optimum import Optimum
+from rbcourse.optimum.chebyshev import Grid, grid
+from rbcourse.so3 import hat
+
+_PENALTY = 1e4  # over ‖c‖ + 1
+_CLEAR = 1e-6  # an eigenvalue that is smaller may be 0 but for rounding
+_DEGREES = 24, 48, 96
+
+
+@lru_cache
+def polynomials(m: int, k: int, nodes: int) -> list[Array]:
+    """Return m polynomials with k zeros at 0 and at 1, and 2 k derivatives, at Chebyshev nodes.
+
+    Each has the shape (nodes, m). The k-th derivatives are the normalised Legendre polynomials of
+    the degrees k, k + 1, …
+    """
+    from numpy.polynomial.legendre import legder, legint, legval
+
+    coefficients = np.diag(np.sqrt(2.0 * np.arange(m + k) + 1))[:, k:]
+    made = [legint(coefficients, k - i, lbnd=-1, scl=0.5) for i in range(k)]
+    made += [legder(coefficients, i, scl=2) for i in range(k + 1)]
+    return [legval(2 * grid(nodes).t - 1, c).T for c in made]
+
+
+def is_positive(curve: Optimum) -> NDArray[np.bool_]:
+    """Tell for which curves the second variation is proven to be positive, shape (count,)."""
+    return np.array([_is_positive(curve.take([i])) for i in range(curve.count)], dtype=bool)
+
+
+def _is_positive(curve: Optimum) -> bool:
+    if np.isnan(curve.constant).any():
+        return False
+    for m in _DEGREES:
+        least, bound = least_eigenvalues(curve, m)
+        if bound > _CLEAR or least < _CLEAR:
+            return bound > _CLEAR
+    return False
+
+
+def least_eigenvalues(curve: Optimum, m: int) -> tuple[float, float]:
+    """Return the least eigenvalues of Q and of Q − E/(1 − γ), with m polynomials for each axis.
+
+    Of a stack of one curve; −∞ for the second one if γ is 1 or more.
+    """
+    functional, k = curve.functional, curve.functional.ends // 2
+    sign, J = (-1) ** k, m + k
+    nodes = grid(max(4 * m + 1, 2 * curve.series.shape[-2] - 1))
+    t, weights = nodes.t, nodes.integral[-1]
+    R, *rates = (curve.values(t[:, None], i).swapaxes(0, 1) for i in range(2 * k + 2))
+    P = [np.broadcast_to(Pi[0], (len(t), 3, 3)) for Pi in functional.p_by(*rates)]
+    c = matvec(R, functional.p(*rates))[0].mean(axis=0)
+    R, M, size = R[0], P[-1][0], float(np.linalg.norm(c))
+
+    root = np.linalg.inv(np.linalg.cholesky(M)).T  # x = root y: L(x, x) = ‖y⁽ᵏ⁾‖²
+    x = [on_each_axis(values, root) for values in polynomials(m, k, len(t))]
+    rate = R @ x[0]
+    total = np.tensordot(weights, rate, axes=1)
+    turn = np.tensordot(nodes.integral, rate, axes=1) - total / 2
+    # the form of x and z is ± ∫ z · force(x) dt
+    penalty = sign * _PENALTY * (1 + size) * np.linalg.norm(M, 2)
+    force = R.mT @ (penalty * total - hat(c) @ turn)
+    force += sum(Pi @ xi for Pi, xi in zip(P, x, strict=True))
+    Q = sign * products(weights, x[0], force)
+    Q = (Q + Q.T) / 2
+
+    F = root.T @ force
+    for _ in range(k):
+        F = np.tensordot(nodes.integral, F, axes=1)
+    legendre = polynomials(J, 0, len(t))[0]
+    F -= np.tensordot(legendre, np.tensordot(weights[:, None] * legendre, F, (0, 0)), axes=1)
+    share = _share([root.T @ Pi @ root for Pi in P], _largest(root.T @ root) * size, nodes, J)
+    least, bound = float(np.linalg.eigvalsh(Q)[0]), -np.inf
+    if share < 1:
+        bound = float(np.linalg.eigvalsh(Q - products(weights, F, F) / (1 - share))[0])
+    return least, bound
+
+
+def _share(P: list[Array], c: float, nodes: Grid, J: int) -> float:
+    """Return γ: how large terms with fewer derivatives can be, as a share of ∫ ‖y₂⁽ᵏ⁾‖² dt."""
+    k = len(P) // 2
+    norms = [_largest(Pi) for Pi in P]
+    # ‖y₂⁽ⁱ⁾‖ is at most size[k − i] ‖y₂⁽ᵏ⁾‖, and ‖ε‖ at most ‖x₂‖/π
+    size = np.cumprod([1.0, *(1 / (2 * J - 1 - 2 * i) for i in range(k))])
+    share = size[k] ** 2 * c / np.pi
+    share += sum(norms[i] * size[k] * size[k - i] for i in range(k + 1))
+    if k == 2:  # by parts: ∫ y · P₃ y⁽³⁾ = −∫ (P₃ᵀ y)' · y''
+        slopes = np.tensordot(nodes.derivative, P[3], axes=1)
+        share += norms[3] * size[1] + _largest(slopes) * size[2]
+    return float(share)
+
+
+def _largest(matrices: Array) -> float:
+    """Return the largest norm of matrices."""
+    return float(np.linalg.norm(matrices, 2, axis=(-2, -1)).max())
+
+
+def on_each_axis(values: Array, root: Array) -> Array:
+    """Return functions of shape (n, m) times each column of a matrix, shape (n, 3, 3 m)."""
+    return np.einsum("tj,ab->tajb", values, root).reshape(len(values), 3, -1)
+
+
+def products(weights: Array, x: Array, y: Array) -> Array:
+    """Return the integrals of the inner products of functions, shapes (..., n, 3, columns)."""
+    n, three, columns = x.shape[-3:]
+    x = (weights[:, None, None] * x).reshape(*x.shape[:-3], n * three, columns)
+    return x.mT @ y.reshape(*y.shape[:-3], n * three, y.shape[-1])

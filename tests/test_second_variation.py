@@ -1,0 +1,189 @@
+import mpmath as mp
+import numpy as np
+import pytest
+
+import rbcourse as rb
+from rbclassroom.surveys.atlas import random_problems
+from rbcourse.curves import Ends, with_inertia
+from rbcourse.optimum import optimum_of
+from rbcourse.optimum.chebyshev import grid
+from rbcourse.optimum.search import LIMITS, ball, body, jerk
+from rbcourse.optimum.second_variation import polynomials
+from rbcourse.so3 import hat, vee
+
+pytestmark = pytest.mark.source("beyond BK 15")
+I3, REST, BOOK = np.eye(3), np.zeros(3), np.diag([1.0, 2.22, 3.18])
+TURN = {"acceleration": [0, 0, 3, -2], "jerk": [0, 0, 0, 10, -15, 6]}
+with mp.workdps(50):
+    BEAM = mp.findroot(lambda x: mp.cosh(x) * mp.cos(x) - 1, 4.73) ** 2
+    SUP, MIXED = 1 / mp.mpf(192), 1 / (16 * mp.sqrt(3) * mp.pi)
+
+
+def stationary(what, R, ends, G=BOOK, accelerations=(REST, REST)):
+    """What Newton's method finds from rotations at its nodes; it need not be a minimum."""
+    one = Ends(*(np.asarray(x, float)[None] for x in ends))
+    if what == "jerk":
+        task = jerk(one, *(np.asarray(a, float)[None] for a in accelerations))
+    elif what == "torque":
+        task = body(*with_inertia(one, G), of_torque=True)
+    else:
+        task = ball(one)
+    found = task.solver(task.equations, R[None])
+    return optimum_of(task.functional, task.equations.ends, found, np.ones(1))
+
+
+def upright(what, angle):
+    """The turn about the third axis from rest to rest, which is stationary for all of them."""
+    nodes = grid(LIMITS.nodes_for_jerk if what == "jerk" else LIMITS.nodes).t
+    angles = angle * np.polynomial.Polynomial(TURN.get(what, TURN["acceleration"]))(nodes)
+    axis = np.array([0, 0, 1.0])
+    R = rb.exp_so3(angles[:, None] * axis)
+    return stationary(what, R, (I3, rb.exp_so3(angle * axis), REST, REST))
+
+
+def hessian(curve, count=16, nodes=41, h=2e-2):
+    """Second differences of the cost by turns η of the nodes, over the matrix of ∫ ‖η⁽ᵏ⁾‖².
+
+    The cost of R exp(η̂) is found from its values at the nodes alone.
+    """
+    functional, k = curve.functional, curve.functional.ends // 2
+    points, weights = grid(nodes), grid(nodes).integral[-1]
+    R = curve(points.t)
+    D = points.derivative
+
+    def cost(etas):
+        moved = R @ rb.exp_so3(etas)
+        w = vee(moved.mT @ np.einsum("st,...tij->...sij", D, moved))
+        rates = [w]
+        for _ in range(k):
+            rates.append(np.einsum("st,...ti->...si", D, rates[-1]))
+        return np.sum(functional.deviation(*rates) ** 2, axis=-1) @ weights
+
+    bumps = polynomials(count, k + 1, nodes)[0]
+    each = np.einsum("tj,ab->jatb", bumps, I3).reshape(-1, nodes, 3)
+    m = len(each)
+    pairs = np.array([(i, j) for i in range(m) for j in range(i, m)])
+    first, second = h * each[pairs[:, 0]], h * each[pairs[:, 1]]
+    sums = cost(first + second) + cost(-first - second) - cost(first - second)
+    sums -= cost(second - first)
+    H = np.zeros((m, m))
+    H[tuple(pairs.T)] = H[tuple(pairs.T[::-1])] = sums / (8 * h * h)
+    return np.linalg.eigvalsh(H)
+
+
+def test_the_hessian_of_the_tests_is_right_for_a_curve_at_rest():
+    """There the cost of R exp(η̂) is ∫ ‖η''‖² to second order: the identity."""
+    rest = rb.minimum_acceleration_so3(I3, I3, REST, REST)
+    assert hessian(rest) == pytest.approx(1, abs=1e-5)
+
+
+def test_constants_of_the_lemma():
+    """Bounds of η, clamped at both ends, by ∫ ‖η''‖²: Rayleigh quotients of polynomials."""
+    nodes = grid(129)
+    weights = nodes.integral[-1]
+    eta, rate = polynomials(40, 2, 129)[:2]
+    squares, slopes = ((x.T * weights) @ x for x in (eta, rate))
+    assert np.linalg.eigvalsh(squares)[-1] == pytest.approx(float(BEAM**-2), rel=1e-10)
+    assert np.linalg.eigvalsh(slopes)[-1] == pytest.approx(1 / (4 * np.pi**2), rel=1e-10)
+    assert np.sum(eta**2, axis=1).max() == pytest.approx(float(SUP), rel=1e-4)
+    assert float(4 * BEAM) == pytest.approx(89.4931, abs=1e-4)
+    assert float(MIXED) == pytest.approx(0.011486, abs=1e-6)
+    assert float(mp.sqrt(SUP) / (2 * mp.pi)) == pytest.approx(float(MIXED), rel=1e-15)
+
+
+def test_the_second_variation_is_at_least_that_of_the_lemma():
+    """For 500 optima, by its spectrum on polynomials, over ∫ ‖D²η‖²."""
+    nodes = grid(65)
+    weights = nodes.integral[-1]
+    eta, rate, bend = (
+        np.einsum("tj,ab->tajb", x, I3).reshape(65, 3, -1) for x in polynomials(14, 2, 65)[:3]
+    )
+    margins = []
+    for size, seed in ((0.5, 1), (1.0, 2), (1.5, 3), (2.0, 4), (3.0, 5)):
+        curves = rb.minimum_acceleration_so3(*random_problems(100, size, rng=seed))
+        w, a, b = (np.moveaxis(curves(nodes.t, k), 1, 0) for k in (1, 2, 3))
+        v = np.linalg.norm(w, axis=-1).max(axis=1)
+        root = np.sqrt(np.sum(a**2, axis=-1) @ weights)
+        bound = (1 - v**2 / float(4 * BEAM)) ** 2
+        bound -= float(MIXED) * root * v + float(SUP) / 4 * root**2
+        W, A, C = hat(w), hat(a), hat(b)
+        x, x_rate = rate + W @ eta, bend + A @ eta + W @ rate
+        D2 = bend + A @ eta / 2 + W @ rate + W @ W @ eta / 4
+        Q, M, P = (
+            np.einsum("t,...tia,...tib->...ab", weights, p, q)
+            for p, q in ((x_rate, x_rate), (D2, D2), (eta, C @ x))
+        )
+        Q -= (P + P.mT) / 2  # + w'' · (η × x), by parts
+        L = np.linalg.inv(np.linalg.cholesky(M))
+        least = np.linalg.eigvalsh(L @ Q @ L.mT)[:, 0]
+        assert np.all(least > bound)
+        margins.append(np.max(bound))
+        assert np.all(rb.is_local_minimum(curves) == (least > 0))
+    assert margins[0] > 0.9
+
+
+SADDLES = [
+    *(("torque", degrees) for degrees in (108.5, 115, 140, 170, 179)),
+    *(("acceleration", degrees) for degrees in (365, 380, 400, 430)),
+    *(("jerk", degrees) for degrees in (365, 380, 390)),
+]
+MINIMA = [
+    *(("torque", degrees) for degrees in (10, 60, 100, 107)),
+    *(("acceleration", degrees) for degrees in (10, 170, 200, 330, 450, 530)),
+    *(("jerk", degrees) for degrees in (10, 170, 200, 350, 450)),
+]
+
+
+@pytest.mark.parametrize(("what", "degrees"), SADDLES)
+def test_a_saddle_is_no_local_minimum(what, degrees):
+    """Turns about an axis, from rest to rest: some turns of the nodes lower their costs."""
+    curve = upright(what, np.radians(degrees))
+    assert curve.converged.all()
+    assert hessian(curve[0])[0] < -1e-5
+    assert not rb.is_local_minimum(curve).any()
+
+
+@pytest.mark.parametrize(("what", "degrees"), MINIMA)
+def test_turns_that_are_minima_are_shown_to_be(what, degrees):
+    curve = upright(what, np.radians(degrees))
+    assert hessian(curve[0])[0] > 1e-5
+    assert rb.is_local_minimum(curve).all()
+
+
+def test_of_many_stationary_curves_the_saddles_are_told():
+    """From turns by more than a full one, with slow ends, against second differences."""
+    rng, told, least = np.random.default_rng(7), [], []
+    t = grid(LIMITS.nodes).t[:, None]
+    for _ in range(24):
+        w0, w1 = 0.5 * rng.normal(size=(2, 3))
+        axis = rng.normal(size=3)
+        turn = np.radians(rng.uniform(365, 480)) * axis / np.linalg.norm(axis)
+        bend = rb.exp_so3(t * (1 - t) ** 2 * w0 - t**2 * (1 - t) * w1)
+        R = rb.exp_so3((3 * t**2 - 2 * t**3) * turn) @ bend
+        curve = stationary("acceleration", R, (I3, R[-1], w0, w1))
+        if curve.converged.all():
+            told.append(rb.is_local_minimum(curve).item())
+            least.append(hessian(curve[0])[0])
+    assert np.all(told == (np.array(least) > 0))
+    assert 3 < np.sum(told) < len(told) - 3
+
+
+def test_stacks_motions_and_curves_that_were_not_found():
+    ends = I3, rb.exp_so3([[0, 0, 1.0], [0, 0, 2.0]]), [[0, 1, 0], [0, 1e160, 0]], REST
+    with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
+        curves = rb.minimum_acceleration_so3(*ends)
+    assert rb.is_local_minimum(curves).tolist() == [True, False]
+    assert rb.is_local_minimum(rb.retime(curves[0], 50.0)).shape == ()
+    poses = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0]])
+    motion = rb.minimum_acceleration_se3(*poses, *np.zeros((4, 3)))
+    assert rb.is_local_minimum(motion)
+    with pytest.raises(ValueError, match=r"^curve: an optimum is wanted, got "):
+        rb.is_local_minimum(rb.geodesic_so3(I3, I3))
+
+
+def test_short_costates_are_minima():
+    """‖c‖ < 2π³: by the isoperimetric inequality, docs/near_optimal.md."""
+    curves = rb.stationary_so3(rb.exponential_cubic_long_so3(*random_problems(200, 1.5, rng=8)))
+    short = np.linalg.norm(curves.c, axis=-1) < 2 * np.pi**3
+    assert short.sum() > 20
+    assert np.all(rb.is_local_minimum(curves)[short])
