@@ -74,7 +74,7 @@ def test_the_two_forms_of_the_second_variation_are_equal(n):
 
 
 def closed_forms(sigma, w0, w1, n):
-    """Bézier's curve from I, and the same less its deviation; E, by (5)."""
+    """Bézier's curve from I, and the same less its deviation; E, by (9)."""
     nodes = grid(NODES)
     t = nodes.t
     S, W0, W1 = (to_matrix(x, n) for x in (sigma, w0, w1))
@@ -94,7 +94,7 @@ def closed_forms(sigma, w0, w1, n):
 
 
 def deviation(s, e, d, n):
-    """(5) of docs/near_optimal.md, by powers of u."""
+    """(9) of docs/near_optimal.md, by powers of u."""
 
     def triple(x, y, z):
         return bracket(x, bracket(y, z, n), n)
@@ -165,3 +165,15 @@ def test_excess_of_the_closed_forms_in_higher_dimensions(n):
             found.append(above / best)
         assert 7.5 < np.log(found[0] / found[1]) / np.log(1 / 0.7) < 8.5
         assert excess(bezier, n)[0] == pytest.approx(E, rel=0.1)
+
+
+def test_the_eight_brackets_are_independent_on_so3():
+    """So what is derived for SO(3) holds for every group: there are eight of degree three."""
+    rows = []
+    for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
+        s, e, d = (as_so3(x) for x in vectors)
+        words = "sse ssd sed ese esd eed dsd ded".split()
+        named = {"s": s, "e": e, "d": d}
+        triples = [[named[k] for k in word] for word in words]
+        rows.append([bracket(x, bracket(y, z, 3), 3) for x, y, z in triples])
+    assert np.linalg.matrix_rank(np.concatenate([np.transpose(row) for row in rows])) == 8

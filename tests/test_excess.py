@@ -259,3 +259,15 @@ def test_other_names_and_curves_are_refused():
     for curve, message in ((I3, "curve: a Curve wanted"), (rb.geodesic_se3(I4, I4), r"on SO\(3\)")):
         with pytest.raises(ValueError, match=message):
             rb.excess_estimate(curve)
+
+
+def test_the_latex_source_has_the_formulas_of_the_note():
+    """Made from it by the command in CONTRIBUTING.md."""
+    note, latex = ((ROOT / f"docs/near_optimal.{x}").read_text("utf-8") for x in ("md", "tex"))
+    here = re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", note, re.DOTALL)
+    body = latex[latex.index(r"\begin{document}") :]
+    there = re.findall(r"\\\[(.+?)\\\]|\\\((.+?)\\\)", body, re.DOTALL)
+    assert len(here) > 200
+    assert [re.sub(r"\s", "", x + y) for x, y in here] == [
+        re.sub(r"\s", "", x + y) for x, y in there
+    ]

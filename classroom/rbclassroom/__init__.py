@@ -3,4 +3,4 @@
 It uses only the names that `rbcourse` exports.
 """
 
-__version__ = "0.33.0"
+__version__ = "0.34.0"
