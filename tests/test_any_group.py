@@ -172,7 +172,7 @@ def test_the_eight_brackets_are_independent_on_so3():
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)
-        words = "sse ssd sed ese esd eed dsd ded".split()
+        words = ["sse", "ssd", "sed", "ese", "esd", "eed", "dsd", "ded"]
         named = {"s": s, "e": e, "d": d}
         triples = [[named[k] for k in word] for word in words]
         rows.append([bracket(x, bracket(y, z, 3), 3) for x, y, z in triples])
