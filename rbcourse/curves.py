@@ -21,7 +21,7 @@ from rbcourse._checks import (
     check_order,
 )
 from rbcourse._hermite import hermite
-from rbcourse._numerics import Array, blocks
+from rbcourse._numerics import Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
 from rbcourse.so3 import hat, log_so3
 
@@ -122,7 +122,7 @@ class Curve:
 
     On SE(3), ``c(t)`` is the pose A, ``c(t, 1)`` the twist S = (w, v), A' = A hat_se3(S), and
     ``c(t, 2)`` the covariant acceleration in metric (14), (w', Rᵀ d''). That is *not* the
-    derivative of the twist: v' = Rᵀ d'' − w × v.
+    derivative of the twist: that is `twist_rate`, with v' = Rᵀ d'' − w × v.
 
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``; on SE(3)
@@ -191,6 +191,24 @@ class Curve:
         times = as_time(t, 0, self.domain)
         values = self.evaluate(times.reshape(-1, 1), self._check_order(order))
         return values.reshape(times.shape + self.batch_shape + self._core(order))
+
+    def twist_rate(self, t: ArrayLike) -> Array:
+        """Return the derivative of ``c(t, 1)``: on SE(3) (w', v') with v' = Rᵀ d'' − w × v.
+
+        On SO(3) it is ``c(t, 2)``.
+
+        Examples
+        --------
+        >>> from rbcourse import pose_from_coordinates, screw_se3
+        >>> c = screw_se3(np.eye(4), pose_from_coordinates([0, 0, 1, 2, 0, 0]))
+        >>> c.twist_rate(0.5).round(12) + 0.0  # the twist of a screw motion is constant
+        array([0., 0., 0., 0., 0., 0.])
+        """
+        rate = self(t, 2)
+        if self.size == 4:
+            twist = self(t, 1)
+            rate[..., 3:] -= cross(twist[..., :3], twist[..., 3:])
+        return rate
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
         """Return each curve of the stack, or a derivative, at times of its own, up to its duration.
