@@ -133,7 +133,7 @@ def render(found: dict[str, Entry]) -> str:
         (key.removeprefix("errata "), row["where"], row["printed"], row["holds"])
         for key, row in MISPRINTS.items()
     )
-    head = ("", "where", "as printed in our copy", "what holds")
+    head = ("", "where", "as printed in our copy", "corrected")
     return "\n\n".join([*parts, _MISPRINTS, _table(head, misprints)]) + "\n"
 
 
