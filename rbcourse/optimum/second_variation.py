@@ -10,7 +10,9 @@ L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾, with a constant positive M, plus terms wit
 occur vanish at both ends, with k − 1 derivatives, and ∫ R x dt = 0. If the integral is at least a
 positive multiple of ∫ L(x, x) dt for all of them, the curve is a strict local minimum.
 
-Three steps prove that. (1) `_PENALTY` ‖∫ R x dt‖² is added; then the last condition is not needed.
+Three steps prove that, up to rounding, quadrature and the error of the computed curve. (1) A
+penalty, `_PENALTY` ‖∫ R x dt‖², is added, and the form is required to be positive without the last
+condition. ε is then the primitive of R x with ε(1) = −ε(0), so that the form is symmetric.
 (2) x is split into x₁, with x₁⁽ᵏ⁾ a polynomial of a degree below J, and x₂, with x₂⁽ᵏ⁾ orthogonal
 to these. Legendre polynomials make a matrix Q of the form for x₁. For x₂, where each integration
 divides the norm by at least 2J − 1, 2J − 3, …, the terms with fewer derivatives are at most a share

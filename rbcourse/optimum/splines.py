@@ -340,12 +340,12 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
 
     Notes
     -----
-    R p = c makes a curve stationary, not a minimum. This function bounds the second variation from
-    below: by its matrix on polynomials, less a bound of what polynomials leave out, see
-    `rbcourse.optimum.second_variation`. That is a proof except for rounding, and as far as the
-    nodes carry the curve. It does not exclude curves far away that cost less. An eigenvalue below
-    1e-6, as a share of the leading term, counts as 0. For the acceleration of a ball ‖c‖ < 2π³, for
-    the time from 0 to 1, is sufficient (docs/near_optimal.md).
+    R p = c makes a curve stationary, not a minimum. This function shows that the second
+    variation is positive: it computes the form on polynomials, and bounds the rest, see
+    `rbcourse.optimum.second_variation`. That is a proof up to rounding, quadrature and the
+    error of the computed curve. It does not exclude curves far away that cost less. An
+    eigenvalue below 1e-6, as a share of the leading term, counts as 0. For the acceleration of
+    a ball ‖c‖ < 2π³, for the time from 0 to 1, is sufficient (docs/near_optimal.md).
 
     Examples
     --------
