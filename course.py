@@ -3,7 +3,7 @@
 # ///
 """Tasks of the course: python3 course.py TASK ...
 
-The first task makes the environment .venv from environment.txt; later ones add what they need.
+The first task makes the environment .venv from environment.txt; later ones extend it.
 When environment.txt changes or the folder is moved, .venv is made anew.
 """
 
@@ -63,7 +63,7 @@ class SetUpError(Exception):
 
 
 def main():
-    """Set up what a task needs, and run it."""
+    """Set up the environment of a task, and run it."""
     task, words = (sys.argv[1:] or ["--help"])[0], sys.argv[2:]
     if task in ("-h", "--help"):
         print(__doc__)
@@ -103,7 +103,7 @@ def run(*words):
 
 
 def set_up(environment):
-    """Make .venv, or add to it what an environment needs."""
+    """Make .venv, or add the missing distributions of an environment."""
     names = list(LISTS)[: list(LISTS).index(environment) + 1]
     wanted = {name: fingerprint(ROOT / LISTS[name]) for name in names}
     found = read_stamp()
@@ -150,7 +150,7 @@ def create(found):
 
 
 def install(*words):
-    """Install into .venv with uv, which pip fetches where there is none; otherwise with pip."""
+    """Install into .venv with uv, which pip fetches if it is missing; if that fails, with pip."""
     pip = python(), "-m", "pip"
     uv, settings = UV, {}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -219,7 +219,7 @@ def read_stamp():
 
 
 def write_stamp(content):
-    """Write down what is installed in .venv."""
+    """Record the environment that .venv holds."""
     (VENV / "made-by-course.txt").write_text(json.dumps(content))
 
 

@@ -147,7 +147,7 @@ def as_duration(name: str, value: ArrayLike) -> Array:
 
 
 def as_angle(angle: ArrayLike) -> Array:
-    """Return angles of rotation, all in [0, π]; what is larger by rounding only becomes π."""
+    """Return angles of rotation, all in [0, π]; angles that exceed π by rounding only become π."""
     angles = as_finite("angle", angle)
     within = (angles >= 0) & (angles <= np.pi * (1 + 4 * EPS))
     _check_all(within, "angle", angles, "an angle in [0, π]")

@@ -50,13 +50,13 @@ def stack_terms(ends: Array) -> Array:
 
 
 def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
-    """Return what a polynomial is a sum of: x0, x1, x1 − x0 and the derivatives at the ends."""
+    """Return the terms of a polynomial: x0, x1, x1 − x0 and the derivatives at the ends."""
     x0, x1, *rates = map(np.asarray, ends)
     return [x0, x1, x1 - x0, *rates]
 
 
 def _weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return what the terms weigh; those of derivatives begin with x1 − x0."""
+    """Return the weights of the terms; those of derivatives begin with x1 − x0."""
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
     weights = [weight for pair in rates for weight in pair]

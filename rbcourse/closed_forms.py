@@ -431,7 +431,7 @@ class CayleyCubic(NormalizedCubic):
 
     @property
     def breakpoints(self) -> Array:
-        """As `Curve.breakpoints`; it turns most quickly where Q is small and its rate large."""
+        """As `Curve.breakpoints`; the curve turns fastest where Q is small and its rate large."""
 
         def time_for_a_radian(t: Array) -> Array:
             jet = polynomial_jet(self._first[:, :, None], t, 1)

@@ -54,7 +54,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     products = N[:, None] @ N
     brackets = (products - products.swapaxes(0, 1)).reshape(m * m, -1).T
     C = np.zeros((m, m * m))
-    for _ in range(3):  # the normal equations, exact for the standard bases, and what they leave
+    for _ in range(3):  # the normal equations, exact for the standard bases, and the residual
         C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
     if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
         raise ValueError("basis: a commutator of two of the matrices is no combination of them")

@@ -1,4 +1,4 @@
-"""What a curve costs: the squares of its acceleration, BK (18), of the torque, and of the jerk."""
+"""Costs of curves: integrals of the squared acceleration, BK (18), torque and jerk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rotations and poses over time: what a curve is, its boundary conditions, and the geodesic."""
+"""Rotations and poses over time: curves, their boundary conditions, and the geodesic."""
 
 from __future__ import annotations
 
@@ -233,7 +233,7 @@ class Curve:
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
 
     def __repr__(self) -> str:
-        """Return what it is a curve of, how many there are, and when."""
+        """Return the kind of the curve, its group, the stack and the interval of time."""
         stack = f", stack of shape {self.batch_shape}" if self.batch_shape else ""
         start, end = self.domain
         return f"<{self._what()} on {_GROUPS[self.size]}{stack}, t in [{start:g}, {end:g}]>"

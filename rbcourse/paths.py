@@ -401,7 +401,7 @@ def _arguments(leg: Leg) -> list[str]:
 
 
 def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
-    """Return the stack of legs; what it warns of is told where `chain` is called."""
+    """Return the stack of legs; its warnings are raised where `chain` is called."""
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
             legs = leg(**ends, duration=duration)

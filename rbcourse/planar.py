@@ -281,7 +281,7 @@ def _rotated(theta: Array, vector: Array) -> Array:
 
 
 def _short(angle: Array) -> Array:
-    """Return angles without their full turns; what is within π is left alone."""
+    """Return angles without their full turns; angles within π are unchanged."""
     return np.where(np.abs(angle) <= np.pi, angle, np.arctan2(np.sin(angle), np.cos(angle)))
 
 

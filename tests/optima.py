@@ -1,4 +1,4 @@
-"""Problems of optima, and what is minimised."""
+"""Problems of optima, and their functionals."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -1,4 +1,4 @@
-"""What is true, computed another way: mpmath and brute force. Never imports rbcourse."""
+"""Independent computations, by mpmath and brute force. This module never imports rbcourse."""
 
 import mpmath as mp
 import numpy as np

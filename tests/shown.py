@@ -1,4 +1,4 @@
-"""What the artists of a saved figure show, recorded where a lesson draws it, beside its numbers.
+"""The data of the artists of a figure, recorded when a lesson saves it, beside its numbers.
 
 A kernel that runs `record` (see conftest.py) writes for each figure all numbers that its artists
 hold, an animation's in all frames, and stops at a figure that is clipped or has no labels.
@@ -22,7 +22,7 @@ __import__("shown").record({folder!r})
 # What of a CSV need not be in the picture as a number: a pattern of "figure, column", and the share
 # that is there all the same.
 SHARES = {
-    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # beside what is drawn
+    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # beside the drawn data
     r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,  # order, or colour
     r".*, (.* )?theta\d? \[rad\]": 0,  # where links and corners are
     r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface of fewer points

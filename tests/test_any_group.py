@@ -124,7 +124,7 @@ def as_so3(x):
 
 
 def excess(R, n):
-    """What a curve costs above the best that descent finds, and the cost of that."""
+    """The cost of a curve above the best one that descent finds, and the cost of that one."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))
@@ -168,7 +168,7 @@ def test_excess_of_the_closed_forms_in_higher_dimensions(n):
 
 
 def test_the_eight_brackets_are_independent_on_so3():
-    """So what is derived for SO(3) holds for every group: there are eight of degree three."""
+    """So the derivation for SO(3) holds for every group: there are eight of degree three."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)

@@ -126,7 +126,7 @@ def cubic_of_quaternions(margin):
 
 
 def cayleys_cubic(short_of):
-    """It turns once more in a time of about the square of what it lacks to a half-turn."""
+    """It turns once more in a time of about the square of π minus its angle."""
     w0, w1, n = np.array([1.0, 0, 0]), np.array([0, 2.0, 0]), np.array([1.0, 2, 2]) / 3
     goal = n / np.tan(short_of / 2)
     rate = (w1 + np.cross(goal, w1) + goal * (goal @ w1)) / 2

@@ -81,7 +81,7 @@ def test_every_lesson_is_announced_with_its_minutes_and_has_two_questions_for_ea
 
 @every_lesson
 def test_the_figures_in_a_lesson_are_the_stored_ones(path):
-    """All whose captions name files; what an exercise shows may have none."""
+    """All figures whose captions name files; pictures in exercises may have no files."""
     text = path.read_text("utf-8")
     shown = re.findall(BASE64 + r".{0,30}<figcaption>[^<]* <small>(\w+)\.", text)
     assert len(shown) == len(re.findall(r"<small>\w+\.(?:png|gif), ", text))

@@ -283,7 +283,7 @@ def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(wha
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
-    """To the bit: what is computed for one number of threads is kept for others."""
+    """To the bit: matrices computed with one number of threads are kept for others."""
     found = []
     for threads in (1, 2):
         for kept in (grid, interpolation):

@@ -302,7 +302,7 @@ def test_far_from_the_origin_it_is_the_same_motion():
 
 
 def test_a_dwell_is_a_rest_wherever_it_is_seen_from_and_near_neighbours_are_none():
-    """Poses equal but for the rounding of their products, at the origin of the frame too."""
+    """Poses that differ only by the rounding of their products, also at the origin of the frame."""
     stay = POSES[[0, 1, 1, 2]]
     for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
         seen = frame @ stay

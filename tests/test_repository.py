@@ -45,7 +45,7 @@ EXTRAS = {  # of rbcourse and of rbcourse-classroom, and the list that contains 
 
 
 def ranges_of(name):
-    """What a list has to contain: dependencies, and extras."""
+    """The contents of a list: dependencies, and extras."""
     wanted = []
     for project, extras in zip((PROJECT, CLASSROOM), EXTRAS[name], strict=True):
         wanted += project["dependencies"] if name == "environment.txt" else []
@@ -170,7 +170,7 @@ def course_module():
 
 @pytest.fixture
 def setting_up(tmp_path, monkeypatch):
-    """course.py in a folder of its own, where set-up only notes what it would run."""
+    """course.py in a folder of its own, where set-up only records its commands."""
     module, done = course_module(), []
 
     def pretend(*command, **_):
@@ -416,7 +416,7 @@ NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "
 NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
-IMPORTED = {  # what is installed, and the modules that need more
+IMPORTED = {  # the installed list, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),

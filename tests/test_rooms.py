@@ -77,7 +77,7 @@ def part(module):
 
 
 def imports(module, path, known):
-    """What a module imports anywhere, inside functions too: modules of the packages, libraries."""
+    """The imports of a module, also inside functions: modules of the packages, libraries."""
     inner, outer = set(), set()
     here = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):

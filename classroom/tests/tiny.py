@@ -34,7 +34,7 @@ def lecture(folder, *further):
 
 
 def ask(address, method="GET", body=None, **headers):
-    """Ask for a page; return its status, its text and what it sets in cookies."""
+    """Request a page; return its status, its text and its cookies."""
     parts = urlsplit(address)
     connection = http.client.HTTPConnection(parts.netloc, timeout=60)
     connection.request(method, f"{parts.path or '/'}?{parts.query}", body, headers)

@@ -113,7 +113,7 @@ def save_animation(
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
     """Return the frames as pictures.
 
-    What does not move is drawn once, and restored before each frame. The axes must not change.
+    Fixed artists are drawn once, and restored before each frame. The axes must not change.
     """
     before: Any = fig.canvas
     paint = painter(fig, update(0))
@@ -146,7 +146,7 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
 
 
 def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return pictures as an endless GIF that takes so many seconds, in its steps of 10 ms."""
+    """Return pictures as an endless GIF of a duration in seconds, in steps of 10 ms."""
     content = io.BytesIO()
     ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)
     durations = [int(10 * step) for step in np.diff(ends)]

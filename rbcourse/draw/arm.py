@@ -69,7 +69,7 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
 def moving_arm(
     ax: Axes, path: Array, shown: Iterable[int], lengths: ArrayLike = LINKS
 ) -> Callable[[int], list[Any]]:
-    """Draw an arm, pale, in some of its states; return what moves it along its way.
+    """Draw an arm, pale, in some of its states; return the function that moves it along its path.
 
     The axes show all that the arm can reach. ``update(i)`` moves the arm to state i, draws the way
     of the tip up to there, and returns the artists that move (RR 4.3, RR Fig. 8, RR Fig. 9).

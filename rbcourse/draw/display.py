@@ -40,7 +40,7 @@ for (const image of document.querySelectorAll("#$name")) rbcourseDisplay.revive(
 
 
 class Display(RendererBase):
-    """A renderer of Matplotlib that returns what is drawn as numbers.
+    """A renderer of Matplotlib that returns the drawing as numbers.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def _marker(outlines: Any) -> tuple[tuple[int, ...], ...]:
 
 
 def joined(states: Sequence[NDArray[np.int16]]) -> bytes:
-    """Return states of `Display.record`: how many, their lengths, and what they draw."""
+    """Return states of `Display.record`: their number, their lengths, and their drawings."""
     sizes = np.array([len(states), *map(len, states)], "<u4")
     return sizes.tobytes() + np.concatenate(states).astype("<i2").tobytes()
 
@@ -195,11 +195,11 @@ class Player:
     Parameters
     ----------
     name, alt, caption : str
-        What it is called, its description, and its caption as HTML.
+        Its name, its description, and its caption as HTML.
     shown, background : bytes
-        PNGs, twice as fine as they are shown: the still, and what does not move.
+        PNGs at twice the shown resolution: the still, and the fixed artists.
     display : Display
-        What has recorded the states.
+        The recorder of the states.
     states : sequence of ndarray
         One for each combination of the controls, that of the last one running fastest.
     controls : sequence of dict
@@ -208,7 +208,7 @@ class Player:
     milliseconds : int, optional
         From one state to the next while it plays.
     texts : sequence, optional
-        Of each state what is to be read: pairs of texts, a notice, and all of it as one line.
+        The readouts of each state: pairs of texts, a notice, and all of it as one line.
     """
 
     name: str

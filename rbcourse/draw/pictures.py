@@ -1,4 +1,4 @@
-"""Figures as pictures: what does not move is drawn once, and PNGs are small."""
+"""Figures as pictures: fixed artists are drawn once, and PNGs are small."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ Paint = Callable[[Sequence[Any] | None], Image.Image]
 
 
 def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
-    """Draw what does not move, once; return a function that draws moving artists over it.
+    """Draw the fixed artists once; return a function that draws moving artists over them.
 
     The function draws the scenes of the figure, too; with None instead of artists it draws nothing.
     """
@@ -37,7 +37,7 @@ def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
 def drawn(
     fig: Figure, moving: Sequence[Any], artists: Sequence[Any] | None, zoom: float = 2
 ) -> bytes:
-    """Return a figure with only these of its moving artists, so many times as fine, as a PNG.
+    """Return a figure with only these of its moving artists as a PNG, enlarged by `zoom`.
 
     With None instead of artists it is the background alone, without scenes.
     """

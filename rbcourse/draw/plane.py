@@ -68,7 +68,7 @@ def draw_compared(
 def moving_route(
     ax: Axes, path: Array, length: float, shown: Iterable[int]
 ) -> Callable[[int], list[Any]]:
-    """Draw a rectangle, pale, at some of its poses; return what moves it along its way.
+    """Draw a rectangle, pale, at some of its poses; return a function that moves it.
 
     ``update(i)`` moves the rectangle to state i, draws the way of its centre up to there, and
     returns the artists that move (RR 3.3, RR Fig. 6, RR Fig. 7).

@@ -75,7 +75,7 @@ class Picture:
     name : str
         The name of its files, without ending.
     alt : str
-        Alternative text: what the figure shows.
+        Alternative text: a description of the figure.
     png : bytes
         The picture, finer than it is shown: sharp on fine screens and on large ones.
     width : int
@@ -116,7 +116,7 @@ def caption(alt: str, files: str = "") -> str:
 def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Player:
     """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
 
-    What is in a `Space` can be turned in the notebook; the files show it as it is seen at first.
+    A `Space` can be turned in the notebook; the files show its first view.
     The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, by default
     to ``figures`` in the current folder; if it is empty, no files are written. The same input gives
     the same bytes. The PNG has 256 colours, which makes it a third as large; no difference is seen.

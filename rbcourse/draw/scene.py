@@ -1,4 +1,4 @@
-"""Pieces of a scene in space, cut and ordered for the eye: what is before hides what is behind.
+"""Pieces of a scene in space, cut and ordered by depth, so that near pieces hide far ones.
 
 The browser does the same, for each direction of view, with scene.js.
 """
@@ -22,7 +22,7 @@ OVERLAP = 0.55
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """What is drawn in one go.
+    """A piece that is drawn at once.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ class Piece:
     fill : tuple of float, optional
         The colour that it is filled with.
     marker : tuple of Path
-        What is drawn at each of its places, in pixels, y upwards.
+        The picture that is drawn at each of its places, in pixels, y upwards.
     zorder : float
-        Where no face decides, what has the least one is drawn first.
+        If no face decides, the piece with the least one is drawn first.
     normal : ndarray, shape (3,), optional
         Of a face: the normal of the whole, of which this may be a part.
     text : artist, optional

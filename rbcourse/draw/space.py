@@ -1,4 +1,4 @@
-"""Axes for what is in space: lines, letters, marks and the faces of bodies are one scene.
+"""Axes in space: lines, letters, marks and the faces of bodies are one scene.
 
 Matplotlib draws one artist in space after the other, so that a line is before or behind all of a
 body. Here all artists become pieces of a scene, which are cut where they pass through faces.
@@ -92,7 +92,7 @@ class Faces(Artist):
 
 
 class Ball(Artist):
-    """A ball of white glass: what is behind it, or on its far side, is pale.
+    """A ball of white glass: objects behind it, or on its far side, are pale.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Scene(Artist):
 
     @property
     def artists(self) -> list[Any]:
-        """What is in the scene."""
+        """The objects of the scene."""
         for artist in self.axes.get_children():
             if hasattr(artist, "do_3d_projection"):
                 name = type(artist).__name__
@@ -264,7 +264,7 @@ class Sight:
 
 
 class Space(Axes3D):  # type: ignore[misc]
-    """Axes in which units are equal and what is far is as large as what is near.
+    """Axes with equal units and an orthographic projection.
 
     They are the projection "space" of Matplotlib: ``plt.subplots(subplot_kw={"projection":
     "space"})``. ``plot``, ``text`` and ``add_artist``, with `Faces` or a `Ball`, put into them what
@@ -288,13 +288,13 @@ class Space(Axes3D):  # type: ignore[misc]
         self.scene.set_figure(self.get_figure())
 
     def fit(self, low: ArrayLike, high: ArrayLike, zoom: float = 1.0) -> None:
-        """Show what is between two corners, shape (3,)."""
+        """Set the limits to a box between two corners, shape (3,)."""
         (x0, y0, z0), (x1, y1, z1) = np.array(low, float), np.array(high, float)
         self.set(xlim=(x0, x1), ylim=(y0, y1), zlim=(z0, z1))
         self._magnified = zoom
 
     def sight(self) -> Sight:
-        """Return how what is in space is seen."""
+        """Return the view: elevation and azimuth."""
         if self.roll or not -90 <= self.elev <= 90:
             view = f"elev {self.elev:g}, roll {self.roll:g}"
             raise ValueError(f"view_init: -90 <= elev <= 90 and roll 0 wanted, got {view}")
@@ -311,7 +311,7 @@ class Space(Axes3D):  # type: ignore[misc]
         return Sight(scale, middle, seen[0], right, up, np.cross(right, up))
 
     def draw(self, renderer: Any) -> None:
-        """Draw what is not in space, titles and legends, and the scene over it."""
+        """Draw titles and legends, and the scene over them."""
         if not self.get_visible():
             return
         inside = [artist for artist in self.scene.artists if artist.get_visible()]

@@ -280,7 +280,7 @@ class Optimum(Curve):
 
     @property
     def cost(self) -> Any:
-        """What is least."""
+        """The minimised integral."""
         return self._told(self.found["cost"] / self.duration ** (self.functional.ends + 1))
 
     @property
@@ -332,7 +332,7 @@ class Optimum(Curve):
         return self.functional.name
 
     def __repr__(self) -> str:
-        """Return what it is, what it costs, and what is left of the equations."""
+        """Return the kind, the cost and the residual."""
         cost = "" if self.batch_shape else f", cost {self.cost:.6g}"
         return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 

@@ -29,8 +29,8 @@ class Primitives(NamedTuple):
     """How k = x⁽ᵐ⁾ at the nodes, and the m end values of x, give x, x', … x⁽ᵐ⁾.
 
     At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k, without derivatives of k: x is the
-    m-fold integral of k, and the polynomial of least degree that mends its ends. The first are the
-    same for the Chebyshev coefficients of x⁽ⁱ⁾. `fit` gives the k, smooth, of an x that has zero
+    m-fold integral of k, and the polynomial of least degree that corrects its ends. The other two
+    matrices give the Chebyshev coefficients of x⁽ⁱ⁾. `fit` gives the smooth k of an x with zero
     ends.
     """
 
@@ -115,6 +115,6 @@ def along(matrix: Array, values: Array) -> Array:
 
 
 def tails(values: Array) -> Array:
-    """Return the larger of the last two Chebyshev coefficients: what the nodes do not carry."""
+    """Return the larger of the last two Chebyshev coefficients, to estimate truncation."""
     last = np.abs(along(grid(values.shape[1]).series[-2:], values))
     return last.max(axis=tuple(range(1, last.ndim)))

@@ -1,7 +1,7 @@
 """R p = c solved for the whole curve at once: Newton's method on rotations at Chebyshev nodes.
 
 `Stationary` is the equation for any functional, `BallStationary` the same for a ball, where it is
-R w'' = c, there are fewer unknowns, and a step is quicker.
+R w'' = c, there are fewer unknowns, and a step is faster.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Solution(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """One problem not solved: what was left, and after how many steps."""
+    """One problem not solved: its residual, and the number of steps."""
 
     residual: float
     iterations: int
@@ -71,7 +71,7 @@ class Equations(Protocol):
         """Return on how many nodes to solve it, from n on."""
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
-        """Return the largest error of each problem, and what a step is made from."""
+        """Return the largest error of each problem, and the data for a step."""
 
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns of the nodes, in the fixed frame, and the changes of the others.
@@ -86,7 +86,7 @@ class Equations(Protocol):
         """Return the changes of k that belong to the `responses`."""
 
     def tails(self, unknowns: Arrays) -> Array:
-        """Return what the nodes do not carry."""
+        """Return the truncation errors."""
 
     def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
         """Return k, c and the cost."""
@@ -198,7 +198,7 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
 
 
 def _verdicts(tail: Array, left: Array, before: Array, size: Array) -> NDArray[np.intp]:
-    """Tell what is solved, and what wants finer nodes, after a step of that size; else FAILED.
+    """Return for each problem whether it is solved or needs more nodes, after a step; else FAILED.
 
     It is solved where the equation and the last coefficients are small; it wants finer nodes where
     the coefficients are the larger, or where rounding stops the iteration.
@@ -238,7 +238,7 @@ def kinematic_error(R0: Array, R: Array, w: Array) -> tuple[Array, Array]:
 
 
 def mending_turns(R: Array, E: Array, W: Array) -> Array:
-    """Return d: to first order turns ε = d + ∫ R δw dt mend E, with δw a change of w.
+    """Return d: to first order turns ε = d + ∫ R δw dt correct E, with δw a change of w.
 
     Turns ε in the fixed frame change R ŵ too: d = vee(E Rᵀ + ∫ E ŵ Rᵀ dt).
     """
@@ -283,7 +283,7 @@ class Stationary:
         return by.fit @ (w - by.from_ends[0] @ self.ends), np.zeros((len(R), 3))
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n and what is larger of 25, 33, 49, 65, 97, 129."""
+        """Return n and the larger numbers of 25, 33, 49, 65, 97, 129."""
         return n, *(more for more in (25, 33, 49, 65, 97, 129) if more > n)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:

@@ -1,4 +1,4 @@
-"""What the optima on SO(3) minimise, and the p for which R p is constant along them.
+"""The functionals that optima on SO(3) minimise, and the p for which R p is constant.
 
 Each functional is a number times ∫ ‖u‖² dt, with u a function of w, w' and, for the jerk, w''. Vary
 a curve R(t) to R exp(η̂), with η a small function of time. Then w changes by δw = η' + w × η, and,
@@ -27,7 +27,7 @@ from rbcourse.so3 import hat
 
 
 class Functional(Protocol):
-    """A number times ∫ ‖u‖² dt, for a stack of problems; and what is linear about it.
+    """A number times ∫ ‖u‖² dt, for a stack of problems, and its linearisation.
 
     The rates w, w', … have the shape (N, n, 3): N problems, n times. Derivatives by them are lists
     of 3 × 3 matrices, shape (N, n, 3, 3), of which the first is by w.
@@ -35,7 +35,7 @@ class Functional(Protocol):
     Attributes
     ----------
     name : str
-        What the optimum is called.
+        The name of the optimum.
     ends : int
         How many end values the optimum has: w, or w and w', at 0 and at 1. So many derivatives of w
         stand in p.

@@ -240,7 +240,7 @@ def cost_at_nodes(functional: Functional, R: Array) -> Array:
 
 
 def rates_of(R: Array, count: int) -> list[Array]:
-    """Return w, w', … at the nodes, so many, from R there."""
+    """Return w and its derivatives at the nodes, `count` in all, from R there."""
     derivative = grid(R.shape[1]).derivative
     rates = [vee(R.mT @ along(derivative, R))]
     for _ in range(count - 1):

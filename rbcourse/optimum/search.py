@@ -49,7 +49,8 @@ NOTHING = Failure(np.inf, 0)
 class Limits:
     """When the search goes further. Ratios are of costs to the cheapest; turns in rad.
 
-    Curves are lowered by at most so many steps, each by at least a share of the cost.
+    A pair limits the lowering of curves: the largest number of steps, and the least gain of a step
+    as a share of the cost.
     """
 
     nodes: int = 17  # on which curves are started, and the linear systems of a ball solved
@@ -186,9 +187,9 @@ def _on_nodes(R: Array, n: int) -> Array:
 
 
 def cheapest(task: Task) -> list[Solution | Failure]:
-    """Follow the starts that cost little when lowered; where that is not enough, all of them.
+    """Follow the starts that cost little when lowered; if that is not enough, all of them.
 
-    It is not where nothing is found, or what is found costs more than a start, lowered or not.
+    It is not enough if nothing is found, or if the result costs more than a start, lowered or not.
     Where all of them are not enough either, they are lowered farther.
     """
     with np.errstate(over="ignore", invalid="ignore"):
@@ -358,7 +359,7 @@ def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Put what is found from these curves into `found`, where it costs less.
+    """Put the solutions from these curves into `found`, if they cost less.
 
     Of curves that cost the same the first one stays, so that rounding does not decide.
     """

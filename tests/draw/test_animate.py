@@ -175,7 +175,7 @@ def test_the_player_is_complete(saved):
     assert not re.search(r"https?:|src=\"(?!data:)", page)
     assert "$" not in re.sub(r"\$\{|\"data:[^\"]*\"", "", page)  # all is filled in
     assert 'alt="a &quot;cube&quot;"' in page
-    assert page.count("data:image/png;base64,") == 2  # the still, and what does not move
+    assert page.count("data:image/png;base64,") == 2  # the still, and the fixed artists
     assert '>a "cube" <small>cube.gif, .png, .pdf, .csv</small></figcaption>' in page
     data = held(page)
     shares = data["controls"][0]["values"]

@@ -31,7 +31,7 @@ from rbclassroom.assignments.locked_cells import Refused, marks_of, name_cell
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 
 UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
-# what a page shows of students' HTML: nothing that runs, loads or looks like the page itself
+# pages show students' HTML without parts that run, load files or imitate the page
 TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt"}
 TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
 TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
@@ -105,7 +105,7 @@ class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
     """Restore the cells that students must not change; refuse what overrides what tests rely on."""
 
     def preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
-        """Restore the notebook as it was released; what was changed is noted in its metadata."""
+        """Restore the notebook as it was released, and note the changes in its metadata."""
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)

@@ -1,4 +1,4 @@
-"""Check a problem set before submission: what was changed, whether it runs, the file to submit.
+"""Check a problem set before submission: report changed cells and errors, write the file to submit.
 
 A student runs this, without nbgrader.
 """
@@ -96,7 +96,7 @@ class _Client(BoundedClient):
 
 
 def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
-    """Run all cells; say what did not go well, except in a problem."""
+    """Run all cells, and report errors outside of the problems."""
     log = logging.getLogger(__name__)
     log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
     cells, ends = notebook.cells, list[str]()

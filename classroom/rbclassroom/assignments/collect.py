@@ -142,7 +142,7 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
             if wanted and entry.file_size > FILE_BYTES:
                 raise ValueError("too large")
             content = zipped.read(entry) if wanted else b""
-            # what a student packed has the dates of the student's machine
+            # files in a student's zip have the dates of the student's machine
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:
             yield "refused", f"{label}: {inner}", str(error)
@@ -181,7 +181,7 @@ def _read_sets(assignments: Path) -> dict[str, set[str]]:
 
 
 def _read_roster(path: Path) -> list[dict[str, str]]:
-    """Return the rows of the roster, whatever its delimiter; none where there is none."""
+    """Return the rows of the roster, with any delimiter; no rows if there is no roster."""
     if not path.exists():
         return []
     try:
@@ -198,7 +198,7 @@ def _read_roster(path: Path) -> list[dict[str, str]]:
 
 
 def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
-    """Return the set that a file is of, by its cells and by its name, or why there is none."""
+    """Return the set of a file, by its cells and its name, or the reason why there is none."""
     cells, stem = read_notebook(upload.content, "it").cells, Path(upload.about["file"]).stem
     shared = {name: len({grade_id(cell) for cell in cells} & own) for name, own in sets.items()}
     named = [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", stem, re.IGNORECASE)]
@@ -218,7 +218,7 @@ def _plain(name: str) -> str:
 
 
 def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
-    """Return the id in the roster of a student, or what can be made of the name."""
+    """Return a student's id in the roster, or an id made from the name."""
     canvas, plain, number = "number" in about, _plain(about["name"]), _plain(about["id"])
     found = [r["id"] for r in roster if canvas and r.get("lms_user_id") == about["id"]]
     key: Any = "".join if canvas else sorted  # Canvas writes the last name first, without spaces
@@ -233,7 +233,7 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
 
 
 def _take(best: Upload, place: Path) -> Row:
-    """Put a file in its place, unless what is there is newer."""
+    """Put a file in its place, unless a newer one is there."""
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
     text = decode(best.content).encode()
     note = "; it is stored in UTF-8, which it was not" * (text != best.content)

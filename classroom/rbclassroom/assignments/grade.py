@@ -33,7 +33,7 @@ from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.tables import update
 
-WORKERS = 2  # so many students are graded at once
+WORKERS = 2  # number of students that are graded at once
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
 Job = tuple[str, str]  # a set and a student
@@ -156,7 +156,7 @@ def course_config(name: str, assignments: Path) -> Config:
 
 
 def run_step(converter: Any, config: Config) -> dict[str, Any]:
-    """Run a step of nbgrader, over what it made before, and print nothing."""
+    """Run a step of nbgrader, replacing earlier results, and print nothing."""
     log = logging.getLogger(__name__)
     log.propagate, log.handlers = False, [logging.NullHandler()]
     step = converter(CourseDirectory(config=config), config=config, log=log)
@@ -239,7 +239,7 @@ def _words(path: Path) -> dict[str, str]:
 
 
 def check_submission(folder: Path, name: str, given: set[str]) -> None:
-    """Refuse what nbgrader cannot read, and what it would copy: links, files not handed out."""
+    """Refuse notebooks that nbgrader cannot read, and links and foreign files."""
     wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
     path = folder / wanted
     if wanted not in there:
@@ -283,13 +283,13 @@ def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[
 
 
 def _tidy(words: str) -> str:
-    """Return a remark, which may hold what a student wrote, as a short line that can be printed."""
+    """Return a remark, which may quote a student, as a short printable line."""
     words = "".join(letter if letter.isprintable() else "?" for letter in words)
     return words if len(words) <= 300 else f"{words[:300]}…"
 
 
 def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:
-    """Take back what a machine gave a submission that is refused now."""
+    """Remove the automatic points of a submission that is refused now."""
     for step in ("autograded", "feedback"):
         if (root / step / student / name).exists():
             rmtree(str(root / step / student / name))

@@ -105,7 +105,7 @@ def build_wheel(course: Path) -> tuple[str, bytes]:
 
 
 def make_handout(name: str, assignments: Path, course: Path) -> Path:
-    """Write ``handouts/NAME.zip``, which is what the students get; the same bytes each time."""
+    """Write ``handouts/NAME.zip`` for the students, with the same bytes each time."""
     files = release(name, assignments)
     wheels = dict(build_wheel(folder) for folder in (course, course / "classroom"))
     environment = (course / "environment.txt").read_text("utf-8").splitlines()

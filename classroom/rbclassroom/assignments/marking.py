@@ -115,7 +115,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Drawing(Problem):
-    """A function to be written, which draws: judged by the data of what it drew.
+    """A function to be written that draws: judged by the data of its artists.
 
     The student's function gets axes before the arguments of `inputs`. A result is a list of
     curves, each an array of points, shape (n, 2); others may be drawn besides. The bars of a

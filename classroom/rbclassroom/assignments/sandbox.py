@@ -2,7 +2,7 @@
 
 In the box the kernel sees its own folder, the system's programs, this Python with its libraries
 and the package, and nothing else of the disk; it has no network and few environment variables.
-What it starts ends with it. Outside Linux, and where bubblewrap does not work, there is no box.
+Its processes end with it. Outside Linux, or if bubblewrap does not work, there is no box.
 """
 
 import functools

@@ -1,6 +1,6 @@
 """Call a student's function: tell where it stops, and which functions it uses that it should not.
 
-Only what a function names is looked at: that tells an honest student what is not meant.
+Only the names in a function are examined: this is help for honest students, not protection.
 """
 
 import linecache
@@ -16,7 +16,7 @@ LIBRARIES |= {"quaternion"}
 
 
 class NotYet(AssertionError):
-    """What is wrong, for the student to read; a notebook shows it without a traceback."""
+    """An error message for the student; a notebook shows it without a traceback."""
 
     def _render_traceback_(self) -> list[str]:
         return textwrap.wrap(str(self), 80)
@@ -25,7 +25,7 @@ class NotYet(AssertionError):
 def call_student(
     function: Any, arguments: tuple[Any, ...], allowed: Sequence[str], times: int = 1
 ) -> list[Any]:
-    """Return what a student's function returns, each time."""
+    """Return the results of a student's function, one for each call."""
     for foreign in _foreign_names(function, allowed):
         how = "Write it yourself: with Python, NumPy, and what the problem set allows."
         raise NotYet(f"This uses {foreign}. {how}")
@@ -44,7 +44,7 @@ def call_student(
 
 
 def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
-    """Yield what a function refers to, itself or by the student's other functions, of libraries."""
+    """Yield the library objects that a function or the functions that it calls refer to."""
     permitted = [("rbcourse", name) for name in allowed]
     waiting, known = [(function, list[str]())], set[tuple[Any, ...]]()
     while waiting:

@@ -139,7 +139,7 @@ def with_keys(text: str, page: str = "ledger.md") -> str:
 def relinked(text: str, path: str, page: str) -> str:
     r"""Return Markdown of a file for a page of the book.
 
-    Links to what has a page lead there, others to a copy of the file in the folder ``files``.
+    A link to a file with a page leads to the page, others to a copy in the folder ``files``.
     The transposed of a matrix has the sign ``\top``, which the font of formulas has.
     """
     text = re.sub(r"\\mathsf(?: T|\{T\})", r"\\top", text)

@@ -116,7 +116,7 @@ def naming(root: Path) -> dict[str, list[str]]:
 
 
 def _imported(tree: ast.Module) -> dict[str, str]:
-    """Return the full names of what a file imports, by the names that it uses."""
+    """Return the full names of the imports of a file, by the names that it uses."""
     known = {}
     for node in tree.body:
         if isinstance(node, ast.Import | ast.ImportFrom):

@@ -130,7 +130,7 @@ def split(content: bytes) -> list[Numbers]:
 
 
 def polygons(state: Numbers, styles: list[Any]) -> list[tuple[Any, bool, NDArray[np.float64]]]:
-    """Return what a state of `rbcourse.draw.display.Display.record` draws.
+    """Return the drawing of a state of `rbcourse.draw.display.Display.record`.
 
     Of each polygon: its style, whether it is filled together with the one before it, and its
     places in pixels. In space styles have more than eight parts, and places three numbers.

@@ -45,7 +45,7 @@ The tests show that the one does not hold, and the other does. (21 only looks li
 
 @dataclass
 class Entry:
-    """Where one entry of the texts is to be found.
+    """The places where one entry of the texts occurs.
 
     Functions and constants, such as ``so3.hat_so3``, are named within their package, tests, such as
     ``test_so3.py::test_hat``, and lessons, as ``06_geodesics.ipynb, 3``, within their folder.
@@ -61,7 +61,7 @@ class Entry:
 
 
 def collect(root: Path) -> dict[str, Entry]:
-    """Return where each entry and each misprint is to be found.
+    """Return the places of each entry and each misprint.
 
     Functions come from "Source: …" in their docstrings, constants from the text below them, tests
     from their marks ``source``, lessons from the keys in small type below their headings.

@@ -60,7 +60,7 @@ def living(name: str, root: Path) -> str:
 
 
 def execute(path: Path, figures: Path) -> str:
-    """Run a lesson from top to bottom in a new kernel and return what is to be stored."""
+    """Run a lesson from top to bottom in a new kernel, and return the notebook to be stored."""
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(
         notebook,
@@ -202,7 +202,7 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
-    """Copy the lessons to a folder to work in, trusted; what was written there is never touched.
+    """Copy the lessons, trusted, to a folder to work in; files that were changed there are kept.
 
     A lesson that is new to the folder is copied. One that has changed since it was copied takes
     the place of its copy if the cells of that are as they were, run or not, and is laid beside it
@@ -235,7 +235,7 @@ def copy_lessons(lessons: Path, work: Path) -> None:
 
 
 def _read_record(record: Path) -> dict[str, list[str]]:
-    """Return what was copied when; nothing where the record is lost or damaged."""
+    """Return the record of copies; an empty one if it is lost or damaged."""
     try:
         copied = json.loads(record.read_bytes())
     except (OSError, ValueError):
@@ -263,7 +263,7 @@ def _digest(content: bytes) -> str:
 
 
 def _cells(content: bytes) -> bytes:
-    """Return what a person writes in a notebook; all of it where it cannot be read as one."""
+    """Return the sources of a notebook; the whole text if it is not a valid notebook."""
     try:
         return json.dumps(_sources(nbformat.reads(content.decode(), as_version=4))).encode()
     except Exception:

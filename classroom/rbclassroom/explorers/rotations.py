@@ -116,7 +116,7 @@ def projection_explorer() -> Explorer:
 
 
 def _gram_schmidt(M: rb.Array) -> tuple[rb.Array, str]:
-    """Return the Gram–Schmidt result for M, and why it is no rotation, or "" if it is one."""
+    """Return the Gram–Schmidt result for M, and the reason why it is not a rotation, or ""."""
     try:
         G = rb.orthonormalize_gram_schmidt(M)
     except ValueError:

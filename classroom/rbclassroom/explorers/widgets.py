@@ -18,7 +18,7 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
 
 
 def stepped(label: str, value: float, low: float, high: float, step: float) -> Any:
-    """Return a slider of what plays: it has these steps and nothing in between."""
+    """Return a slider for playing, with these steps and no values in between."""
     values = np.round(np.arange(low, high + step / 2, step), _digits(step)) + 0.0
     options = [(numbers(x, _digits(step)), x) for x in values.tolist()]
     return ipywidgets.SelectionSlider(options=options, value=value, description=label, **_LOOK)

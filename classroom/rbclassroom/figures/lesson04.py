@@ -113,7 +113,7 @@ def describe_columns(matrices: Mapping[str, Array]) -> str:
 
 
 def _sense(M: Array) -> str:
-    """Tell what a matrix does: one that mirrors has its second column to the right of the first."""
+    """Describe a matrix: a mirror has its second column to the right of the first."""
     return "turns" if np.linalg.det(M) > 0 else "mirrors"
 
 

@@ -194,7 +194,7 @@ def cell_table(
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
     """Return the smallest number that is not below `share` of the numbers in the last axis.
 
-    NaN does not count. The result is rounded to four digits, and to so many decimals at most.
+    NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 
     Examples
     --------
@@ -207,7 +207,7 @@ def quantile(x: Array, share: float, decimals: int = 8) -> Array:
 
 
 def rounded(x: Array, decimals: int = 8) -> Array:
-    """Return numbers with four digits, and so many decimals at most."""
+    """Return numbers rounded to four digits, and to at most `decimals` decimals."""
     return np.vectorize(lambda y: round(float(f"{y:.4g}"), decimals) + 0.0, otypes=[float])(x)
 
 

@@ -101,11 +101,11 @@ def maps(excess: Mapping[str, Mapping[str, Array]], draws: int) -> dict[str, Arr
 
 
 def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
-    """Return for each domain and curve what is known of its excess, with 95 % intervals.
+    """Return for each domain and curve the quantiles of its excess, with 95 % intervals.
 
     The columns: the median and the 90 % quantile, the share of the problems within a tenth of the
     optimum, and the share for which it is the cheapest of the `CLOSED_FORMS`, the first of equals,
-    NaN for what is none; each with the ends of its interval, "low" and "high". Those of quantiles
+    NaN for other curves; each with the ends of its interval, "low" and "high". Those of quantiles
     are numbers of the sample, by the binomial law, NaN where it is too small; those of shares are
     Clopper and Pearson's. Both hold for independent problems, and are too long, rather than too
     short, for a sample with the same number of problems in each cell. All are rounded to four

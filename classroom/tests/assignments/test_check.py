@@ -1,4 +1,4 @@
-"""What a student is told before handing in, and the file that is to be submitted."""
+"""The report before a submission, and the file to submit."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What the students get: all they need, and nothing of what they shall find out."""
+"""The handout has all that students need, and no solutions."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A problem accepts what is right, hints at a listed mistake, and else says what it saw."""
+"""A problem accepts right answers, and gives hints for listed mistakes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A student's function is called; what it borrows, and where it stops, is told."""
+"""A student's function is called; borrowed functions and errors are reported."""
 
 from textwrap import dedent
 

@@ -32,7 +32,7 @@ def pytest_sessionstart(session):
 
 @pytest.fixture(scope="session")
 def context():
-    """What the pages of a worker have in common; it keeps what it has loaded."""
+    """The browser context that the pages of a worker share, with its cache."""
     expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         path = os.environ["CHROMIUM"]

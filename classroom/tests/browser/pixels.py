@@ -1,4 +1,4 @@
-"""What a canvas shows, beside Matplotlib's own picture."""
+"""The picture of a canvas, compared with that of Matplotlib."""
 
 import base64
 import io
@@ -13,7 +13,7 @@ def pixels(png):
 
 
 def shown(canvas):
-    """What a canvas of the page shows, as a PNG."""
+    """The picture of a canvas of the page, as a PNG."""
     return base64.b64decode(canvas.evaluate("(canvas) => canvas.toDataURL()").split(",")[1])
 
 

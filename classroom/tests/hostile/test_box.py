@@ -1,4 +1,4 @@
-"""What runs in a box ends: by itself, and with the process that grades."""
+"""Processes in a box end: by themselves, and with the process that grades."""
 
 import os
 import sys

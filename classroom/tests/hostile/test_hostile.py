@@ -1,4 +1,4 @@
-"""Submissions that mean harm, and unlucky ones, graded in one go: nobody else is harmed."""
+"""Malicious and broken submissions, graded in one run: no other submission is affected."""
 
 import base64
 import codecs
@@ -27,7 +27,7 @@ PIXEL = (
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+A8AAQUBAScY42YAAAAASUVORK5CYII="
 )
 HIDDEN = ["assert square(-3) == 9", "assert math.isclose(half, 0.5)"]
-SLEEP = f"9{os.getpid():08d}"  # a number of seconds that nobody else sleeps
+SLEEP = f"9{os.getpid():08d}"  # a number of seconds that no other process sleeps
 SECRET = "the-token-of-the-teacher"
 REFUSALS = {"AssertionError", "CalledProcessError", "OperationalError"}
 KINDS = [OSError, *OSError.__subclasses__(), *ConnectionError.__subclasses__()]
@@ -50,7 +50,7 @@ HONEST = {
     "odd outputs": "odd = {'text/plain': {'a': 1}, 'application/x-odd': [float('inf')]}\n"
     "display(odd, raw=True)",
 }
-# What they try fails, and they say what they got; the points are those of their answers.
+# Their attacks fail, and they report the results; the points are those of their answers.
 SNEAKS = {
     "reads the set": "print(open('COURSE/source/ps0/ps0.ipynb').read())",
     "reads others": "import os\nprint(os.listdir('COURSE/submitted'))",
@@ -75,7 +75,7 @@ SNEAKS = {
     "becomes root": "import os\nos.setuid(0)",
     "mounts": "import subprocess as s\ns.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
-# These do what they want, in the box; the points are those of their answers.
+# These succeed inside the box only; the points are those of their answers.
 LOUD = {
     "leaves daemons": "import subprocess\nfor _ in range(50):\n"
     "    subprocess.Popen(['setsid', 'sleep', 'SLEEP'], start_new_session=True)",
@@ -96,7 +96,7 @@ LOUD = {
     "display({'image/png': '', 'text/plain': ''}, raw=True,\n"
     "    metadata={'filenames': {'image/png': 'https://evil.example/x.png'}})",
 }
-# It leaves what it has read for the next run: in a file, and with the keys that Linux keeps.
+# It tries to pass data to the next run: in a file, and in the kernel's keyring.
 TELLS = """
 import base64, linecache, platform
 import numpy
@@ -115,7 +115,7 @@ def square(x):
     except OSError:
         pass
     return x * x
-call(keyctl, 8, -4, -2)  # what the process has it may read
+call(keyctl, 8, -4, -2)  # the process may read its own data
 for ring in (-3, -4):
     key = call(keyctl, 10, ring, b"user", b"note", 0)
     text = ctypes.create_string_buffer(9999)
@@ -248,7 +248,7 @@ def state(folder):
 
 @pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
 def test_each_submission_has_its_points_and_a_clear_line(course, rows, student, wanted, remark):
-    """Noise costs nobody points. A remark that is None may be any."""
+    """Noise costs no points. A remark that is None may have any text."""
     row = rows["'" * student.startswith("=") + student]
     assert f"{row['square-test']} {row['half-test']}" == wanted, row
     assert row["remarks"].isprintable()
@@ -303,7 +303,7 @@ def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(pages):
 
 
 def test_grading_without_a_box_is_announced_or_refused(tmp_path, template, monkeypatch, capsys):
-    """As on macOS: then a submission can do what the teacher can."""
+    """As on macOS: without a box a submission has the rights of the teacher."""
     why = "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
     monkeypatch.setattr(sandbox, "missing", lambda: why)
     course = Class(tmp_path, template)

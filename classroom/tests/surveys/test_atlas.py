@@ -1,4 +1,4 @@
-"""The atlas: its problems, what curves cost in it, and what is read off."""
+"""The atlas: its problems, the costs of curves, and the quantiles."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The atlas of real bodies: its curves, its domains, and what is known of a quantile."""
+"""The atlas of real bodies: its curves, its domains, and the intervals of quantiles."""
 
 import numpy as np
 import pytest

@@ -65,7 +65,7 @@ def test_the_optimum_is_the_lowest_of_several_starts():
 
 
 class Backwards(Executor):
-    """An executor of one worker that does what is submitted last first."""
+    """An executor of one worker that runs the last submitted task first."""
 
     def __init__(self):
         self.waiting = []
