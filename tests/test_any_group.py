@@ -133,7 +133,7 @@ def excess(R, n):
     shapes = [np.einsum("tj,ab->jatb", p, np.eye(d)) for p in polynomials(10, 2, NODES)[:3]]
     eta, rate, bend = (x.reshape(-1, NODES, d) for x in shapes)
     saved = 0.0
-    for _ in range(16):
+    for _ in range(10):
         by = bend + bracket(a, eta, n) + bracket(w, rate, n)
         slope = np.einsum("t,ta,jta->j", weights, a, by)
         step = np.linalg.solve(np.einsum("t,ita,jta->ij", weights, by, by), -slope)
