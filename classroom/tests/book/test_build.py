@@ -143,7 +143,7 @@ def test_the_page_of_a_lesson_has_all_of_it_but_its_run_sheet(path, source):
 def test_lessons_that_are_named_are_linked_and_explorers_live(source):
     text = source("lessons/06_geodesics.ipynb")
     assert "([lesson 3](03_rotations_in_space.ipynb))" in text
-    assert "On to [lesson 1](01_plane.ipynb)" in source("lessons/00_start_here.ipynb")
+    assert "Go on to [lesson 1](01_plane.ipynb)" in source("lessons/00_start_here.ipynb")
     cells = nbformat.reads(text, as_version=4).cells
     (explorer,) = [cell for cell in cells if "explorers.theta_explorer()" in cell.source]
     shown = explorer.outputs[0].data["text/html"]
