@@ -20,7 +20,7 @@ from rbclassroom.lecture.slides import deck_of, words_of
 ROOT = Path(__file__).parents[3]
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
 SHEET = "## Run sheet for the lecturer\n\n| minute | part | ask | skip |\n|---|---|---|---|\n"
-QUESTION = "# Tiny: a lesson\n\n**The question of this session.** Why?\n\nGoals."
+QUESTION = "# Tiny: a lesson\n\n**The question of this lesson.** Why?\n\nGoals."
 
 
 def text(source, slide=None, **more):
