@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array
 
-Rng: TypeAlias = "np.random.Generator | int | None"  # loads no numpy.random
+Rng: TypeAlias = "np.random.Generator | int | None"  # a string: numpy.random is not imported
 
 
 def as_array(
@@ -20,19 +20,20 @@ def as_array(
 ) -> Array:
     """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
 
-    A letter in `core` matches any size ≥ 1, repeated letters the same size, and "n+1" any size ≥ 2:
-    ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are batch axes;
-    with ``stacked=False`` there may be none. With ``copy=False`` the result may be the input.
+    A letter in `core` matches any size ≥ 1, repeated letters match the same size, and "n+1" matches
+    any size ≥ 2. For example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All
+    other axes are batch axes; with ``stacked=False``, no batch axis is allowed. With
+    ``copy=False``, the result may be the input.
 
     Raises
     ------
     ValueError
-        If `value` is ragged, masked, not made of real numbers, or of another shape; the message
-        names the argument, the wanted and the given.
+        If `value` is ragged, masked, not made of real numbers, or of another shape. The message
+        names the argument, what is wanted, and what was given.
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]
-    ma = sys.modules.get("numpy.ma")  # without it there are no masked arrays
+    ma = sys.modules.get("numpy.ma")  # if it is not loaded, no array is masked
     if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
         raise ValueError(f"{name}: a masked array, whose mask would be lost; fill or compress it")
     try:
@@ -51,19 +52,19 @@ def as_array(
 
 
 def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
-    """Return `as_array` of the arguments, where no entry may be NaN or infinite."""
+    """Return `as_array` of the arguments; no entry may be NaN or infinite."""
     array = as_array(name, value, *core, stacked=stacked)
     _check_all(np.isfinite(array), name, array, "a finite number")
     return array
 
 
 def as_single(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of one array of the shape `core`, no stack of them."""
+    """Return `as_finite` of one array of the shape `core`; a stack is not allowed."""
     return as_finite(name, value, *core, stacked=False)
 
 
 def as_unit(name: str, value: ArrayLike, size: int) -> Array:
-    """Return `as_finite` of vectors, each over its norm."""
+    """Return `as_finite` of vectors, each divided by its norm."""
     array = as_finite(name, value, size)
     largest = np.abs(array).max(axis=-1, keepdims=True)
     if not largest.all():
@@ -90,8 +91,9 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        As `as_symmetric`; and the message names the first matrix that is not positive definite, or
-        with eigenvalues whose squares are not floating-point numbers.
+        For the same reasons as in `as_symmetric`; or if a matrix is not positive definite or the
+        squares of its eigenvalues are not floating-point numbers. The message names the first such
+        matrix.
     """
     G = as_symmetric(name, value, 3)
     moments = np.linalg.eigvalsh(G)
@@ -113,7 +115,7 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
 
 
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of the arguments, where all entries must lie in [0, 1]."""
+    """Return `as_finite` of the arguments; all entries must lie in [0, 1]."""
     array = as_finite(name, value, *core)
     _check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
     return array
@@ -124,8 +126,8 @@ def as_time(
 ) -> Array:
     """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
 
-    A time that is outside by rounding only, by 8 eps of the larger end, becomes that end. The end
-    of the domain is one, or one for each time, where the shapes broadcast.
+    A time that is outside the domain only by rounding, by 8 eps of the larger end, is replaced by
+    the nearer end. The end of the domain is one number, or an array that broadcasts with the times.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
     if not (np.all(times >= start) and np.all(times <= end)):
@@ -140,14 +142,14 @@ def as_time(
 
 
 def as_duration(name: str, value: ArrayLike) -> Array:
-    """Return durations, all from 1e-100 up: accelerations over shorter ones overflow."""
+    """Return durations of at least 1e-100; accelerations over shorter ones overflow."""
     durations = as_finite(name, value)
     _check_all(durations >= 1e-100, name, durations, "a duration from 1e-100 up")
     return durations
 
 
 def as_angle(angle: ArrayLike) -> Array:
-    """Return angles of rotation, all in [0, π]; angles that exceed π by rounding only become π."""
+    """Return angles of rotation in [0, π]; an angle that exceeds π only by rounding becomes π."""
     angles = as_finite("angle", angle)
     within = (angles >= 0) & (angles <= np.pi * (1 + 4 * EPS))
     _check_all(within, "angle", angles, "an angle in [0, π]")
@@ -155,7 +157,7 @@ def as_angle(angle: ArrayLike) -> Array:
 
 
 def as_tolerance(name: str, value: float) -> float:
-    """Return a tolerance, or raise a ValueError if it is not a number from 0 up."""
+    """Return a tolerance; raise ValueError if it is not a number of at least 0."""
     tolerance = as_array(name, value)
     if tolerance.ndim or not tolerance >= 0:
         raise ValueError(f"{name}: a number from 0 up wanted, got {value!r}")
@@ -163,7 +165,7 @@ def as_tolerance(name: str, value: float) -> float:
 
 
 def as_positive(name: str, value: float) -> float:
-    """Return a number above 0, or raise a ValueError."""
+    """Return a number above 0; raise ValueError for any other value."""
     if isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} is {value}, a number above 0 is wanted")
     number = float(as_single(name, value))
@@ -173,14 +175,14 @@ def as_positive(name: str, value: float) -> float:
 
 
 def as_count(name: str, value: int) -> int:
-    """Return a count, or raise a ValueError if it is not an integer from 1 up."""
+    """Return a count; raise ValueError if it is not an integer of at least 1."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{name}: an integer from 1 up wanted, got {value!r}")
     return int(value)
 
 
 def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
-    """Return the shape of a batch: () for None, (n,) for n; a ValueError if it is no shape."""
+    """Return the shape of a batch, () for None, (n,) for n; raise ValueError if it is invalid."""
     given: Any = () if size is None else size
     lengths = given if isinstance(given, tuple | list) else [given]
     try:
@@ -195,7 +197,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
 
 
 def as_generator(rng: Rng) -> np.random.Generator:
-    """Return a generator of random numbers, or raise a ValueError if `rng` makes none."""
+    """Return a generator of random numbers; raise ValueError if `rng` does not give one."""
     try:
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
@@ -203,7 +205,7 @@ def as_generator(rng: Rng) -> np.random.Generator:
 
 
 def check_order(order: int, most: int) -> int:
-    """Return `order`, that of a derivative; a ValueError if it is no integer from 0 to `most`."""
+    """Return the `order` of a derivative; raise ValueError unless it is an integer, 0 to `most`."""
     known = isinstance(order, int | np.integer) and not isinstance(order, bool)
     if not known or not 0 <= order <= most:
         wanted = ", ".join(map(str, range(most)))
@@ -212,12 +214,12 @@ def check_order(order: int, most: int) -> int:
 
 
 def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
-    """Return the common batch shape of arrays, each given with the number of its core axes.
+    """Return the common batch shape of arrays, which are given with the numbers of their core axes.
 
     Raises
     ------
     ValueError
-        If the batch shapes do not broadcast; the message gives every one of them.
+        If the batch shapes do not broadcast; the message lists all of them.
     """
     batches = {name: array.shape[: array.ndim - core] for name, (array, core) in arguments.items()}
     try:
@@ -228,7 +230,7 @@ def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
 
 
 def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
-    """Return how the first chosen entry is called: ``R[0, 2]``, or ``R`` where there is one."""
+    """Return the name of the first chosen entry: ``R[0, 2]``, or ``R`` for a single value."""
     first = ", ".join(str(i) for i in np.argwhere(chosen)[0])
     return f"{name}[{first}]" if first else name
 

@@ -1,18 +1,19 @@
-"""The nearest rotations to 3 × 3 matrices: Markley's fast optimal attitude matrix, FOAM.
+"""The nearest rotations to 3 × 3 matrices, by Markley's fast optimal attitude matrix, FOAM.
 
 Let R be the nearest rotation to M, so that S = RᵀM is symmetric, with eigenvalues s₁ ≥ s₂ ≥ |s₃|.
-The cofactor matrix of R f(S) is R cof f(S), for every function f. So three matrices are R times
+The cofactor matrix of R f(S) is R cof f(S) for every function f. So three matrices are products of
+R:
 
-    cof M                    a matrix with the eigenvalues s₂s₃, s₃s₁, s₁s₂;
-    cof(λM + cof M)          one with ζ (s₂ + s₃), ζ (s₃ + s₁), ζ (s₁ + s₂);
-    ζM + cof(λM + cof M)     λζ I,
+    cof M R times a matrix with the eigenvalues s₂s₃, s₃s₁, s₁s₂;
+    cof(λM + cof M) R times one with ζ (s₂ + s₃), ζ (s₃ + s₁), ζ (s₁ + s₂);
+    ζM + cof(λM + cof M) R times λζ I,
 
-where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁). Here s₁² is the largest root of
-x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, by Viète's formula, and (s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁.
-An error in λ or ζ leaves R times another symmetric matrix, near λζ I; one step of Newton's method
-for the polar factor, X ← (X + X⁻ᵀ)/2, squares its relative distance.
+where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁). Here s₁² is the largest root of x³ −
+‖M‖² x² + ‖cof M‖² x − det² = 0, computed by Viète's formula, and (s₂ + s₃)² = ‖M‖² − s₁² + 2
+det/s₁. With an error in λ or ζ, the result is R times another symmetric matrix near λζ I. One step
+of Newton's method for the polar factor, X ← (X + X⁻ᵀ)/2, squares its relative distance from λζ I.
 
-Arrays have the shape (3, 3, N). For few matrices the SVD is faster, see `rbcourse.projection`.
+Arrays have the shape (3, 3, N). For few matrices, the SVD is faster (see `rbcourse.projection`).
 """
 
 import numpy as np
@@ -20,15 +21,16 @@ from numpy.typing import NDArray
 
 from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
-LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; below, digits are lost, and matrices are rare
-_BLOCK = 5128  # matrices that fit into the cache; with rows of 4096 bytes they would collide there
+LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; smaller ζ lose digits, and are rare
+_BLOCK = 5128  # matrices that fit into the cache; rows of 4096 bytes would collide
 
 
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
-    """Write the nearest rotations to M into R, both of shape (3, 3, N); return which are right.
+    """Write the nearest rotations to M into R, both of shape (3, 3, N); return which are valid.
 
-    Wrong are those where ζ is less than `LEAST_ZETA` s₁ ‖M‖², near the singular set of
-    `project_so`, and those where an entry of M is not finite or ‖M‖ is extreme.
+    A rotation is not valid if ζ is less than `LEAST_ZETA` s₁ ‖M‖², which means that M is near the
+    singular set of `project_so`. It is also not valid if an entry of M is not finite or ‖M‖ is
+    extreme.
 
     Source: BK Prop. 2; F. L. Markley, Attitude determination using vector observations: a fast
     optimal matrix algorithm, J. Astronautical Sciences 41, 1993.
@@ -46,9 +48,9 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
 
 
 def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
-    """Write the nearest rotations to M into C, and return which are right; M and X are lost."""
+    """Write the nearest rotations to M into C, return which are valid, and overwrite M and X."""
     norm2 = _dots(M, M)
-    if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # its sixth power is a number
+    if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # so that its sixth power does not overflow
         M[...] = scaled(M, axis=(0, 1))
         norm2 = _dots(M, M)
     _write_cofactors(M, C)
@@ -75,7 +77,7 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
 
 
 def _write_cofactors(M: Array, C: Array) -> None:
-    """Write the cofactors of M into C: each row is the cross product of the two others."""
+    """Write the cofactors of M into C: each row is the cross product of the two other rows of M."""
     for i in range(3):
         (a, b, c), (d, e, f), (x, y, z) = M[i - 2], M[i - 1], C[i]
         np.subtract(b * f, c * e, x)

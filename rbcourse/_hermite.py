@@ -1,4 +1,4 @@
-"""Polynomials of degree one, three and five through given ends: Hermite interpolation."""
+"""Polynomials of degree one, three and five with given ends: Hermite interpolation."""
 
 import math
 from collections.abc import Sequence
@@ -13,19 +13,20 @@ from rbcourse._numerics import Array
 def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
     """Return the polynomial of least degree with these ends, or a derivative, at the times t.
 
-    Ends: x0, x1, for a cubic also v0, v1, for a quintic also a0, a1, at t = 0 and 1; t broadcasts
-    with them. It meets both ends exactly. The line has the least ∫ ‖x'‖² dt, the cubic the least
-    ∫ ‖x''‖² dt, the quintic the least ∫ ‖x'''‖² dt.
+    The ends at t = 0 and 1 are x0, x1, for a cubic also v0, v1, and for a quintic also a0, a1; t
+    broadcasts with them. The polynomial meets both ends exactly. The line has the least ∫ ‖x'‖² dt,
+    the cubic the least ∫ ‖x''‖² dt, the quintic the least ∫ ‖x'''‖² dt.
     Source: BK 6, BK 6.2.
     """
     return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
 
 
 def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
-    """Return `hermite` of a stack with these `stack_terms`, components first.
+    """Return `hermite` of a stack with these `stack_terms`; components are on the first axes.
 
-    Terms (n + 1, ..., count) and t (T, count) or (T, 1) give the shape (..., T, count); `by_curve`,
-    t (count, T) or (1, T) give (..., count, T).
+    The terms have the shape (n + 1, ..., count). If t has the shape (T, count) or (T, 1), the
+    result has the shape (..., T, count). If `by_curve`, t has the shape (count, T) or (1, T), and
+    the result has the shape (..., count, T).
     """
     weights = _weights(len(terms) - 1, t, order)
     if not by_curve:
@@ -38,13 +39,13 @@ def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False)
 
 
 def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
-    """Return the sum of the last terms, weighed."""
+    """Return the weighted sum of the last terms, as many as there are weights."""
     first, *others = (w * x for w, x in zip(weights, terms[-len(weights) :], strict=True))
     return sum(others, first)
 
 
 def stack_terms(ends: Array) -> Array:
-    """Return the terms of a stack: of ends of shape (count, n, ...), shape (n + 1, ..., count)."""
+    """Return the terms, shape (n + 1, ..., count), of a stack of ends of shape (count, n, ...)."""
     terms = _terms(np.moveaxis(ends, 1, 0))
     return np.stack([np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in terms])
 
@@ -56,7 +57,7 @@ def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
 
 
 def _weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of the terms; those of derivatives begin with x1 − x0."""
+    """Return the weights of the terms; for derivatives, the first weight is that of x1 − x0."""
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
     weights = [weight for pair in rates for weight in pair]
@@ -67,7 +68,7 @@ def _weights(count: int, t: Array, order: int) -> list[Array]:
 
 
 def _start_weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of x0, v0, a0; those of x1, v1, a1 are the same at 1 − t, up to signs."""
+    """Return the weights of x0, v0, a0, which up to signs are those of x1, v1, a1 at 1 − t."""
     s = 1 - t
     match count, order:
         case 2, 0:

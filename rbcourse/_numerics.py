@@ -1,4 +1,4 @@
-"""Numerical care: ratios near zero, scaling by powers of two, blocks that fit the cache."""
+"""Numerical tools: ratios near zero, scaling by powers of two, blocks that fit into the cache."""
 
 import math
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ def sinc(x: Array) -> Array:
 
 def sine_gap_ratio(x: Array) -> Array:
     """Return (x − sin x)/x³, and 1/6 at x = 0, with an absolute error of eps/x²."""
-    tiny = np.abs(x) < 1e-4  # its user multiplies by x³ again: there the limit is exact enough
+    tiny = np.abs(x) < 1e-4  # the caller multiplies by x³, so the limit suffices
     return np.where(tiny, 1 / 6, (1 - sinc(x)) / np.where(tiny, 1.0, x) ** 2)
 
 
@@ -28,7 +28,7 @@ def matvec(A: Array, x: Array) -> Array:
 
 
 def cross(x: Array, y: Array, axis: int = -1) -> Array:
-    """Return x × y, several times as fast as NumPy's; the components are on the axis 0 or −1."""
+    """Return x × y several times faster than NumPy; the components are on the axis 0 or −1."""
     product = np.empty(np.broadcast(x, y).shape)
     (a, b, c), (u, v, w), parts = (z if axis == 0 else z.T for z in (x, y, product))
     parts[0], parts[1], parts[2] = b * w - c * v, c * u - a * w, a * v - b * u
@@ -36,7 +36,7 @@ def cross(x: Array, y: Array, axis: int = -1) -> Array:
 
 
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
-    """Return matrices, or columns, over powers of two; the largest entries are in [0.5, 1)."""
+    """Return matrices, or columns, over powers of two, with the largest entries in [0.5, 1)."""
     _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))
     return np.ldexp(matrix, -exponent)
 
@@ -48,7 +48,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 def at_cache_line(*shape: int) -> Array:
-    """Return an uninitialised array aligned to a cache line, where NumPy is faster."""
+    """Return an uninitialised array that is aligned to a cache line, on which NumPy is faster."""
     raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
     start = -raw.ctypes.data % 64
     return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)

@@ -1,7 +1,7 @@
 """Quaternions (w, x, y, z) as functions of time: products, exp and slerp with their derivatives.
 
 A jet is the list of a function of time and its first derivatives: [x, x', x'', x'''] or fewer.
-Components come first: a quaternion has the shape (4, ...), a vector (3, ...).
+Components are on the first axis: a quaternion has the shape (4, ...), a vector (3, ...).
 """
 
 import math
@@ -15,7 +15,7 @@ from rbcourse._numerics import cross as cross_product
 
 Jet = list[Array]
 
-# Coefficients, the highest first: of the second derivative of sin(√s)/√s in s, of that of
+# Coefficients, the highest first, of the second derivative of sin(√s)/√s in s, of that of
 # arccos(x)² in (1 − x)/2, and of both third derivatives.
 _SINC_BEND = [n * (n - 1) * (-1) ** n / math.factorial(2 * n + 1) for n in range(9, 1, -1)]
 _ANGLE_BEND = [k * math.prod(j / (j + 0.5) for j in range(1, k + 1)) for k in range(13, 0, -1)]
@@ -28,7 +28,7 @@ def product(p: Jet, q: Jet) -> Jet:
 
 
 def multiply(p: Array, q: Array) -> Array:
-    """Return Hamilton's product of two quaternions, components first."""
+    """Return Hamilton's product of two quaternions, with components on the first axis."""
     (a, b, c, d), (w, x, y, z) = p, q
     return np.stack(
         [
@@ -41,7 +41,7 @@ def multiply(p: Array, q: Array) -> Array:
 
 
 def exp(u: Jet) -> Jet:
-    """Return the jet of exp(u) = (cos ‖u‖, sin(‖u‖)/‖u‖ u), u half the rotation vector."""
+    """Return the jet of exp(u) = (cos ‖u‖, sin(‖u‖)/‖u‖ u), where u is half the rotation vector."""
     s = dot(u, u)
     cosine, sinc = _cosine_and_sinc(s[0], len(u) - 1)
     real, share = _chain(cosine, s), _chain(sinc, s)
@@ -49,10 +49,10 @@ def exp(u: Jet) -> Jet:
 
 
 def slerp(a: Jet, b: Jet, share: Jet) -> Jet:
-    """Return the jet of (sin((1 − t) φ) a + sin(t φ) b)/sin φ, φ < π the angle between a and b.
+    """Return the jet of (sin((1 − t) φ) a + sin(t φ) b)/sin φ, with the angle φ < π from a to b.
 
     Here t is `share`, and a and b are unit quaternions. sin(t φ)/sin φ = t sinc(t φ)/sinc φ is a
-    smooth function of t and s = φ², as s is of cos φ = a·b.
+    smooth function of t and s = φ², and s is a smooth function of cos φ = a·b.
     """
     order = len(share) - 1
     cosine = dot(a, b)
@@ -101,9 +101,10 @@ def rotation(q: Array) -> Array:
 
 
 def angular_velocity(q: Jet) -> Array:
-    """Return the last derivative that a jet gives: w of [q, q'], w' of [q, q', q''], then w''.
+    """Return the last derivative that a jet gives: w for [q, q'], w' for [q, q', q''], then w''.
 
-    q is of any norm but 0, the result in the body frame. With n = ‖q‖², n w = 2 im(q̄ q'), so
+    q has any norm except 0, and the result is in the body frame. With n = ‖q‖², n w = 2 im(q̄ q'),
+    so
     n w' + n' w = 2 im(q̄ q'') and n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
     """
     n = _dot(q[0], q[0])
@@ -159,7 +160,7 @@ def _chain(f: list[Array], x: Jet) -> Jet:
 
 
 def _over(x: Jet, y: Jet) -> Jet:
-    """Return the jet of the quotient of two numbers: x = quotient times y, by Leibniz's rule."""
+    """Return the jet of the quotient of two numbers, from x = quotient times y."""
     quotient: Jet = [x[0] / y[0]]
     if len(x) > 1:
         quotient.append((x[1] - quotient[0] * y[1]) / y[0])
@@ -172,12 +173,13 @@ def _over(x: Jet, y: Jet) -> Jet:
 
 
 def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
-    """Return c = cos √s, k = sin(√s)/√s, and their derivatives by s; for small s by power series.
+    """Return c = cos √s, k = sin(√s)/√s and their derivatives by s, for small s from power series.
 
-    c' = −k/2, 4 s k'' + 6 k' + k = 0 and 4 s k''' + 10 k'' + k' = 0 give the others.
+    The equations c' = −k/2, 4 s k'' + 6 k' + k = 0 and 4 s k''' + 10 k'' + k' = 0 give the other
+    derivatives.
     """
     root = np.sqrt(s)
-    tangent = np.tan(root / 2)  # NumPy's fastest way
+    tangent = np.tan(root / 2)  # tan is the fastest in NumPy
     sine = 2 * tangent / (1 + tangent * tangent)
     c, k = 1 - tangent * sine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
     if order == 0:
@@ -194,7 +196,7 @@ def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
 
 
 def _squared_angle(x: Array, order: int) -> list[Array]:
-    """Return h = arccos(x)² and its derivatives by x; where x is near 1 by power series.
+    """Return h = arccos(x)² and its derivatives by x, near x = 1 from power series.
 
     They satisfy (1 − x²) h'' = 2 + x h' and (1 − x²) h''' = 3 x h'' + h'.
     """

@@ -1,4 +1,4 @@
-"""An arm in the plane: links in a row, each turned by its joint from the one before it."""
+"""An arm in the plane: a chain of links, each turned by its joint relative to the previous one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Posture(NamedTuple):
     Parameters
     ----------
     joints : ndarray, shape (..., n + 1, 2)
-        The joints in order, the first one at the origin; then the tip.
+        The positions of the joints in order, from the first one at the origin, and then the tip.
     frames : ndarray, shape (..., n, 3)
         The frames of the links: poses (x, y, theta) at their centres, x along the link.
     """
@@ -48,7 +48,8 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     Parameters
     ----------
     q : array_like, shape (..., n)
-        Joint angles: the first from the world's x axis, each other one from the link before.
+        Joint angles. The first is measured from the world's x axis, and each other angle from the
+        previous link.
     lengths : array_like, shape (n,), optional
         Lengths of the links, above 0.
 
@@ -74,9 +75,9 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
 
 
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
-    """Return the matrix that takes joint velocities to the velocity of the tip in the world frame.
+    """Return the matrix that maps joint velocities to the velocity of the tip in the world frame.
 
-    Singular set: all links lie on one line, stretched or folded; the rank is 1.
+    Singular set: all links lie on one line, stretched or folded; the rank is then 1.
     Source: RR 4.
 
     Parameters
@@ -87,7 +88,8 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     Returns
     -------
     ndarray, shape (..., 2, n)
-        In m/rad. Column k is the vector from joint k to the tip, turned by a quarter to the left.
+        The matrix in m/rad. Column k is the vector from joint k to the tip, turned to the left by
+        90°.
 
     Examples
     --------
@@ -101,23 +103,24 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
 
 def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
-    """Return the two sets of joint angles that bring the tip of a two-link arm to a place.
+    """Return the two sets of joint angles that bring the tip of a two-link arm to a position.
 
-    Singular set: the links lie on one line, where both solutions are the same up to full turns.
-    Where equal links fold up, any first angle puts the tip at the base; one is taken.
+    Singular set: the links lie on one line, where both solutions are the same up to full turns. If
+    equal links are folded, any first angle puts the tip at the base; one of them is returned.
     Source: RR 4.
 
     Parameters
     ----------
     tip : array_like, shape (..., 2)
-        Position of the tip, world frame. One out of reach raises ValueError.
+        The position of the tip in the world frame. A position out of reach raises ValueError.
     lengths : array_like, shape (2,), optional
         Lengths of the links, above 0.
 
     Returns
     -------
     ndarray, shape (..., 2, 2)
-        Angles in [−π, π], a row for each solution: elbow angle in [0, π], then its mirror image.
+        Angles in [−π, π], one row for each solution. The first has an elbow angle in [0, π], and
+        the second is its mirror image.
 
     Examples
     --------
@@ -126,7 +129,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
            [ 73.74, -90.  ]])
     """
     tip, lengths = as_finite("tip", tip, 2), _lengths(lengths, 2)
-    size = 2.0 ** np.frexp(lengths.max())[1]  # so that no unit of length matters
+    size = 2.0 ** np.frexp(lengths.max())[1]  # so that the unit of length does not matter
     (a, b), r = lengths / size, np.hypot(tip[..., 0], tip[..., 1]) / size
     slack = 4 * EPS * (a + b)  # the rounding of a tip that was computed
     out = (r > a + b + slack) | (r < abs(a - b) - slack)
@@ -152,7 +155,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     ----------
     start, goal : array_like, shape (..., n)
     steps : int, optional
-        Number of equal steps, at least 1.
+        The number of equal steps, at least 1.
 
     Returns
     -------
@@ -171,7 +174,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
 
 
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
-    """Return the joint angles after each command of a plan, the start first; turns add up.
+    """Return the start and the joint angles after each command of a plan; turns add up.
 
     Source: RR 4.2, RR (22), RR (23), with errata 20.
 
@@ -179,7 +182,8 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     ----------
     start : array_like, shape (..., n)
     plan : iterable of (velocity, duration)
-        Velocities of the n joints in rad/s; durations from 0 up, in s. It may be empty.
+        Velocities of the n joints in rad/s, and durations of at least 0 in s. The plan may be
+        empty.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Bézier curves of rotations: by geodesics, cumulative, and less their leading deviation."""
+"""Bézier curves of rotations: by geodesics, in cumulative form, and with a correction."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def bezier_so3(
     Returns
     -------
     Bezier
-        Its control points are R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1; it meets all four ends.
+        A curve with the control points R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1. It meets all four ends.
 
     Notes
     -----
-    Singular set: the two inner control points a half-turn apart; `log_so3` chooses the geodesic
-    between them. By the triangle inequality no other leg can become a half-turn. Moved ends give
-    the moved curve, and R1, R0, −w1, −w0 give the reversed curve.
+    Singular set: the two inner control points a half-turn apart; `log_so3` then chooses the
+    geodesic between them. By the triangle inequality, no other leg can become a half-turn. The
+    curve moves with its ends, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
@@ -67,9 +67,9 @@ def bezier_long_so3(
 ) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
-    Where the end velocities are large, it may cost less than `bezier_so3`. Moved and reversed ends,
-    singular set: as there; also singular where the two inner control points are equal, where it is
-    that curve.
+    If the end velocities are large, it may cost less than `bezier_so3`. Moved and reversed ends and
+    singular set: as for `bezier_so3`. The set also contains ends with equal inner control points,
+    for which the two curves are the same.
     Source: beyond BK 10.
 
     Parameters
@@ -80,7 +80,7 @@ def bezier_long_so3(
     Returns
     -------
     Bezier
-        With the control points of `bezier_so3`; it meets all four ends.
+        A curve with the control points of `bezier_so3`. It meets all four ends.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def cumulative_bezier_so3(
 ) -> CumulativeBezier:
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
-    It is faster to evaluate than `bezier_so3`.
+    This curve is faster to evaluate than `bezier_so3`.
     Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
     quaternion curves with simple high order derivatives, SIGGRAPH 1995.
 
@@ -110,13 +110,14 @@ def cumulative_bezier_so3(
     Returns
     -------
     CumulativeBezier
-        v₁ = w0/3, v₃ = w1/3, v₂ is the shortest turn between, and β₁ = 1 − (1 − t)³,
-        β₂ = 3t² − 2t³, β₃ = t³. It meets all four ends.
+        The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ between them, and β₁ = 1 − (1 −
+        t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four ends.
 
     Notes
     -----
     Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where `log_so3` chooses v₂. The
-    curve itself is smooth everywhere. Moved ends give the moved curve; reversed ends another.
+    curve itself is smooth everywhere. The curve moves with its ends, but reversed ends give another
+    curve.
 
     Examples
     --------
@@ -133,7 +134,7 @@ def cumulative_bezier_so3(
 def corrected_bezier_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> CorrectedBezier:
-    """Return Bézier's curve less its leading deviation from the optimum.
+    """Return the Bézier curve minus its leading deviation from the optimum.
 
     Source: beyond BK 10.
 
@@ -145,18 +146,18 @@ def corrected_bezier_so3(
     Returns
     -------
     CorrectedBezier
-        R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B the curve of `bezier_so3` and δ(t) of
+        The curve R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B(t) of `bezier_so3` and δ(t) of
         `bezier_deviation`. It meets all four ends.
 
     Notes
     -----
-    R_m = R0 exp(σ̂/2) is the rotation half-way; σ is the logarithm of R0ᵀ R1, of any length, that is
-    nearest to the sum of Bézier's three legs.
-    Near-optimal for small excursions: data s times as large have a relative excess over the optimum
-    about s⁸ times as large (s⁴ or s² for the other closed forms). δ is of third order in the data:
-    fast ends make it large, and the curve cost more than Bézier's (see docs/near_optimal.md).
-    Singular set, moved and reversed ends: as for `bezier_so3`; also singular where two logarithms
-    are equally near.
+    R_m = R0 exp(σ̂/2) is the rotation half-way. Of all logarithms of R0ᵀ R1, of any length, σ is
+    the nearest to the sum of the three legs of the Bézier curve.
+    The curve is near-optimal for small excursions: for ends s times as large, the relative excess
+    over the optimum is about s⁸ times as large (s⁴ or s² for the other closed forms). δ is of third
+    order in the ends. Fast ends make δ large, and the curve may then cost more than the Bézier
+    curve (see docs/near_optimal.md). Singular set, moved and reversed ends: as for `bezier_so3`.
+    The set also contains ends for which two logarithms are equally near.
 
     Examples
     --------
@@ -180,7 +181,7 @@ def corrected_bezier_so3(
 
 
 def bezier_legs(ends: Ends) -> Legs:
-    """Return the turns from each of Bézier's control points to the next, the shortest."""
+    """Return the shortest turns from each Bézier control point to the next."""
     first, last = ends.w0 / 3, ends.w1 / 3
     return first, log_so3(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
 
@@ -188,7 +189,7 @@ def bezier_legs(ends: Ends) -> Legs:
 def _slow_ends(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
 ) -> tuple[Ends, Array, Legs]:
-    """Return ends for the time from 0 to 1, the duration, and Bézier's legs, of less than π."""
+    """Return ends for times from 0 to 1, the duration, and the Bézier legs; check ‖w0‖ and ‖w1‖."""
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     for name, w in (("w0", ends.w0), ("w1", ends.w1)):
         angle = np.linalg.norm(w, axis=-1)
@@ -201,10 +202,11 @@ def _slow_ends(
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
-    """Return e, the mean of two end velocities less σ = log(R0ᵀ R1), and d, their difference.
+    """Return e, the mean of two end velocities minus σ = log(R0ᵀ R1), and d, their difference.
 
-    Both are carried to the rotation half-way, R0 exp(σ̂/2), parallel in a bi-invariant metric: on
-    each half the body axes turn by σ/2, parallel vectors by σ/4. 0 for the geodesic.
+    Both velocities are parallel transported to the rotation half-way, R0 exp(σ̂/2), in a
+    bi-invariant metric. On each half, the body axes turn by σ/2, and parallel vectors by σ/4. For
+    the geodesic, e and d are 0.
     """
     quarter = exp_so3(sigma / 4)
     u0, u1 = matvec(quarter.mT, w0), matvec(quarter, w1)
@@ -212,10 +214,11 @@ def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Arr
 
 
 def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
-    """Return the coefficients c₀, …, c₄ of Bézier's deviation from the optimum, to third order.
+    """Return the coefficients c₀, …, c₄ of the Bézier curve's deviation from the optimum.
 
-    The deviation, a rotation vector, is δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴), u = 2t − 1; e
-    and d are those of `seen_from_the_middle`. In the code ``sed`` is σ × (e × d).
+    To third order, the deviation is the rotation vector δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴),
+    with u = 2t − 1; e and d are those of `seen_from_the_middle`. In the code, ``sed`` is σ × (e ×
+    d).
     Source: beyond BK 10.
     """
     first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
@@ -232,7 +235,7 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
 
 
 def nearest_turn(turn: Array, way: Array) -> Array:
-    """Return the turns to the same rotations, by full turns more or fewer, nearest to `way`."""
+    """Return the turns nearest to `way` that differ from the given turns by full turns."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     axis = turn / np.where(angle == 0, 1, angle)
     more = (np.sum(way * axis, axis=-1, keepdims=True) - angle) / (2 * np.pi)
@@ -240,7 +243,7 @@ def nearest_turn(turn: Array, way: Array) -> Array:
 
 
 class CumulativeBezier(QuaternionCurve):
-    """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), β the cumulative Bernstein polynomials."""
+    """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃) of cumulative Bernstein polynomials β."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return the product of exp(βᵢ vᵢ/2)."""
@@ -258,7 +261,7 @@ class CumulativeBezier(QuaternionCurve):
 
 
 class Bezier(QuaternionCurve):
-    """The `Curve` of de Casteljau's construction, geodesics in the place of straight lines."""
+    """The `Curve` of de Casteljau's construction with geodesics in place of straight lines."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return the point of the construction, from four control points."""
@@ -281,9 +284,9 @@ def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
 
 
 class CorrectedBezier(Bezier):
-    """The `Curve` of de Casteljau's construction, less its leading deviation from the optimum.
+    """The `Curve` of de Casteljau's construction minus its leading deviation from the optimum.
 
-    Seen from the rotation half-way, moving by −δ is exp(−δ̂/2) on both sides.
+    Relative to the rotation half-way, the correction by −δ is exp(−δ̂/2) on both sides.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:

@@ -1,7 +1,8 @@
 """Other closed forms, with the boundary conditions of the projected cubic (BK section 1).
 
-Each is a fixed rotation times the rotation of a quaternion Q(t) of any norm. `CLOSED_FORMS` lists
-those for two rotations and two angular velocities that are compared; a new one is added there.
+Each curve is a fixed rotation times the rotation of a quaternion Q(t) of any norm. `CLOSED_FORMS`
+lists the closed forms for two rotations and two angular velocities that the course compares. Add a
+new one to this list.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from rbcourse.so3 import hat, log_so3, right_jacobian_inverse_so3
 def exponential_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ExponentialCubic:
-    """Return R0 exp(σ̂(t)), σ(t) the cubic in exponential coordinates about R0 with these ends.
+    """Return R0 exp(σ̂(t)) with these ends, where σ(t), exponential coordinates, is a cubic.
 
     Source: BK 1, its reference 13.
 
@@ -54,13 +55,14 @@ def exponential_cubic_so3(
     Returns
     -------
     ExponentialCubic
-        σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) by `right_jacobian_inverse_so3`.
+        The curve of σ(t) with σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
+        `right_jacobian_inverse_so3`. It meets all four ends.
 
     Notes
     -----
     Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses σ(1). The curve itself is
-    smooth everywhere. Velocities along the geodesic give the optimum among all curves that turn by
-    σ(1). Moved ends give the moved curve; the reversed ends give another curve.
+    smooth everywhere. For velocities along the geodesic, it is the optimum among all curves that
+    turn by σ(1). The curve moves with its ends, but reversed ends give another curve.
 
     Examples
     --------
@@ -78,7 +80,8 @@ def exponential_cubic_long_so3(
 ) -> ExponentialCubic:
     """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
 
-    Singular set: that of `exponential_cubic_so3`; and R0 = R1, where it is that curve.
+    Singular set: that of `exponential_cubic_so3`, and R0 = R1, for which the two curves are the
+    same.
     Source: beyond BK 10.
 
     Parameters
@@ -89,7 +92,7 @@ def exponential_cubic_long_so3(
     Returns
     -------
     ExponentialCubic
-        It meets all four ends, with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1).
+        The curve with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1). It meets all four ends.
 
     Examples
     --------
@@ -106,7 +109,7 @@ def exponential_cubic_long_so3(
 def quaternion_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> QuaternionCubic:
-    """Return the projection of a cubic in R⁴ on the unit quaternions: BK's idea in another space.
+    """Return the projection of a cubic in R⁴ on the unit quaternions: BK's method in another space.
 
     Source: BK 1, BK Remark 7.
 
@@ -118,16 +121,16 @@ def quaternion_cubic_so3(
     Returns
     -------
     QuaternionCubic
-        It meets all four ends; with ``margin``. The cubic has q' = q (0, w)/2 at its ends; of q1
-        and −q1 it ends at the one nearer to q0.
+        A `Curve`, with ``margin``, that meets all four ends. The cubic has q' = q (0, w)/2 at its
+        ends. It ends at q1 or −q1, whichever is nearer to q0.
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart, where `canonical_quaternion` of R0ᵀ R1 is taken; and
-    times when the cubic is zero, when calling the curve raises ValueError. Near a small ``margin``
-    the body turns by up to a full turn in a moment, and the curve is accurate to eps over
-    ``margin`` at that time, its derivatives to that over its square and its cube. Moved ends give
-    the moved curve, and R1, R0, −w1, −w0 give the reversed curve.
+    Singular set: R0 and R1 a half-turn apart, where the `canonical_quaternion` of R0ᵀ R1 is used;
+    and times at which the cubic is zero, where a call of the curve raises ValueError. Near a small
+    ``margin``, the body turns by up to a full turn in a short time. The curve is then accurate to
+    eps over ``margin``, and its derivatives to eps over the square and the cube of ``margin``. The
+    curve moves with its ends, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
@@ -142,7 +145,7 @@ def quaternion_cubic_so3(
 def quaternion_cubic(
     ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
 ) -> QuaternionCubic:
-    """Return the quaternion cubic of checked ends, or where `long` is True that to −q1."""
+    """Return the quaternion cubic of checked ends, or if `long` is True the cubic to −q1."""
     turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
     turn = np.where(np.expand_dims(long, -1), -turn, turn)
     return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
@@ -151,7 +154,7 @@ def quaternion_cubic(
 def cayley_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> CayleyCubic:
-    """Return the cubic in Cayley's parameters about R0 with these ends.
+    """Return the cubic with these ends in Cayley parameters about R0.
 
     Source: BK 1, its reference 8.
 
@@ -163,14 +166,14 @@ def cayley_cubic_so3(
     Returns
     -------
     CayleyCubic
-        Its quaternion is (1, g) over its norm. Cayley's parameters of a turn by a about the unit
-        vector n are g = tan(a/2) n; along a curve 2 g' = w + g × w + (g·w) g.
+        A curve whose quaternion is (1, g) over its norm. The Cayley parameters of a turn by a about
+        the unit vector n are g = tan(a/2) n. Along a curve 2 g' = w + g × w + (g·w) g.
 
     Notes
     -----
-    Singular set: half-turns, which have no such parameters. No curve ever turns by 180° from R0, so
-    near them it is a long way round, and the cost grows without bound. Moved ends give the moved
-    curve; the reversed ends give another curve.
+    Singular set: half-turns, which have no Cayley parameters. No curve ever turns by 180° from R0,
+    so near half-turns the curve is long, and the cost grows without bound. The curve moves with its
+    ends, but reversed ends give another curve.
 
     Examples
     --------
@@ -211,21 +214,22 @@ def normal_cubic_so3(
     Returns
     -------
     NormalCubic
-        R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with x(t) the cubic with x(0) = 0, x'(0) = w0 and the
-        x(1) and x'(1) that give R1 and w1.
+        The curve R0 exp(ŷ) with y = x − ½ G⁻¹(x × G x). Here x(t) is the cubic with x(0) = 0, x'(0)
+        = w0 and the values of x(1) and x'(1) that give R1 and w1.
 
     Notes
     -----
-    x is the Riemannian normal coordinate of R0 exp(ŷ), the initial velocity of the geodesic from
-    R0, to second order. Zimmermann interpolates in normal coordinates; for the second-order map we
-    know no source. It is not a Riemannian cubic, which is the optimum, but near-optimal for small
-    excursions: data s times as large have a relative excess over the optimum about s⁴ times as
-    large. With G a multiple of I it is `exponential_cubic_so3`.
+    To second order, x is the Riemannian normal coordinate of R0 exp(ŷ), the initial velocity of the
+    geodesic from R0. Zimmermann interpolates in normal coordinates; for the second-order map we
+    know no source. The curve is not a Riemannian cubic, which is the optimum. It is near-optimal
+    for small excursions: for ends s times as large, the relative excess over the optimum is about
+    s⁴ times as large. If G is a multiple of I, the curve is `exponential_cubic_so3`.
 
-    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses y(1); and where x ↦ y is
-    singular at x(1): ValueError, as when no x(1) is found. With y(1) up to π the moments 1, 2, 2.9
-    have no such place; thin bodies with three different moments do, beyond about 2 rad about their
-    middle axis. Near it the curve is long. Moved ends give the moved curve; reversed ends another.
+    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses y(1); and ends for which x ↦
+    y is singular at x(1). The latter raise ValueError, as do ends for which no x(1) is found. For
+    y(1) up to π, the map is never singular for the moments 1, 2, 2.9. For thin bodies with three
+    different moments, it is singular somewhere beyond about 2 rad about the middle axis. Near such
+    ends, the curve is long. The curve moves with its ends, but reversed ends give another curve.
 
     Examples
     --------
@@ -259,7 +263,7 @@ def exponential_quintic_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ExponentialQuintic:
-    """Return R0 exp(σ̂(t)), σ(t) the quintic with these ends: near-optimal minimum jerk.
+    """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic: near-optimal minimum jerk.
 
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
 
@@ -271,12 +275,14 @@ def exponential_quintic_so3(
     Returns
     -------
     ExponentialQuintic
-        σ(0) = 0, σ(1) = log_so3(R0ᵀ R1), and the derivatives of σ give w and w' at both ends.
+        The curve with σ(0) = 0, σ(1) = log_so3(R0ᵀ R1) and the derivatives of σ that give w and w'
+        at both ends.
 
     Notes
     -----
-    Near-optimal for small excursions (see docs/near_optimal.md), and from rest to rest it is the
-    optimum (`minimum_jerk_so3`). Singular set and invariance: as for `exponential_cubic_so3`.
+    The curve is near-optimal for small excursions (see docs/near_optimal.md). From rest to rest, it
+    is the optimum (`minimum_jerk_so3`). Singular set and invariance: as for
+    `exponential_cubic_so3`.
 
     Examples
     --------
@@ -312,7 +318,7 @@ CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
 
 
 class ExponentialCubic(QuaternionCurve):
-    """The `Curve` R0 exp(σ̂(t)), σ a cubic; σ(1) is any logarithm of the turn."""
+    """The `Curve` R0 exp(σ̂(t)) with a cubic σ; σ(1) is any logarithm of the turn."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return exp(σ/2)."""
@@ -320,7 +326,7 @@ class ExponentialCubic(QuaternionCurve):
 
 
 class ExponentialQuintic(ExponentialCubic):
-    """The `Curve` R0 exp(σ̂(t)), σ a quintic."""
+    """The `Curve` R0 exp(σ̂(t)) with a quintic σ."""
 
 
 def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
@@ -330,7 +336,7 @@ def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
 
 
 class NormalCubic(QuaternionCurve):
-    """The `Curve` R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), x a cubic."""
+    """The `Curve` R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with a cubic x."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return exp(y/2), from the ends of x, G and G⁻¹."""
@@ -370,9 +376,9 @@ def _check_normal(lost: Array, why: str) -> None:
 
 
 class NormalizedCubic(QuaternionCurve):
-    """The `Curve` of a cubic of quaternions, of norm 1 at its start and of another at its end.
+    """The `Curve` of a cubic of quaternions with norm 1 at its start and any norm at its end.
 
-    Its components are seen from the goal: Q(1) is real there and does not round w1 away.
+    The components are relative to the goal, where Q(1) is real, so that w1 is not lost to rounding.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
@@ -383,7 +389,7 @@ class NormalizedCubic(QuaternionCurve):
 def _cubic_from_the_goal(
     ends: Ends, T: Array, turn: Array, norm: Array, growth: Array
 ) -> dict[str, Array]:
-    """Return the arrays of a `NormalizedCubic`, of a norm at its goal that grows so."""
+    """Return the arrays of a `NormalizedCubic`, from the norm at its goal and the norm's growth."""
     start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
     end_rate = growth[..., None] * one + _rate(one, ends.w1)
     cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
@@ -392,10 +398,11 @@ def _cubic_from_the_goal(
 
 
 class QuaternionCubic(NormalizedCubic):
-    """The `Curve` of the unit quaternions nearest to a cubic between unit quaternions.
+    """The `Curve` of the unit quaternions nearest to a cubic that joins two unit quaternions.
 
-    Its ``margin`` is the least norm of the cubic, ``margin_time`` the time of it, both of shape
-    (...). Where the margin is 0 the nearest unit quaternion is not unique.
+    Its ``margin`` is the least norm of the cubic, and ``margin_time`` the time at which it is
+    reached; both have the shape (...). If the margin is 0, the nearest unit quaternion is not
+    unique.
     """
 
     def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
@@ -410,7 +417,7 @@ class QuaternionCubic(NormalizedCubic):
 
     @property
     def margin_time(self) -> Array:
-        """When the margin is reached."""
+        """The time at which the margin is reached."""
         return self._least[0] * self.duration
 
     @cached_property
@@ -422,16 +429,16 @@ class QuaternionCubic(NormalizedCubic):
 
     @property
     def breakpoints(self) -> Array:
-        """As `Curve.breakpoints`."""
+        """The `Curve.breakpoints`, refined near small margins."""
         return near_margins(super().breakpoints, *self._least)
 
 
 class CayleyCubic(NormalizedCubic):
-    """The `Curve` of a cubic in Cayley's parameters."""
+    """The `Curve` of a cubic in Cayley parameters."""
 
     @property
     def breakpoints(self) -> Array:
-        """As `Curve.breakpoints`; the curve turns fastest where Q is small and its rate large."""
+        """The `Curve.breakpoints`, refined near the time when the curve turns fastest."""
 
         def time_for_a_radian(t: Array) -> Array:
             jet = polynomial_jet(self._first[:, :, None], t, 1)

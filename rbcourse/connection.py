@@ -1,6 +1,6 @@
 """The connection of a left-invariant metric, in components, and its geodesics (BK section 2).
 
-Components are those of `rbcourse.metrics`: of angular velocities or twists.
+Components are those of `rbcourse.metrics`, that is, of angular velocities or twists.
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ def structure_constants(basis: ArrayLike) -> Array:
     Parameters
     ----------
     basis : array_like, shape (m, n, n)
-        L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``: linearly independent, to one part in a
-        million, with commutators that are, to rounding, combinations of the basis.
+        The basis L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``. The matrices are linearly
+        independent, to one part in a million, and their commutators are, to rounding, combinations
+        of the basis.
 
     Returns
     -------
     ndarray, shape (m, m, m)
-        Antisymmetric in i and j; for ``BASIS_SO3`` C[k, i, j] = ε_ijk.
+        The constants are antisymmetric in i and j; for ``BASIS_SO3``, C[k, i, j] = ε_ijk.
 
     Examples
     --------
@@ -46,7 +47,7 @@ def structure_constants(basis: ArrayLike) -> Array:
         raise ValueError(f"basis: shape (m, n, n) wanted, got {L.shape}")
     m = len(L)
     _, exponents = np.frexp(np.abs(L).max(axis=(1, 2)))
-    N = scaled(L)  # so that no size matters
+    N = scaled(L)  # so that their sizes do not matter
     columns = N.reshape(m, -1).T
     condition = np.linalg.cond(columns)
     if not condition < 1e6:
@@ -54,7 +55,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     products = N[:, None] @ N
     brackets = (products - products.swapaxes(0, 1)).reshape(m * m, -1).T
     C = np.zeros((m, m * m))
-    for _ in range(3):  # the normal equations, exact for the standard bases, and the residual
+    for _ in range(3):  # normal equations, exact for the standard bases, then refinement
         C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
     if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
         raise ValueError("basis: a commutator of two of the matrices is no combination of them")
@@ -65,16 +66,18 @@ def structure_constants(basis: ArrayLike) -> Array:
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
-    ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i, at all points. To a few eps times the condition
-    number of G the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and Γ, lowered by G, is
-    antisymmetric in i and k. Γ is *not* symmetric in j and k. It follows from Koszul's formula,
+    At all points ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. To a few eps times the condition
+    number of G, the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and Γ with its first
+    index lowered by G is antisymmetric in i and k. Γ is *not* symmetric in j and k. It follows from
+    Koszul's formula,
     2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
     Source: BK 2.4, BK (8).
 
     Parameters
     ----------
     G : array_like, shape (..., m, m)
-        The metric in the frame: symmetric and not singular to rounding, definite or not.
+        The matrix of the metric in the frame. It is symmetric and not singular to rounding, but
+        need not be definite.
     basis : array_like, shape (m, n, n)
         The frame L_1 … L_m at the identity, as for `structure_constants`.
 
@@ -89,7 +92,7 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """
     C = structure_constants(basis)
     m = len(C)
-    G = scaled(as_symmetric("G", G, m))  # its size does not matter
+    G = scaled(as_symmetric("G", G, m))  # the size of G does not matter
     sizes = np.abs(np.linalg.eigvalsh(G))
     singular = sizes.min(axis=-1) <= m * EPS * sizes.max(axis=-1)
     if singular.any():
@@ -104,16 +107,17 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
 def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
     """Return the covariant derivative x_dot[i] + gamma[i, j, k] v[j] x[k] of a field along a curve.
 
-    The sum is over j and k. With x = v it is the acceleration (9), which vanishes along geodesics,
-    (8); with x_dot = 0 it is ∇_v x of left-invariant fields.
+    The sum is over j and k. For x = v, the result is the acceleration (9), which vanishes along
+    geodesics, (8). For x_dot = 0, it is ∇_v x of left-invariant fields.
     Source: BK 2.4, BK (8), BK (9).
 
     Parameters
     ----------
     gamma : array_like, shape (..., m, m, m)
-        As `christoffel` returns them.
+        The Christoffel symbols, as returned by `christoffel`.
     v, x, x_dot : array_like, shape (..., m)
-        Velocity of the curve, field and its derivative by time, in left-invariant components.
+        The velocity of the curve, the field, and the time derivative of the field, in
+        left-invariant components.
 
     Returns
     -------
@@ -122,8 +126,8 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
     Examples
     --------
     >>> gamma = christoffel(np.diag([2, 2, 2, 1, 1, 1]), BASIS_SE3)
-    >>> S = [0, 0, 2, 3, 0, 0]  # a constant twist: the origin runs on a circle
-    >>> covariant_derivative(gamma, S, S, np.zeros(6)) + 0.0  # ω × v, to its centre
+    >>> S = [0, 0, 2, 3, 0, 0]  # a constant twist: the origin moves on a circle
+    >>> covariant_derivative(gamma, S, S, np.zeros(6)) + 0.0  # ω × v, towards its centre
     array([0., 0., 0., 0., 6., 0.])
     """
     v = as_finite("v", v, "n")
@@ -135,39 +139,41 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
 
 
 def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
-    """Return A, v at the times t of the geodesics that start at A0 with the velocity v0.
+    """Return A and v at the times t for the geodesics that start at A0 with the velocity v0.
 
-    Source: BK 2.4, BK (8); where the paper prints second derivatives of coordinates, which need
+    Source: BK 2.4, BK (8), where the paper prints second derivatives of coordinates, which need
     other symbols than those of the left-invariant frame.
 
     Parameters
     ----------
     G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
-        The matrix of a left-invariant metric, such as the inertia of a body that turns freely:
-        symmetric and not singular, definite or not.
+        The matrix of a left-invariant metric, such as the inertia of a freely rotating body. It is
+        symmetric and not singular, but need not be definite.
     A0, v0 : array_like, shapes (..., 3, 3) and (..., 3), or (..., 4, 4) and (..., 6)
         Rotations and angular velocities, or poses and twists, at t = 0.
     t : array_like, any shape
-        Times, in any order, negative ones too.
+        Times in any order, which may be negative.
 
     Returns
     -------
     A, v : ndarray, shapes t.shape + A0.shape and t.shape + v0.shape
-        After broadcasting of the batches of G, A0 and v0; vᵀ G v is constant.
+        The shapes are those after broadcasting of the batches of G, A0 and v0. Along each geodesic
+        vᵀ G v is constant.
 
     Notes
     -----
-    Singular set: none. For an indefinite metric on SE(3) the velocity may grow exponentially,
-    beyond the range of the floating-point numbers; if the integration fails, FloatingPointError is
+    Singular set: none. For an indefinite metric on SE(3), the velocity may grow exponentially,
+    beyond the range of the floating-point numbers. If the integration fails, FloatingPointError is
     raised.
-    Solves A' = A hat(v), v'_i = −Γ_ijk v_j v_k, on SO(3) Euler's equations, by an eighth-order
-    Runge–Kutta method at a relative tolerance of 3e-14, which the N members of a batch share: that
-    of a single one may be up to √N times larger. Closed forms: `screw_se3` for the metric (10),
-    `geodesic_so3` and `geodesic_se3`, from end to end, for (12) and (14).
+    The equations A' = A hat(v), v'_i = −Γ_ijk v_j v_k, which on SO(3) are Euler's equations, are
+    solved by an eighth-order Runge–Kutta method with a relative tolerance of 3e-14. The N members
+    of a batch share the tolerance, so the error of a single member may be up to √N times larger.
+    Closed forms are `screw_se3` for the metric (10), and `geodesic_so3` and `geodesic_se3`, from
+    end to end, for (12) and (14).
 
     Examples
     --------
-    >>> G, spin = np.diag([1.0, 2, 3]), [0.01, 3, 0]  # nearly about the middle axis
+    >>> G, spin = np.diag([1.0, 2, 3]), [0.01, 3, 0]  # a spin nearly about the middle axis
     >>> R, w = geodesic_flow(G, np.eye(3), spin, [0, 6])
     >>> w[:, 1].round(1)  # it flips
     array([ 3., -3.])
@@ -194,7 +200,7 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
 
 
 def _scales(A0: Array, v0: Array, last: float) -> tuple[Array, Array]:
-    """Return how large the entries of A and v are: those of ω, v and d each in their own unit."""
+    """Return typical sizes of the entries of A and v, separately for ω, v and d."""
     speeds = np.abs(v0).reshape(*v0.shape[:-1], v0.shape[-1] // 3, 3).max(axis=-1)
     speeds = np.where(speeds == 0, speeds.max(axis=-1, keepdims=True), speeds)
     speeds = np.where(speeds < 1e-200, 1.0, speeds)  # at rest
@@ -212,7 +218,7 @@ def _joined(A: Array, v: Array) -> Array:
 def _integrate(
     flow: Callable[[float, Array], Array], start: Array, scales: Array, times: Array
 ) -> Array:
-    """Return the states at the times, a row for each; they are `start` at t = 0."""
+    """Return the states at the times, one row for each time; the state at t = 0 is `start`."""
     from scipy.integrate import solve_ivp
 
     states = np.broadcast_to(start, (len(times), len(start))).copy()

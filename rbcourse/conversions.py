@@ -12,7 +12,7 @@ from rbcourse.quaternion import canonical_quaternion
 
 
 def matrix_from_quaternion(q: ArrayLike) -> Array:
-    """Return the rotation matrix R of a unit quaternion; q and −q give the same.
+    """Return the rotation matrix R of a unit quaternion; q and −q give the same matrix.
 
     Source: RR 2.2.
 
@@ -38,8 +38,9 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
 def quaternion_from_matrix(R: ArrayLike) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
-    It is the normalized row of 4 q qᵀ (linear in R) with the largest diagonal entry, accurate to a
-    few eps. Singular set: half-turns, where `canonical_quaternion` chooses between q and −q.
+    The result is the normalised row of 4 q qᵀ (linear in R) with the largest diagonal entry,
+    accurate to a few eps. Singular set: half-turns, where `canonical_quaternion` chooses between q
+    and −q.
     Source: BK Remark 7.
 
     Parameters
@@ -86,24 +87,24 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
 
 
 def axis_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1); 0 where w is.
+    """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1), 0 for w = 0.
 
-    A norm that overflows raises ValueError.
+    ValueError is raised if the norm overflows.
     """
     with np.errstate(over="ignore"):
         angle = np.linalg.norm(w, axis=-1, keepdims=True)
         extreme = ~((angle > 1e-150) & (angle < 1e150))[..., 0]
-        if extreme.any():  # zero, or squares have left the range of numbers
+        if extreme.any():  # w is zero, or its square overflows or underflows
             angle[extreme] = np.hypot.reduce(w[extreme], axis=-1, keepdims=True)
             as_finite("norm of w", angle[..., 0])
     return w / np.where(angle == 0, 1.0, angle), angle
 
 
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
-    """Return the shortest rotation vector of a unit quaternion; q and −q give the same.
+    """Return the shortest rotation vector of a unit quaternion; q and −q give the same vector.
 
-    Angle in [0, π] to rounding; accurate to a few eps. Singular set: half-turns, where
-    `canonical_quaternion` chooses the axis.
+    The angle is in [0, π] to rounding, and the result accurate to a few eps. Singular set:
+    half-turns, where `canonical_quaternion` chooses the axis.
     Source: BK 2.5, RR 2.2.
 
     Parameters
@@ -129,8 +130,8 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
 def matrix_from_zyx(angles: ArrayLike) -> Array:
     """Return R_z(α) R_y(β) R_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
-    The turns are about axes of the *body*: first z, then the new y, then the newest x; or about
-    *fixed* axes: first x, then y, then z.
+    The turns are about axes of the *body*: first z, then the new y, then the new x. Equivalently,
+    they are about *fixed* axes: first x, then y, then z.
     Source: RR 2.1, RR (7), RR (8).
 
     Parameters
@@ -164,7 +165,7 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        The angles give R back to a few eps, in gimbal lock to 40 eps.
+        The angles reproduce R to a few eps, or in gimbal lock to 40 eps.
 
     Examples
     --------
@@ -203,8 +204,9 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
-    Singular set: gimbal lock, β = ±π/2 to 16 eps. Only α − γ (β = −π/2: α + γ) is determined, and
-    γ = 0 is returned. Near it α and γ are accurate to eps over the distance, α ∓ γ to eps.
+    Singular set: gimbal lock, β = ±π/2 to 16 eps. Only α − γ (for β = −π/2, only α + γ) is
+    determined then, and γ = 0 is returned. Near gimbal lock, α and γ are accurate to eps over the
+    distance, but α ∓ γ to eps.
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
 
@@ -216,7 +218,8 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        α, γ in (−π, π], β in [−π/2, π/2]; they give q back to a few eps, in gimbal lock 20 eps.
+        α and γ in (−π, π], β in [−π/2, π/2]. The angles reproduce q to a few eps, or in gimbal lock
+        to 20 eps.
 
     Examples
     --------
@@ -233,7 +236,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
 
 
 def _wrapped(angle: Array) -> Array:
-    """Return angles between −2π and 2π as they lie in (−π, π]; −π to rounding becomes π."""
+    """Return angles from (−2π, 2π) wrapped to (−π, π]; −π to rounding becomes π."""
     angle = np.where(angle > np.pi, angle - 2 * np.pi, angle)
     angle = np.where(angle < -np.pi * (1 - 4 * EPS), angle + 2 * np.pi, angle)
     return np.minimum(angle, np.pi)

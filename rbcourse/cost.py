@@ -1,4 +1,4 @@
-"""Costs of curves: integrals of the squared acceleration, BK (18), torque and jerk."""
+"""Costs of curves: integrals of the squared acceleration, BK (18), torque, and jerk."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.paths import smooth_parts
 
-_TOGETHER = 2000  # panels that are evaluated at once
+_TOGETHER = 2000  # panels that are evaluated together
 _HALVINGS = 30
-_MOST = 50_000  # panels that may be halved at once
+_MOST = 50_000  # panels that may be halved in one pass
 Index: TypeAlias = NDArray[np.intp]
 Density: TypeAlias = Callable[[Curve, Array, Index], Array]
 
@@ -39,36 +39,38 @@ def acceleration_cost(
     Parameters
     ----------
     curve : Curve
-        On SO(3) or SE(3), or a stack of them.
+        A curve on SO(3) or SE(3), or a stack of curves.
     inertia : array_like, shape (..., 3, 3), optional
-        As for `minimum_acceleration_so3`, about the centre of mass; one, or one for each curve.
+        As for `minimum_acceleration_so3`, about the centre of mass: one for all curves, or one for
+        each.
     mass, centre : float above 0; array_like, shape (3,); optional
-        Mass of the body, and its centre of mass in the body frame; on SE(3) only.
+        The mass of the body, and its centre of mass in the body frame; for SE(3) only.
     rtol : float, optional
-        The relative error, from 1e-12 to 0.1. From 1e-8 on the quadrature starts from two panels
-        instead of 16 and more: 3 to 40 times as fast, but it may miss a peak narrower than a
+        The relative error, from 1e-12 to 0.1. From 1e-8 on, the quadrature starts from two panels
+        instead of 16 or more. It is then 3 to 40 times as fast, but may miss a peak narrower than a
         hundredth of the interval.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w; on SE(3) plus ∫ m ‖d_c''‖² dt, where d_c
-        is the position of the centre of mass. By default ∫ 2 ‖w'‖² dt, and on SE(3)
-        ∫ (2 ‖w'‖² + ‖d''‖²) dt. To `rtol`, or absolutely to 1e-20 times a third of the trace of G
-        (1e-20 by default), unless acceleration has peaks or ripples within a hundredth of the
-        interval, as with an abrupt ``f`` of a `projected_line_so3`.
+        ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w. On SE(3), ∫ m ‖d_c''‖² dt is added, where
+        d_c is the position of the centre of mass. By default, the cost is ∫ 2 ‖w'‖² dt, and on
+        SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. The relative error is `rtol`, or the absolute error is 1e-20
+        times a third of the trace of G (1e-20 by default). This holds unless the acceleration has
+        peaks or ripples within a hundredth of the interval, for example with an abrupt ``f`` of a
+        `projected_line_so3`.
 
     Raises
     ------
     RuntimeError
-        If the integral does not settle, ``margin`` is below 1e-6, the curve is NaN or the velocity
-        of a `chain` jumps.
+        If the integral does not converge, ``margin`` is below 1e-6, the curve is NaN, or the
+        velocity of a `chain` jumps.
 
     Notes
     -----
-    G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ its square; free motions cost
-    nothing. On SE(3) the sum, and any ratio of sums, depends on the unit of length unless inertia
-    and mass are those of a body; see `acceleration_cost_parts`.
+    G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ its square. Free motions have
+    the cost 0. On SE(3), the sum, and any ratio of sums, depends on the unit of length unless
+    inertia and mass are those of a body; see `acceleration_cost_parts`.
 
     Examples
     --------
@@ -91,19 +93,19 @@ def acceleration_cost_parts(
     *,
     rtol: float = 1e-10,
 ) -> tuple[Array, Array]:
-    """Return the two parts of `acceleration_cost`: of the rotation, and of the translation.
+    """Return the two parts of `acceleration_cost`: rotation and translation.
 
     Source: BK (18); for other inertias beyond BK 1.
 
     Parameters
     ----------
     curve, inertia, mass, centre, rtol
-        As for `acceleration_cost`; so are errors.
+        As for `acceleration_cost`, with the same errors.
 
     Returns
     -------
     rotation, translation : ndarray, shape curve.batch_shape
-        ∫ τᵀ G⁻¹ τ dt, by default ∫ 2 ‖w'‖² dt; and ∫ m ‖d_c''‖² dt, 0 on SO(3).
+        ∫ τᵀ G⁻¹ τ dt, by default ∫ 2 ‖w'‖² dt; and ∫ m ‖d_c''‖² dt, which is 0 on SO(3).
 
     Examples
     --------
@@ -131,14 +133,14 @@ def acceleration_cost_parts(
 
 
 def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Array:
-    """Return ∫ ‖τ‖² dt, with the torque τ = G w' + w × G w on a body that turns so.
+    """Return ∫ ‖τ‖² dt, with the torque τ = G w' + w × G w that moves a body along the curve.
 
     Source: beyond BK 4.
 
     Parameters
     ----------
     curve, inertia, rtol
-        As for `acceleration_cost`, on SO(3) only; so are errors and accuracy.
+        As for `acceleration_cost`, with the same errors and accuracy, but on SO(3) only.
 
     Returns
     -------
@@ -161,14 +163,14 @@ def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Arr
 def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     """Return ∫ 2 ‖w'' + ½ w × w'‖² dt, the integral of the squared covariant jerk in metric (12).
 
-    It does not change if the motion is seen from the body, as Rᵀ(t); ∫ 2 ‖w''‖² dt would.
+    The cost is the same for the inverse motion Rᵀ(t), unlike ∫ 2 ‖w''‖² dt.
     Source: beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
 
     Parameters
     ----------
     curve, rtol
-        As for `acceleration_cost`, on SO(3) only; so are errors (also if the acceleration of a
-        `chain` jumps) and accuracy.
+        As for `acceleration_cost`, with the same errors and accuracy, but on SO(3) only. An error
+        is also raised if the acceleration of a `chain` jumps.
 
     Returns
     -------
@@ -189,7 +191,7 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
 
 
 def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
-    """Raise a ValueError unless that is a `Curve`, on SO(3) if `on_so3`."""
+    """Raise ValueError unless the argument is a `Curve`, which must be on SO(3) if `on_so3`."""
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve wanted, got {curve!r}")
     if on_so3 and curve.size != 3:
@@ -209,14 +211,14 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
 
 
 def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
-    """Return the costs of curves from those for the time from 0 to 1: of a chain their sum."""
+    """Return costs from those for times from 0 to 1; for a chain, the sum over its legs."""
     with np.errstate(over="ignore"):
         costs = costs / legs.flat.duration**power
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
 
 
 def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float = 1e-10) -> Array:
-    """Return a functional of the rotations of a stack of curves, as `integral`."""
+    """Return a functional of the rotations of a stack of curves, computed by `integral`."""
 
     def density(some: Curve, t: Array, index: Index) -> Array:
         those = functional.take(index)
@@ -228,7 +230,7 @@ def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float =
 
 
 def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Array:
-    """Return ‖d_c''‖², of the point r of the body: Rᵀ d_c'' = Rᵀ d'' + w' × r + w × (w × r)."""
+    """Return ‖d_c''‖² for the point r of the body: Rᵀ d_c'' = Rᵀ d'' + w' × r + w × (w × r)."""
     a = curve.values(t, 2)
     moved = a[..., 3:]
     if r.any():
@@ -238,12 +240,12 @@ def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Arr
 
 
 def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
-    """Return the integral for each curve of a stack, as if they took from 0 to 1: halving panels.
+    """Return the integral for each curve of a stack, for times from 0 to 1, by halving panels.
 
-    Each curve has panels of its own, halved while the rules of Clenshaw and Curtis with 9 and 17
-    nodes differ by more than `rtol` times the integral. ``density(some, t, index)``
-    returns the integrand at the times t, shape (T, K), on K curves, with their numbers. Messages
-    name `name`.
+    Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
+    nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
+    integrand at the times t, shape (T, K), for the K curves `some` with the numbers `index`.
+    Messages begin with `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")
@@ -270,7 +272,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
             with np.errstate(invalid="ignore"):  # inf − inf
                 error[part] = np.abs(value[part] - rest)
         expected = cost + np.bincount(index, value, curve.count)
-        coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN is
+        coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN counts as coarse
         lost = coarse & (width < 256 * EPS * (start + width))  # beyond the resolution of the times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break

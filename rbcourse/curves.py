@@ -1,4 +1,4 @@
-"""Rotations and poses over time: curves, their boundary conditions, and the geodesic."""
+"""Rotations and poses over time: the class `Curve`, boundary conditions, and geodesics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rbcourse._numerics import Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
 from rbcourse.so3 import hat, log_so3
 
-BLOCK = 5128  # rotations that are evaluated together, in the cache: a block of `rbcourse._foam`
+BLOCK = 5128  # rotations evaluated together, as many as a block of `rbcourse._foam`
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
 AnyCurve = TypeVar("AnyCurve", bound="Curve")
 
@@ -38,9 +38,9 @@ class _Ends(NamedTuple):
 
 
 class Ends(_Ends):
-    """Boundary conditions at both ends, all of one batch shape: rotations and body velocities.
+    """Boundary conditions at both ends: rotations and body velocities of one batch shape.
 
-    A tuple, which makers of curves take as ``make(*ends)``.
+    The class is a tuple, so a function that makes curves takes it as ``make(*ends)``.
     Source: BK 6.2.
 
     Parameters
@@ -67,40 +67,40 @@ class Ends(_Ends):
 
     @property
     def turn(self) -> Array:
-        """R0ᵀ R1."""
+        """The rotation R0ᵀ R1 from the start to the end."""
         return np.swapaxes(self.R0, -1, -2) @ self.R1
 
     def over(self, duration: ArrayLike) -> tuple[Self, Array]:
-        """Return the same for the time from 0 to 1, and the durations, of one batch shape."""
+        """Return the ends for times rescaled to [0, 1], and the durations, with one batch shape."""
         T = as_duration("duration", duration)
         batch = check_broadcast(ends=(self.R0, 2), duration=(T, 0))
         T, (R0, R1, w0, w1) = np.broadcast_to(T, batch), self.broadcast_to(batch)
         return type(self)._make((R0, R1, T[..., None] * w0, T[..., None] * w1)), T
 
     def flat(self) -> Self:
-        """Return the same with one batch axis."""
+        """Return the ends with a single batch axis."""
         return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
 
     def broadcast_to(self, batch: tuple[int, ...]) -> Self:
-        """Return the same with another batch shape."""
+        """Return the ends with another batch shape."""
         shapes = (3, 3), (3, 3), (3,), (3,)
         arrays = zip(self, shapes, strict=True)
         return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
 
     def take(self, index: Any) -> Self:
-        """Return some of the problems, by an index of NumPy's into the batch axes."""
+        """Return the ends that a NumPy index into the batch axes selects."""
         return type(self)._make(x[index] for x in self)
 
 
 def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
-    """Return the boundary conditions and the inertia of bodies, of one batch shape."""
+    """Return the boundary conditions and the inertia of bodies, with one batch shape."""
     G = as_inertia("inertia", inertia)
     batch = check_broadcast(ends=(ends.R0, 2), inertia=(G, 2))
     return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
 
 
 class SingularTime(ValueError):
-    """A curve is not defined at a time; `curve` is its number in the stack."""
+    """The error for a time at which a curve is undefined; `curve` is its number in the stack."""
 
     def __init__(
         self, time: float, curve: int, reason: str, batch_shape: tuple[int, ...] = ()
@@ -126,20 +126,20 @@ class Curve:
 
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``; on SE(3)
-    ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed as an array of that
-    shape is: ``c[2]`` is its third curve. All array attributes begin with the axes of the stack.
+    ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed like an array of its
+    shape: ``c[2]`` is its third curve. All array attributes begin with the axes of the stack.
 
     Source: BK (1), BK (9), BK 6.
 
     Attributes
     ----------
     duration : ndarray, shape (...)
-        How long each curve takes, from t = 0. Velocities are per unit of that time.
+        The duration of each curve, which starts at t = 0. Velocities are per unit of this time.
     batch_shape : tuple of int
         The shape of the stack; ``()`` for a single curve.
     domain : tuple of float
-        The first and the last time; for a stack, of the interval that all curves have in common;
-        for an empty one (0, inf).
+        The first and the last time. For a stack, they bound the interval that all curves have in
+        common; for an empty stack, they are (0, inf).
     """
 
     duration: Array
@@ -156,7 +156,7 @@ class Curve:
 
     @property
     def count(self) -> int:
-        """How many curves there are."""
+        """The number of curves."""
         return self.duration.size
 
     @property
@@ -166,10 +166,11 @@ class Curve:
 
     @property
     def breakpoints(self) -> Array:
-        """Ends of panels for a quadrature, as shares of the duration, shape (n,).
+        """The ends of panels for a quadrature, as fractions of the duration, shape (n,).
 
-        Sixteenths, and finer panels where a curve may turn fast: at its ends, by its velocity and
-        acceleration there, and at times of small margin. RuntimeError if a margin is below 1e-6.
+        The panels are sixteenths. They are finer where a curve may turn fast: at its ends,
+        depending on velocity and acceleration there, and near times of small margin. A margin below
+        1e-6 raises RuntimeError.
         """
         ends = np.array([[0.0], [1.0]])
         w, a = (np.linalg.norm(self.flat.values(ends, k)[..., :3], axis=-1) for k in (1, 2))
@@ -179,7 +180,8 @@ class Curve:
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
         """Return the curve, or a derivative, at times of any shape in the domain.
 
-        `order` is 0 to 3, on SE(3) 0 to 2. Times may exceed the domain by 8 eps of its larger end.
+        `order` is from 0 to 3, or on SE(3) from 0 to 2. Times may exceed the domain by 8 eps of its
+        larger end.
 
         Examples
         --------
@@ -211,10 +213,10 @@ class Curve:
         return rate
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
-        """Return each curve of the stack, or a derivative, at times of its own, up to its duration.
+        """Return each curve of the stack, or a derivative, at its own times, up to its duration.
 
-        `t` has the shape (...) + batch_shape, the result t.shape + (3, 3) or t.shape + (3,), on
-        SE(3) with 4 and 6.
+        `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or t.shape
+        + (3,), or with 4 and 6 on SE(3).
         """
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
@@ -227,13 +229,13 @@ class Curve:
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
-        """Return a curve of the stack, or some as a stack; the index is one for NumPy's arrays."""
+        """Return one curve of the stack, or a smaller stack; the index is one for NumPy arrays."""
         if not self.batch_shape:
             raise TypeError("a single curve is no stack, and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
 
     def __repr__(self) -> str:
-        """Return the kind of the curve, its group, the stack and the interval of time."""
+        """Return the kind of curve, the shape of the stack, and the domain."""
         stack = f", stack of shape {self.batch_shape}" if self.batch_shape else ""
         start, end = self.domain
         return f"<{self._what()} on {_GROUPS[self.size]}{stack}, t in [{start:g}, {end:g}]>"
@@ -242,7 +244,7 @@ class Curve:
         return type(self).__name__
 
     def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these numbers, which count through the stack."""
+        """Return the stack of the curves with these numbers in the flattened stack."""
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         stacked = len(self.batch_shape)
         for name, value in parts.items():
@@ -258,15 +260,16 @@ class Curve:
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return all curves of a stack with one axis, as if they took from 0 to 1; by subclasses.
+        """Return all curves of a stack with one axis, for times from 0 to 1.
 
-        `t` has the shape (T, count) or (T, 1), the result (T, count, 3, 3) or (T, count, 3), on
-        SE(3) with 4 and 6. SingularTime if a curve is not defined at one of the times.
+        Subclasses implement this method. `t` has the shape (T, count) or (T, 1). The result has the
+        shape (T, count, 3, 3) or (T, count, 3), or with 4 and 6 on SE(3). SingularTime is raised if
+        a curve is not defined at one of the times.
         """
         raise NotImplementedError
 
     def evaluate(self, t: Array, order: int) -> Array:
-        """Return all curves at the times t, shape (T, count) or (T, 1), in blocks of times."""
+        """Return all curves at the times t, shape (T, count) or (T, 1), by blocks of times."""
         T, core = self.flat.duration, self._core(order)
         shares = t / (T[:1] if np.all(T[:1] == T) else T)
         values = np.empty((len(t), self.count, *core))
@@ -287,7 +290,7 @@ class Curve:
         return self if len(self.batch_shape) == 1 else self.take(np.arange(self.count))
 
     def _check_order(self, order: int) -> int:
-        """Return the order of a derivative, or raise a ValueError if the curve has none of it."""
+        """Return the order of a derivative; raise ValueError if the curve does not have it."""
         return check_order(order, 3 if self.size == 3 else 2)
 
     def _core(self, order: int) -> tuple[int, ...]:
@@ -302,15 +305,15 @@ class QuaternionCurve(Curve):
     """
 
     start: Array  # the fixed rotation as a quaternion, shape (..., 4)
-    controls: Array  # what Q is made of, shape (..., n, components)
+    controls: Array  # the data that define Q, shape (..., n, components)
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return the jet of Q at the times t, from controls that broadcast with them."""
         raise NotImplementedError
 
     def values(self, t: Array, order: int) -> Array:
-        """Return the rotation of the start times Q, or a derivative."""
-        by_curve = len(t) > self.count  # the longer axis last
+        """Return the start rotation times the rotation of Q, or a derivative."""
+        by_curve = len(t) > self.count  # put the longer axis last
         t, axis = (t.T, -1) if by_curve else (t, -2)
         Q = self.quaternion(np.expand_dims(self._first, axis), t, order)
         self._check(Q[0], t, by_curve)
@@ -321,22 +324,22 @@ class QuaternionCurve(Curve):
         return values.swapaxes(0, 1) if by_curve else values
 
     def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
-        """Raise a SingularTime where Q has no direction."""
+        """Raise SingularTime if Q has no direction at one of the times."""
 
     @cached_property
     def _first(self) -> Array:
-        """The controls, components first."""
+        """The controls with the axis of the components first."""
         return np.ascontiguousarray(np.moveaxis(self.controls, (-2, -1), (0, 1)))
 
 
 def other_way(turn: Array) -> Array:
-    """Return the turns to the same rotations the other way round, by 2π − angle; 0 stays 0."""
+    """Return the turns to the same rotations the other way round, by 2π − angle; 0 is kept."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
 
 
 def polynomial_jet(ends: Array, t: Array, order: int) -> Jet:
-    """Return the jet of Hermite's polynomial with these ends."""
+    """Return the jet of the Hermite polynomial with these ends."""
     return [hermite(ends, t, k) for k in range(order + 1)]
 
 
@@ -349,11 +352,11 @@ class AlongGeodesic(Curve):
     Attributes
     ----------
     R0, rotation_vector : ndarray, shapes (..., 3, 3) and (..., 3)
-        The start, and σ, which turns it into the goal; body frame.
+        The start, and the rotation vector σ that turns it into the goal, in the body frame.
     """
 
     rotation_vector: Array
-    terms: Array  # R0, R0 K and R0 K² of R0 (I + sin a K + (1 − cos a) K²), Rodrigues' formula
+    terms: Array  # R0, R0 K and R0 K², for R0 (I + sin a K + (1 − cos a) K²), Rodrigues' formula
 
     @property
     def R0(self) -> Array:
@@ -369,7 +372,7 @@ class AlongGeodesic(Curve):
         progress, count = self._progress(t, order), self.count
         if order:
             values = np.empty((len(t), count, 3))
-            for i in range(3):  # four times as fast as in one go
+            for i in range(3):  # a loop is four times as fast as one product
                 np.multiply(progress, self.rotation_vector[:, i], out=values[..., i])
             return values
         weights = np.empty((3, count, len(t)))
@@ -383,7 +386,7 @@ class AlongGeodesic(Curve):
 
 
 def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
-    """Write sin a and 1 − cos a, a = 2 `half` times `progress`, by tan(a/2): the fastest way."""
+    """Write sin a and 1 − cos a, a = 2 `half` times `progress`, from tan(a/2), which is fastest."""
     tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
     np.multiply(tangent, tangent, out=sine)
     sine += 1
@@ -393,9 +396,10 @@ def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: 
 
 
 def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
-    """Return for each curve of a stack the sums of its terms, each times its weight.
+    """Return the weighted sums of the terms of each curve of a stack.
 
-    Shapes: `weights` (T, count, n) or (T, 1, n), `terms` (count, n, m), the sums (T, count) + core.
+    `weights` has the shape (T, count, n) or (T, 1, n), `terms` (count, n, m), and the result (T,
+    count) + core.
     """
     sums = np.empty((len(weights), len(terms), terms.shape[-1]))
     np.matmul(np.swapaxes(weights, 0, 1), terms, out=np.swapaxes(sums, 0, 1))
@@ -412,7 +416,7 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     R0, R1 : array_like, shape (..., 3, 3)
         Rotation matrices.
     duration : array_like, shape (...), optional
-        How long it takes.
+        The duration of the motion.
 
     Returns
     -------
@@ -421,9 +425,9 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
 
     Notes
     -----
-    Singular set: rotations a half-turn apart. Of the two shortest geodesics the one whose
-    ``rotation_vector`` has its component of largest magnitude (the first of equals) positive is
-    returned.
+    Singular set: rotations a half-turn apart. Two geodesics are then shortest. The one returned has
+    a ``rotation_vector`` whose component of largest magnitude (the first, if several are equal) is
+    positive.
 
     Examples
     --------
@@ -454,16 +458,17 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     Parameters
     ----------
     curve : Curve
-        Or a stack of them.
+        A curve or a stack of curves.
     duration : array_like, shape (...)
-        The new duration, from 1e-100 up; one, or one for each curve. It must not vanish in rounding
-        beside the first time of a `chain`.
+        The new duration, at least 1e-100: one for all curves, or one for each. For a `chain`, it
+        must not vanish by rounding when it is added to the first time.
 
     Returns
     -------
     Curve
-        Of the same kind. k times the duration divides velocities and accelerations by k and k², and
-        `acceleration_cost` by k³. A `chain` that starts at a is then at its poses at a + k (t − a).
+        A curve of the same kind. If the duration is multiplied by k, velocities and accelerations
+        are divided by k and k², and `acceleration_cost` by k³. A `chain` that starts at a then
+        passes through its poses at a + k (t − a).
 
     Examples
     --------
@@ -489,7 +494,7 @@ def identity(t: Array, order: int) -> Array:
 
 
 def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
-    """Return how a curve of a stack is called in messages, nothing for a single one."""
+    """Return the name of a curve of a stack for messages; it is empty for a single curve."""
     index = [int(i) for i in np.unravel_index(curve, batch_shape)] if batch_shape else []
     return f" of curve {index}" if index else ""
 
@@ -497,7 +502,10 @@ def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
 def check_defined(
     t: Array, lost: NDArray[np.bool_], reason: str, *, by_curve: bool = False
 ) -> None:
-    """Raise `SingularTime` for the first lost t, shape (T, count) or, `by_curve`, (count, T)."""
+    """Raise `SingularTime` for the first time that is `lost`.
+
+    `t` and `lost` have the shape (T, count) or, if `by_curve`, (count, T).
+    """
     if lost.any():
         place = tuple(np.argwhere(lost)[0])
         curve = place[0] if by_curve else place[1]
@@ -505,7 +513,7 @@ def check_defined(
 
 
 def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
-    """Return `graded` breakpoints, finer near small margins; RuntimeError if one is below 1e-6."""
+    """Return breakpoints, `graded` near small margins; raise RuntimeError if one is below 1e-6."""
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
         raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
@@ -514,7 +522,7 @@ def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
 
 
 def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Return breakpoints in [0, 1], with more of them from 1/32 down to some widths near times."""
+    """Return breakpoints in [0, 1], refined near the times from 1/32 down to the widths."""
     cuts = [points]
     for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
@@ -526,7 +534,10 @@ def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
 def least_over_time(
     value: Callable[[Array], Array], batch_shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Return when a function of time is least, and its value; both of shape (N,) + batch_shape."""
+    """Return the time when a function is least, and the least value, of shape batch_shape.
+
+    The function takes times of the shape (N,) + batch_shape and returns values of this shape.
+    """
     centre, reach, count = np.full(batch_shape, 0.5), 0.5, 129
     while reach > 1e-15:
         steps = np.linspace(-reach, reach, count).reshape(-1, *(1 for _ in batch_shape))

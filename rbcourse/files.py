@@ -1,4 +1,4 @@
-"""Paths and plans as files: CSV with names and units, and TUM trajectories."""
+"""Reading and writing of paths and plans: CSV with names and units, and TUM trajectories."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ HEADERS = {
     for moves in (True, False)
     for rates in (True, False)
 }
-"""The columns of a CSV file of poses, or of rotations, with velocities or without."""
+"""The columns of a CSV file of poses or of rotations, with or without velocities."""
 TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
-"""The columns of a TUM trajectory: its quaternions end with the scalar, ours begin with it."""
+"""The columns of a TUM trajectory. Its quaternions end with the scalar part; ours begin with it."""
 VELOCITIES = {
     "world": ["vx world [m/s]", "vy world [m/s]", "vtheta [rad/s]"],
     "body": ["vx body [m/s]", "vy body [m/s]", "vtheta [rad/s]"],
 }
-"""The columns of a plan before the duration, for each frame of the plane, and for joints."""
+"""The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
-_TOLERANCE = 1e-3  # of the norm of a quaternion in a file: others write four decimals
+_TOLERANCE = 1e-3  # of the norm of a quaternion in a file: some programs write four decimals
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -56,21 +56,23 @@ def write_path(
 ) -> None:
     """Write a path of poses or rotations as CSV or as a TUM trajectory, by the file extension.
 
-    A line for each time, after a line of names (CSV: with units) or a comment (TUM): time,
-    position, quaternion, ω, v. Quaternions are (w, x, y, z) in CSV, (x, y, z, w) in TUM; the first
-    has w ≥ 0, each other the sign that is nearer to the one before. Numbers have all their digits.
-    An existing file is replaced; if an argument is malformed, nothing is written.
+    The first line has the names of the columns, with units in CSV, or as a comment in TUM. Each
+    further line has a time, position, quaternion, ω and v. Quaternions are (w, x, y, z) in CSV and
+    (x, y, z, w) in TUM. The first quaternion has w ≥ 0, and every other has the sign that makes it
+    nearer to the previous one. Numbers are written with all digits. An existing file is replaced.
+    If an argument is malformed, nothing is written.
 
     Parameters
     ----------
     file : str or Path
-        ``….csv``; or ``….tum`` or ``….txt`` for TUM, poses without velocities.
+        The file name ends in ``.csv``, or for TUM (poses without velocities) in ``.tum`` or
+        ``.txt``.
     times : array_like, shape (N,)
-        In s, increasing.
+        Increasing times in s.
     poses : array_like, shape (N, 4, 4) or (N, 3, 3)
         Poses or rotation matrices, valid to 1e-9.
     velocities : array_like, shape (N, 6) or (N, 3), optional
-        Twists (ω, v), or angular velocities ω, body frame, in rad/s and m/s.
+        Twists (ω, v), or angular velocities ω, in the body frame, in rad/s and m/s.
 
     Examples
     --------
@@ -102,9 +104,10 @@ def write_path(
 
 
 def read_path(file: File) -> tuple[Array, Array, Array | None]:
-    """Read a path that `write_path` wrote, or a TUM trajectory; all of it, or nothing.
+    """Read a path that `write_path` wrote, or a TUM trajectory.
 
-    Each quaternion is replaced by the nearest unit quaternion. CSV is in UTF-8.
+    A malformed file is rejected as a whole. Each quaternion is replaced by the nearest unit
+    quaternion. CSV files are in UTF-8.
 
     Parameters
     ----------
@@ -116,15 +119,15 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     times : ndarray, shape (N,)
         In s.
     poses : ndarray, shape (N, 4, 4) or (N, 3, 3)
-        Poses; rotation matrices if the file has no positions.
+        Poses, or rotation matrices if the file has no positions.
     velocities : ndarray, shape (N, 6) or (N, 3), or None
-        Twists (ω, v), or ω, body frame, if the file has them.
+        Twists (ω, v), or ω, in the body frame, if the file has them.
 
     Raises
     ------
     ValueError
         If the file has other content or no pose, if times do not increase, or if the norm of a
-        quaternion differs from 1 by more than 1e-3. The message gives the line and the reason.
+        quaternion differs from 1 by more than 1e-3. The message names the line and the reason.
     """
     moves, rows = _tum_rows(file) if _is_tum(file) else _csv_rows(file)
     at, table, last = (4 if moves else 1), [], -math.inf
@@ -145,7 +148,7 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
 
 
 def save_plan(file: File, plan: Plan, kind: str) -> None:
-    """Write a plan as CSV: a line of names with their units, then a line for each command.
+    """Write a plan as CSV: a line of names with units, and then a line for each command.
 
     An existing file is replaced; if an argument is malformed, nothing is written.
     Source: RR 3.2, RR 4.2.
@@ -154,26 +157,29 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     ----------
     file : str or Path
     plan : iterable of (velocity, duration)
-        Velocities: three numbers in the plane, any for joints; durations from 0 up, in s.
+        Velocities have three numbers in the plane, and any number for joints. Durations are at
+        least 0, in s.
     kind : {"world", "body", "joints"}
-        Planar velocities in the world or the body frame, or joint velocities: the column names.
+        The kind of velocities: planar in the world or the body frame, or of joints. It determines
+        the names of the columns.
     """
-    commands = as_plan(plan, "n")  # how many joints there are, the first of them tells
+    commands = as_plan(plan, "n")  # the first command tells the number of joints
     names = _velocities(kind, commands[0][0].size if commands else 0)
     rows = [[*velocity, duration] for velocity, duration in as_plan(commands, len(names))]
     write_csv(file, [*names, DURATION], rows)
 
 
 def load_plan(file: File, kind: str) -> Commands:
-    """Read a plan that `save_plan` or a spreadsheet wrote; all of it, or nothing.
+    """Read a plan that `save_plan` or a spreadsheet wrote.
 
-    Other content or another kind raises ValueError, with the line and the reason.
+    A malformed file is rejected as a whole: other content or another kind raises ValueError, with
+    the line and the reason.
     Source: RR 3.2, RR 4.2.
 
     Parameters
     ----------
     file : str or Path
-        Comma-separated values, UTF-8; the first line has the names of the columns.
+        A file of comma-separated values in UTF-8. The first line has the names of the columns.
     kind : {"world", "body", "joints"}
         As for `save_plan`.
 
@@ -192,7 +198,7 @@ def load_plan(file: File, kind: str) -> Commands:
 
 
 def _is_tum(file: File) -> bool:
-    """Tell TUM from CSV."""
+    """Return whether a file is TUM, not CSV, by its ending."""
     suffix = os.path.splitext(file)[1].lower()
     if suffix not in (".csv", ".tum", ".txt"):
         raise ValueError(f"file: a name wanted that ends in .csv, .tum or .txt, got {file}")
@@ -200,7 +206,7 @@ def _is_tum(file: File) -> bool:
 
 
 def _csv_rows(file: File) -> tuple[bool, Rows]:
-    """Return whether there are positions, and the rows of a CSV file."""
+    """Return whether a CSV file has positions, and its rows."""
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
     kind = next((kind for kind, names in HEADERS.items() if names == header), None)
@@ -215,7 +221,7 @@ def _csv_rows(file: File) -> tuple[bool, Rows]:
 
 
 def _tum_rows(file: File) -> tuple[bool, Rows]:
-    """Return that there are positions, and the rows of a TUM file in the order of the CSV."""
+    """Return True, since a TUM file has positions, and its rows in the order of a CSV file."""
     lines = ((place, line.split()) for place, line in text_lines(file))
     rows = (
         _row(place, TUM, cells) for place, cells in lines if cells and not cells[0].startswith("#")
@@ -224,7 +230,7 @@ def _tum_rows(file: File) -> tuple[bool, Rows]:
 
 
 def _velocities(kind: str, joints: int) -> list[str]:
-    """Return the columns of the velocities of a plan; those of joints are numbered from 0."""
+    """Return the names of the velocity columns of a plan; joints are numbered from 0."""
     if kind == "joints":
         return [f"v{i} [rad/s]" for i in range(joints)]
     if kind in list(VELOCITIES):
@@ -257,7 +263,7 @@ def csv_lines(file: File) -> Iterator[tuple[str, list[str]]]:
 
 
 def text_lines(file: File) -> Iterator[tuple[str, str]]:
-    """Yield the place and the text of each line of a file; blank lines at its end are left out."""
+    """Yield the place and the text of each line of a file; blank lines at the end are skipped."""
     with open(file, "rb") as stream:
         content = stream.read()
     try:
@@ -270,7 +276,7 @@ def text_lines(file: File) -> Iterator[tuple[str, str]]:
 
 
 def write_csv(file: File, names: list[str], rows: Iterable[Iterable[float]]) -> None:
-    """Write a line of names, then a line for each row, with all digits that numbers need."""
+    """Write a line of names, and then a line for each row, with all digits of the numbers."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
@@ -279,13 +285,13 @@ def write_csv(file: File, names: list[str], rows: Iterable[Iterable[float]]) -> 
 
 
 def write_text(file: File, text: str) -> None:
-    """Write a text file, the same on every system."""
+    """Write a text file with the same bytes on every system."""
     with open(file, "w", encoding="utf-8", newline="\n") as stream:
         stream.write(text)
 
 
 def to_number(place: str, cell: str) -> float:
-    """Return a cell as a finite number, or raise a ValueError that gives its place."""
+    """Return a cell as a finite number, or raise a ValueError that names its place."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
         raise ValueError(f"{place}: a finite number wanted, got {cell[:40]!r}")

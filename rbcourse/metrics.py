@@ -1,7 +1,7 @@
 """Metrics on matrices and on the groups: trace metrics, invariance, inertia and weight.
 
-Tangent vectors at A are matrices X = A hat(x); x are the components of X in the left-invariant
-frame: an angular velocity on SO(3), a twist (ω, v) on SE(3).
+Tangent vectors at A are matrices X = A hat(x), where x are the components of X in the
+left-invariant frame: an angular velocity on SO(3), or a twist (ω, v) on SE(3).
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors R hat_so3(x), R hat_so3(y): 2 x · y.
 
-    It is invariant under rotations on both sides, and twice the kinetic energy of a ball with the
-    moment of inertia 2.
+    It is invariant under rotations on both sides. For X = Y it is twice the kinetic energy of a
+    ball with moment of inertia 2.
     Source: BK 3.1, BK (12), BK Prop. 1, BK Remark 1, BK Remark 2.
 
     Parameters
@@ -106,8 +106,9 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors A hat_se3(x), A hat_se3(y): 2 ω_x · ω_y + v_x · v_y.
 
-    It is invariant under poses on the left, under rotations only on the right, and twice the
-    kinetic energy of a ball of mass 1 and moment of inertia 2 whose centre is the body's origin.
+    It is invariant under poses on the left, but on the right only under rotations. For X = Y it is
+    twice the kinetic energy of a ball of mass 1 and moment of inertia 2 whose centre is the body's
+    origin.
     Source: BK 3.2, BK (14), BK Remark 3, BK Remark 4, BK Remark 5.
 
     Parameters
@@ -128,14 +129,14 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
 
 
 def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike) -> Array:
-    """Return ⟨X, Y⟩ = xᵀ G y at A: the left-invariant metric with the matrix G.
+    """Return ⟨X, Y⟩ = xᵀ G y at A in the left-invariant metric with the matrix G.
 
     Source: BK 2.3, BK (6), BK (7).
 
     Parameters
     ----------
     G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
-        The metric at the identity, in the basis of angular velocities or twists: symmetric.
+        The symmetric matrix of the metric at the identity, for angular velocities or twists.
     A, X, Y : array_like, shape (..., 3, 3) or (..., 4, 4)
         Rotations or poses, and tangent vectors there; x and y are their components.
 
@@ -158,17 +159,17 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
 
 
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
-    """Return [[alpha I, beta I], [beta I, 0]]: invariant on both sides, and indefinite.
+    """Return [[alpha I, beta I], [beta I, 0]], an indefinite metric invariant on both sides.
 
-    Three eigenvalues are positive and three negative: the "length" of a motion can be 0 or
-    imaginary. The geodesics are screws.
+    Three eigenvalues are positive and three negative, so the "length" of a motion can be 0 or
+    imaginary. The geodesics are screw motions.
     Source: BK 2.6, BK (10).
 
     Parameters
     ----------
     alpha, beta : float
-        Positive. alpha, in m² for an energy per mass, weighs rotation, and beta, in m, couples it
-        to translation.
+        Positive numbers. alpha, in m² for an energy per mass, is the weight of rotation, and beta,
+        in m, couples rotation to translation.
 
     Returns
     -------
@@ -188,7 +189,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
 
 
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
-    """Return the tangent vector X = A hat(x) at A: the left-invariant field of x.
+    """Return the tangent vector X = A hat(x) at A, a value of the left-invariant field of x.
 
     Source: BK 2.2, BK (4), BK (5).
 
@@ -216,7 +217,7 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     """Return the components x of tangent vectors X at A: vee(A⁻¹ X), with Rᵀ for R⁻¹.
 
-    The part of X normal to the tangent space is dropped.
+    The part of X that is normal to the tangent space is dropped.
     Source: BK 2.2, BK (1), BK (5).
 
     Parameters
@@ -281,12 +282,12 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     Parameters
     ----------
     W : array_like, shape (..., 3, 3)
-        Symmetric; of a body ∫ p pᵀ dm over its points p, in kg m², body frame.
+        Symmetric matrices; for a body, ∫ p pᵀ dm over its points p in the body frame, in kg m².
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        Of a body its inertia about the origin.
+        For a body, its inertia about the origin.
 
     Examples
     --------
@@ -302,15 +303,16 @@ def inertia_from_weight(W: ArrayLike) -> Array:
 def weight_from_inertia(G: ArrayLike) -> Array:
     """Return the weight W with tr(W) I − W = G: tr(G)/2 I − G.
 
-    The inertia of every body satisfies the condition on G, and no other G has a W without negative
-    eigenvalues, which are ∫ x² dm along the axes. W has rank 2 for a flat body, whose largest
-    moment is the sum of the other two, and rank 1 for a rod without thickness.
+    The inertia of every body satisfies the condition on G below. For any other G, W has a negative
+    eigenvalue. The eigenvalues of a body's W are ∫ x² dm along the axes. W has rank 2 for a flat
+    body, whose largest moment is the sum of the other two, and rank 1 for a rod without thickness.
     Source: BK 3, for the metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
     G : array_like, shape (..., 3, 3)
-        Symmetric, each eigenvalue at most the sum of the other two, to a few eps of the largest.
+        Symmetric matrices. Each eigenvalue is at most the sum of the other two, to a few eps of the
+        largest.
 
     Returns
     -------
@@ -325,7 +327,7 @@ def weight_from_inertia(G: ArrayLike) -> Array:
 
 
 def weight_of(name: str, G: Array) -> Array:
-    """Return `weight_from_inertia` of symmetric matrices; errors call them by their name."""
+    """Return `weight_from_inertia` of symmetric matrices; errors begin with `name`."""
     moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
     refused = slack < -16 * EPS * np.abs(moments).max(axis=-1)
@@ -339,7 +341,7 @@ def weight_of(name: str, G: Array) -> Array:
 
 
 def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
-    """Return matrices of SO(3) or SE(3), told by their size, and the dimension of the group."""
+    """Return matrices of SO(3) or SE(3), and the dimension of the group, from their size."""
     A = as_finite(name, value, "n", "n")
     if A.shape[-1] not in (3, 4):
         raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) wanted, got {A.shape}")

@@ -1,4 +1,4 @@
-"""Motions of a rigid body: a rotation and a path of the origin, each on its own; and screws."""
+"""Motions of a rigid body: independent rotations and paths of the origin, and screw motions."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class RigidMotion(Curve):
     ----------
     rotation : Curve on SO(3)
     path : ndarray, shape (..., n, 3)
-        d(0), d(1), for a cubic also d'(0), d'(1), for a quintic also d''(0), d''(1), for the time
-        from 0 to 1: in m, fixed frame.
+        d(0) and d(1), for a cubic also d'(0) and d'(1), for a quintic also d''(0) and d''(1). They
+        are in m, in the fixed frame, for times from 0 to 1.
     centre : ndarray, shape (..., 3)
-        The point of the body that follows the path, body frame, in m; 0 is the origin.
+        The point of the body that follows the path, in the body frame, in m; 0 is the origin.
     """
 
     rotation: Curve
@@ -47,8 +47,8 @@ class RigidMotion(Curve):
     centre: Array
 
     def values(self, t: Array, order: int) -> Array:
-        """Return (R, d), or the velocity or acceleration of R beside Rᵀ times that of d."""
-        by_curve = len(t) > self.count  # the longer axis last
+        """Return (R, d), or the velocity or acceleration of R together with Rᵀ times that of d."""
+        by_curve = len(t) > self.count  # put the longer axis last
         d = hermite_stack(self._terms, t.T if by_curve else t, order, by_curve=by_curve)
         d = d.T if by_curve else np.moveaxis(d, 0, -1)
         R = self.rotation.values(t, 0)
@@ -62,7 +62,7 @@ class RigidMotion(Curve):
         return values
 
     def _arm(self, t: Array, order: int, turning: Array) -> Array | float:
-        """Return R r, w × r or w' × r + w × (w × r): the centre's own part of its motion."""
+        """Return R r, w × r or w' × r + w × (w × r), the centre's motion relative to the origin."""
         r = self.centre
         if not r.any():
             return 0.0
@@ -85,7 +85,7 @@ class RigidMotion(Curve):
 
     @property
     def breakpoints(self) -> Array:
-        """As `Curve.breakpoints`, of the rotation."""
+        """The `Curve.breakpoints` of the rotation."""
         return self.rotation.breakpoints
 
     def lasting(self, duration: Array) -> Self:
@@ -110,7 +110,7 @@ class ProjectedMotion(RigidMotion):
 def rigid_motion(
     kind: type[Motion], rotation: Curve, *path: Array, centre: Array | None = None
 ) -> Motion:
-    """Return the motion of a rotation and a path; its velocities are per unit of their time."""
+    """Return the motion of a rotation and a path; velocities are per unit of the rotation time."""
     batch = np.broadcast_shapes(rotation.batch_shape, *(x.shape[:-1] for x in path))
     numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
     turning = rotation.take(np.broadcast_to(numbers, batch))
@@ -125,7 +125,7 @@ def rigid_motion(
 
 
 def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> RigidMotion:
-    """Return the shortest curve from A0 to A1 in metric (14): turn and straight line at once.
+    """Return the shortest curve from A0 to A1 in metric (14): a geodesic turn and a straight line.
 
     Singular set: half-turns, as for `geodesic_so3`. `screw_se3` is a geodesic of another metric.
     Source: BK 2.6, BK (14).
@@ -138,8 +138,8 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     Returns
     -------
     RigidMotion
-        Its ``rotation`` is `geodesic_so3`; the origin moves on a straight line at constant speed.
-        The angular velocity is constant, and so is d', but not v = Rᵀ d'.
+        Its ``rotation`` is `geodesic_so3`, and the origin moves on a straight line at constant
+        speed. The angular velocity and d' are constant, but v = Rᵀ d' is not.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def projected_cubic_se3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ProjectedMotion:
-    """Return the near-optimal minimum-acceleration motion: projected cubic, and a cubic in R³.
+    """Return the near-optimal minimum-acceleration motion: a projected cubic and a cubic in R³.
 
     Source: BK 6.3, BK Prop. 5.
 
@@ -174,15 +174,16 @@ def projected_cubic_se3(
     A0, A1 : array_like, shape (..., 4, 4)
         Poses at the start and at the end.
     w0, w1, d0_dot, d1_dot : array_like, shape (..., 3)
-        Angular velocities there, body frame, and velocities of the origin there, *fixed* frame.
+        Angular velocities there in the body frame, and velocities of the origin there in the
+        *fixed* frame.
     duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        The duration of the motion; velocities are per unit of this time.
 
     Returns
     -------
     ProjectedMotion
         Its ``rotation`` is `projected_cubic_so3`, with the same ``margin``, warning and singular
-        set; the path of the origin is the optimum.
+        set. The path of the origin is the optimum.
 
     Examples
     --------
@@ -210,10 +211,10 @@ def minimum_acceleration_se3(
     centre: ArrayLike = (0.0, 0.0, 0.0),
     duration: ArrayLike = 1.0,
 ) -> RigidMotion:
-    """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic.
+    """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic path.
 
-    Of all motions with these ends it has the least `acceleration_cost` with the same `inertia`,
-    `mass` and `centre`, as far as the rotation has.
+    Of all motions with these ends, it has the least `acceleration_cost` with the same `inertia`,
+    `mass` and `centre`, provided that the rotation that was found has the least.
     Source: BK 6.3; for bodies beyond BK 9.
 
     Parameters
@@ -221,24 +222,25 @@ def minimum_acceleration_se3(
     A0, A1, w0, w1, d0_dot, d1_dot, duration
         As for `projected_cubic_se3`.
     inertia : array_like, shape (..., 3, 3), optional
-        As for `minimum_acceleration_so3`, about the centre of mass. By default 2 I, metric (14).
+        As for `minimum_acceleration_so3`, about the centre of mass. The default is 2 I, metric
+        (14).
     mass : float, optional
-        Of the body, more than 0. It changes the cost of the motion, but not the motion.
+        The mass of the body, above 0. It changes the cost of the motion, but not the motion.
     centre : array_like, shape (3,), optional
-        The centre of mass, in the body frame, in m; by default its origin.
+        The centre of mass, in the body frame, in m; by default the origin.
 
     Returns
     -------
     RigidMotion
-        Its ``rotation`` is `minimum_acceleration_so3`, with the same error and warning; its
-        ``path``, of the centre of mass, is a cubic.
+        Its ``rotation`` is `minimum_acceleration_so3`, with the same error and warning. Its
+        ``path``, that of the centre of mass, is a cubic.
 
     Notes
     -----
-    Rotation and translation are independent in metric (14), and in the metric of the kinetic energy
-    for the position d + R r of the centre of mass r; so each has its own optimum. The end
-    velocities of the centre are d_c' = d' + R (w × r). `projected_cubic_se3` is near-optimal, in
-    closed form.
+    Rotation and translation are independent in metric (14). They are also independent in the metric
+    of the kinetic energy, for the position d + R r of the centre of mass r. So each has its own
+    optimum. The end velocities of the centre are d_c' = d' + R (w × r). `projected_cubic_se3` is
+    near-optimal and has a closed form.
 
     Examples
     --------
@@ -259,12 +261,12 @@ def minimum_acceleration_se3(
 
 
 def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
-    """Return the screw motion from A0 to A1: about one axis, at constant twist.
+    """Return the screw motion from A0 to A1: a motion about one axis with a constant twist.
 
-    Its covariant acceleration is (0, ω × v): every point of the body runs on a helix about the
-    axis (see `screw_from_pose`). It is a geodesic of the indefinite metric (10), not of metric (14)
-    (see `geodesic_se3`). Singular set: poses a half-turn apart, where `log_so3` chooses one of two
-    ω. More full turns give more screws, with other twists.
+    Its covariant acceleration is (0, ω × v). Every point of the body moves on a helix about the
+    axis (see `screw_from_pose`). A screw motion is a geodesic of the indefinite metric (10), not of
+    metric (14) (see `geodesic_se3`). Singular set: poses a half-turn apart, where `log_so3` chooses
+    one of two ω. Additional full turns give other screw motions, with other twists.
     Source: BK 2.6.
 
     Parameters
@@ -275,7 +277,7 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
     Returns
     -------
     ScrewMotion
-        A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1), which turns by π at most.
+        The motion A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1). It turns by at most π.
 
     Examples
     --------
@@ -296,10 +298,10 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ScrewMotion(Curve):
-    """The `Curve` A0 exp_se3(S t), of constant twist S.
+    """The `Curve` A0 exp_se3(S t) with constant twist S.
 
-    ``A0`` is the start; ``twist`` is S = (ω, v), body frame, shape (..., 6); ``displacement`` is S
-    times the duration.
+    ``A0`` is the start, ``twist`` is S = (ω, v) in the body frame, shape (..., 6), and
+    ``displacement`` is S times the duration.
     Source: BK 2.6.
     """
 
@@ -313,7 +315,7 @@ class ScrewMotion(Curve):
 
     @property
     def twist(self) -> Array:
-        """(ω, v), body frame."""
+        """The twist (ω, v) in the body frame."""
         return self.displacement / self.duration[..., None]
 
     def values(self, t: Array, order: int) -> Array:
@@ -327,26 +329,26 @@ class ScrewMotion(Curve):
 
 
 def screw_from_pose(A: ArrayLike) -> Screw:
-    """Return the screw of a displacement, in the fixed frame: axis, point, angle and slide.
+    """Return the screw of a displacement in the fixed frame: axis, point, angle and slide.
 
     Source: BK 2.6.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. For the screw from a pose A0 to A1, in the fixed frame, take A1 @ inverse_se3(A0).
+        Poses. For the screw from a pose A0 to A1, in the fixed frame, use A1 @ inverse_se3(A0).
 
     Returns
     -------
     Screw
-        Also with ``pitch``, the slide for each rad of the turn.
+        The screw; it also has ``pitch``, the slide per radian of the turn.
 
     Notes
     -----
     Singular set: half-turns, which have two screws (`log_so3` chooses the axis), and no turn, where
-    no axis is distinguished; a turn by less than 8 eps counts as a slide alone. Near there axis,
-    slide and pitch have a relative error of a few eps over the angle, and the point, far away, one
-    of a few eps ‖d‖ over its square.
+    no axis is distinguished. A turn by less than 8 eps counts as a pure slide. Near no turn, axis,
+    slide and pitch have a relative error of a few eps over the angle. The point is then far away,
+    and its error is a few eps ‖d‖ over the square of the angle.
 
     Examples
     --------
@@ -367,14 +369,15 @@ def screw_from_pose(A: ArrayLike) -> Screw:
 
 
 class Screw(NamedTuple):
-    """A turn about an axis, and a slide along it: every displacement is one (Chasles).
+    """A turn about an axis and a slide along it; every displacement is a screw (Chasles).
 
     Attributes
     ----------
     axis : ndarray, shape (..., 3)
-        The unit direction of the axis; of the slide where nothing turns, 0 where nothing moves.
+        The unit direction of the axis. It is that of the slide if there is no turn, and 0 if there
+        is no motion.
     point : ndarray, shape (..., 3)
-        The point of the axis nearest to the origin, in m; 0 where nothing turns.
+        The point of the axis nearest to the origin, in m; 0 if there is no turn.
     angle, slide : ndarray, shape (...)
         The turn, in [0, π] rad, and the displacement along the axis, in m.
     """
@@ -385,7 +388,7 @@ class Screw(NamedTuple):
     slide: Array
 
     def __repr__(self) -> str:
-        """Return the screw in words; of a stack, its shape."""
+        """Return a description of the screw, or the shape of a stack."""
         if np.ndim(self.angle):
             return f"<Screw, stack of shape {self.angle.shape}>"
         axis, point = (", ".join(f"{x:.4g}" for x in v + 0.0) for v in (self.axis, self.point))
@@ -394,7 +397,7 @@ class Screw(NamedTuple):
 
     @property
     def pitch(self) -> Array:
-        """The slide for each rad of the turn, in m: inf for a slide alone, NaN for no motion."""
+        """The slide per radian of the turn, in m: inf for a pure slide, NaN for no motion."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.divide(self.slide, self.angle)
 

@@ -1,7 +1,7 @@
-"""Curves through many poses: two-point curves, one after the other.
+"""Curves through many poses, composed of two-point curves.
 
-The splines have the velocities for which the accelerations are continuous, see
-`rbcourse.velocities`; the optimum is in `rbcourse.optimum.splines`.
+The splines have the velocities for which the accelerations are continuous (see
+`rbcourse.velocities`). The optimum is in `rbcourse.optimum.splines`.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def chain(
     *,
     leg: Leg | None = None,
 ) -> Chain:
-    """Return a curve that is at given poses at given times, joined by two-point curves.
+    """Return a curve through given poses at given times, composed of two-point curves.
 
     Source: BK 6, BK 6.3.
 
@@ -54,43 +54,44 @@ def chain(
     times, poses
         As for `bessel_velocities`.
     velocities : array_like, shape (N, 6) or (N, 3), optional
-        Twists or angular velocities at the poses. By default the `spline_velocities` with 0 at both
-        ends and where two successive poses are equal to rounding.
+        Twists or angular velocities at the poses. By default they are the `spline_velocities`, with
+        0 at both ends and where two successive poses are equal to rounding.
     leg : callable, optional
-        What joins two poses: a function of this package, or one of your own, that returns a stack
-        of two-point curves. It is called once for all legs, with the keyword argument ``duration``
-        and its other parameters, which must be among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1
-        (d0_dot and d1_dot in the fixed frame). A function for rotations also joins poses: the
-        origin then moves on the polynomial with as many boundary conditions. By default
-        `projected_cubic_so3`, or `projected_cubic_se3`.
+        The function that makes the legs, from this package or your own. It returns a stack of
+        two-point curves, and is called once for all legs. Its arguments are the keyword
+        ``duration`` and others among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1 (d0_dot and
+        d1_dot in the fixed frame). A function for rotations can also join poses: the origin then
+        moves on the polynomial with as many boundary conditions. The default is
+        `projected_cubic_so3`, or for poses `projected_cubic_se3`.
 
     Returns
     -------
     Chain
-        A `Curve` on [times[0], times[-1]], at its poses to a few eps, with the attributes ``legs``
-        and ``velocities`` and the method ``jumps(order)``.
+        A `Curve` on [times[0], times[-1]] that passes through its poses to a few eps. It has the
+        attributes ``legs`` and ``velocities`` and the method ``jumps(order)``.
 
     Raises
     ------
     ValueError
-        As `bessel_velocities`; if `velocities` are given to legs that ask for none; if `leg` asks
-        for other arguments, refuses these, or does not lead to the next pose, to 1e-6. The message
-        names the first place. Other errors, and warnings, are those of `leg`.
+        For the same reasons as in `bessel_velocities`; if `velocities` are given, but `leg` takes
+        none; or if `leg` needs other arguments, rejects these, or misses the next pose by more than
+        1e-6. The message names the first place. Other errors, and warnings, are those of `leg`.
 
     Notes
     -----
-    At the joints a chain is C⁰ (the velocity jumps) with `geodesic_so3`, `geodesic_se3`,
-    `screw_se3` and `projected_line_so3`. It is C² with the default legs and velocities, apart from
+    At the joints, a chain is C⁰ (the velocity jumps) with `geodesic_so3`, `geodesic_se3`,
+    `screw_se3` and `projected_line_so3`. It is C² with the default legs and velocities, except at
     inner poses where it rests, and with `projected_quintic_so3`, `exponential_quintic_so3` and
-    `minimum_jerk_so3`; C¹ (the acceleration jumps) with all others, which ask for velocities.
-    Projected legs meet this to a few eps of the largest ‖w‖ and of ‖w‖² + ‖w'‖. The accelerations
-    a0, a1 are those of the default chain, also where velocities are given, but 0 at both ends and
-    where the curve rests.
-    Rest at both ends costs more than natural ends of `projected_spline_se3`. Legs that turn by 60°
-    cost 5 % more than `minimum_acceleration_spline_se3` with the same ends, those by 90° a third
-    more; the legs of `quaternion_spline_so3` cost 0.4 % and 2 % more.
-    Singular set: that of the legs, and half-turns between neighbours, which are refused. To turn by
-    more, put a pose between.
+    `minimum_jerk_so3`. It is C¹ (the acceleration jumps) with all other legs, which take
+    velocities. For projected legs, this holds to a few eps of the largest ‖w‖ and of ‖w‖² + ‖w'‖.
+    The accelerations a0, a1 are those of the default chain, even if velocities are given, but they
+    are 0 at both ends and where the curve rests.
+    Rest at both ends costs more than the natural ends of `projected_spline_se3`. Compared with
+    `minimum_acceleration_spline_se3` with the same ends, legs that turn by 60° cost 5 % more, and
+    legs that turn by 90° cost a third more. The legs of `quaternion_spline_so3` cost 0.4 % and 2 %
+    more.
+    Singular set: that of the legs, and half-turns between neighbours, which raise ValueError. For a
+    larger turn, insert a pose.
 
     Examples
     --------
@@ -152,15 +153,17 @@ def projected_spline_so3(
     Returns
     -------
     Chain
-        Of `projected_cubic_so3`, or of `weighted_cubic_so3`, with the `spline_velocities`.
+        A chain of `projected_cubic_so3`, or with an inertia of `weighted_cubic_so3`, with the
+        `spline_velocities`.
 
     Notes
     -----
-    For two rotations and given velocities it is the projected cubic. Moved rotations have the moved
-    spline, and reversed times the reversed one. Its relative excess over the optimum,
-    `minimum_acceleration_spline_so3`, is about 0.05 θ⁴, θ the angle of a leg in rad: 0.3 % at 30°,
-    5 % at 60°, 30 % at 90°; that of `quaternion_spline_so3` is 16 times smaller. Rotations about
-    one axis by (0, θ, 0), at even times and with natural ends, have the excess 20711/180180 θ⁴.
+    For two rotations and given velocities, the result is the projected cubic. If the rotations are
+    moved, the spline moves with them; if the times are reversed, the spline is reversed. Its
+    relative excess over the optimum, `minimum_acceleration_spline_so3`, is about 0.05 θ⁴, with the
+    angle θ of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
+    `quaternion_spline_so3` is 16 times smaller. For rotations about one axis by (0, θ, 0), at
+    equally spaced times and with natural ends, the excess is 20711/180180 θ⁴.
     Singular set: that of the legs.
 
     Examples
@@ -190,8 +193,8 @@ def projected_spline_se3(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "n
     Returns
     -------
     Chain
-        Of `projected_cubic_se3`, with the `spline_velocities`: the rotation is
-        `projected_spline_so3`, the origin moves on a cubic spline.
+        A chain of `projected_cubic_se3` with the `spline_velocities`. The rotation is
+        `projected_spline_so3`, and the origin moves on a cubic spline.
 
     Examples
     --------
@@ -210,7 +213,7 @@ def quaternion_spline_so3(
 ) -> Chain:
     """Return normalised cubics of quaternions through many rotations, twice differentiable.
 
-    Of all closed forms here it is the nearest to `minimum_acceleration_spline_so3`.
+    Of all closed forms in this package, this is the nearest to `minimum_acceleration_spline_so3`.
     Source: beyond BK 13, beyond BK 14.
 
     Parameters
@@ -221,13 +224,15 @@ def quaternion_spline_so3(
     Returns
     -------
     Chain
-        Of `quaternion_cubic_so3`, with the velocities for which their accelerations are the same at
-        each rotation: one linear system, which is positive definite whatever the rotations are.
+        A chain of `quaternion_cubic_so3` with the velocities for which successive legs have the
+        same acceleration at each rotation. They solve a linear system that is positive definite for
+        all rotations.
 
     Notes
     -----
-    Its relative excess over the optimum is about 0.003 θ⁴, θ the angle of a leg in rad. Each leg
-    turns the short way. Moved rotations have the moved spline, and reversed times the reversed one.
+    The relative excess over the optimum is about 0.003 θ⁴, with the angle θ of a leg in rad. Each
+    leg turns the short way. If the rotations are moved, the spline moves with them; if the times
+    are reversed, the spline is reversed.
     Singular set: that of the legs.
 
     Examples
@@ -247,14 +252,14 @@ def quaternion_spline_so3(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Chain(Curve):
-    """A `Curve` of legs, each from one pose to the next. At an inner time the later leg counts.
+    """A `Curve` of legs from pose to pose. At the time of an inner pose, the later leg is used.
 
     Attributes
     ----------
     times : ndarray, shape (N,)
-        When it is at each pose.
+        The times at which the chain passes through its poses.
     velocities : ndarray, shape (N, 3) or (N, 6), or None
-        Its velocities at the poses; None where the legs ask for none.
+        Its velocities at the poses, or None if the legs take no velocities.
     legs : Curve
         The stack of the N − 1 legs.
     """
@@ -275,7 +280,7 @@ class Chain(Curve):
 
     @property
     def breakpoints(self) -> Array:
-        """Ends of panels for a quadrature, as shares of the duration: the joints among them."""
+        """The ends of panels for a quadrature, with the joints, as fractions of the duration."""
         T = self.legs.duration
         inside = self.legs.breakpoints * T[:, None]
         return np.unique((np.append(0.0, np.cumsum(T[:-1]))[:, None] + inside) / np.sum(T))
@@ -304,13 +309,14 @@ class Chain(Curve):
     def jumps(self, order: int) -> Array:
         """Return the jumps at the inner poses of the curve or a derivative, shape (N − 2, ...).
 
-        They are the values after minus those before; `order` is 0 to 3, on SE(3) 0 to 2.
+        They are the values after the poses minus those before; `order` is from 0 to 3, or on SE(3)
+        from 0 to 2.
         """
         starts, ends = _at_ends(self.legs, self.legs._check_order(order))
         return starts[1:] - ends[:-1]
 
     def evaluate(self, t: Array, order: int) -> Array:
-        """Return the values at the times t, shape (T, 1): each leg in its own time."""
+        """Return the values at the times t, shape (T, 1), from each leg at its own times."""
         times = t[:, 0]
         values = np.empty((len(t), 1, *self._core(order)))
         if np.any(times[1:] < times[:-1]):
@@ -339,22 +345,23 @@ class Chain(Curve):
         return values
 
     def check_smooth(self, name: str, order: int) -> None:
-        """Raise a RuntimeError about the cost `name` if a derivative up to an order jumps."""
+        """Raise RuntimeError for the cost `name` if a derivative up to `order` jumps."""
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
         for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
-            if k == 2:  # a velocity that changes in the time of a leg
+            if k == 2:  # or of a velocity that changes within a leg
                 sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
-            for half in (slice(3), slice(3, None)):  # rad and m
+            for half in (slice(3), slice(3, None)):  # the rotation in rad and the translation in m
                 jump = jumps[:, half].max(initial=0)
                 if jump > 1e-9 * sizes[:, half].max(initial=0):
                     raise RuntimeError(f"{name}: {what} jumps at a joint, by {jump:.3g}")
 
 
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Divide runs of these lengths, one after the other, into parts of one length.
+    """Divide successive runs of rows, with these lengths, into parts of one length.
 
-    Return run and rows of each part, shapes (parts,) and (parts, length); last rows are repeated.
+    Return the run and the rows of each part, shapes (parts,) and (parts, length). Parts are filled
+    up by repeating the last row.
     """
     mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
     length, ends = max(1, min(int(counts.max()), 2 * mean)), np.cumsum(counts)
@@ -366,7 +373,7 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
 
 
 def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
-    """Return the curve, or the legs of a chain; RuntimeError as `Chain.check_smooth`."""
+    """Return the curve, or the legs of a chain, which must pass `Chain.check_smooth`."""
     if isinstance(curve, Chain):
         curve.check_smooth(name, order)
         return curve.legs
@@ -374,17 +381,17 @@ def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
 
 
 def _at_ends(legs: Curve, order: int) -> Array:
-    """Return the legs, or a derivative, at their starts and their ends."""
+    """Return the values of the legs, or of a derivative, at their starts and at their ends."""
     return legs.at_own_times(np.stack([0 * legs.duration, legs.duration]), order)
 
 
 def _ends(name: str, values: Array) -> dict[str, Array]:
-    """Return, by their names, the values that legs have at their starts and their ends."""
+    """Return a dict of the values at the starts and at the ends of the legs, by name."""
     return {name.format(0): values[:-1], name.format(1): values[1:]}
 
 
 def _arguments(leg: Leg) -> list[str]:
-    """Return the names of the arguments that a leg cannot do without, except the duration."""
+    """Return the names of the required arguments of a leg, except the duration."""
     try:
         parameters = signature(leg).parameters
     except (TypeError, ValueError) as error:
@@ -401,7 +408,7 @@ def _arguments(leg: Leg) -> list[str]:
 
 
 def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
-    """Return the stack of legs; its warnings are raised where `chain` is called."""
+    """Return the stack of legs; issue its warnings at the line that calls `chain`."""
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
             legs = leg(**ends, duration=duration)
@@ -419,7 +426,7 @@ def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
 
 
 def _check_arrival(legs: Curve, poses: Array) -> None:
-    """Raise a ValueError that names the first leg that is not at the poses of its ends."""
+    """Raise ValueError for the first leg that does not join the poses at its ends."""
     starts, ends = _at_ends(legs, 0)
     missed = np.abs(np.stack([starts - poses[:-1], ends - poses[1:]]))
     missed[..., :3, 3:] -= 64 * EPS * np.abs(poses[1:, :3, 3:])
@@ -432,10 +439,10 @@ def _check_arrival(legs: Curve, poses: Array) -> None:
 
 
 def _rotated(poses: Array, v: Array) -> Array:
-    """Return vectors of body frames in the fixed frame."""
+    """Return vectors of the body frames as vectors of the fixed frame."""
     return matvec(poses[:, :3, :3], v) if v.size else v
 
 
 def _twists(poses: Array, w: Array, d_dot: Array) -> Array:
-    """Return (w, Rᵀ d'), or w where nothing moves."""
+    """Return (w, Rᵀ d'), or only w for rotations."""
     return np.concatenate([w, _rotated(poses.mT, d_dot)], axis=-1)

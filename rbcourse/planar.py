@@ -1,9 +1,9 @@
 """Rigid bodies in the plane: poses (x, y, theta), the group SE(2), plans and paths.
 
-Poses are in m, m and rad, in the frame of the world unless a docstring says otherwise. They count
-full turns: theta and theta + 2π are the same orientation, reached after another turn. A twist is
-(vx, vy, omega), in the body frame. A plan is a list of commands (velocity, duration); a path is an
-array of states, one row each.
+Poses are in m, m and rad, in the frame of the world unless a docstring says otherwise. Angles count
+full turns: theta and theta + 2π are the same orientation, but after another turn. A twist is
+(vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A path is an
+array with one row for each state.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        They carry coordinates of the body to those of the world.
+        The matrices map coordinates in the body frame to coordinates in the world frame.
 
     Examples
     --------
@@ -67,8 +67,9 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
 def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices, −π ≤ theta ≤ π.
 
-    The rotation nearest to the upper left block is used. Singular set: blocks [[a, b], [b, −a]], to
-    which no rotation is nearest; theta is 0. At θ = ±π rounding decides the sign.
+    The angle is that of the rotation nearest to the upper left block. Singular set: blocks [[a, b],
+    [b, −a]], to which no rotation is nearest; theta is then 0. At θ = ±π, rounding decides the
+    sign.
     Source: RR 3.1.
 
     Parameters
@@ -93,7 +94,7 @@ def planar_from_matrix(A: ArrayLike) -> Array:
 
 
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
-    """Return the pose `step`, given in the body frame of `pose`, in the frame of the world.
+    """Return the pose `step`, given in the body frame of `pose`, in the world frame.
 
     Source: RR 3.2.
 
@@ -105,11 +106,11 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Its matrix is the product of the two matrices, and the angles add up.
+        The matrix of the result is the product of the two matrices, and the angles add up.
 
     Examples
     --------
-    >>> compose_planar([4, 5, np.pi / 2], [1, 0, np.pi]).round(4)  # a step ahead, and about-turn
+    >>> compose_planar([4, 5, np.pi / 2], [1, 0, np.pi]).round(4)  # one step ahead, and a half-turn
     array([4.    , 6.    , 4.7124])
     """
     pose, step = as_finite("pose", pose, 3), as_finite("step", step, 3)
@@ -119,7 +120,7 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
 
 
 def inverse_planar(pose: ArrayLike) -> Array:
-    """Return the pose of the world in the body frame: `compose_planar` of the two is (0, 0, 0).
+    """Return the pose of the world in the body frame; `compose_planar` of the two is (0, 0, 0).
 
     Source: RR 3.2.
 
@@ -145,20 +146,20 @@ def inverse_planar(pose: ArrayLike) -> Array:
 def exp_planar(S: ArrayLike) -> Array:
     """Return the pose that the constant body twist S reaches from (0, 0, 0) in unit time.
 
-    Its matrix is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]]. No singular set;
-    omega = 0 gives the translation exactly.
+    Its matrix is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]]. There is no
+    singular set; omega = 0 gives the translation exactly.
     Source: RR 3.2.
 
     Parameters
     ----------
     S : array_like, shape (..., 3)
-        Twists (vx, vy, omega), in m, m and rad for unit time; omega of any size.
+        Twists (vx, vy, omega), in m, m and rad for unit time; omega may have any size.
 
     Returns
     -------
     ndarray, shape (..., 3)
-        Poses (x, y, omega). (x, y), the chord of an arc of the angle omega, is (vx, vy) turned by
-        omega/2, times sin(omega/2) / (omega/2).
+        Poses (x, y, omega). The point (x, y) is the end of an arc of the angle omega. It is
+        (vx, vy) turned by omega/2, times sin(omega/2) / (omega/2).
 
     Examples
     --------
@@ -174,8 +175,8 @@ def exp_planar(S: ArrayLike) -> Array:
 def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist that reaches a pose from (0, 0, 0) in unit time, −π ≤ omega ≤ π.
 
-    Singular set: half-turns, which two twists reach. theta = π gives omega = π and −π gives −π;
-    with full turns added rounding decides.
+    Singular set: half-turns, which two twists reach. theta = π gives omega = π, and −π gives −π. If
+    full turns are added to these angles, rounding decides.
     Source: RR 3.1.
 
     Parameters
@@ -204,19 +205,19 @@ def interpolate_planar(
 ) -> Array:
     """Return the path (1 − t) start + t goal of poses (x, y, theta) at even times t in [0, 1].
 
-    The path depends on which point of the body is its place.
-    Singular set of `shortest`: angles that differ by half a turn. If they differ by π or −π as
-    given, the turn is that; otherwise rounding decides.
+    The path depends on the choice of the body point at (x, y).
+    Singular set of `shortest`: angles that differ by half a turn. If the given angles differ by π
+    or −π, the turn is this difference; otherwise rounding decides.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Parameters
     ----------
     start, goal : array_like, shape (..., 3)
     steps : int, optional
-        Number of equal steps, at least 1.
+        The number of equal steps, at least 1.
     shortest : bool, optional
-        Whether to turn by π at most (to rounding): the last theta may then differ from the goal's
-        by full turns. By default theta goes from its start to its goal as given.
+        Whether to turn by at most π (to rounding). The last theta may then differ from the goal's
+        by full turns. By default, theta changes from its given start to its given goal.
 
     Returns
     -------
@@ -240,7 +241,7 @@ def interpolate_planar(
 
 
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
-    """Return the poses (x, y, theta) after each command of a plan, the start first; turns add up.
+    """Return the start and the poses (x, y, theta) after each command of a plan; turns add up.
 
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
@@ -248,19 +249,19 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     ----------
     start : array_like, shape (..., 3)
     plan : iterable of (velocity, duration)
-        Velocities (vx, vy, vtheta) in m/s, m/s and rad/s; durations from 0 up, in s.
+        Velocities (vx, vy, vtheta) in m/s, m/s and rad/s, and durations of at least 0 in s.
     frame : {"world", "body"}, optional
-        The frame of vx and vy. In "world" a command adds velocity times duration; in "body" it is
-        a constant twist, which moves the body along an arc or a line (`exp_planar`).
+        The frame of vx and vy. In "world", a command adds velocity times duration. In "body", a
+        command is a constant twist, which moves the body along an arc or a line (`exp_planar`).
 
     Returns
     -------
     ndarray, shape (commands + 1, ..., 3)
-        Only the ends of the commands are in the path: divide a command to see between them.
+        The path has only the ends of the commands. To see poses in between, divide a command.
 
     Examples
     --------
-    >>> quarter = [([np.pi / 2, 0, np.pi / 2], 1)]  # ahead by a quarter of a circle, turning left
+    >>> quarter = [([np.pi / 2, 0, np.pi / 2], 1)]  # a quarter of a circle to the left
     >>> propagate_planar([0, 0, 0], quarter).round(4)[-1]
     array([1.5708, 0.    , 1.5708])
     >>> propagate_planar([0, 0, 0], quarter, frame="body").round(4)[-1]
@@ -281,14 +282,14 @@ def _rotated(theta: Array, vector: Array) -> Array:
 
 
 def _short(angle: Array) -> Array:
-    """Return angles without their full turns; angles within π are unchanged."""
+    """Return angles without full turns; angles in [−π, π] are returned unchanged."""
     return np.where(np.abs(angle) <= np.pi, angle, np.arctan2(np.sin(angle), np.cos(angle)))
 
 
 def as_plan(plan: Plan, size: int | str) -> Commands:
     """Return a plan as a list of checked commands whose velocities have `size` numbers ("n": any).
 
-    A ValueError names the malformed command and the reason.
+    ValueError names the malformed command and the reason.
     """
     try:
         commands = iter(plan)
@@ -298,7 +299,7 @@ def as_plan(plan: Plan, size: int | str) -> Commands:
 
 
 def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> tuple[Array, float]:
-    """Return one command as arrays; `name` is how it is called in messages."""
+    """Return one command as arrays; `name` is its name in messages."""
     try:
         velocity, duration = command
     except (TypeError, ValueError) as error:
@@ -310,12 +311,12 @@ def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> 
 
 
 def as_states(path: ArrayLike) -> Array:
-    """Return a path as an array of shape (states, k), at least one state, or raise ValueError."""
+    """Return a path as an array of shape (states, k); raise ValueError if it has no state."""
     return as_single("path", path, "states", "k")
 
 
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
-    """Return (1 − t) start + t goal at steps + 1 even times; entries that are equal stay exact."""
+    """Return (1 − t) start + t goal at steps + 1 even times; equal entries are kept exactly."""
     t = np.linspace(0, 1, as_count("steps", steps) + 1)
     batch = check_broadcast(start=(start, 1), goal=(goal, 1))
     t = t.reshape(-1, *[1] * (len(batch) + 1))
@@ -323,7 +324,7 @@ def interpolate(start: Array, goal: Array, steps: int) -> Array:
 
 
 def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = np.add) -> Array:
-    """Return the states from a start on, time first, by ``move(state, velocity * duration)``."""
+    """Return the states from `start` on, time first, by ``move(state, velocity * duration)``."""
     path = [start]
     for i, (velocity, duration) in enumerate(as_plan(plan, start.shape[-1])):
         try:

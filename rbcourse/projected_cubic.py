@@ -1,4 +1,4 @@
-"""Projections on SO(3) of the cubic and the quintic polynomials through given ends."""
+"""Projections on SO(3) of the cubic and quintic polynomials with given ends."""
 
 from __future__ import annotations
 
@@ -26,26 +26,27 @@ from rbcourse.so3 import hat
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ProjectedPolynomial(Curve):
-    """The `Curve` of the nearest rotations to a polynomial M(t) in the space of matrices.
+    """The `Curve` of the rotations nearest to a polynomial M(t) in the space of matrices.
 
     Source: BK 6, BK 6.2.
 
     Attributes
     ----------
     ends : ndarray, shape (..., n, 3, 3)
-        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1), for the time from 0 to 1. With a
-        weight, all times W.
+        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1), for times from 0 to 1. With a
+        weight, all of them are multiplied by W.
     margin, margin_time : ndarray, shape (...)
-        The least sum over t of the two smallest eigenvalues of RᵀM, R the projection of M, and its
-        time. At 0 the nearest rotation is not unique. A small margin is a sign of a poor cubic, a
-        large one does not guarantee a good one (see docs/near_optimal.md).
+        The least value over t of the sum of the two smallest eigenvalues of RᵀM, with the
+        projection R of M, and its time. If the margin is 0, the nearest rotation is not unique. A
+        small margin indicates a poor cubic; a large one does not guarantee a good cubic (see
+        docs/near_optimal.md).
     """
 
     ends: Array
 
     def values(self, t: Array, order: int) -> Array:
-        """Return R, w, w' or w'' of the projection of M; its arrays have their components first."""
-        by_curve = len(t) > self.count  # the longer axis last
+        """Return R, w, w' or w'' of the projection of M."""
+        by_curve = len(t) > self.count  # put the longer axis last
         t = t.T if by_curve else t
         M = [hermite_stack(self._terms, t, k, by_curve=by_curve) for k in range(order + 1)]
         R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
@@ -67,7 +68,7 @@ class ProjectedPolynomial(Curve):
 
     @property
     def margin_time(self) -> Array:
-        """When the margin is reached."""
+        """The time at which the margin is reached."""
         return self._least_gap[0] * self.duration
 
     @cached_property
@@ -76,7 +77,7 @@ class ProjectedPolynomial(Curve):
         return least_over_time(lambda t: gap(hermite(ends, t[..., None, None])), self.batch_shape)
 
     def may_jump(self) -> bool:
-        """Tell whether the gap at 65 times, if not at 9, leaves room for a zero in between."""
+        """Return whether the gap may vanish between 9 sample times, and then also between 65."""
         may = np.ones(self.count, bool)
         ends = np.moveaxis(self.take(np.arange(self.count)).ends, 1, 0)
         for count in (9, 65):
@@ -88,7 +89,7 @@ class ProjectedPolynomial(Curve):
 
     @property
     def breakpoints(self) -> Array:
-        """As `Curve.breakpoints`."""
+        """The `Curve.breakpoints`, refined near small margins."""
         return near_margins(super().breakpoints, *self._least_gap)
 
 
@@ -102,9 +103,10 @@ def projected_cubic_so3(
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        Rotation matrices at the start and at the end, and angular velocities there, body frame.
+        Rotation matrices at the start and at the end, and angular velocities there in the body
+        frame.
     duration : array_like, shape (...), optional
-        How long it takes; velocities are per unit of that time.
+        The duration of the motion; velocities are per unit of this time.
 
     Returns
     -------
@@ -114,17 +116,18 @@ def projected_cubic_so3(
 
     See Also
     --------
-    rbcourse.textbook.projected_cubic_so3 : The same, matrix by matrix.
+    rbcourse.textbook.projected_cubic_so3 : The same for a single curve.
 
     Notes
     -----
-    Singular set: times when the two smallest eigenvalues of RᵀM sum to 0. There the curve jumps,
-    and raises ValueError when called; it is right on both sides. A ``margin`` below 1e-6 gives a
-    RuntimeWarning that names the time. Near a small ``margin`` the curve turns by up to π in a time
-    of about ``margin`` over the speed of M; it is accurate to a few eps ‖M‖ over the sum at that
-    time, its derivatives to that over its square and its cube.
-    Moved ends give the moved curve: L R(t) Q for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1. The optimum is
-    `minimum_acceleration_so3`; for the inertia of a body see `weighted_cubic_so3`.
+    Singular set: times at which the two smallest eigenvalues of RᵀM sum to 0. The curve jumps at
+    such a time, and a call raises ValueError there; on both sides the curve is correct. A
+    ``margin`` below 1e-6 gives a RuntimeWarning that names the time. Near a small ``margin``, the
+    curve turns by up to π in a time of about ``margin`` over the speed of M. The curve is accurate
+    to a few eps ‖M‖ over the sum at that time, and its derivatives to a few eps over the square and
+    the cube of the sum.
+    The curve moves with its ends: for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 it is L R(t) Q. The optimum is
+    `minimum_acceleration_so3`. For the inertia of a body see `weighted_cubic_so3`.
 
     Examples
     --------
@@ -154,20 +157,23 @@ def weighted_cubic_so3(
     R0, R1, w0, w1, duration
         As for `projected_cubic_so3`.
     inertia : array_like, shape (..., 3, 3)
-        As for `minimum_acceleration_so3`; each principal moment is at most the sum of the others.
+        As for `minimum_acceleration_so3`. Each principal moment is at most the sum of the other
+        two.
 
     Returns
     -------
     ProjectedPolynomial
         `project_so_weighted` of the cubic of `projected_cubic_so3`, with the weight W of
-        `weight_from_inertia`. It meets all four ends. ``margin`` is that of M W with W of trace 3.
+        `weight_from_inertia`. It meets all four ends. The ``margin`` is that of M W, with W scaled
+        to trace 3.
 
     Notes
     -----
-    Near-optimal for small excursions: data s times as large have a relative excess over the optimum
-    about s⁴ times as large (s² times for `projected_cubic_so3`). For large ones it may be far from
-    it; `normal_cubic_so3` is a closed form for any inertia. With G a multiple of I the curve is
-    `projected_cubic_so3`. Singular set, warning, moved ends (Qᵀ G Q): as there, of M W.
+    The curve is near-optimal for small excursions: for ends s times as large, the relative excess
+    over the optimum is about s⁴ times as large (s² times for `projected_cubic_so3`). For large
+    excursions, the excess may be large. `normal_cubic_so3` is a closed form for any inertia. If G
+    is a multiple of I, the curve is `projected_cubic_so3`. Singular set, warning and moved ends
+    (with Qᵀ G Q): as for `projected_cubic_so3`, with M W for M.
 
     Examples
     --------
@@ -203,19 +209,20 @@ def projected_quintic_so3(
     R0, R1, w0, w1, duration
         As for `projected_cubic_so3`.
     a0, a1 : array_like, shape (..., 3)
-        Angular accelerations w' there, body frame, in rad per unit time squared.
+        Angular accelerations w' at both ends in the body frame, in rad per unit time squared.
 
     Returns
     -------
     ProjectedPolynomial
-        With ``margin``: the nearest rotations to the quintic M(t) with R, R ŵ and R (ŵ² + â) as
-        values, first and second derivatives at both ends. It meets all six ends exactly.
+        A `Curve`, with ``margin``: the nearest rotations to the quintic M(t) with R, R ŵ and R (ŵ²
+        + â) as values, first and second derivatives at both ends. It meets all six ends exactly.
 
     Notes
     -----
-    In general it is not near the curve of least jerk, `minimum_jerk_so3`: from rest to rest it
-    costs 1.17 times the optimum for a turn by 60°, and 11.6 times for 120°;
-    `exponential_quintic_so3` is near it. Singular set, invariance: as for `projected_cubic_so3`.
+    In general, this curve is not near the curve of least jerk, `minimum_jerk_so3`. From rest to
+    rest, it costs 1.17 times the optimum for a turn by 60°, and 11.6 times for 120°.
+    `exponential_quintic_so3` is near the optimum. Singular set and invariance: as for
+    `projected_cubic_so3`.
 
     Examples
     --------
@@ -240,7 +247,7 @@ def ends_of_quintic(
     a1: ArrayLike,
     duration: ArrayLike,
 ) -> tuple[Ends, Array, Array, Array]:
-    """Return `Ends`, a0 and a1 for the time from 0 to 1, and the duration, of one batch shape."""
+    """Return `Ends`, a0 and a1 for times from 0 to 1, and the duration, of one batch shape."""
     ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     ends, T = ends.broadcast_to(batch).over(duration)
@@ -249,7 +256,7 @@ def ends_of_quintic(
 
 
 def projected_cubic(ends: Ends, duration: Array) -> ProjectedPolynomial:
-    """Return `projected_cubic_so3` of ends for the time from 0 to 1, with no warning."""
+    """Return `projected_cubic_so3` of ends for times from 0 to 1, without a warning."""
     R0, R1, w0, w1 = ends
     M = np.stack([R0, R1, R0 @ hat(w0), R1 @ hat(w1)], axis=-3)
     return ProjectedPolynomial(ends=M, duration=duration)
@@ -263,7 +270,9 @@ def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
 
 
 def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
-    """Return w, w', w'', as many as there are of M', M'', M'''; R nearest to M; components first.
+    """Return w, w', w'', one for each of the derivatives M', M'', M''' that are given.
+
+    R is the nearest rotation to M, and the components are on the first axes of all arrays.
 
     S = RᵀM is symmetric. With A = RᵀM' and K(S) = tr(S) I − S, differentiation gives
     K(S) w = vee(A − Aᵀ), K(S) w' = vee(A' − A'ᵀ) − K(S') w and
@@ -292,7 +301,7 @@ def _spin(S: Array, w: Array) -> Array:
 
 
 def _transposed_times(R: Array, M: Array) -> Array:
-    """Return RᵀM; row by row, several times faster than NumPy's einsum."""
+    """Return RᵀM, computed row by row, several times faster than NumPy's einsum."""
     product = np.empty_like(M)
     for i in range(3):
         np.multiply(R[0, i], M[0], out=product[i])
@@ -307,7 +316,7 @@ def _skew(A: Array) -> Array:
 
 
 def _solve(S: Array, b: Array) -> Array:
-    """Return x with (tr(S) I − S) x = b; that matrix, L D Lᵀ, is positive definite."""
+    """Return x with (tr(S) I − S) x = b, by the factors L D Lᵀ of this positive definite matrix."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = S
     d1 = yy + zz
     l21, l31 = -xy / d1, -xz / d1

@@ -1,4 +1,4 @@
-"""The straight line between two rotations, its projection on SO(3), and θ and f, which time it."""
+"""The straight line between two rotations, its projection on SO(3), and its timing by θ and f."""
 
 from __future__ import annotations
 
@@ -44,13 +44,14 @@ class ProjectedLine(AlongGeodesic):
     Attributes
     ----------
     margin : ndarray, shape (...)
-        2 cos(‖σ‖/2): the least sum, over the line, of the two smallest eigenvalues of RᵀM, M on the
-        line and R its projection. At 0 the projection of the middle is not unique.
+        2 cos(‖σ‖/2), the least value on the line of the sum of the two smallest eigenvalues of RᵀM,
+        for M on the line and its projection R. If the margin is 0, the projection of the middle is
+        not unique.
     """
 
     timing: Progress
-    number: NDArray[np.intp]  # in the stack of this shape that the timing is for:
-    timed: tuple[int, ...]
+    number: NDArray[np.intp]  # of each curve in the stack that the timing is for
+    timed: tuple[int, ...]  # the shape of this stack
 
     @property
     def margin(self) -> Array:
@@ -83,7 +84,7 @@ class ProjectedLine(AlongGeodesic):
             return identity(t, order)
         if t.shape[1] == 1 and t.size:
             values = np.take(self._f_at(t[:, 0], order), self.number, axis=1, mode="clip")
-        elif t.size and self._f_at(t[0, :1], order).shape[1] == 1:  # the same for all curves
+        elif t.size and self._f_at(t[0, :1], order).shape[1] == 1:  # f is the same for all curves
             values = self._f_at(t.ravel(), order).reshape(t.shape)
         else:
             values = np.empty(t.shape)
@@ -106,7 +107,7 @@ class ProjectedLine(AlongGeodesic):
 
     @property
     def breakpoints(self) -> Array:
-        """As `Curve.breakpoints`."""
+        """The `Curve.breakpoints`, refined near a small margin."""
         return near_margins(super().breakpoints, 0.5, self.margin)
 
 
@@ -122,9 +123,10 @@ def projected_line_so3(
     R0, R1, duration
         As for `projected_cubic_so3`.
     f : callable, optional
-        ``f(t, order)``, order 0, 1 or 2: how the line is run through, f(0) = 0 and f(1) = 1 to
-        1e-12, and the derivatives of that; for the jerk ``c(t, 3)`` order 3 too. The times come
-        with an axis of length 1 for each batch axis, and from 0 to 1. By default f(t) = t.
+        The function ``f(t, order)`` returns the position on the line at time t, with f(0) = 0 and
+        f(1) = 1 to 1e-12, for order 0, and its derivatives for order 1 and 2. The jerk ``c(t, 3)``
+        also needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch
+        axis. By default f(t) = t.
 
     Returns
     -------
@@ -133,11 +135,11 @@ def projected_line_so3(
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart. At f(t) = 1/2 the projection jumps from R0 to R1, the
-    curve raises ValueError, and ``margin`` is 0 to a few eps; `RuntimeWarning` if it is below 1e-6.
-    The projection is accurate to eps over the sum of the two smallest eigenvalues of RᵀM, which
-    ``margin`` bounds from below. The curve also raises ValueError when called if `f` returns
-    non-finite values or another shape.
+    Singular set: R0 and R1 a half-turn apart. At f(t) = 1/2, the projection then jumps from R0 to
+    R1, and a call of the curve raises ValueError. The ``margin`` is 0 to a few eps; a margin below
+    1e-6 gives a RuntimeWarning. The projection is accurate to eps over the sum of the two smallest
+    eigenvalues of RᵀM, which ``margin`` bounds from below. A call of the curve also raises
+    ValueError if `f` returns non-finite values or another shape.
 
     Examples
     --------
@@ -172,7 +174,7 @@ def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
 
 
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
-    """Return s(t): the line (1 − t) I + t R2 has the singular values 1, s(t), s(t).
+    """Return s(t) for the line (1 − t) I + t R2, whose singular values are 1, s(t), s(t).
 
     s vanishes only at the angle π and t = 1/2, where the nearest rotation is not unique.
     Source: BK (17).
@@ -180,12 +182,12 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     Parameters
     ----------
     t, angle : array_like, shape (...)
-        Where on the line, any real numbers, and the angle ‖ω₀‖ of R2, in [0, π].
+        The positions on the line, any real numbers, and the angle ‖ω₀‖ of R2, in [0, π].
 
     Returns
     -------
     ndarray, shape (...)
-        √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)), accurate to a few eps relative.
+        √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)), with a relative error of a few eps.
 
     Examples
     --------
@@ -196,25 +198,26 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
 
 
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return θ: the nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)); or a derivative.
+    """Return θ or a derivative: the nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)).
 
-    Angle 0: the limit, θ(t) = t. Angle π is singular: θ is 0 before t = 1/2, 1/2 there and 1 after
-    it. `numpy.pi` is less than π by 1.2e-16, so there the jump has the finite slope 1e16.
+    For the angle 0, the limit θ(t) = t is returned. The angle π is singular: θ is 0 before t = 1/2,
+    1/2 at this time and 1 after it. Since `numpy.pi` is less than π by 1.2e-16, the jump has the
+    finite slope 1e16 for `numpy.pi`.
     Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², where the paper
     prints s, with s from BK (17).
 
     Parameters
     ----------
     t, angle : array_like, shape (...)
-        Where on the line, any real numbers, and the angle ‖ω₀‖, in [0, π].
+        The positions on the line, any real numbers, and the angle ‖ω₀‖, in [0, π].
     order : {0, 1, 2, 3}, optional
-        Which derivative with respect to t.
+        The order of the derivative with respect to t.
 
     Returns
     -------
     ndarray, shape (...)
-        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)); a
-        derivative to a few eps relative.
+        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)).
+        Derivatives have a relative error of a few eps.
 
     Examples
     --------
@@ -231,13 +234,14 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
 
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return where on the line to be at time t for a projection of constant speed, or a derivative.
+    """Return the position on the line for a projection of constant speed, or a derivative.
 
-    It is the inverse of `theta`: theta(f(t)) = t. Rounding f disturbs that by up to
-    eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, the greatest slope of θ.
+    It is the inverse of `theta`: theta(f(t)) = t. Rounding of f changes this by up to eps · 2
+    tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
 
-    Angle 0: the limit, f(t) = t. Angle π is singular: f is 0 at t = 0, 1 at t = 1, and 1/2 at all
-    times between. `numpy.pi` is less than π by 1.2e-16, so there f' is about 1e16 at the ends.
+    For the angle 0, the limit f(t) = t is returned. The angle π is singular: f is 0 at t = 0, 1 at
+    t = 1, and 1/2 at all times in between. Since `numpy.pi` is less than π by 1.2e-16, f' is about
+    1e16 at the ends for `numpy.pi`.
     Source: BK Cor. 2.
 
     Parameters
@@ -250,7 +254,8 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     Returns
     -------
     ndarray, shape (...)
-        sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)) or a derivative, to a few eps relative.
+        sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)) or a derivative, with a relative error of a
+        few eps.
 
     Examples
     --------

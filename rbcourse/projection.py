@@ -1,4 +1,4 @@
-"""The nearest rotation, the nearest pose, and membership: in any dimension n."""
+"""The nearest rotation, the nearest pose, and tests of membership, in any dimension n."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from rbcourse._checks import (
 from rbcourse._foam import nearest_rotations
 from rbcourse._numerics import EPS, Array, scaled
 
-MANY = 20  # matrices from which on FOAM is faster than the SVD
+MANY = 20  # from this number of matrices on, FOAM is faster than the SVD
 NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see margin)"
 
 
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
-    """Tell which matrices are rotations: MᵀM = I and det M = 1.
+    """Return which matrices are rotations: MᵀM = I and det M = 1.
 
     Source: RR 1.1, RR (1), RR (2); BK 2.1.
 
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        Non-finite entries do not raise; the result is False.
+        For non-finite entries the result is False; they raise no error.
     atol : float, optional
-        The largest defect that passes, in any entry of MᵀM − I and in det M − 1.
+        The largest accepted error of any entry of MᵀM − I and of det M − 1.
 
     Returns
     -------
@@ -51,16 +51,16 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 
 
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
-    """Tell which matrices are poses [[R, d], [0, 1]], R a rotation and d finite.
+    """Return which matrices are poses [[R, d], [0, 1]], with a rotation R and finite d.
 
     Source: RR 1.3; BK 2.1.
 
     Parameters
     ----------
     A : array_like, shape (..., n + 1, n + 1)
-        Non-finite entries do not raise; the result is False.
+        For non-finite entries the result is False; they raise no error.
     atol : float, optional
-        As for `is_so`, with R for M; also the largest defect of the last row that passes.
+        As for `is_so`, with R for M. It is also the largest accepted error of the last row.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def project_so(M: ArrayLike) -> Array:
     """Return the rotation R nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
     RᵀM is symmetric, and its two smallest eigenvalues sum to 0 or more. L M projects to L R, and
-    M L to R L, for every rotation L. The paper prints U Vᵀ, which is a reflection where det M < 0.
+    M L to R L, for every rotation L. The paper prints U Vᵀ, which is a reflection if det M < 0.
     Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Parameters
@@ -95,15 +95,16 @@ def project_so(M: ArrayLike) -> Array:
 
     See Also
     --------
-    rbcourse.textbook.project_so : The same in three lines, by the SVD.
-    distance_to_so : How far M is from R.
+    rbcourse.textbook.project_so : The same in three lines, with the SVD.
+    distance_to_so : The distance of M from R.
 
     Notes
     -----
-    Singular set: where the two smallest eigenvalues of RᵀM sum to 0 (rank n − 2 or less; or the
-    smallest singular value of M repeated and det M < 0) several rotations are equally near; one is
-    returned. Near that set R is accurate to a few eps ‖M‖ over that sum. Many 3 × 3 matrices are
-    projected by FOAM (see `rbcourse._foam`), except near the singular set; others by the SVD.
+    Singular set: matrices M for which the two smallest eigenvalues of RᵀM sum to 0 (rank n − 2 or
+    less; or the smallest singular value of M repeated and det M < 0). Several rotations are then
+    equally near, and one of them is returned. Near this set, R is accurate to a few eps ‖M‖ over
+    the sum. FOAM (see `rbcourse._foam`) projects large stacks of 3 × 3 matrices, except near the
+    singular set; the SVD projects all others.
 
     Examples
     --------
@@ -117,16 +118,17 @@ def project_so(M: ArrayLike) -> Array:
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     """Return the rotation R with the least √tr(XᵀX W), X = M − R: `project_so` of M W.
 
-    For a body tr(XᵀX W) is the sum of the squared distances, by mass, from where M puts its points
-    to where R does. `rbcourse.metrics.weight_from_inertia` returns the W of a given metric.
+    For a body, tr(XᵀX W) is the sum of the squared distances between the images of its points under
+    M and under R, weighted by mass. `rbcourse.metrics.weight_from_inertia` returns the W of a given
+    metric.
     Source: BK 4, for metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
     M, W : array_like, shape (..., n, n)
-        W is symmetric, to 1e-12 of the largest entry, and without negative eigenvalues, to a few
-        eps of the largest; of a body ∫ p pᵀ dm over its points p, body frame. Its factor does not
-        matter.
+        W is symmetric, to 1e-12 of the largest entry, and has no negative eigenvalues, to a few eps
+        of the largest. For a body, it is ∫ p pᵀ dm over its points p in the body frame. A scale
+        factor of W does not matter.
 
     Returns
     -------
@@ -134,10 +136,11 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
 
     Notes
     -----
-    L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L.
-    On SO(3) W induces the left-invariant metric tr(W) I − W: the inertia of the body.
-    Singular set: that of `project_so`, for M W. A W of rank n − 1, as of a flat body, determines R
-    wherever M keeps that rank; one of rank n − 2 or less, as of a thin rod, never does.
+    L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L. On
+    SO(3), W induces the left-invariant metric tr(W) I − W, which is the inertia of the body.
+    Singular set: that of `project_so`, for M W. A W of rank n − 1, such as that of a flat body,
+    determines R if M W has the same rank. A W of rank n − 2 or less, such as that of a thin rod,
+    never determines R.
 
     Examples
     --------
@@ -158,17 +161,17 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
 
 
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
-    """Return the columns of M made orthonormal, from left to right, as Gram and Schmidt do.
+    """Return the columns of M orthonormalised from left to right, by the Gram–Schmidt method.
 
-    The result Q has QᵀQ = I, and QᵀM is upper triangular with a positive diagonal: Q is a
-    reflection where det M < 0. Q is not the rotation nearest to M: the first column keeps its
+    The result Q has QᵀQ = I, and QᵀM is upper triangular with a positive diagonal. So Q is a
+    reflection if det M < 0. Q is not the rotation nearest to M, since the first column keeps its
     direction. L M gives L Q for every rotation L; M L does *not* give Q L.
     Source: BK 4, BK Remark 6, BK Prop. 3.
 
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        No column depends on those before it, to rounding.
+        No column may depend linearly on the columns before it, to rounding.
 
     Returns
     -------
@@ -176,7 +179,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> orthonormalize_gram_schmidt([[1, 0.2], [0, 1]])  # the first column is right already
+    >>> orthonormalize_gram_schmidt([[1, 0.2], [0, 1]])  # the first column is already a unit vector
     array([[1., 0.],
            [0., 1.]])
     """
@@ -186,7 +189,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     for j in range(n):
         earlier, q = Q[..., :j], Q[..., j]
         size = np.linalg.norm(q, axis=-1)
-        for _ in range(2):  # what rounding leaves of the earlier columns is taken away again
+        for _ in range(2):  # the second pass removes what rounding left
             q -= (earlier @ (np.swapaxes(earlier, -1, -2) @ q[..., None]))[..., 0]
         rest = np.linalg.norm(q, axis=-1)
         dependent = rest <= 4 * n * EPS * size
@@ -200,8 +203,8 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 def distance_to_so(M: ArrayLike) -> Array:
     """Return ‖M − R‖, in the Frobenius norm, for the nearest rotation R: √Σ (σ_i − 1)².
 
-    Of the singular values σ of M the smallest is signed as det M.
-    Source: BK 4, BK Remark 6; where the paper prints the square, and no sign.
+    The smallest singular value σ of M has the sign of det M.
+    Source: BK 4, BK Remark 6, where the paper prints the square, and no sign.
 
     Parameters
     ----------
@@ -221,7 +224,7 @@ def distance_to_so(M: ArrayLike) -> Array:
 
 
 def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return `project_so` of M, in the memory layout of M, and where it is unique."""
+    """Return `project_so` of M, in the memory layout of M, and whether it is unique."""
     flat = M.reshape(-1, *M.shape[-2:])
     R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
     if M.shape[-1] == 3 and len(flat) >= MANY:
@@ -244,7 +247,7 @@ def _nearest_by_svd(M: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def gap(M: Array) -> Array:
-    """Return the sum of the two smallest eigenvalues of RᵀM, R the nearest rotation to M."""
+    """Return the sum of the two smallest eigenvalues of RᵀM, with the nearest rotation R to M."""
     return _signed_singular_values(M)[..., -2:].sum(axis=-1)
 
 
@@ -257,7 +260,7 @@ def _signed_singular_values(M: Array) -> Array:
 def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
     """Return the small skew Ω that makes Uᵀ M V symmetric: Ω d + d Ω = K − Kᵀ, K = Uᵀ M V.
 
-    An SVD leaves K − Kᵀ of some ten eps ‖M‖. Where d_i + d_j nearly vanishes, Ω_ij is 0.
+    After an SVD, K − Kᵀ is about ten eps ‖M‖. If d_i + d_j nearly vanishes, Ω_ij is set to 0.
     """
     K = np.swapaxes(U, -1, -2) @ M @ np.swapaxes(Vt, -1, -2)
     sums = d[..., :, None] + d[..., None, :]
@@ -274,7 +277,7 @@ def project_se(B: ArrayLike) -> Array:
     Parameters
     ----------
     B : array_like, shape (..., n + 1, n + 1)
-        Any other last row is replaced.
+        Its last row is replaced by [0, 1].
 
     Returns
     -------
@@ -294,7 +297,7 @@ def project_se(B: ArrayLike) -> Array:
 
 
 def warn_if_nearly_singular(margin: Array, time: Array | float, name: str = "t") -> None:
-    """Warn of the first curve of a stack whose margin is below 1e-6, and say at which time."""
+    """Warn of the first curve of a stack with a margin below 1e-6, and name the time."""
     low = np.argwhere(np.asarray(margin) < 1e-6)
     if len(low):
         first = tuple(low[0])

@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z): the unit sphere in R⁴, where q and −q are the same rotation."""
+"""Unit quaternions (w, x, y, z): points of the unit sphere in R⁴; q and −q are one rotation."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Candidates. Non-finite entries do not raise; the result is False.
+        Candidates. For non-finite entries the result is False; they raise no error.
     atol : float, optional
-        The largest difference between norm and 1 that passes.
+        The largest accepted difference of the norm from 1.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 
 
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
-    """Return Hamilton's product p q of quaternions (w, x, y, z): the rotation by q, then by p.
+    """Return Hamilton's product p q of quaternions (w, x, y, z): rotation by q, and then by p.
 
     Source: RR 2.2.
 
@@ -131,9 +131,9 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
 
 
 def project_quaternion(q: ArrayLike) -> Array:
-    """Return the unit quaternion nearest to q: q over its norm.
+    """Return the unit quaternion nearest to q, which is q over its norm.
 
-    Singular set: q = 0, to which all are equally near; it raises ValueError.
+    Singular set: q = 0, to which all unit quaternions are equally near; it raises ValueError.
     Source: RR 1.5, RR (6), RR Fig. 2.
 
     Parameters
@@ -153,10 +153,11 @@ def project_quaternion(q: ArrayLike) -> Array:
 
 
 def canonical_quaternion(q: ArrayLike) -> Array:
-    """Return the one of the unit quaternions q and −q with w ≥ 0: one for each rotation.
+    """Return q or −q, whichever has w ≥ 0: a unique unit quaternion for each rotation.
 
-    Singular set: half-turns, w = 0 to 4 eps. The one whose component of largest magnitude is
-    positive is returned, with w = 0; of components that are equal to 1e-8 the first decides.
+    Singular set: half-turns, w = 0 to 4 eps. The quaternion whose component of largest magnitude is
+    positive is returned, with w = 0. If several components are largest, to 1e-8, the first of them
+    is made positive.
     Source: BK Remark 7.
 
     Parameters
@@ -183,10 +184,11 @@ def canonical_quaternion(q: ArrayLike) -> Array:
 
 
 def continuous_quaternions(q: ArrayLike) -> Array:
-    """Return quaternions along a path, each with the sign that is nearer to the one before.
+    """Return quaternions along a path, each with the sign that makes it nearer to the previous one.
 
-    Unlike those of `quaternion_from_matrix` they do not jump where w passes through 0. Singular
-    set: successive rotations a half-turn apart; the sign changes if that before was changed.
+    Unlike the quaternions of `quaternion_from_matrix`, they do not jump where w passes through 0.
+    Singular set: successive rotations a half-turn apart; the sign is then changed if the previous
+    sign was changed.
 
     Parameters
     ----------
@@ -196,7 +198,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (N, ..., 4) or (4,)
-        ± q; the first quaternion keeps its sign.
+        The quaternions ± q; the first one keeps its sign.
 
     Examples
     --------
@@ -215,8 +217,8 @@ def continuous_quaternions(q: ArrayLike) -> Array:
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
-    Constant angular speed. Singular set: q0 · q1 = 0, to 4 eps, a half-turn. Of the two shortest
-    arcs the one to q1 as given is taken.
+    The angular speed is constant. Singular set: q0 · q1 = 0, to 4 eps, a half-turn. Of the two
+    shortest arcs, the arc to the given q1 is returned.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Parameters
@@ -252,9 +254,10 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
 def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
 
-    Where `slerp` turns by the angle a about an axis, this turns by 2π − a about the opposite axis
-    and ends at the other of q1 and −q1. Singular set: q0 and q1 are the same rotation, to 4 eps; it
-    raises ValueError. Near it the axis is accurate to eps over ‖q1 − q0‖.
+    If `slerp` turns by the angle a about an axis, this function turns by 2π − a about the opposite
+    axis. Of q1 and −q1, it ends at the one at which `slerp` does not end. Singular set: q0 and q1
+    are the same rotation, to 4 eps; ValueError is raised. Near this set, the axis is accurate to
+    eps over ‖q1 − q0‖.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Parameters

@@ -1,7 +1,7 @@
 """The functions of the report RR, under its own names and with its signatures.
 
-Arguments that the report does not have are keyword-only. Inputs of a wrong shape, or not finite,
-fail a check and are refused by a correction.
+Arguments that the report does not have are keyword-only. For inputs of a wrong shape or with
+non-finite entries, a check returns False, and a correction raises ValueError.
 """
 
 from __future__ import annotations
@@ -96,9 +96,9 @@ def check_SEn(m: ArrayLike, epsilon: float = 0.01) -> bool:
 
 
 def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
-    """Return a copy of m if it passes `check_SOn`, else the rotation matrix nearest to it.
+    """Return a copy of m if it passes `check_SOn`, or else the rotation matrix nearest to it.
 
-    m is any square matrix, also a singular or reflected one.
+    m is any square matrix, which may be singular or a reflection.
     Source: RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Examples
@@ -125,9 +125,10 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
-    """Return a copy of m if it passes `check_SEn`, else the pose nearest to it.
+    """Return a copy of m if it passes `check_SEn`, or else the pose nearest to it.
 
-    m has the shape (n + 1, n + 1), n ≥ 1. Its translation is kept, its last row made 0, …, 0, 1.
+    m has the shape (n + 1, n + 1), n ≥ 1. Its translation is kept, and its last row becomes 0, …,
+    0, 1.
     Source: RR 1.6, RR Fig. 3.
 
     Examples
@@ -141,9 +142,10 @@ def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random rotation matrix, shape (3, 3): uniform, by Arvo's method, if not naive.
+    """Return a random rotation matrix, shape (3, 3), uniform by Arvo's method if not naive.
 
-    If naive, three angles are uniform, not the rotation. `rng` is a Generator, a seed or None.
+    If naive, the three angles are uniform, but the rotation is not. `rng` is a Generator, a seed or
+    None.
     Source: RR 2.1.
 
     Examples
@@ -155,7 +157,7 @@ def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
 
 
 def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random unit quaternion, shape (4,); uniform, by Shoemake's method, if not naive.
+    """Return a random unit quaternion, shape (4,), uniform by Shoemake's method if not naive.
 
     Source: RR 2.2.
 
@@ -168,11 +170,12 @@ def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
 
 
 def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure, Animation]:
-    """Show how a rotation carries v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) over the sphere.
+    """Show how a rotation moves v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) over the sphere.
 
-    `rotation` is a rotation matrix (3, 3) or a unit quaternion (4,), within 0.01; the nearest one
-    is shown, reached in `steps` equal steps about one axis. Return the figure with all images, and
-    an animation of them. A notebook shows a player; ``animation.save(path)`` writes a GIF.
+    `rotation` is a rotation matrix (3, 3) or a unit quaternion (4,), within 0.01. The figure shows
+    the nearest rotation, which is reached in `steps` equal steps about one axis. Return the figure
+    with all images, and an animation of them. A notebook shows the animation as a player;
+    ``animation.save(path)`` writes a GIF.
     Source: RR 2.2.
 
     Examples
@@ -191,10 +194,11 @@ def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure,
 def visualize(
     quaternion: bool, *, naive: bool = False, rng: Rng = None, steps: int = 100
 ) -> tuple[Figure, Animation]:
-    """Show where random rotations, `steps` of them, carry v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0).
+    """Show the images of v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) under `steps` random rotations.
 
-    They are from `random_quaternion`, with v ↦ q v q⁻¹, if `quaternion` is True, else from
-    `random_rotation_matrix`. Return figure and animation as `visualize_rotation`.
+    The rotations are those of `random_quaternion`, with v ↦ q v q⁻¹, if `quaternion` is True, and
+    else those of `random_rotation_matrix`. Return a figure and an animation as `visualize_rotation`
+    does.
     Source: RR 2.2, RR Fig. 4, RR Fig. 5.
 
     Examples
@@ -216,10 +220,10 @@ def visualize(
 def interpolate_rigid_body(
     start_pose: ArrayLike, goal_pose: ArrayLike, *, steps: int = 10, shortest: bool = False
 ) -> Array:
-    """Return the path from one planar pose to another that blends x, y and theta evenly.
+    """Return the path from one planar pose to another on which x, y and theta change linearly.
 
-    Poses are (x, y, theta); the path has the shape (steps + 1, 3). With `shortest` the body turns
-    the short way.
+    Poses are (x, y, theta), and the path has the shape (steps + 1, 3). With `shortest`, the body
+    turns the short way.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Examples
@@ -236,8 +240,9 @@ def forward_propagate_rigid_body(
 ) -> Array:
     """Return the path of a planar body that follows a plan, shape (commands + 1, 3).
 
-    The plan is a list of (velocity, duration): (vx, vy, vtheta) in m/s, m/s and rad/s, and s ≥ 0.
-    vx and vy are along the axes of `frame`, "world" as in the report, or "body".
+    The plan is a list of (velocity, duration). A velocity is (vx, vy, vtheta) in m/s, m/s and
+    rad/s; a duration is at least 0 in s. vx and vy are along the axes of `frame`, which is "world",
+    as in the report, or "body".
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
@@ -251,12 +256,12 @@ def forward_propagate_rigid_body(
 
 
 def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Figure, Animation]:
-    """Show a path of planar poses: a rectangle that turns with its pose, and its way.
+    """Show a path of planar poses: a rectangle at these poses, and the path of its centre.
 
-    The path has poses (x, y, theta), shape (states, 3). The rectangle has a `length`, by default a
-    fifth of the larger extent of the path, or 1 if the body does not move. Lines join the states:
-    to show the arc of a command in the frame of the body, divide it first. Return a figure of the
-    whole way, and an animation of at most 40 frames, as `visualize_rotation`.
+    The path has poses (x, y, theta), shape (states, 3). The `length` of the rectangle is by default
+    a fifth of the larger extent of the path, or 1 if the body does not move. Straight lines join
+    the states; to show the arc of a command in the body frame, divide the command first. Return a
+    figure of the whole path, and an animation of at most 40 frames, as `visualize_rotation` does.
     Source: RR 3.3, RR Fig. 6, RR Fig. 7.
 
     Examples
@@ -276,9 +281,10 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
 
 
 def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Array:
-    """Return the path that takes each joint angle evenly from its start to its goal.
+    """Return the path on which each joint angle changes linearly from its start to its goal.
 
-    Angles have the shape (n,), with n = 2 for the arm of the report; the path has (steps + 1, n).
+    The angles have the shape (n,), with n = 2 for the arm of the report. The path has the shape
+    (steps + 1, n).
     Source: RR 4.1, RR (20), RR (21).
 
     Examples
@@ -293,8 +299,8 @@ def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Ar
 def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
     """Return the path of an arm that follows a plan, shape (commands + 1, n).
 
-    `start_pose` (the report's name) are joint angles, shape (n,); the plan is a list of
-    (velocity, duration), with velocities of the joints in rad/s and durations from 0 up, in s.
+    `start_pose` (the report's name) is an array of joint angles, shape (n,). The plan is a list of
+    (velocity, duration), with velocities of the joints in rad/s and durations of at least 0 in s.
     Source: RR 4.2, RR (22), RR (23).
 
     Examples
@@ -308,10 +314,10 @@ def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
 
 
 def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[Figure, Animation]:
-    """Show a path of an arm: its links in blue, and the way of its tip, a red curve that grows.
+    """Show a path of an arm: its links in blue, and the path of its tip as a growing red curve.
 
-    The path has joint angles, shape (states, n); `lengths` are those of the n links, above 0.
-    Return figure and animation as `visualize_path`.
+    The path has joint angles, shape (states, n); `lengths` are the lengths of the n links, above 0.
+    Return a figure and an animation as `visualize_path` does.
     Source: RR 4.3, RR Fig. 8, RR Fig. 9.
 
     Examples
@@ -336,7 +342,7 @@ def _show_images(name: str, alt: str, images: Any) -> tuple[Figure, Animation]:
 def _show_path(
     name: str, alt: str, states: Array, moving: Callable[[Any, Any], Update]
 ) -> tuple[Figure, Animation]:
-    """Show a path; six states of it pale, at even distances, and 40 as frames."""
+    """Show a path: at most six equally spaced states in a pale colour, and at most 40 frames."""
     last = len(states) - 1
     pale, frames = (
         np.linspace(0, last, min(count, last + 1)).round().astype(int) for count in (6, 40)
@@ -347,7 +353,7 @@ def _show_path(
 
 
 def _passes(test: Callable[..., Any], x: ArrayLike, epsilon: float) -> bool:
-    """Return the membership test's result for a single matrix; a stack is rejected."""
+    """Return the result of a membership test for a single matrix; it is False for a stack."""
     epsilon = as_tolerance("epsilon", epsilon)
     try:
         verdict = test(x, epsilon)

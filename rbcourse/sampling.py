@@ -1,7 +1,7 @@
-"""Random rotations: uniform ones, naive ones that are not, and tests of uniformity.
+"""Random rotations: uniform ones, naive ones that are not uniform, and tests of uniformity.
 
-Uniform means Haar's measure: a set of rotations is as likely as the same set turned by any other
-rotation, from the left or from the right.
+Uniform means distributed by the Haar measure: a set of rotations is as likely as the same set
+multiplied by any rotation from the left or from the right.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ __all__ = [
 ]
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
-_BLOCK = 6136  # draws whose arrays fit into the cache together; with 6144 they would collide there
+_BLOCK = 6136  # draws whose arrays fit into the cache together; arrays of 6144 would collide
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
-    """Return Arvo's rotation −M B of three numbers; uniform if they are.
+    """Return Arvo's rotation −M B of three numbers; it is uniform if the numbers are.
 
     B turns by 2π x₁ about the z axis, and −M is a half-turn about V = (√z cos 2π x₂, √z sin 2π x₂,
-    √(1 − z)): M = I − 2 V Vᵀ. M B, as printed, has the determinant −1.
+    √(1 − z)): M = I − 2 V Vᵀ. The printed M B has determinant −1.
     Source: RR 2.1, RR (9), RR (10), RR (11); J. Arvo, Fast random rotation matrices, Graphics Gems
     III, 1992.
 
@@ -67,7 +67,7 @@ def arvo_rotation(x: ArrayLike) -> Array:
 
 
 def shoemake_quaternion(x: ArrayLike) -> Array:
-    """Return Shoemake's quaternion of three numbers; uniform if they are.
+    """Return Shoemake's quaternion of three numbers; it is uniform if the numbers are.
 
     Source: RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid
     body path planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
@@ -102,9 +102,9 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     Parameters
     ----------
     size : int or tuple of int, optional
-        How many; by default one, without a batch axis.
+        The number of rotations; by default one, without a batch axis.
     rng : Generator, int or None, optional
-        A generator, a seed, or None for fresh numbers; or as for `numpy.random.default_rng`.
+        A generator, a seed, or None for fresh numbers, as for `numpy.random.default_rng`.
 
     Returns
     -------
@@ -145,9 +145,9 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
 
 
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return rotations R_z(α) R_y(β) R_x(γ) of angles uniform on [0, 2π): not uniform rotations.
+    """Return rotations R_z(α) R_y(β) R_x(γ) of angles uniform on [0, 2π); they are not uniform.
 
-    E tr² is 7/8; for uniform rotations it is 1.
+    The mean E tr² is 7/8; for uniform rotations, it is 1.
     Source: RR 2.1, RR (7), RR (8).
 
     Parameters
@@ -168,10 +168,10 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
 
 
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return quaternions q_z(γ) q_y(β) q_x(α) of angles uniform on [0, 2π): not uniform rotations.
+    """Return quaternions q_z(γ) q_y(β) q_x(α) of angles uniform on [0, 2π); they are not uniform.
 
-    The rotations have the law of `sample_rotation_naive`, but the first random angle turns about x,
-    not about z.
+    The rotations have the distribution of `sample_rotation_naive`, but the first random angle turns
+    about x, not about z.
     Source: RR 2.2, RR (12).
 
     Parameters
@@ -201,7 +201,7 @@ def _in_blocks(
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return draws of a kernel: of uniform numbers, shape (3, m), it writes the entries, (…, m)."""
+    """Return draws of a kernel, which writes entries, (…, m), from uniform numbers, (3, m)."""
     shape, generator = as_size(size), as_generator(rng)
     draws = np.empty((math.prod(shape), math.prod(core)))
     width = min(len(draws), _BLOCK)
@@ -215,7 +215,7 @@ def _in_blocks(
 
 
 def _arvo(x: Array, entries: Array) -> None:
-    """Write `arvo_rotation`, multiplied out, with the angles φ and ψ = φ − θ."""
+    """Write `arvo_rotation` with its products expanded in the angles φ and ψ = φ − θ."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = entries
     (c, cos_psi), (s, sin_psi) = _cos_sin(np.stack([x[1], x[1] - x[0]]))
     height, radius = 2 * x[2] - 1, 2 * np.sqrt(x[2] * (1 - x[2]))
@@ -254,11 +254,11 @@ def _cos_sin(turns: Array) -> tuple[Array, Array]:
 
 
 class UniformityTest(NamedTuple):
-    """Result of a test of uniformity: ``statistic``, ``p_value`` and ``null``.
+    """The result of a test of uniformity: ``statistic``, ``p_value`` and ``null``.
 
     ``statistic`` is the value of the statistic; ``p_value`` is the probability that uniform
-    rotations give a value at least as unusual; ``null`` names the law of the statistic if the
-    rotations are uniform and independent.
+    rotations give a value at least as unusual; ``null`` names the distribution of the statistic for
+    uniform and independent rotations.
     """
 
     statistic: float
@@ -291,7 +291,7 @@ def angle_law(angle: ArrayLike) -> Array:
 
 
 def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
-    """Return statistics that tell whether rotations are uniform and independent.
+    """Return statistics that test whether rotations are uniform and independent.
 
     Source: RR 2; J. Arvo, Fast random rotation matrices, Graphics Gems III, 1992.
 
@@ -304,15 +304,19 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     -------
     dict of str to UniformityTest
         E tr, E tr²
-            Means of the trace and its square; for large n normal, means 0, 1, variances 1/n, 2/n.
+            Means of the trace and of its square. For large n, they are normal with means 0, 1 and
+            variances 1/n, 2/n.
         angle
-            The largest distance of the angle's distribution from `angle_law`; Kolmogorov's law.
+            The largest distance of the angle's distribution from `angle_law`, with Kolmogorov's
+            distribution.
         image of e₁, image of e₃
             χ² of the first and of the last column, on 20 cells of the sphere of equal area, 4 in
-            height by 5 in longitude; for large n χ² with 19 degrees of freedom.
+            height by 5 in longitude. For large n, its distribution is χ² with 19 degrees of
+            freedom.
         angle to next, angle to half
-            As angle, of the turns from each even draw to the next, and from each draw of the first
-            half to its partner in the second: these show draws that depend on each other.
+            The statistic of angle for the turns from each even draw to the next, and from each draw
+            of the first half to its partner in the second half. They detect draws that depend on
+            each other.
 
     Examples
     --------
@@ -347,13 +351,13 @@ def _mean_test(values: Array, mean: float, variance: float) -> UniformityTest:
 def _angle_test(R: Array) -> UniformityTest:
     from scipy.stats import kstest
 
-    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2  # half the digits are enough for a law
+    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2  # half the digits suffice for the test
     done = kstest(np.arccos(np.clip(cosine, -1, 1)), angle_law)
     return UniformityTest(float(done.statistic), float(done.pvalue), f"Kolmogorov, n = {len(R)}")
 
 
 def _cell_test(points: Array) -> UniformityTest:
-    """Return the χ² of points of the sphere: by Archimedes equal heights have equal areas."""
+    """Return the χ² of points of the sphere; by Archimedes, equal heights have equal areas."""
     from scipy.stats import chisquare
 
     x, y, z = points.T

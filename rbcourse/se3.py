@@ -1,4 +1,4 @@
-"""Poses and twists: SE(3), its Lie algebra se(3), exp and log, and coordinates.
+"""Poses and twists: SE(3), its Lie algebra se(3), exp, log, and coordinates.
 
 A twist is (ω, v): the angular velocity and the velocity of the origin, both in the body frame.
 """
@@ -30,7 +30,7 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     ----------
     R : array_like, shape (..., 3, 3)
     d : array_like, shape (..., 3)
-        Positions, fixed frame.
+        Positions in the fixed frame.
 
     Returns
     -------
@@ -73,12 +73,12 @@ def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
 
 
 def split(A: Array) -> tuple[Array, Array]:
-    """Return views of the blocks R and d of poses, unchecked."""
+    """Return views of the blocks R and d of poses, without checks."""
     return A[..., :3, :3], A[..., :3, 3]
 
 
 def join(R: Array, d: Array) -> Array:
-    """Return `pose_from_components`, unchecked."""
+    """Return `pose_from_components`, without checks."""
     A = np.zeros((*np.broadcast_shapes(R.shape[:-2], d.shape[:-1]), 4, 4))
     A[..., :3, :3], A[..., :3, 3], A[..., 3, 3] = R, d, 1
     return A
@@ -214,8 +214,8 @@ BASIS_SE3.flags.writeable = False
 def exp_se3(S: ArrayLike) -> Array:
     """Return the pose that the constant twist S = (ω, v) reaches from I in unit time.
 
-    It is [[exp_so3(ω), J v], [0, 1]] with J = ``right_jacobian_so3(ω).mT``, accurate to a few
-    eps (1 + ‖ω‖) (1 + ‖v‖). No singular set; ω = 0 gives the translation by v exactly.
+    It is [[exp_so3(ω), J v], [0, 1]] with J = ``right_jacobian_so3(ω).mT``, accurate to a few eps
+    (1 + ‖ω‖) (1 + ‖v‖). There is no singular set; ω = 0 gives the translation by v exactly.
     Source: BK 2.6.
 
     Parameters
@@ -228,7 +228,7 @@ def exp_se3(S: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> exp_se3([0, 0, np.pi / 2, 1, 0, 3]).round(3) + 0.0  # a quarter of a circle, rising
+    >>> exp_se3([0, 0, np.pi / 2, 1, 0, 3]).round(3) + 0.0  # a quarter of a helix
     array([[ 0.   , -1.   ,  0.   ,  0.637],
            [ 1.   ,  0.   ,  0.   ,  0.637],
            [ 0.   ,  0.   ,  1.   ,  3.   ],
@@ -243,8 +243,8 @@ def exp_se3(S: ArrayLike) -> Array:
 def log_se3(A: ArrayLike) -> Array:
     """Return the twist (ω, v) that reaches A from I in unit time: exp_se3((ω, v)) = A, ‖ω‖ ≤ π.
 
-    Accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists reach A; ω is the
-    one that `log_so3` returns.
+    The result is accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists reach
+    A. The returned ω is that of `log_so3`.
     Source: BK 2.6.
 
     Parameters
@@ -267,7 +267,7 @@ def log_se3(A: ArrayLike) -> Array:
 
 
 def adjoint_se3(A: ArrayLike) -> Array:
-    """Return [[R, 0], [d̂ R, R]], which carries twists from the body frame of A to the fixed frame.
+    """Return [[R, 0], [d̂ R, R]], which maps twists from the body frame of A to the fixed frame.
 
     ``hat_se3(adjoint_se3(A) @ S)`` is A hat_se3(S) A⁻¹.
     Source: BK 2.1.
@@ -296,9 +296,10 @@ def adjoint_se3(A: ArrayLike) -> Array:
 def check_path(
     times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> tuple[Array, Array, Array | None]:
-    """Return times, poses or rotations, and velocities if there are any, as arrays.
+    """Return times, poses or rotations, and velocities or None, as arrays.
 
-    A ValueError names the first wrong shape, time that does not increase, or invalid matrix.
+    ValueError names the first wrong shape, the first time that does not increase, or the first
+    invalid matrix.
     """
     if np.size(times) == 0:
         raise ValueError("times, poses: one or more wanted, got none")

@@ -25,12 +25,12 @@ BASIS_SO3.flags.writeable = False
 
 
 def hat(w: Array) -> Array:
-    """Return `hat_so3` of vectors, unchecked: their combinations of the basis."""
+    """Return `hat_so3` of vectors without checks, as combinations of the basis."""
     return (w @ BASIS_SO3.reshape(3, 9)).reshape(*w.shape, 3) + 0.0
 
 
 def vee(W: Array) -> Array:
-    """Return `vee_so3` of matrices, unchecked."""
+    """Return `vee_so3` of matrices without checks."""
     return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
 
 
@@ -81,8 +81,8 @@ def vee_so3(W: ArrayLike) -> Array:
 def exp_so3(w: ArrayLike) -> Array:
     """Return the rotation by ‖w‖ about w: I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a.
 
-    Rodrigues' formula, accurate to a few eps (1 + a): a rotation for every a, but no digit is
-    significant above a = 1/eps. No singular set; w = 0 gives I exactly.
+    Rodrigues' formula is accurate to a few eps (1 + a). The result is a rotation for every a, but
+    no digit is significant above a = 1/eps. There is no singular set; w = 0 gives I exactly.
     Source: BK 2.5.
 
     Parameters
@@ -107,8 +107,9 @@ def exp_so3(w: ArrayLike) -> Array:
 def log_so3(R: ArrayLike) -> Array:
     """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, to rounding.
 
-    Accurate to a few eps. Singular set: half-turns, to 8 eps in the angle; of w and −w the
-    one whose component of largest magnitude is positive is returned (see `canonical_quaternion`).
+    The result is accurate to a few eps. Singular set: half-turns, to 8 eps in the angle, where w
+    and −w are equally short. The vector whose component of largest magnitude is positive is
+    returned (see `canonical_quaternion`).
     Source: BK 2.5.
 
     Parameters
@@ -152,10 +153,10 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
 
 
 def right_jacobian_so3(w: ArrayLike) -> Array:
-    """Return J with body angular velocity = J w' along the curve exp_so3(w(t)).
+    """Return J for which J w' is the body angular velocity along the curve exp_so3(w(t)).
 
-    Its transpose is the left Jacobian, for the angular velocity in the fixed frame. Singular set: J
-    is smooth, but has rank 1 where ‖w‖ = 2π, 4π, …
+    The transpose of J is the left Jacobian, which gives the angular velocity in the fixed frame.
+    Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, …
     Source: BK 2.5.
 
     Parameters
@@ -169,7 +170,7 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> right_jacobian_so3([0, 0, 1]) @ [0, 0, 5]  # along the axis nothing changes
+    >>> right_jacobian_so3([0, 0, 1]) @ [0, 0, 5]  # a vector along the axis is unchanged
     array([0., 0., 5.])
     """
     N, angle = _hat_and_angle(as_finite("w", w, 3))
@@ -179,8 +180,8 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`: w' = J⁻¹ times the body angular velocity.
 
-    Singular set: ‖w‖ = 2π, 4π, …, where J has no inverse and the result is finite and huge. Near it
-    the entries grow like 1 over the distance.
+    Singular set: ‖w‖ = 2π, 4π, …, where J has no inverse, and the result is finite and huge. Near
+    this set, the entries grow like 1 over the distance.
     Source: BK 2.5.
 
     Parameters
@@ -204,6 +205,6 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
 
 
 def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n̂ and a of w = a n, to go with matrices."""
+    """Return n̂ and a of w = a n; a has two more axes, to multiply matrices."""
     axis, angle = axis_and_angle(w)
     return hat(axis), angle[..., None]

@@ -1,8 +1,8 @@
-"""Textbook versions of the fast functions, as on the board: short, slow, and to be read first.
+"""Textbook versions of the fast functions, as on the board: short and slow; read them first.
 
-Each has the name, units, frames and singular set of its fast twin and gives the same to rounding,
-the optimum to a tolerance. No argument is checked. R0, R1, w0, w1 are single ones, of shape (3, 3)
-and (3,); the times t have the shape (N,), R (N, 3, 3), w and w' (N, 3).
+Each function has the name, units, frames and singular set of its fast counterpart. It returns the
+same result to rounding, or for an optimum to a tolerance. Arguments are not checked. R0, R1 have
+the shape (3, 3), and w0, w1 (3,). The times t have the shape (N,), R (N, 3, 3), w and w' (N, 3).
 """
 
 import ast
@@ -34,7 +34,7 @@ __all__ = [
 
 
 def show(function: Callable[..., Any]) -> None:
-    """Print the code of a function without its docstring; ValueError if it has no docstring.
+    """Print the code of a function without its docstring; raise ValueError if it has none.
 
     Examples
     --------
@@ -86,8 +86,8 @@ def projected_cubic_so3(
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the projected cubic at the times t.
 
-    With S = RᵀM, A = RᵀM' and G = tr(S) I − S the condition that S is symmetric, differentiated
-    once and twice, says G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
+    Let S = RᵀM, A = RᵀM' and G = tr(S) I − S. S is symmetric. Differentiating this condition once
+    and twice gives G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
     Source: BK 6.2.
 
     Examples
@@ -111,8 +111,8 @@ def projected_cubic_so3(
 def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
 
-    x0, x1, v0, v1 have one shape, and the result, the coefficients of 1, t, t², t³, shape (4, ...).
-    Of all curves with these ends the cubic has the least ∫ ‖x''‖² dt.
+    x0, x1, v0, v1 have the same shape. The result, the coefficients of 1, t, t², t³, has the shape
+    (4, ...). Of all curves with these ends, the cubic has the least ∫ ‖x''‖² dt.
     Source: BK 6.2.
 
     Examples
@@ -125,9 +125,10 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
 
 
 def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
-    """Return a polynomial or, if order > 0, that derivative, at the times t.
+    """Return a polynomial, or if order > 0 its derivative of this order, at the times t.
 
-    The coefficients, shape (degree + 1, ...), are those of 1, t, t², …; t broadcasts with one.
+    The coefficients, shape (degree + 1, ...), are those of 1, t, t², …; t broadcasts with each of
+    them.
 
     Examples
     --------
@@ -147,11 +148,12 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
 def minimum_torque_so3(
     R0: Array, R1: Array, w0: Array, w1: Array, G: Array, t: Array, tol: float = 1e-9
 ) -> tuple[Array, Array]:
-    """Return R and w of a body's least torque at the times t, by SciPy's `solve_bvp`.
+    """Return R and w of the body's motion of least torque at the times t, by SciPy's `solve_bvp`.
 
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
-    with p = G (τ' + w × τ) − G w × τ, for an unknown c. ‖σ‖ has to stay below 2π. If it
-    fails, a RuntimeError says why. It may find a stationary curve that is not the cheapest.
+    with p = G (τ' + w × τ) − G w × τ, for an unknown c. ‖σ‖ must be below 2π. If the solver fails,
+    a RuntimeError names the reason. The solver may find a stationary curve that is not the
+    cheapest.
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
 
     Examples
@@ -195,7 +197,7 @@ def _spin(S: Array) -> Array:
 
 
 def sample_rotation(n: int, rng: np.random.Generator) -> Array:
-    """Return n uniformly random rotations, each Arvo's of three uniform numbers.
+    """Return n uniformly random rotations, each by Arvo's method from three uniform numbers.
 
     Source: RR 2.1, RR (9), RR (10), RR (11).
 
@@ -208,7 +210,7 @@ def sample_rotation(n: int, rng: np.random.Generator) -> Array:
 
 
 def sample_quaternion(n: int, rng: np.random.Generator) -> Array:
-    """Return n uniformly random unit quaternions, each Shoemake's of three uniform numbers.
+    """Return n uniformly random unit quaternions, each by Shoemake's method.
 
     Source: RR 2.2, RR (13).
 
@@ -225,8 +227,8 @@ def minimum_acceleration_so3(
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the optimum at the times t, by SciPy's `solve_bvp`.
 
-    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. ‖σ‖ has to stay below
-    2π. If it fails, a RuntimeError says why.
+    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. ‖σ‖ must be below 2π.
+    If the solver fails, a RuntimeError names the reason.
     Source: BK (19).
 
     Examples
@@ -261,9 +263,9 @@ def minimum_acceleration_so3(
 def spline_velocities(times: Array, R: Array) -> Array:
     """Return the velocities at rotations R, shape (N, 3, 3), for which w' is continuous.
 
-    With s = vee skew Q, Q = R_iᵀ R_{i+1}, and B = ½ (tr Q I − Qᵀ), a projected cubic of duration h
-    has h² w'(0) = 6 s − 4 h w_i − 2 h B w_{i+1} and h² w'(1) = −6 s + 2 h Bᵀ w_i + 4 h w_{i+1}.
-    At both ends of the path w' = 0.
+    Let Q = R_iᵀ R_{i+1}, s = vee skew Q, and B = ½ (tr Q I − Qᵀ). A projected cubic of duration h
+    has h² w'(0) = 6 s − 4 h w_i − 2 h B w_{i+1} and h² w'(1) = −6 s + 2 h Bᵀ w_i + 4 h w_{i+1}. At
+    both ends of the path w' = 0.
     Source: beyond BK 13.
 
     Examples
@@ -288,11 +290,11 @@ def spline_velocities(times: Array, R: Array) -> Array:
 def minimum_acceleration_spline_so3(
     times: Array, R: Array, ends: tuple[Array, Array] | None = None, tol: float = 1e-10
 ) -> tuple[Array, Array]:
-    """Return w and w' at rotations R of the optimum through them, by SciPy's `solve_bvp`.
+    """Return w and w' of the optimum through the rotations R, at these, by SciPy's `solve_bvp`.
 
-    All legs at once, each in its own time from 0 to 1: the equations are those of
-    `minimum_acceleration_so3`. At the inner rotations w and w' are continuous; at both ends w is
-    given, or w' = 0. If it fails, a RuntimeError says why.
+    All legs are solved together, each with its own time from 0 to 1. The equations are those of
+    `minimum_acceleration_so3`. At the inner rotations, w and w' are continuous. At both ends, w is
+    given, or w' = 0. If the solver fails, a RuntimeError names the reason.
     Source: beyond BK 12.
 
     Examples
@@ -334,12 +336,12 @@ def minimum_acceleration_spline_so3(
 
 
 def fastest(turn: Array, inertia: Array, torque: float, cells: int) -> tuple[Array, Array]:
-    """Return the shares of a turn and the times of a body that makes it with bounded torque.
+    """Return the fractions of a turn and the fastest times to reach them with bounded torque.
 
-    With σ the rotation vector `turn` and R = exp(σ̂ s), x = s'² changes evenly in a cell of length h
-    and u = s'' = (x_i+1 − x_i)/2h. The torque G σ u + (σ × G σ) x has perpendicular terms. The
-    larger of x_i and x_i+1 obeys ‖G σ‖² u² + ‖σ × G σ‖² x² = τ²; seen from the end backwards, and
-    from the start forwards.
+    Let σ be the rotation vector `turn` and R = exp(σ̂ s). In a cell of length h, x = s'² changes
+    linearly, and u = s'' = (x_i+1 − x_i)/2h. The torque G σ u + (σ × G σ) x has perpendicular
+    terms. The larger x of the two ends of a cell satisfies ‖G σ‖² u² + ‖σ × G σ‖² x² = τ². One pass
+    goes backwards from the end, and one forwards from the start.
     Source: beyond BK 16.
 
     Examples

@@ -1,29 +1,33 @@
 """The fastest timing of a path under limits on speeds, accelerations, torque and force.
 
-A path c(s) is run through by s(t); x = s'², u = s'' = ½ dx/ds. With V = c(s, 1) = (ω, v) and
-A = c(s, 2) = (α, β) the motion has the velocity V s' and the acceleration V u + A x, body frame.
-The torque is G ω u + (G α + ω × G ω) x, the acceleration of the point r of the body is
-(v + ω × r) u + (β + α × r + ω × (ω × r)) x, and the force on a mass m there m times that, minus
-m Rᵀ g. So a limit on a speed is x ≤ X(s), and every other one ‖a u + b x + k‖ ≤ 1.
+The timing s(t) moves the body along a path c(s). Let x = s'² and u = s'' = ½ dx/ds. With V =
+c(s, 1) = (ω, v) and A = c(s, 2) = (α, β), the motion has the velocity V s' and the acceleration V u
++ A x in the body frame. The torque is G ω u + (G α + ω × G ω) x. The acceleration of the point r of
+the body is (v + ω × r) u + (β + α × r + ω × (ω × r)) x. The force on a mass m there is m times this
+acceleration, minus m Rᵀ g. So a limit on a speed is x ≤ X(s), and every other limit is ‖a u + b x +
+k‖ ≤ 1.
 
-The path is divided into cells of length h. In a cell u is constant, x changes evenly from x_i to
-y = x_i+1, and u = (y − x_i)/2h. A limit holds at both ends of the cell, with the a, b, k of this
-side, as they may jump: ‖p x_i + q y + k‖ ≤ 1 with p = b − a/2h, q = a/2h at the start, and
-p = −a/2h, q = b + a/2h at the end. These are ellipses, or strips, in the plane of x_i and y.
+The path is divided into cells of length h. In a cell, u is constant, x changes linearly from x_i to
+y = x_i+1, and u = (y − x_i)/2h. A limit holds at both ends of the cell, with the a, b, k of the
+cell's side, since they may jump: ‖p x_i + q y + k‖ ≤ 1 with p = b − a/2h, q = a/2h at the start,
+and p = −a/2h, q = b + a/2h at the end. These limits are ellipses, or strips, in the plane of x_i
+and y.
 
-Two passes. Backward: the largest x_i from which the end can be reached. Forward: the largest x_i+1
-that x_i and the first pass allow. Cells are convex: if a timing keeps the limits on the cells, one
-is found. It takes the time Σ 2h/(s'_i + s'_i+1), which any larger x makes shorter.
+The algorithm makes two passes. The backward pass finds the largest x_i from which the end can be
+reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. The limits of a
+cell are convex, so if some timing satisfies the limits on the cells, the passes find one. The
+motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
 
-At the top of an ellipse x_i grows only as y falls. The largest x_i, the choice of TOPP-RA, is then
-not the best: a little of x_i costs much of y. Both have nearly the same weight in the time, so
-`_tops` takes the largest x_i + y. On 80 random paths the time is at most 1e-5 above the optimum on
-the same cells, which a cone program finds.
+Near the top of an ellipse, x_i grows only if y decreases. TOPP-RA chooses the largest x_i, which is
+not the best choice there, since a small gain of x_i causes a large loss of y. Both have nearly the
+same weight in the time, so `_tops` maximises x_i + y. On 80 random paths, the time is at most 1e-5
+above the optimum on the same cells, which was computed by a cone program.
 
 Pham and Pham (TOPP-RA, IEEE Transactions on Robotics 34, 2018) find reachable and controllable sets
 of joints by two passes of linear programs. Nguyen and Pham (Journal of Guidance, Control, and
 Dynamics, 2016) time rotations with bounds on angular velocities, accelerations or torques. Of both
-only the abstract or introduction was read; limits on norms for poses were not found elsewhere.
+papers, only the abstract or introduction was read for this module. Limits on norms for poses were
+not found elsewhere.
 """
 
 from __future__ import annotations
@@ -43,7 +47,7 @@ from rbcourse.curves import Curve
 from rbcourse.paths import Chain
 
 FINER = 1, 2, 4, 8
-TOLERANCE = 1e-4  # by which a limit may be exceeded inside a cell
+TOLERANCE = 1e-4  # a limit may be exceeded by this share inside a cell
 _REPEATS = 12
 _INSIDE = np.linspace(0, 1, 6)[:, None, None]
 _BETWEEN = np.linalg.solve(
@@ -77,22 +81,24 @@ def fastest(
     Parameters
     ----------
     curve : Curve
-        A single one; of a `Timed` curve the path. Its times do not matter.
+        A single curve. Of a `Timed` curve, only the path is used. The times of the curve do not
+        matter.
     angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
         The largest norms of ω, of the velocity of the point `centre` of the body, of ω', and of the
-        acceleration of that point. Three numbers are the largest magnitudes of the components in
-        the body frame. Of rotations only ω, ω' and the torque have limits.
+        acceleration of this point. Three numbers are the largest magnitudes of the components in
+        the body frame. For rotations, only ω, ω' and the torque can be limited.
     torque, force : likewise
-        Of G ω' + ω × G ω, and of `mass` times the acceleration of `centre`, less its weight. One of
-        the accelerations, the torque or the force is needed.
+        The largest norms of G ω' + ω × G ω, and of `mass` times the acceleration of `centre`, minus
+        its weight. At least one limit on an acceleration, the torque or the force is required.
     inertia : array_like, shape (3, 3), optional
-        G, about the centre of mass; for a torque.
+        G, about the centre of mass; required for a limit on the torque.
     mass, centre, gravity : float; array_like, shape (3,); optional
-        For a force the mass, the centre of mass in the body frame, and the acceleration of free
-        fall in the fixed frame. Without a force `centre` is any point, as the tip of a tool.
+        For a force, these are the mass, the centre of mass in the body frame, and the acceleration
+        of free fall in the fixed frame. Without a force, `centre` may be any point, such as the tip
+        of a tool.
     rates : (float, float), optional
-        s' at both ends: 0 is rest, 1 is the velocity of the curve itself. Without effect at an end
-        where the curve rests.
+        The values of s' at both ends: 0 is rest, and 1 is the velocity of the curve itself. A rate
+        has no effect at an end where the curve rests.
 
     Returns
     -------
@@ -102,8 +108,8 @@ def fastest(
     Raises
     ------
     ValueError
-        If the path stands still, nothing limits the speed, the force cannot hold the body at rest,
-        or the `rates` are out of reach; with the first place on the path.
+        If the path stands still, no limit bounds the speed, the force cannot hold the body at rest,
+        or the `rates` are out of reach. The message names the first place on the path.
 
     Warns
     -----
@@ -112,11 +118,11 @@ def fastest(
 
     Notes
     -----
-    The grid has 1,000 cells, for chains 250 for each leg (25 if there are many), and up to eight
-    times as many until the limits hold between its points to 1e-4. T is then about 1e-3 above the
-    shortest time. The motion stops where the velocity of the path jumps. Its acceleration jumps
-    where that of the path does, at both ends, and between cells; jerk is not limited. A thousand
-    cells take about 50 ms.
+    The grid has 1,000 cells, or for chains 250 for each leg (25 if there are many legs). It is
+    refined up to eight times until the limits hold between its points to 1e-4. T is then about 1e-3
+    above the shortest time. The motion stops where the velocity of the path jumps. Its acceleration
+    jumps where the acceleration of the path jumps, at both ends, and between cells; the jerk is not
+    limited. A thousand cells take about 50 ms.
 
     Examples
     --------
@@ -161,22 +167,23 @@ def fastest(
 
 
 def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
-    """Return for each limit the largest share of it that a curve over time uses, and when.
+    """Return the largest share of each limit that a curve uses, and the time of its use.
 
     Source: beyond BK 16.
 
     Parameters
     ----------
     curve : Curve
-        A single one.
+        A single curve.
     **limits
         The keyword arguments of `fastest`, without `rates`.
 
     Returns
     -------
     dict of str to (float, float)
-        The share, and the first time at which it is reached to a millionth, among 20,001 times
-        and both sides of the joints of a chain; a limit may be exceeded between them.
+        The share, and the first time at which it is reached to a millionth. The curve is evaluated
+        at 20,001 times and on both sides of the joints of a chain; a limit may be exceeded between
+        these times.
 
     Examples
     --------
@@ -202,15 +209,17 @@ def _shares(curve: Curve, limits: _Limits, count: int) -> dict[str, tuple[float,
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Timed(Curve):
-    """The `Curve` c(s(t)) on [0, T]. s'' is constant in a cell; at its end the next cell counts.
+    """The `Curve` c(s(t)) on [0, T], with constant s'' in each cell.
+
+    At the end of a cell, the s'' of the next cell is used.
 
     Attributes
     ----------
     curve : Curve
         The path c(s).
     s, rate, times : ndarray, shape (N + 1,)
-        The grid, s' there, and when it is there. The pose of a path at s0 is passed at
-        ``times[np.searchsorted(s, s0)]``.
+        The grid points, the values of s' there, and the times at which the curve passes them. It
+        passes the pose c(s0) of the path at ``times[np.searchsorted(s, s0)]``.
     """
 
     curve: Curve
@@ -219,7 +228,7 @@ class Timed(Curve):
 
     @cached_property
     def times(self) -> Array:
-        """When it is at the grid points."""
+        """The times at which the curve passes the grid points."""
         return np.append(0, np.cumsum(2 * np.diff(self.s) / (self.rate[1:] + self.rate[:-1])))
 
     @property
@@ -250,12 +259,12 @@ class Timed(Curve):
         return c[0] * u + c[1] * v**2 if order == 2 else 3 * c[0] * u * v + c[1] * v**3
 
     def values(self, t: Array, order: int) -> Array:
-        """Raise a RuntimeError: costs are integrals of smooth curves."""
+        """Raise RuntimeError, since costs are integrals of smooth curves."""
         raise RuntimeError("cost: the acceleration of a Timed curve jumps between its cells")
 
     @property
     def flat(self) -> Self:
-        """The curve."""
+        """The curve itself."""
         return self
 
 
@@ -267,7 +276,7 @@ class _Limits(NamedTuple):
     gravity: Array
 
     def rows(self, V: Array, A: Array, R: Array) -> list[Row]:
-        """Return the name, a, b and k of each limit; that on a speed is ‖a‖² x ≤ 1."""
+        """Return the name, a, b and k of each limit; a limit on a speed is ‖a‖² x ≤ 1."""
         (w, bend), (_, G, m, r, g) = (V[..., :3], A[..., :3]), self
         parts = {"angular_speed": (w,), "angular_acceleration": (w, bend)}
         parts["torque"] = w @ G, bend @ G + cross(w, w @ G)
@@ -313,7 +322,7 @@ def _limits(
 
 
 class _Grid(NamedTuple):
-    """Grid points, (N + 1,); V, A and R at six points of each cell, (6, N, ...); where x is 0."""
+    """Grid points, (N + 1,); V, A, R at six points of each cell, (6, N, ...); stops with x = 0."""
 
     s: Array
     V: Array
@@ -323,7 +332,7 @@ class _Grid(NamedTuple):
 
 
 def _sampled(curve: Curve, finer: int) -> _Grid:
-    """Return a grid of as many cells for each leg, smaller ones near an end with c' = c'' = 0."""
+    """Return a grid with equally many cells in each leg, smaller near ends with c' = c'' = 0."""
     legs = (curve.legs if isinstance(curve, Chain) else curve).flat
     knots = curve.times if isinstance(curve, Chain) else np.append(0.0, legs.duration)
     L, h, halves = legs.count, legs.duration, (curve.size - 2, 3)
@@ -335,7 +344,7 @@ def _sampled(curve: Curve, finer: int) -> _Grid:
         return np.abs(x.reshape(*x.shape[:-1], *halves)).max(axis=-1)
 
     rates, bends = (sizes(legs.values(probe, order)) for order in (1, 2))
-    rest = (rates <= 1e-12 * rates.max(axis=0) + 1e-14 * far)[[0, -1]]  # but for rounding
+    rest = (rates <= 1e-12 * rates.max(axis=0) + 1e-14 * far)[[0, -1]]  # up to rounding
     slow = rest & (bends <= 1e-9 * bends.max(axis=0) + 1e-12 * far)[[0, -1]]
     slow = slow.all(axis=-1)
     graded = q * q * (3 - 2 * q), q * q, 1 - (1 - q) ** 2
@@ -365,7 +374,7 @@ def _sampled(curve: Curve, finer: int) -> _Grid:
 def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, Array]:
     """Return x on the grid, and the largest share of a limit that is used in each cell.
 
-    Cells in which a limit is exceeded between the ends are solved again with a lower one.
+    Cells in which a limit is exceeded between the ends are solved again with a lower limit.
     """
     s, V, A, R, stops = grid
     rows, h, X = limits.rows(V, A, R), np.diff(s), np.full(V.shape[:2], inf)
@@ -401,7 +410,7 @@ def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, A
 
 
 def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any]) -> Array:
-    """Return x on the grid; `ends` are its least and its greatest value at both ends."""
+    """Return x on the grid; `ends` are the least and the greatest allowed x at both ends."""
     A, B, C, D, E, F = Q = _ellipses(np.diff(s), rows)
     tops, cap, N = _tops(Q, caps).tolist(), caps.tolist(), len(s) - 1
     there, back, least = (
@@ -412,7 +421,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
     low, high = [0.0] * N + [last], [inf] * N + [min(most_there, cap[N])]
     if last > high[N] * (1 + 1e-9):
         raise ValueError("rates[1] is above a limit on a speed")
-    for i in range(N - 1, -1, -1):  # from which x the end is reached
+    for i in range(N - 1, -1, -1):  # backward: the x from which the end can be reached
         high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])
         low[i] = max(0.0, -_largest(least[i], low[i + 1])) if low[i + 1] > 0 else 0.0
         if high[i] == inf:
@@ -423,7 +432,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
     if x[0] < max(low[0], first) * (1 - 1e-9):
         why = "too low for rates[1]" if low[0] > x[0] else "too high to brake, or above a limit"
         raise ValueError(f"rates[0] is {why}")
-    for i in range(N):  # as fast as that allows
+    for i in range(N):  # forward: as fast as the first pass allows
         x.append(max(min(_largest(back[i], x[i]), high[i + 1]), low[i + 1], 0.0))
     return np.array(x)
 
@@ -440,12 +449,12 @@ def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
 
 
 def _tops(Q: Array, caps: Array) -> Array:
-    """Return for each cell the y up to which x + y rises, x the largest that all limits allow.
+    """Return for each cell the y up to which x + y rises, where x is the largest allowed value.
 
-    By bisection, of the exponent at first.
+    The y is found by bisection, at first of the exponent.
     """
     A, B, C, D, E, F = Q
-    free = A == 0  # a limit on y alone
+    free = A == 0  # the limit is on y alone
     low, high = np.full((len(A), 1), 1e-60), np.minimum(caps[1:], 1e60)[:, None]
     for _ in range(50):
         y = np.sqrt(low * high)
@@ -467,7 +476,7 @@ def _tops(Q: Array, caps: Array) -> Array:
 
 
 def _largest(ellipses: list[list[float]], y: float) -> float:
-    """Return the largest x that all limits of a cell allow beside y."""
+    """Return the largest x that all limits of a cell allow for a given y."""
     x = inf
     for A, B, C, D, E, F in ellipses:
         if A > 0:

@@ -1,21 +1,22 @@
-"""Velocities at the poses of a path: splines with a continuous acceleration, and parabolas.
+"""Velocities at the poses of a path, from splines with a continuous acceleration or parabolas.
 
-A cubic leg of the duration h joins R₀ to R₁ = R₀ Q. At its ends the ambient cubic M(t) of BK 6 has
-M = R and M' = R ŵ, so its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities.
-With s = vee skew Q and B = ½ (tr Q I − Qᵀ), for which vee skew(Q ŵ) = B w,
+A cubic leg of duration h joins R₀ to R₁ = R₀ Q. At its ends, the ambient cubic M(t) of BK 6 has M =
+R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities. With
+s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(Q ŵ) = B w,
 
     h² w'(0) = 6 s − 4 h w₀ − 2 h B w₁,    h² w'(1) = −6 s + 2 h Bᵀ w₀ + 4 h w₁.
 
-That w' is the same on both sides of each inner pose is a linear system for the velocities, of
-symmetric elements (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]] and loads 6 s/h² at both ends of each leg. No
-singular value of B is larger than 1: the system is diagonally dominant, positive definite, and has
-one solution, whatever the poses are. For unit quaternions q = (cos ½θ, x) of Q the element is the
-same with B = cos ½θ I + x̂ and loads 12 x/h². For a body with the weight W, K = Rᵀ M'' W has
-vee(K − Kᵀ) = τ = G w' + w × G w, with G in place of I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and loads of
-Q W and −Qᵀ W: the torque is continuous. For the path of the origin, in the body frame, B = Q.
+The condition that w' is the same on both sides of each inner pose is a linear system for the
+velocities. It has symmetric elements (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]] and loads 6 s/h² at both ends
+of each leg. No singular value of B is larger than 1. So the system is diagonally dominant and
+positive definite, and it has one solution for all poses. For unit quaternions q = (cos ½θ, x) of Q,
+the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For a body with the
+weight W, K = Rᵀ M'' W has vee(K − Kᵀ) = τ = G w' + w × G w. The torque is then continuous, G
+replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are those of Q W and −Qᵀ W. For the path of
+the origin, in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
-a continuous acceleration of nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
+continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
 `RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. A linear
 system for the velocities was not found in the literature.
 """
@@ -35,7 +36,7 @@ from rbcourse.se3 import check_path
 from rbcourse.so3 import hat, log_so3, right_jacobian_so3, vee
 
 PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
-"""How a path begins and ends: "natural", "periodic", or a pair of velocities."""
+"""The end conditions of a path: "natural", "periodic", or a pair of velocities."""
 
 _SHORTEST, _LONGEST = 1e-100, 1e100  # of a duration
 _NEAR_HALF_TURN = 1e-6
@@ -48,10 +49,10 @@ def spline_velocities(
     ends: PathEnds = "natural",
     inertia: ArrayLike | None = None,
 ) -> Array:
-    """Return the velocities with which cubic legs join with a continuous acceleration.
+    """Return the velocities for which cubic legs join with a continuous acceleration.
 
-    They solve one linear system, which is positive definite whatever the poses are; the time it
-    takes grows like N.
+    The velocities solve one linear system, which is positive definite for all poses. The computing
+    time is proportional to N.
     Source: beyond BK 13.
 
     Parameters
@@ -59,12 +60,12 @@ def spline_velocities(
     times, poses
         As for `bessel_velocities`.
     ends : {"natural", "periodic"} or pair of array_like, optional
-        "natural": no acceleration at both ends. "periodic": velocity and acceleration, body frame,
-        are the same at both ends; the poses there may differ. Or the first and the last velocity,
-        of shape (6,) or (3,), each of which may be None: natural at that end.
+        "natural": the acceleration is 0 at both ends. "periodic": velocity and acceleration in the
+        body frame are the same at both ends; the poses there may differ. A pair gives the first and
+        the last velocity, of shape (6,) or (3,). None in a pair means a natural end.
     inertia : array_like, shape (3, 3), optional
-        Of a body: the torque is continuous, and "natural" means no torque. As for
-        `weighted_cubic_so3`; by default 2 I.
+        The inertia of a body, as for `weighted_cubic_so3`. The torque is then continuous, and
+        "natural" means zero torque at the ends. The default is 2 I.
 
     Returns
     -------
@@ -74,9 +75,10 @@ def spline_velocities(
 
     Notes
     -----
-    Moved poses have moved velocities, and so has the path backwards in time. For rotations about
-    one axis through small angles they are those of SciPy's ``CubicSpline``. Singular set: poses a
-    half-turn apart, to 1e-6, raise ValueError, as no leg joins them.
+    If the poses are moved, the velocities move with them; if the times are reversed, the velocities
+    are those of the reversed path. For rotations about one axis by small angles, they are those of
+    SciPy's ``CubicSpline``. Singular set: poses a half-turn apart, to 1e-6, raise ValueError, since
+    no leg joins them.
 
     Examples
     --------
@@ -98,10 +100,10 @@ def spline_velocities(
 
 
 class KnotSystem(NamedTuple):
-    """A quadratic function of unknowns x at N knots: ½ xᵀ H x − xᵀ b, a sum over the legs.
+    """A quadratic function ½ xᵀ H x − xᵀ b of unknowns x at N knots, a sum over the legs.
 
-    Each leg adds its element [[A, B], [Bᵀ, D]] to H and (b0, b1) to b, at its two knots; the blocks
-    have the shape (N − 1, m, m), the loads (N − 1, m).
+    Each leg adds its element [[A, B], [Bᵀ, D]] to H and (b0, b1) to b at its two knots. The blocks
+    have the shape (N − 1, m, m), and the loads (N − 1, m).
     """
 
     A: Array
@@ -111,10 +113,10 @@ class KnotSystem(NamedTuple):
     b1: Array
 
     def solve(self, fixed: NDArray[np.bool_], given: Array, periodic: bool = False) -> Array:
-        """Return the x, shape (N, m), for which the function is least; x is `given` where `fixed`.
+        """Return the x, shape (N, m), that minimises the function; x is `given` where `fixed`.
 
-        If it is `periodic`, x is the same at the first and the last knot. LinAlgError is raised if
-        H is not positive definite.
+        If `periodic`, x is the same at the first and the last knot. LinAlgError is raised if H is
+        not positive definite.
         """
         from scipy.linalg import solveh_banded
 
@@ -130,7 +132,7 @@ class KnotSystem(NamedTuple):
             band = _band(on, above)
             return given + solveh_banded(band, right.ravel(), lower=True).reshape(given.shape)
         first, load = on[0] + on[-1], right[0] + right[-1]
-        inner = np.zeros((len(on) - 2, *on.shape[1:]))  # the columns of the first knot
+        inner = np.zeros((len(on) - 2, *on.shape[1:]))  # columns that belong to the first knot
         if len(inner):
             inner[0] += above[0].mT
             inner[-1] += above[-1]
@@ -143,7 +145,7 @@ class KnotSystem(NamedTuple):
         else:
             first = first + above[0] + above[0].mT
             by_first, alone = np.zeros((0, len(load))), np.zeros(0)
-        np.linalg.cholesky((first + first.mT) / 2)  # LinAlgError if it is not positive definite
+        np.linalg.cholesky((first + first.mT) / 2)  # raises LinAlgError if not positive definite
         end = np.linalg.solve(first, load)
         between = (alone - by_first @ end).reshape(-1, len(end))
         return np.concatenate([end[None], between, end[None]])
@@ -175,7 +177,7 @@ def rotation_system(times: Array, R: Array, G: Array | None = None) -> KnotSyste
 
 
 def quaternion_system(times: Array, R: Array, long: NDArray[np.bool_]) -> KnotSystem:
-    """Return the system for unit quaternions; legs turn the `long` way round where that is True."""
+    """Return the system for unit quaternions; legs with `long` True turn the long way."""
     k, q = 1 / np.diff(times)[:, None, None], quaternion_from_matrix(R[:-1].mT @ R[1:])
     q = np.where(long[:, None], -q, q)
     same, load = 4 * k * np.eye(3), 12 * k[:, 0] ** 2 * q[:, 1:]
@@ -195,7 +197,7 @@ def _skew(X: Array) -> Array:
 
 
 def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], Array]:
-    """Return at which of `count` poses velocities of this size are given, and these, else 0."""
+    """Return at which of `count` poses velocities are given, and the velocities, or 0."""
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "periodic"):
@@ -210,14 +212,14 @@ def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], A
 
 
 def is_periodic(ends: PathEnds) -> bool:
-    """Tell whether a path ends as it begins."""
+    """Return whether the end conditions are periodic."""
     return isinstance(ends, str) and ends == "periodic"
 
 
 def resting_spline(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
-    """Return w and d', w' and d'' at the poses, d without components for rotations.
+    """Return w, d', w' and d'' at the poses; for rotations, d' and d'' have no components.
 
-    All are 0 at both ends, and where two successive poses are equal to rounding.
+    They are 0 at both ends and where two successive poses are equal to rounding.
     """
     change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
     same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
@@ -237,24 +239,25 @@ def resting_spline(times: Array, poses: Array) -> tuple[Array, Array, Array, Arr
 
 
 def _accelerations(system: KnotSystem, x: Array) -> Array:
-    """Return the accelerations at the starts of the legs, and 0 at the end of the last."""
+    """Return the accelerations at the starts of the legs, and 0 at the end of the last leg."""
     starts = system.b0 - matvec(system.A, x[:-1]) - matvec(system.B, x[1:])
     return np.append(starts, np.zeros((1, 3)), axis=0)
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
-    """Return velocities for a path: at each pose of the parabola through it and its neighbours.
+    """Return the velocities of parabolas, each through a pose of a path and its two neighbours.
 
-    A change of one pose changes only the velocities there and at its neighbours. The price: the
+    A change of one pose affects only the velocities at this pose and at its neighbours. But the
     acceleration jumps at the poses, and between random poses the motion costs 12 % more than the
-    optimum, in the median, however small the steps are; `spline_velocities` have neither drawback.
-    On samples of a smooth motion the excess over the optimum with the same velocities at both ends
-    falls by 4 for twice as many samples.
+    optimum, in the median, no matter how small the steps are. The `spline_velocities` have neither
+    drawback. On samples of a smooth motion, the excess over the optimum with the same velocities at
+    both ends falls by a factor of 4 for twice as many samples.
 
     Parameters
     ----------
     times, poses : array_like, shapes (N,) and (N, 4, 4) or (N, 3, 3)
-        Two or more times, increasing, with a pose or a rotation matrix, valid to 1e-9, for each.
+        Two or more increasing times, and for each of them a pose or a rotation matrix, valid to
+        1e-9.
 
     Returns
     -------
@@ -263,10 +266,10 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
     Notes
     -----
-    Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). The parabola of the origin
-    is one in R³, that of the rotation one in the exponential coordinates about the pose in the
-    middle, so that moved poses have moved velocities. The first and the last velocity are those of
-    the neighbours' parabolas; two poses alone have the constant velocity between them.
+    This is Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). The parabola of the
+    origin is in R³. The parabola of the rotation is in exponential coordinates about the middle
+    pose, so that the velocities move with the poses. The first and the last velocity are those of
+    the neighbours' parabolas. For two poses, the velocity is constant.
     Singular set: neighbours a half-turn apart, to 1e-6, raise ValueError.
 
     Examples
@@ -283,7 +286,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     turns = log_so3(R[:-1].mT @ R[1:])
     w = _slopes_of_parabolas(h, turns / h)
     for end, turn in ((0, -turns[0]), (-1, turns[-1])):
-        w[end] = right_jacobian_so3(turn) @ w[end]  # coordinates about the neighbour
+        w[end] = right_jacobian_so3(turn) @ w[end]  # from coordinates about the neighbour
     if not d.size:
         return w
     chords = np.diff(d[..., 0], axis=0)
@@ -291,7 +294,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
 
 def _slopes_of_parabolas(h: Array, slopes: Array) -> Array:
-    """Return first derivatives of the parabolas at the knots, from the slopes of the chords."""
+    """Return the first derivatives of the parabolas at the knots, from the slopes of the chords."""
     bend = np.zeros((len(h) + 1, slopes.shape[1]))
     if len(h) > 1:
         bend[1:-1] = 2 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
@@ -302,7 +305,7 @@ def _slopes_of_parabolas(h: Array, slopes: Array) -> Array:
 def checked_path(
     times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> tuple[Array, Array, Array | None]:
-    """Return `check_path` of two poses or more, no neighbours a half-turn apart."""
+    """Return `check_path` of two poses or more; neighbours must not be a half-turn apart."""
     times, poses, velocities = check_path(times, poses, velocities)
     if len(times) < 2:
         raise ValueError("times, poses: two or more wanted, got 1")

@@ -1,4 +1,4 @@
-"""The optima on SO(3): least acceleration, BK (19), of balls and real bodies; torque; jerk."""
+"""The optima on SO(3): least acceleration, BK (19), of balls and bodies, least torque and jerk."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def minimum_acceleration_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> Optimum:
-    """Return the minimum-acceleration curve with these ends, of a ball or of any body.
+    """Return the minimum-acceleration curve with these ends, for a ball or for any body.
 
     Source: BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see
     `rbcourse.optimum.functionals.Effort`).
@@ -47,44 +47,47 @@ def minimum_acceleration_so3(
     R0, R1, w0, w1, duration
         As for `projected_cubic_so3`.
     inertia : array_like, shape (..., 3, 3), optional
-        G, the metric or the inertia of a body, body frame: symmetric and positive definite. By
-        default 2 I, the metric (12).
+        G, the metric or the inertia of a body in the body frame, symmetric and positive definite.
+        The default is 2 I, the metric (12).
 
     Returns
     -------
     Optimum
         A `Curve` that meets all four ends, with the least ∫ 2 ‖w'‖² dt that was found; ``c`` is the
-        constant R w''. With an inertia the least ∫ τᵀ G⁻¹ τ dt, with the torque τ = G w' + w × G w;
-        ``c`` is the constant R p of `Optimum.costate`. Its attributes tell how it was found.
+        constant R w''. With an inertia, it has the least ∫ τᵀ G⁻¹ τ dt that was found, with the
+        torque τ = G w' + w × G w; ``c`` is then the constant R p of `Optimum.costate`. The
+        attributes report how the curve was found.
 
     Raises
     ------
     ConvergenceError
-        For a single problem, if Newton's method converges from none of its starts.
+        For a single problem, if Newton's method does not converge from any of its starting curves.
 
     Warns
     -----
     RuntimeWarning
-        For a stack, if that happens to some, which are NaN; or if a start costs less than the curve
-        that is returned. ``converged`` is False there.
+        For a stack, if this happens for some problems, whose curves are then NaN. Also if a
+        starting curve costs less than the curve that is returned. In both cases, ``converged`` is
+        False for the problem.
 
     See Also
     --------
-    rbcourse.textbook.minimum_acceleration_so3 : The equation, and SciPy's `solve_bvp`.
-    shoot_minimum_acceleration_so3 : The same by shooting.
+    rbcourse.textbook.minimum_acceleration_so3 : The equation, solved by SciPy's `solve_bvp`.
+    shoot_minimum_acceleration_so3 : The same optimum by shooting.
 
     Notes
     -----
-    Singular set: none is known in closed form. (19) is necessary, not sufficient, and has several
-    solutions. If costs differ by less than 1e-9, as a share, the arguments decide which curve is
-    returned, not their rounding.
+    Singular set: none is known in closed form. Equation (19) is necessary, not sufficient, and has
+    several solutions. If two costs have a relative difference below 1e-9, rounding does not affect
+    which of the two curves is returned.
 
-    Starts go each way round, with full turns more where ‖w0‖ + ‖w1‖ > 6π; for a body also from the
-    optimum of the ball and from curves between free motions. Steps of Gauss and Newton lower their
-    costs, then Newton's method solves R p = c from the cheapest. The result is stationary; that
-    none costs less is not proven (tests on random problems: docs/near_optimal.md). Problems of very
-    thin rods may not converge. End velocities along the geodesic give R0 exp(σ̂ p(t)), with p a
-    cubic and σ a logarithm of R0ᵀR1, not always the shortest.
+    The starting curves turn each way round, with additional full turns if ‖w0‖ + ‖w1‖ > 6π. For a
+    body, the optimum of the ball and curves between free motions are starting curves, too.
+    Gauss–Newton steps lower their costs; then Newton's method solves R p = c from the cheapest
+    ones. The result is stationary. It is not proven that no curve costs less (tests on random
+    problems: docs/near_optimal.md). Problems of very thin rods may not converge. If the end
+    velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)) with a cubic p and a logarithm
+    σ of R0ᵀR1, which is not always the shortest.
 
     Examples
     --------
@@ -112,7 +115,7 @@ def minimum_torque_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> Optimum:
-    """Return the curve with these ends that takes a body there with the least squared torque.
+    """Return the curve with these ends that moves a body with the least squared torque.
 
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`).
 
@@ -131,10 +134,10 @@ def minimum_torque_so3(
 
     Notes
     -----
-    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`; problems of thin
-    rods often do not converge. A turn about a principal axis is stationary; about that of the
-    largest moment it may be a saddle, and a curve that leaves the axis costs less. Such curves are
-    tried, too. The equation, with J = R G Rᵀ and H = R G w, is J H'' + H' × H = c; see
+    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. Problems of thin
+    rods often do not converge. A turn about a principal axis is stationary. About the axis of the
+    largest moment it may be a saddle; a curve that leaves the axis then costs less. The search
+    tries such curves, too. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c; see
     `rbcourse.textbook.minimum_torque_so3`.
 
     Examples
@@ -171,14 +174,14 @@ def minimum_jerk_so3(
     Returns
     -------
     Optimum
-        A `Curve` that meets all six ends, with the least ∫ 2 ‖w'' + ½ w × w'‖² dt that was found,
-        the squared covariant jerk; ``c`` is the constant R p of `Optimum.costate`.
+        A `Curve` that meets all six ends. It has the least integral of the squared covariant jerk,
+        ∫ 2 ‖w'' + ½ w × w'‖² dt, that was found; ``c`` is the constant R p of `Optimum.costate`.
 
     Notes
     -----
     Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. From rest to rest
-    without acceleration it is the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and costs 1440 ‖σ‖².
-    `exponential_quintic_so3` is near-optimal, in closed form.
+    without acceleration, the optimum is on the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
+    costs 1440 ‖σ‖². `exponential_quintic_so3` is near-optimal and has a closed form.
 
     Examples
     --------
@@ -201,13 +204,13 @@ def stationary_so3(guess: Curve) -> Optimum:
     Parameters
     ----------
     guess : Curve
-        On SO(3), or a stack of them; not NaN.
+        A curve on SO(3), or a stack of curves, without NaN.
 
     Returns
     -------
     Optimum
-        A `Curve` with the rotations and velocities of the guess at both ends, and R w'' constant.
-        It need not be the cheapest; NaN where nothing is found (see ``converged``).
+        A `Curve` with the rotations and velocities of the guess at both ends and constant R w''. It
+        may not be the cheapest one. It is NaN where no curve is found (see ``converged``).
 
     Examples
     --------
@@ -231,7 +234,7 @@ def stationary_so3(guess: Curve) -> Optimum:
 
 
 class ConvergenceError(RuntimeError):
-    """No curve was found; `residual` is the error that was left after a number of `iterations`."""
+    """The error that no curve was found; `residual` is the error after `iterations` steps."""
 
     def __init__(self, residual: float, iterations: int) -> None:
         super().__init__(
@@ -242,50 +245,50 @@ class ConvergenceError(RuntimeError):
         self.iterations = iterations
 
     def __reduce__(self) -> tuple[type, tuple[float, int]]:
-        """Return how to make it again; its only argument would be the message."""
+        """Return what pickle needs; by default, the only argument would be the message."""
         return type(self), (self.residual, self.iterations)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Optimum(Curve):
-    """A `Curve` on SO(3), or a stack of them, along which R p is constant; as Chebyshev series.
+    """A `Curve` on SO(3), or a stack, along which R p is constant, as Chebyshev series.
 
     Source: beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
 
     Attributes
     ----------
     functional : Functional
-        Defines the cost, and p.
+        The functional that defines the cost and p.
     converged : bool, or ndarray of bool, shape (...)
-        Whether a solution was found, and no curve that was tried costs less. If none was found
-        the curve, `c` and the cost are NaN.
+        Whether a solution was found, and no curve that was tried costs less. If no solution was
+        found, the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
-        R p, constant, in the fixed frame. Without an inertia p is w'', half of that of 2 I.
+        The constant R p in the fixed frame. Without an inertia, p is w'', half of the p of 2 I.
     cost, residual : float or ndarray, shape (...)
         The `acceleration_cost`, `torque_cost` or `jerk_cost`, and the largest error of the
-        equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for the time from 0 to 1.
+        equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for times from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
-        The number of steps of the solver, and of nodes that carry the curve.
+        The number of steps of the solver, and of nodes that represent the curve.
     """
 
     functional: Functional
     series: Array  # of the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
-    constant: Array  # c for the time from 0 to 1
+    constant: Array  # c for times from 0 to 1
     found: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
 
     @property
     def c(self) -> Array:
-        """R p, in the fixed frame."""
+        """The constant R p in the fixed frame."""
         return self.constant / self.duration[..., None] ** (self.functional.ends + 1)
 
     @property
     def cost(self) -> Any:
-        """The minimised integral."""
+        """The cost that the optimum minimises."""
         return self._told(self.found["cost"] / self.duration ** (self.functional.ends + 1))
 
     @property
     def converged(self) -> Any:
-        """Where a solution was found, and no curve that was tried costs less."""
+        """Whether a solution was found, and no curve that was tried costs less."""
         return self._told(self.found["converged"])
 
     @property
@@ -295,24 +298,24 @@ class Optimum(Curve):
 
     @property
     def iterations(self) -> Any:
-        """How many steps the solver took."""
+        """The number of steps of the solver."""
         return self._told(self.found["iterations"])
 
     @property
     def nodes(self) -> Any:
-        """How many nodes carry the curve."""
+        """The number of nodes that represent the curve."""
         return self._told(self.found["nodes"])
 
     def _told(self, values: NDArray[Any]) -> Any:
         return values if self.batch_shape else values.item()
 
     def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these numbers, which count through the stack."""
+        """Return the stack of the curves with these numbers in the flattened stack."""
         functional = self.functional.take(np.reshape(index, -1))
         return replace(super().take(index), functional=functional)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return the sums of the series; of R without their rounding."""
+        """Return the sums of the series; R is made orthogonal to rounding."""
         columns = slice(9) if order == 0 else slice(6 + 3 * order, 9 + 3 * order)
         terms = self.series[..., columns]
         weights = chebyshev(t, terms.shape[1])
@@ -321,7 +324,10 @@ class Optimum(Curve):
         return orthogonal(weighted_sums(weights, terms, 3, 3))
 
     def costate(self, t: ArrayLike) -> Array:
-        """Return p at times of any shape, body frame, shape t.shape + (..., 3): R p is `c`."""
+        """Return p in the body frame at times of any shape, shape t.shape + (..., 3).
+
+        R p is the constant `c`.
+        """
         times = as_time(t, 0, self.domain)
         orders = range(1, self.functional.ends + 2)
         rates = [self.evaluate(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
@@ -332,13 +338,13 @@ class Optimum(Curve):
         return self.functional.name
 
     def __repr__(self) -> str:
-        """Return the kind, the cost and the residual."""
+        """Return the kind of curve, its cost, and the residual of the equations."""
         cost = "" if self.batch_shape else f", cost {self.cost:.6g}"
         return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 
 
 def solve(task: Task, duration: Array) -> Optimum:
-    """Return for each problem the cheapest curve found; errors as `minimum_acceleration_so3`."""
+    """Return the cheapest curve found for each problem, as `minimum_acceleration_so3` does."""
     solutions = cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
@@ -377,7 +383,7 @@ def optimum_of(
 def _series(ends: Array, solutions: Sequence[Solution | Failure], nodes: Array) -> Array:
     """Return the Chebyshev series of R, w, w', …, shape (count, n, 9 + 3 + …).
 
-    Series of fewer nodes are padded with zeros. Where no solution was found they are NaN.
+    Series of fewer nodes are padded with zeros. Series of problems without a solution are NaN.
     """
     m = ends.shape[1]
     series = np.zeros((len(nodes), nodes.max(initial=1) + m, 12 + 3 * m))
