@@ -122,7 +122,10 @@ def crib_page(deck: Deck) -> str:
     """Return the crib of a lecture, one sheet: its run sheet with slides, and right answers."""
     rows = rows_of(deck.sheet)
     starts = starts_of(deck.shown, rows)
-    lines = ["| min | slide | part | question and expected answer | late? skip |", "|--|--|--|--|--|"]
+    lines = [
+        "| min | slide | part | question and expected answer | late? skip |",
+        "|--|--|--|--|--|",
+    ]
     for i, ((minute, part, ask, skip), start) in enumerate(zip(rows, starts, strict=True)):
         if i and minute < rows[i - 1][0]:
             lines.append("| | | **second lecture** | | |")
