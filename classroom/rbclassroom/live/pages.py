@@ -11,10 +11,11 @@ from nbformat.v4 import new_markdown_cell
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test
 
-_IN_PAGES = {  # sentences about Jupyter, and those that stand in their places
-    r"Below each answer is a test: run it, and it tells": "*Check*, below each answer, tells",
-    r"Save\. Then run `rbclassroom\.assignments\.check .*": "Press *Check* below each answer once "
-    "more. Then download the file, and hand it in where your teacher collects it.",
+_IN_PAGES = {  # sentences about Jupyter, and the sentences that replace them
+    r"Each answer is followed by a test\. Run the test, and it tells you": "*Check*, below each "
+    "answer, tells you",
+    r"Save the notebook\. Then run `rbclassroom\.assignments\.check .*": "Press *Check* below each "
+    "answer once more. Then download the file, and hand it in where your teacher collects it.",
 }
 
 

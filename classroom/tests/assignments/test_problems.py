@@ -128,7 +128,7 @@ def examples():
         ("ps1", "pose-matrix"): in_tex(one["pose_matrix"](np.array([4, 2, np.pi / 6]))),
         ("ps1", "seen"): f"the result is ${place(np.round(seen, 9))}$",
         ("ps1", "plan"): ", ".join(f"${place(pose)}$" for pose in poses),
-        ("ps1", "short"): "half-way: {:.4g}. From 20 to 385, half-way: {:.4g}.".format(*short),
+        ("ps1", "short"): "is {:.4g}. Half-way from 20 to 385 it is {:.4g}.".format(*short),
         ("ps1", "angles"): f"the result is, rounded, ${place(arm, '.2f')}$",
         ("ps2", "turn"): in_tex(two["turn_about"](np.ones(3), 2 * np.pi / 3)),
         ("ps2", "far"): f"is at the distance {two['how_far'](mirror):.9g}",
@@ -145,7 +145,7 @@ def test_the_examples_in_the_questions_are_right():
     }
     for key, text in wanted.items():
         assert text in asked[key], key
-    given = re.compile(r"Examples?[:,]|rounded|\bit is \$|at the distance")
+    given = re.compile(r"Examples?[:,]|rounded|\bmatrix is \$|at the distance")
     assert {key for key, text in asked.items() if given.search(text)} == set(wanted)
 
 
