@@ -540,6 +540,7 @@ def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
             unknowns = problem.on_nodes(R, n), *more
         exact = max(left.max(), tail) < EXACT and last < 1e-5
         if exact and _balanced(problem, legs, unknowns):
+            definite = problem.solve(_linearised(problem, legs, unknowns, parts)[0])[1]
             k, c, costs = legs.solution(unknowns)
             each = zip(unknowns[0], k, c, costs.tolist(), left.tolist(), strict=True)
             solutions = [Solution(*one, iterations=step) for one in each]
