@@ -325,6 +325,21 @@ def test_the_certificate_needs_a_definite_system_and_legs_that_are_minima():
     assert fast.certified
 
 
+def test_a_saddle_is_not_returned_as_a_minimum():
+    """Upright turns of a book there and back are stationary, and tilting lowers their torque."""
+    rest, B = np.zeros(3), rb.exp_so3([0, 0, np.radians(100)])
+    poses, ends = np.stack([np.eye(3), B, np.eye(3)]), (rest, rest)
+    tilted = rb.minimum_torque_so3(np.eye(3), B, rest, [1, 0.3, 0], BOOK).cost
+    tilted += rb.minimum_torque_so3(B, np.eye(3), [1, 0.3, 0], rest, BOOK).cost
+    assert tilted < 2 * rb.minimum_torque_so3(np.eye(3), B, rest, rest, BOOK).cost
+    try:
+        found = rb.minimum_torque_spline_so3([0, 1, 2], poses, ends, inertia=BOOK).cost
+    except rb.ConvergenceError as error:
+        assert "only a saddle was found" in str(error)
+    else:
+        assert found <= tilted
+
+
 BAD_ENDS = [
     ("nature", "ends: 'natural', 'periodic' or a pair wanted, got 'nature'"),
     ([[0, 0, 0]], "ends: a pair of velocities wanted, got 1 of them"),

@@ -14,7 +14,7 @@ from rbcourse._checks import as_time
 from rbcourse._numerics import Array
 from rbcourse.curves import Curve, Ends, retime, weighted_sums, with_inertia
 from rbcourse.optimum.chebyshev import along, chebyshev, grid, primitives
-from rbcourse.optimum.collocation import Failure, Solution, orthogonal
+from rbcourse.optimum.collocation import EXACT, Failure, Solution, orthogonal
 from rbcourse.optimum.functionals import Functional
 from rbcourse.optimum.search import LIMITS, Task, ball, body, cheapest, jerk
 from rbcourse.projected_cubic import ends_of_quintic
@@ -237,9 +237,11 @@ class ConvergenceError(RuntimeError):
     """The error that no curve was found; `residual` is the error after `iterations` steps."""
 
     def __init__(self, residual: float, iterations: int) -> None:
+        reason = "the ends may be too fast, or the inertia too uneven"
+        if residual < EXACT:
+            reason = "only a saddle was found"
         super().__init__(
-            f"no convergence: residual {residual:.1e} after {iterations} iterations; "
-            "the ends may be too fast, or the inertia too uneven"
+            f"no convergence: residual {residual:.1e} after {iterations} iterations; {reason}"
         )
         self.residual = residual
         self.iterations = iterations
