@@ -349,7 +349,7 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
 
     Examples
     --------
-    The upright turn of a book, from rest to rest, has the least torque up to 108°. There curves
+    The upright turn of a book, from rest to rest, has the least torque up to about 107.9°. There curves
     that leave the axis begin to cost less:
 
     >>> from rbcourse import exp_so3, minimum_torque_so3
