@@ -332,7 +332,7 @@ def test_a_saddle_is_not_returned_as_a_minimum():
     tilted = rb.minimum_torque_so3(np.eye(3), B, rest, [1, 0.3, 0], BOOK).cost
     tilted += rb.minimum_torque_so3(B, np.eye(3), [1, 0.3, 0], rest, BOOK).cost
     assert tilted < 2 * rb.minimum_torque_so3(np.eye(3), B, rest, rest, BOOK).cost
-    with pytest.raises(rb.ConvergenceError, match="only a saddle was found$"):
+    with pytest.raises(rb.ConvergenceError, match=r"only a saddle was found$"):
         rb.minimum_torque_spline_so3([0, 1, 2], poses, ends, inertia=BOOK)
 
 

@@ -349,8 +349,8 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
 
     Examples
     --------
-    The upright turn of a book, from rest to rest, has the least torque up to about 107.9°. There curves
-    that leave the axis begin to cost less:
+    The upright turn of a book, from rest to rest, has the least torque up to about 107.9°. From
+    there on, curves that leave the axis cost less:
 
     >>> from rbcourse import exp_so3, minimum_torque_so3
     >>> book, rest = np.diag([1.0, 2.22, 3.18]), [0, 0, 0]
