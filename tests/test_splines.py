@@ -326,9 +326,9 @@ def test_the_certificate_needs_a_definite_system_and_legs_that_are_minima():
 
 
 BAD_ENDS = [
-    ("nature", "ends: 'natural', 'periodic' or a pair wanted, got 'nature'"),
-    ([[0, 0, 0]], "ends: a pair of velocities wanted, got 1 of them"),
-    (([0, 0], None), r"ends: shape \(3\) wanted"),
+    ("nature", "ends: 'natural', 'periodic' or a pair is wanted, got 'nature'"),
+    ([[0, 0, 0]], "ends: a pair of velocities is wanted, got 1 of them"),
+    (([0, 0], None), r"ends: shape \(3\) is wanted"),
     (([0, 0, np.nan], None), "ends"),
 ]
 

@@ -58,9 +58,9 @@ def animate(
 ) -> Animation:
     """Return a figure as an animation; afterwards the figure shows the still frame."""
     if not name.isidentifier():
-        raise ValueError(f"name: a word of letters, digits and _ wanted, got {name!r}")
+        raise ValueError(f"name: a word of letters, digits and _ is wanted, got {name!r}")
     if not 0 < frames <= 50 * seconds:
-        raise ValueError(f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s")
+        raise ValueError(f"frames: 1 to 50 per second are wanted, got {frames} in {seconds} s")
     files = os.environ.get("RBCOURSE_FIGURES") != ""  # see `save_figure`
     rendered = render(fig, update, frames if files else 0)  # this also lays out the figure
     pictures = tuple(indexed(rendered)) if rendered else ()

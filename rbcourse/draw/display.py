@@ -67,7 +67,7 @@ class Display(RendererBase):
         self._fig = fig
         self.width, self.height = self.size = tuple(round(x) for x in fig.bbox.size)
         if max(self.size) > 1500:  # larger coordinates would not fit
-            raise ValueError(f"fig: at most 1500 pixels each way wanted, got {self.size}")
+            raise ValueError(f"fig: at most 1500 × 1500 pixels are wanted, got {self.size}")
         self.styles: dict[tuple[Any, ...], int] = {}
         places = [scene.axes.sight().origin * [1, -1] + [0, self.height] for scene in scenes(fig)]
         views = np.round([(scene.axes.azim, scene.axes.elev) for scene in scenes(fig)], 2)

@@ -174,11 +174,11 @@ def csv_text(data: Table) -> str:
     columns = {name: np.asarray(column) for name, column in data.items()}
     if len({column.shape for column in columns.values()}) > 1:
         shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
-        raise ValueError(f"data: columns of one shape wanted, got {shapes}")
+        raise ValueError(f"data: columns of one shape are wanted, got {shapes}")
     for name, column in columns.items():
         if column.dtype.kind != "U" and not name.endswith(tuple(f" [{unit}]" for unit in UNITS)):
             units = ", ".join(f"[{unit}]" for unit in UNITS)
-            raise ValueError(f"data: {name!r} has to end with a space and a unit: one of {units}")
+            raise ValueError(f"data: {name!r} must end with a space and a unit: one of {units}")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

@@ -131,7 +131,7 @@ class Scene(Artist):
         for artist in self.axes.get_children():
             if hasattr(artist, "do_3d_projection"):
                 name = type(artist).__name__
-                raise ValueError(f"{name}: lines, letters, Faces or a Ball wanted in a Space")
+                raise ValueError(f"{name}: lines, letters, Faces or a Ball are wanted in a Space")
         return [artist for artist in self.axes.get_children() if isinstance(artist, IN_SPACE)]
 
     def pieces(self, renderer: Any) -> list[Piece]:
@@ -299,7 +299,7 @@ class Space(Axes3D):  # type: ignore[misc]
         """Return the view of the axes."""
         if self.roll or not -90 <= self.elev <= 90:
             view = f"elev {self.elev:g}, roll {self.roll:g}"
-            raise ValueError(f"view_init: -90 <= elev <= 90 and roll 0 wanted, got {view}")
+            raise ValueError(f"view_init: -90 <= elev <= 90 and roll 0 are wanted, got {view}")
         low, high = np.reshape(self.get_w_lims(), (3, 2)).T
         self.set_box_aspect(high - low, zoom=self._magnified)
         self.apply_aspect()
@@ -370,7 +370,7 @@ def _marked(every: Any) -> Any:
         return slice(None, None, int(every))
     if every is None or isinstance(every, list | slice):
         return slice(None) if every is None else every
-    raise ValueError(f"markevery: None, an integer, a list or a slice wanted, got {every!r}")
+    raise ValueError(f"markevery: None, an integer, a list or a slice is wanted, got {every!r}")
 
 
 def _runs(places: Array) -> list[Array]:
