@@ -309,7 +309,7 @@ def _limits(
         if name not in _SPEEDS + _BENDS:
             raise TypeError(f"{name}: no limit has this name")
         if x.shape not in ((), (3,)) or x.min() <= 0:
-            raise ValueError(f"{name}: one number above 0, or three, are wanted, got {x.tolist()}")
+            raise ValueError(f"{name}: a number above 0, or three, is wanted, got {x.tolist()}")
         if curve.size == 3 and name in ("speed", "acceleration", "force"):
             raise ValueError(f"{name}: a curve on SO(3) has none")
     if not most:

@@ -214,7 +214,7 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
     for values in (*(curve(TIMES, order) for order in range(3)), curve.c, curve.cost):
         assert np.isnan(values).all()
-    with pytest.raises(ValueError, match=r"^guess: a curve is NaN, it did not converge"):
+    with pytest.raises(ValueError, match=r"^guess: a curve is NaN, since it did not converge"):
         rb.stationary_so3(curve)
     for what, speed in (*((what, 1) for what in SOLVERS), ("ball", 1e-10), ("ball", 1e148)):
         with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iter") as failed:
