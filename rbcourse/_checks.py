@@ -29,7 +29,7 @@ def as_array(
     ------
     ValueError
         If `value` is ragged, masked, not made of real numbers, or of another shape. The message
-        names the argument, what is wanted, and what was given.
+        names the argument, the expected shape or type, and the given one.
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]

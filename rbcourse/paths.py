@@ -124,7 +124,7 @@ def chain(
         )
     legs = _made(leg, {name: ends[name] for name in wanted}, np.diff(times))
     if moves and "A0" not in wanted:
-        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # that legs ask for
+        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # highest that legs take
         path = [poses[:, :3, 3], d_dot, d_bend][: 1 + order]
         legs = rigid_motion(RigidMotion, legs, *(x for pair in path for x in (pair[:-1], pair[1:])))
     _check_arrival(legs, poses)

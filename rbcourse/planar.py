@@ -89,7 +89,7 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     A = as_finite("A", A, 3, 3)
     block = scaled(A[..., :2, :2])  # so that nothing overflows
     sine, cosine = block[..., 1, 0] - block[..., 0, 1], block[..., 0, 0] + block[..., 1, 1]
-    theta = np.arctan2(sine + 0.0, cosine + 0.0)  # without the sign of a zero
+    theta = np.arctan2(sine + 0.0, cosine + 0.0)  # removes the sign of a zero
     return np.concatenate([A[..., :2, 2], theta[..., None]], axis=-1)
 
 

@@ -38,7 +38,7 @@ from rbcourse.so3 import hat, log_so3, right_jacobian_so3, vee
 PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
 """The end conditions of a path: "natural", "periodic", or a pair of velocities."""
 
-_SHORTEST, _LONGEST = 1e-100, 1e100  # of a duration
+_SHORTEST, _LONGEST = 1e-100, 1e100  # limits of a duration
 _NEAR_HALF_TURN = 1e-6
 _EQUAL = 1e-12
 

@@ -48,10 +48,10 @@ class Faces(Artist):
     corners : ndarray, shape (n, k, 3)
         The corners of each face, in order around it.
     colours : sequence of colours
-        Of each face.
+        The colour of each face.
     edgecolor : colour, optional
     linewidth : float, optional
-        In points.
+        The width of the edges, in points.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Ball(Artist):
     Parameters
     ----------
     radius : float, optional
-        The radius; the centre is the origin.
+        The radius of the ball, whose centre is the origin.
     """
 
     def __init__(self, radius: float = 1.0) -> None:

@@ -272,7 +272,7 @@ class Optimum(Curve):
     """
 
     functional: Functional
-    series: Array  # of the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
+    series: Array  # for the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
     constant: Array  # c for times from 0 to 1
     found: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
 

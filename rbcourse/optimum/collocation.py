@@ -62,7 +62,7 @@ class Equations(Protocol):
     together: int  # number of problems solved together, which fit into the cache
 
     def take(self, index: Any) -> Self:
-        """Return those of some of the problems."""
+        """Return the equations of some of the problems."""
 
     def first(self, R: Array) -> Arrays:
         """Return initial values of the other unknowns, from rotations of shape (N, n, 3, 3)."""
@@ -269,7 +269,7 @@ class Stationary:
         self.functional, self.R0, self.R1, self.ends = functional, R0, R1, ends
 
     def take(self, index: Any) -> Self:
-        """Return those of some of the problems."""
+        """Return the equations of some of the problems."""
         parts = self.R0[index], self.R1[index], self.ends[index]
         return type(self)(self.functional.take(index), *parts)
 
@@ -389,7 +389,7 @@ class BallStationary:
         self.R0, self.R1, self.ends, self.coarse = R0, R1, ends, coarse
 
     def take(self, index: Any) -> Self:
-        """Return those of some of the problems."""
+        """Return the equations of some of the problems."""
         return type(self)(self.R0[index], self.R1[index], self.ends[index], self.coarse)
 
     def first(self, R: Array) -> tuple[Array]:

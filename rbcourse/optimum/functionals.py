@@ -53,7 +53,7 @@ class Functional(Protocol):
     unit: Any
 
     def take(self, index: Any) -> Self:
-        """Return that of some of the problems."""
+        """Return the functional of some of the problems."""
 
     @property
     def deviation(self) -> Callable[..., Array]:
@@ -152,7 +152,7 @@ class Effort:
         self.scale = self.unit = size**2 if of_torque else size
 
     def take(self, index: Any) -> Self:
-        """Return that of some of the problems."""
+        """Return the functional of some of the problems."""
         chosen = object.__new__(type(self))
         chosen.of_torque, chosen.name = self.of_torque, self.name
         chosen.G, chosen.M, chosen.root = (x[index] for x in (self.G, self.M, self.root))
