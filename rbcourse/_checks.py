@@ -29,7 +29,7 @@ def as_array(
     ------
     ValueError
         If `value` is ragged, masked, not made of real numbers, or of another shape. The message
-        names the argument, what is wanted, and what was given.
+        names the argument, the expected shape or type, and the given one.
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]
@@ -40,13 +40,13 @@ def as_array(
         given = np.asarray(value)
     except ValueError as error:
         raise ValueError(
-            f"{name}: an array of numbers wanted, got rows of unequal length"
+            f"{name}: an array of numbers is wanted, got rows of unequal length"
         ) from error
     if given.dtype.kind not in "biuf":
-        raise ValueError(f"{name}: real numbers wanted, got dtype {given.dtype}")
+        raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}")
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
         wanted = ", ".join([*["..."] * stacked, *map(str, core)])
-        raise ValueError(f"{name}: shape ({wanted}) wanted, got {given.shape}")
+        raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}")
     array: Array = given.astype(np.float64, copy=copy)
     return array
 
@@ -108,7 +108,7 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
     if refused.any():
         listed = ", ".join(f"{x:.6g}" for x in moments[refused][0])
         raise ValueError(
-            f"{first_index(name, refused)}: eigenvalues from 1e-150 to 1e150 are wanted, they are "
+            f"{first_index(name, refused)}: eigenvalues from 1e-150 to 1e150 are wanted, got "
             f"{listed}; use another unit"
         )
     return G
@@ -160,7 +160,7 @@ def as_tolerance(name: str, value: float) -> float:
     """Return a tolerance; raise ValueError if it is not a number of at least 0."""
     tolerance = as_array(name, value)
     if tolerance.ndim or not tolerance >= 0:
-        raise ValueError(f"{name}: a number from 0 up wanted, got {value!r}")
+        raise ValueError(f"{name}: a number from 0 up is wanted, got {value!r}")
     return float(tolerance)
 
 
@@ -177,7 +177,7 @@ def as_positive(name: str, value: float) -> float:
 def as_count(name: str, value: int) -> int:
     """Return a count; raise ValueError if it is not an integer of at least 1."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
-        raise ValueError(f"{name}: an integer from 1 up wanted, got {value!r}")
+        raise ValueError(f"{name}: an integer from 1 up is wanted, got {value!r}")
     return int(value)
 
 
@@ -190,9 +190,9 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
             raise TypeError("True and False are integers to Python")
         shape = tuple(map(index, lengths))
     except TypeError as error:
-        raise ValueError(f"size: None, an integer or a tuple wanted, got {size!r}") from error
+        raise ValueError(f"size: None, an integer or a tuple is wanted, got {size!r}") from error
     if any(length < 0 for length in shape):
-        raise ValueError(f"size: lengths from 0 up wanted, got {size!r}")
+        raise ValueError(f"size: lengths from 0 up are wanted, got {size!r}")
     return shape
 
 
@@ -201,7 +201,7 @@ def as_generator(rng: Rng) -> np.random.Generator:
     try:
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"rng: a Generator, a seed or None wanted, got {rng!r}") from error
+        raise ValueError(f"rng: a Generator, a seed or None is wanted, got {rng!r}") from error
 
 
 def check_order(order: int, most: int) -> int:
@@ -209,7 +209,7 @@ def check_order(order: int, most: int) -> int:
     known = isinstance(order, int | np.integer) and not isinstance(order, bool)
     if not known or not 0 <= order <= most:
         wanted = ", ".join(map(str, range(most)))
-        raise ValueError(f"order: {wanted} or {most} wanted, got {order!r}")
+        raise ValueError(f"order: {wanted} or {most} is wanted, got {order!r}")
     return order
 
 

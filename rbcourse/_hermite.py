@@ -97,4 +97,4 @@ def _start_weights(count: int, t: Array, order: int) -> list[Array]:
         case 6, 3:
             tt = t * t
             return [60 * (6 * t * s - 1), -12 * (3 - 16 * t + 15 * tt), -9 + 36 * t - 30 * tt]
-    raise ValueError(f"ends: two, four or six wanted, got {count}")
+    raise ValueError(f"ends: two, four or six are wanted, got {count}")

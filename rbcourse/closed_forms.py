@@ -43,7 +43,7 @@ from rbcourse.so3 import hat, log_so3, right_jacobian_inverse_so3
 def exponential_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ExponentialCubic:
-    """Return R0 exp(σ̂(t)) with these ends, where σ(t), exponential coordinates, is a cubic.
+    """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a cubic in exponential coordinates.
 
     Source: BK 1, its reference 13.
 
@@ -55,7 +55,7 @@ def exponential_cubic_so3(
     Returns
     -------
     ExponentialCubic
-        The curve of σ(t) with σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
+        The curve with σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
         `right_jacobian_inverse_so3`. It meets all four ends.
 
     Notes

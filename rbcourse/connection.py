@@ -44,7 +44,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     """
     L = as_finite("basis", basis, "n", "n")
     if L.ndim != 3 or len(L) == 0:
-        raise ValueError(f"basis: shape (m, n, n) wanted, got {L.shape}")
+        raise ValueError(f"basis: shape (m, n, n) is wanted, got {L.shape}")
     m = len(L)
     _, exponents = np.frexp(np.abs(L).max(axis=(1, 2)))
     N = scaled(L)  # so that their sizes do not matter
@@ -58,7 +58,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     for _ in range(3):  # normal equations, exact for the standard bases, then refinement
         C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
     if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
-        raise ValueError("basis: a commutator of two of the matrices is no combination of them")
+        raise ValueError("basis: a commutator of two of the matrices is not a combination of them")
     k, i, j = np.ix_(exponents, exponents, exponents)
     return np.ldexp(C.reshape(m, m, m), i + j - k)
 

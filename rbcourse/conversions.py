@@ -74,7 +74,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4)
-        (−1, 0, 0, 0) for one full turn, (1, 0, 0, 0) for two.
+        The quaternion is (−1, 0, 0, 0) for one full turn, and (1, 0, 0, 0) for two.
 
     Examples
     --------

@@ -119,7 +119,7 @@ def acceleration_cost_parts(
     check_curve(curve, on_so3=False)
     m, r = as_positive("mass", mass), as_single("centre", centre, 3)
     if curve.size == 3 and (m != 1 or r.any()):
-        raise ValueError("mass, centre: a curve on SO(3) has none of them")
+        raise ValueError("mass, centre: a curve on SO(3) has neither of them")
     name = "acceleration cost"
     legs = smooth_parts(curve, name, 1)
     functional: Functional = BallAcceleration()
@@ -193,7 +193,7 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
 def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
     """Raise ValueError unless the argument is a `Curve`, which must be on SO(3) if `on_so3`."""
     if not isinstance(curve, Curve):
-        raise ValueError(f"curve: a Curve wanted, got {curve!r}")
+        raise ValueError(f"curve: a Curve is wanted, got {curve!r}")
     if on_so3 and curve.size != 3:
         raise ValueError(f"curve: one on SO(3) is wanted, got {curve!r}")
 
@@ -252,7 +252,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
     flat = curve.flat
     if (nan := ~np.isfinite(flat.values(np.array([[0.0], [1.0]]), 1)).all(axis=(0, 2))).any():
         lost = which_curve(int(np.argmax(nan)), curve.batch_shape)
-        raise RuntimeError(f"{name}{lost}: the curve is NaN, it did not converge")
+        raise RuntimeError(f"{name}{lost}: the curve is NaN, since it did not converge")
     ends = curve.breakpoints if rtol < 1e-8 else np.array([0.0, 0.5, 1.0])
     fine, rough = grid(17), grid(9)
     cost = np.zeros(curve.count)

@@ -221,7 +221,7 @@ class Curve:
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
             wanted = ", ".join(["...", *map(str, self.batch_shape)])
-            raise ValueError(f"t: shape ({wanted}) wanted, got {times.shape}")
+            raise ValueError(f"t: shape ({wanted}) is wanted, got {times.shape}")
         start = self.domain[0]
         times = as_time(times, 0, (start, start + self.duration))
         rows = math.prod(times.shape[: times.ndim - stacked])
@@ -231,7 +231,7 @@ class Curve:
     def __getitem__(self, index: Any) -> Self:
         """Return one curve of the stack, or a smaller stack; the index is one for NumPy arrays."""
         if not self.batch_shape:
-            raise TypeError("a single curve is no stack, and has no index")
+            raise TypeError("a single curve is not a stack and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
 
     def __repr__(self) -> str:
@@ -478,7 +478,7 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     ((0.0, 3.0), array([0. , 0. , 0.5]))
     """
     if not isinstance(curve, Curve):
-        raise ValueError(f"curve: a Curve wanted, got {curve!r}")
+        raise ValueError(f"curve: a Curve is wanted, got {curve!r}")
     T = as_duration("duration", duration)
     if check_broadcast(curve=(curve.duration, 0), duration=(T, 0)) != curve.batch_shape:
         raise ValueError(

@@ -91,9 +91,9 @@ def write_path(
     d = poses[:, :3, 3:].reshape(len(poses), -1)
     if _is_tum(file):
         if velocities is not None:
-            raise ValueError(f"velocities: TUM has no columns for them; {file} has to end in .csv")
+            raise ValueError(f"velocities: TUM has no columns for them; {file} must end in .csv")
         if not d.size:
-            raise ValueError(f"poses: TUM has no rotations alone; {file} has to end in .csv")
+            raise ValueError(f"poses: TUM cannot store rotations alone; {file} must end in .csv")
         rows = np.column_stack([times, d, np.roll(q, -1, axis=-1)]).tolist()
         lines = ["# " + " ".join(TUM), *(" ".join(map(repr, row)) for row in rows), ""]
         write_text(file, "\n".join(lines))
@@ -133,14 +133,14 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     at, table, last = (4 if moves else 1), [], -math.inf
     for place, row in rows:
         if row[0] <= last:
-            raise ValueError(f"{place}: a time after {last} wanted, got {row[0]}")
+            raise ValueError(f"{place}: a time after {last} is wanted, got {row[0]}")
         norm = math.hypot(*row[at : at + 4])
         if abs(norm - 1) > _TOLERANCE:
-            raise ValueError(f"{place}: a quaternion of norm 1 wanted, got one of {norm:.6g}")
+            raise ValueError(f"{place}: a quaternion of norm 1 is wanted, got one of {norm:.6g}")
         table.append(row)
         last = row[0]
     if not table:
-        raise ValueError(f"{file}: a pose wanted, the file ends")
+        raise ValueError(f"{file}: a pose is wanted, but the file ends")
     times, d, q, velocities = np.split(np.array(table), [1, at, at + 4], axis=1)
     R = matrix_from_quaternion(project_quaternion(q))
     poses = join(R, d) if moves else R
@@ -192,7 +192,7 @@ def load_plan(file: File, kind: str) -> Commands:
     place, header = next(lines, (f"{file}, line 1", []))
     names = [*_velocities(kind, max(0, len(header) - 1)), DURATION]
     if header != names:
-        raise ValueError(f"{place}: {', '.join(names)} wanted, got {', '.join(header)[:200]!r}")
+        raise ValueError(f"{place}: {', '.join(names)} are wanted, got {', '.join(header)[:200]!r}")
     rows = (_row(place, names, cells) for place, cells in lines)
     return [_command(place, row) for place, row in rows]
 
@@ -201,7 +201,7 @@ def _is_tum(file: File) -> bool:
     """Return whether a file is TUM, not CSV, by its ending."""
     suffix = os.path.splitext(file)[1].lower()
     if suffix not in (".csv", ".tum", ".txt"):
-        raise ValueError(f"file: a name wanted that ends in .csv, .tum or .txt, got {file}")
+        raise ValueError(f"file: a name that ends in .csv, .tum or .txt is wanted, got {file}")
     return suffix != ".csv"
 
 
@@ -236,18 +236,18 @@ def _velocities(kind: str, joints: int) -> list[str]:
     if kind in list(VELOCITIES):
         return VELOCITIES[kind]
     wanted = ", ".join(map(repr, [*VELOCITIES, "joints"]))
-    raise ValueError(f"kind: one of {wanted} wanted, got {kind!r}")
+    raise ValueError(f"kind: one of {wanted} is wanted, got {kind!r}")
 
 
 def _command(place: str, row: list[float]) -> tuple[Array, float]:
     if len(row) == 1:
-        raise ValueError(f"{place}: a velocity wanted, there is no column for it")
+        raise ValueError(f"{place}: a velocity is wanted, but there is no column for it")
     return as_command(f"{place}:", (row[:-1], row[-1]), "n")
 
 
 def _row(place: str, names: list[str], cells: list[str]) -> tuple[str, list[float]]:
     if len(cells) != len(names):
-        raise ValueError(f"{place}: numbers wanted: {len(names)}, got: {len(cells)}")
+        raise ValueError(f"{place}: {len(names)} numbers are wanted, got {len(cells)}")
     numbers = zip(names, cells, strict=True)
     return place, [to_number(f"{place}, {name}", cell) for name, cell in numbers]
 
@@ -270,7 +270,7 @@ def text_lines(file: File) -> Iterator[tuple[str, str]]:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = len(re.split(rb"\r\n|\n|\r", content[: error.start]))
-        raise ValueError(f"{file}, line {line}: no text in UTF-8") from error
+        raise ValueError(f"{file}, line {line}: the text is not in UTF-8") from error
     lines = re.split("\r\n|\n|\r", text.rstrip(" \t\r\n"))
     yield from ((f"{file}, line {number}", line) for number, line in enumerate(lines, start=1))
 
@@ -294,5 +294,5 @@ def to_number(place: str, cell: str) -> float:
     """Return a cell as a finite number, or raise a ValueError that names its place."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
-        raise ValueError(f"{place}: a finite number wanted, got {cell[:40]!r}")
+        raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}")
     return number

@@ -184,7 +184,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     for name, value in (("alpha", alpha), ("beta", beta)):
         number = as_finite(name, value)
         if number.ndim or not number > 0:
-            raise ValueError(f"{name}: a positive number wanted, got {value!r}")
+            raise ValueError(f"{name}: a positive number is wanted, got {value!r}")
     return np.kron([[alpha, beta], [beta, 0.0]], np.eye(3))
 
 
@@ -344,7 +344,7 @@ def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
     """Return matrices of SO(3) or SE(3), and the dimension of the group, from their size."""
     A = as_finite(name, value, "n", "n")
     if A.shape[-1] not in (3, 4):
-        raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) wanted, got {A.shape}")
+        raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) is wanted, got {A.shape}")
     return A, 3 if A.shape[-1] == 3 else 6
 
 
@@ -358,7 +358,7 @@ def _trace(X: ArrayLike, Y: ArrayLike, size: int | str) -> Array:
     X, Y = as_finite("X", X, size, size), as_finite("Y", Y, size, size)
     check_broadcast(X=(X, 2), Y=(Y, 2))
     if X.shape[-1] != Y.shape[-1]:
-        raise ValueError(f"X and Y: matrices of one size wanted, got {X.shape} and {Y.shape}")
+        raise ValueError(f"X and Y: matrices of one size are wanted, got {X.shape} and {Y.shape}")
     product: Array = (X * Y).sum(axis=(-2, -1))
     return product
 

@@ -80,7 +80,7 @@ class RigidMotion(Curve):
 
     @property
     def size(self) -> int:
-        """Of its matrices."""
+        """The size of its matrices, 4."""
         return 4
 
     @property
@@ -310,7 +310,7 @@ class ScrewMotion(Curve):
 
     @property
     def size(self) -> int:
-        """Of its matrices."""
+        """The size of its matrices, 4."""
         return 4
 
     @property

@@ -107,7 +107,7 @@ def chain(
         leg = projected_cubic_se3 if moves else projected_cubic_so3
     wanted = _arguments(leg)
     if velocities is not None and "w0" not in wanted:
-        raise ValueError("velocities: the legs ask for none")
+        raise ValueError("velocities: the legs take none")
     w, d_dot, a, d_bend = resting_spline(times, poses)
     if velocities is not None:
         w, d_dot = velocities[:, :3], _rotated(poses, velocities[:, 3:])
@@ -120,11 +120,11 @@ def chain(
     if unknown:
         bound = f"functools.partial(leg, {unknown[0]}=...)"
         raise ValueError(
-            f"leg: it asks for {unknown[0]}; there are {', '.join(ends)}; {bound} gives it the rest"
+            f"leg: it needs {unknown[0]}, which is not among {', '.join(ends)}; use {bound}"
         )
     legs = _made(leg, {name: ends[name] for name in wanted}, np.diff(times))
     if moves and "A0" not in wanted:
-        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # that legs ask for
+        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # highest that legs take
         path = [poses[:, :3, 3], d_dot, d_bend][: 1 + order]
         legs = rigid_motion(RigidMotion, legs, *(x for pair in path for x in (pair[:-1], pair[1:])))
     _check_arrival(legs, poses)
@@ -294,7 +294,7 @@ class Chain(Curve):
         share = float(duration) / (end - start)
         if start + float(duration) == start:
             raise ValueError(
-                f"duration is {duration}: that vanishes beside the first time, {start}"
+                f"duration is {duration}: it vanishes by rounding beside the first time, {start}"
             )
         times = start + share * (self.times - start)
         times[-1] = start + duration
@@ -395,7 +395,7 @@ def _arguments(leg: Leg) -> list[str]:
     try:
         parameters = signature(leg).parameters
     except (TypeError, ValueError) as error:
-        raise ValueError(f"leg: a function that makes curves wanted, got {leg!r}") from error
+        raise ValueError(f"leg: a function that makes curves is wanted, got {leg!r}") from error
     taken = {one.kind for one in parameters.values()}
     if "duration" not in parameters and Parameter.VAR_KEYWORD not in taken:
         raise ValueError(f"leg: it has no parameter duration: {leg!r}")
@@ -418,10 +418,12 @@ def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
         warnings.warn(warning.message, stacklevel=3)
     count, size = len(duration), 4 if "A0" in ends else 3
     if not isinstance(legs, Curve) or not np.array_equal(legs.duration, duration):
-        raise ValueError(f"leg: a stack of {count} curves of these durations wanted, got {legs!r}")
+        raise ValueError(
+            f"leg: a stack of {count} curves of these durations is wanted, got {legs!r}"
+        )
     if legs.size != size:
         given = f"({legs.size}, {legs.size})"
-        raise ValueError(f"leg: curves of shape ({size}, {size}) wanted, got {given}")
+        raise ValueError(f"leg: curves of shape ({size}, {size}) are wanted, got {given}")
     return legs
 
 

@@ -89,7 +89,7 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     A = as_finite("A", A, 3, 3)
     block = scaled(A[..., :2, :2])  # so that nothing overflows
     sine, cosine = block[..., 1, 0] - block[..., 0, 1], block[..., 0, 0] + block[..., 1, 1]
-    theta = np.arctan2(sine + 0.0, cosine + 0.0)  # without the sign of a zero
+    theta = np.arctan2(sine + 0.0, cosine + 0.0)  # removes the sign of a zero
     return np.concatenate([A[..., :2, 2], theta[..., None]], axis=-1)
 
 
@@ -272,7 +272,7 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
         return propagate(start, plan)
     if frame == "body":
         return propagate(start, plan, lambda pose, S: compose_planar(pose, exp_planar(S)))
-    raise ValueError(f"frame: 'world' or 'body' wanted, got {frame!r}")
+    raise ValueError(f"frame: 'world' or 'body' is wanted, got {frame!r}")
 
 
 def _rotated(theta: Array, vector: Array) -> Array:
@@ -294,7 +294,7 @@ def as_plan(plan: Plan, size: int | str) -> Commands:
     try:
         commands = iter(plan)
     except TypeError as error:
-        raise ValueError(f"plan: a list of (velocity, duration) wanted, got {plan!r}") from error
+        raise ValueError(f"plan: a list of (velocity, duration) is wanted, got {plan!r}") from error
     return [as_command(f"plan[{i}]", command, size) for i, command in enumerate(commands)]
 
 
@@ -303,7 +303,7 @@ def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> 
     try:
         velocity, duration = command
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: (velocity, duration) wanted, got {command!r}") from error
+        raise ValueError(f"{name}: (velocity, duration) is wanted, got {command!r}") from error
     d = float(as_single(f"{name} duration", duration))
     if d < 0:
         raise ValueError(f"{name} duration is {d}, a duration from 0 up is wanted")
@@ -331,5 +331,5 @@ def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = 
             with np.errstate(over="raise"):
                 path.append(move(path[-1], velocity * duration))
         except FloatingPointError as error:
-            raise ValueError(f"plan[{i}] leads beyond all numbers") from error
+            raise ValueError(f"plan[{i}] leads beyond the floating-point numbers") from error
     return np.array(path)

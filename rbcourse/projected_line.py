@@ -100,7 +100,7 @@ class ProjectedLine(AlongGeodesic):
         try:
             np.broadcast_to(value, shape)
         except ValueError as error:
-            raise ValueError(f"{name}: shape {shape} wanted, got {value.shape}") from error
+            raise ValueError(f"{name}: shape {shape} is wanted, got {value.shape}") from error
         if value.size == 1 or value.shape[-len(shape) :] == (len(t), *each):
             return np.broadcast_to(value.reshape(-1, 1), (len(t), 1))
         return np.broadcast_to(value, shape).reshape(len(t), -1)
@@ -159,7 +159,7 @@ def projected_line_so3(
 
 def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
     if timing is f:
-        raise ValueError("f: it must be bound to an angle: lambda t, order: f(t, angle, order)")
+        raise ValueError("f: bind it to an angle, as in lambda t, order: f(t, angle, order)")
     shape = data["duration"].shape
     number = np.arange(math.prod(shape)).reshape(shape)
     curve = ProjectedLine(**data, timing=timing, number=number, timed=shape)

@@ -193,7 +193,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (N, ..., 4) or (4,)
-        The first axis is time. A single quaternion is returned as it is.
+        The first axis is time. A single quaternion is returned unchanged.
 
     Returns
     -------

@@ -274,7 +274,9 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
     if length is None:
         length = extent_of(states) / 5 or max(1.0, 1e-12 * far)
     if not as_single("length", length) > 1e-13 * far:
-        raise ValueError(f"length: above 0 wanted, and enough to be seen, got {length!r}")
+        raise ValueError(
+            f"length: a number above 0, large enough to be seen, is wanted, got {length!r}"
+        )
     return _show_path(
         "path", describe_route(states), states, lambda ax, p: moving_route(ax, states, length, p)
     )
@@ -364,7 +366,7 @@ def _passes(test: Callable[..., Any], x: ArrayLike, epsilon: float) -> bool:
 
 def _chosen(name: str, value: bool) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name}: True or False wanted, got {value!r}")
+        raise ValueError(f"{name}: True or False is wanted, got {value!r}")
     return bool(value)
 
 

@@ -326,7 +326,7 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     """
     R = as_finite("R", R, 3, 3)
     if R.ndim != 3 or len(R) < 100:
-        raise ValueError(f"R: shape (n, 3, 3) with n >= 100 wanted, got {R.shape}")
+        raise ValueError(f"R: shape (n, 3, 3) with n >= 100 is wanted, got {R.shape}")
     back, pairs = np.swapaxes(R, -1, -2), len(R) // 2
     trace = np.trace(R, axis1=-2, axis2=-1)
     return {

@@ -302,13 +302,15 @@ def check_path(
     invalid matrix.
     """
     if np.size(times) == 0:
-        raise ValueError("times, poses: one or more wanted, got none")
+        raise ValueError("times, poses: one or more are wanted, got none")
     times, poses = as_single("times", times, "N"), as_finite("poses", poses, "n", "n")
     size = poses.shape[-1]
     if poses.ndim != 3 or size not in (3, 4):
-        raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) wanted, got {poses.shape}")
+        raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) is wanted, got {poses.shape}")
     if len(times) != len(poses):
-        raise ValueError(f"times, poses: as many of each wanted, got {len(times)} and {len(poses)}")
+        raise ValueError(
+            f"times, poses: as many of each are wanted, got {len(times)} and {len(poses)}"
+        )
     late = np.flatnonzero(times[1:] <= times[:-1])
     if len(late):
         before, after = times[late[0] :][:2]
@@ -316,9 +318,11 @@ def check_path(
     passes = is_so(poses) if size == 3 else is_se(poses)
     if not passes.all():
         what, cure = ("rotation", "project_so") if size == 3 else ("pose", "project_se")
-        raise ValueError(f"poses[{np.argmin(passes)}] is no {what} ({cure} gives the nearest)")
+        raise ValueError(f"poses[{np.argmin(passes)}] is not a {what} ({cure} gives the nearest)")
     if velocities is not None:
         velocities = as_single("velocities", velocities, "N", 3 if size == 3 else 6)
         if len(velocities) != len(times):
-            raise ValueError(f"velocities: {len(times)} wanted, one a pose, got {len(velocities)}")
+            raise ValueError(
+                f"velocities: {len(times)} are wanted, one for each pose, got {len(velocities)}"
+            )
     return times, poses, velocities

@@ -150,7 +150,7 @@ def fastest(
         raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
     ends = as_single("rates", rates, 2)
     if ends.min() < 0:
-        raise ValueError(f"rates: two numbers from 0 up wanted, got {rates}")
+        raise ValueError(f"rates: two numbers from 0 up are wanted, got {rates}")
     for finer in FINER:
         grid = _sampled(path, finer)
         x, used = _squared_rates(grid, limits, ends)
@@ -303,19 +303,19 @@ def _limits(
     **limits: ArrayLike | None,
 ) -> _Limits:
     if not isinstance(curve, Curve) or curve.batch_shape:
-        raise ValueError(f"curve: a single Curve wanted, no stack, got {curve!r}")
+        raise ValueError(f"curve: a single Curve, not a stack, is wanted, got {curve!r}")
     most = {name: as_finite(name, x) for name, x in limits.items() if x is not None}
     for name, x in most.items():
         if name not in _SPEEDS + _BENDS:
             raise TypeError(f"{name}: no limit has this name")
         if x.shape not in ((), (3,)) or x.min() <= 0:
-            raise ValueError(f"{name}: a number above 0, or three, wanted, got {x.tolist()}")
+            raise ValueError(f"{name}: a number above 0, or three, is wanted, got {x.tolist()}")
         if curve.size == 3 and name in ("speed", "acceleration", "force"):
             raise ValueError(f"{name}: a curve on SO(3) has none")
     if not most:
         raise ValueError(f"limits: none of {', '.join(_SPEEDS + _BENDS)} is given")
     if "torque" in most and inertia is None:
-        raise ValueError("inertia: it is needed for a torque")
+        raise ValueError("inertia: it is required for a limit on the torque")
     G = np.eye(3) if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
     vectors = as_single("centre", centre, 3), as_single("gravity", gravity, 3)
     return _Limits(most, G, as_positive("mass", mass), *vectors)
@@ -385,10 +385,10 @@ def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, A
     parts = [row[1:] for row in rows if row[0] in _BENDS]
     held = np.max([np.linalg.norm(k, axis=-1) for _, _, k in parts], axis=(0, 1))
     if (held >= 1).any():
-        where = (
-            f"{held.max():.6g} times that to hold the body near s = {s[np.argmax(held >= 1)]:.6g}"
+        most, where = held.max(), s[np.argmax(held >= 1)]
+        raise ValueError(
+            f"force: {most:.6g} times the limit is needed to hold the body near s = {where:.6g}"
         )
-        raise ValueError(f"force: it takes {where}")
     caps = np.minimum(np.append(X[0], inf), np.append(inf, X[-1]))
     caps[stops] = 0
     moving = V[0, 0].any(), V[-1, -1].any()
@@ -427,7 +427,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
         if high[i] == inf:
             raise ValueError(f"limits: none of them bounds the speed near s = {s[i]:.6g}")
         if low[i] > high[i] * (1 + 1e-9):
-            raise ValueError(f"rates[1] is out of reach: too low a limit near s = {s[i]:.6g}")
+            raise ValueError(f"rates[1] is out of reach: a limit is too low near s = {s[i]:.6g}")
     x = [min(high[0], most)]
     if x[0] < max(low[0], first) * (1 - 1e-9):
         why = "too low for rates[1]" if low[0] > x[0] else "too high to brake, or above a limit"

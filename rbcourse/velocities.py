@@ -38,7 +38,7 @@ from rbcourse.so3 import hat, log_so3, right_jacobian_so3, vee
 PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
 """The end conditions of a path: "natural", "periodic", or a pair of velocities."""
 
-_SHORTEST, _LONGEST = 1e-100, 1e100  # of a duration
+_SHORTEST, _LONGEST = 1e-100, 1e100  # limits of a duration
 _NEAR_HALF_TURN = 1e-6
 _EQUAL = 1e-12
 
@@ -201,10 +201,10 @@ def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], A
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "periodic"):
-            raise ValueError(f"ends: 'natural', 'periodic' or a pair wanted, got {ends!r}")
+            raise ValueError(f"ends: 'natural', 'periodic' or a pair is wanted, got {ends!r}")
         return fixed, given
     if len(ends) != 2:
-        raise ValueError(f"ends: a pair of velocities wanted, got {len(ends)} of them")
+        raise ValueError(f"ends: a pair of velocities is wanted, got {len(ends)} of them")
     for place, value in ((0, ends[0]), (-1, ends[1])):
         if value is not None:
             fixed[place], given[place] = True, as_single("ends", value, size)
@@ -308,13 +308,13 @@ def checked_path(
     """Return `check_path` of two poses or more; neighbours must not be a half-turn apart."""
     times, poses, velocities = check_path(times, poses, velocities)
     if len(times) < 2:
-        raise ValueError("times, poses: two or more wanted, got 1")
+        raise ValueError("times, poses: two or more are wanted, got 1")
     with np.errstate(over="ignore"):
         h = np.diff(times)
     odd = ~((h > _SHORTEST) & (h < _LONGEST))
     if odd.any():
         i = np.argmax(odd)
-        raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too near, or too far")
+        raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too close or too far")
     R = poses[:, :3, :3]
     far = np.sum(R[:-1] * R[1:], axis=(1, 2)) + 1 < _NEAR_HALF_TURN**2  # 2 + 2 cos of the angle
     if far.any():

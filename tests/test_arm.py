@@ -86,7 +86,7 @@ def test_a_configuration_of_the_arm_is_no_planar_pose():
     grid = np.stack(np.meshgrid(*[np.linspace(-np.pi, np.pi, 181)] * 2), axis=-1)
     reached = np.linalg.norm(tips(grid), axis=-1)
     assert 0.5 - 1e-12 < reached.min() < reached.max() < 3.5 + 1e-12
-    with pytest.raises(ValueError, match=r"^plan\[0\] velocity: shape \(3\) wanted, got \(2,\)"):
+    with pytest.raises(ValueError, match=r"^plan\[0\] velocity: shape \(3\) is wanted, got \(2,\)"):
         arm.propagate_joints(np.zeros(3), [([1, -0.5], 2)])  # x, y, θ
 
 
@@ -114,8 +114,8 @@ def test_both_solutions_bring_the_tip_there_and_one_is_where_it_came_from(length
 REACH = "0.5 to 3.5 m from the base wanted, got"
 ANGLES_AND_LENGTHS = [
     (([0, np.nan],), "q[1] is nan, a finite number is wanted"),
-    ((3,), "q: shape (..., n) wanted, got ()"),
-    (([0, 0, 0],), "lengths: shape (3) wanted, got (2,)"),
+    ((3,), "q: shape (..., n) is wanted, got ()"),
+    (([0, 0, 0],), "lengths: shape (3) is wanted, got (2,)"),
     (([0, 0], [0, 1]), "lengths[0] is 0.0, a length above 0 is wanted"),
 ]
 
@@ -125,7 +125,7 @@ ANGLES_AND_LENGTHS = [
     [
         *(("arm_forward_kinematics", *bad) for bad in ANGLES_AND_LENGTHS),
         *(("arm_tip_jacobian", *bad) for bad in ANGLES_AND_LENGTHS),
-        ("interpolate_joints", ([0, 0], [1, 2], 0), "steps: an integer from 1 up wanted, got 0"),
+        ("interpolate_joints", ([0, 0], [1, 2], 0), "steps: an integer from 1 up is wanted, got 0"),
         ("propagate_joints", ([0, np.nan], [([1], -1)]), "start[1] is nan"),
         ("propagate_joints", ([0], [([1], -1)]), "plan[0] dur"),
         ("arm_inverse_kinematics", ([0, 3.5 + 1e-12],), f"tip: {REACH} 3.500000000001 m"),

@@ -10,9 +10,9 @@ EPS = np.finfo(float).eps
 
 def test_messages_have_the_index_the_shape_and_the_kind_of_what_was_given():
     for value, core, message in (
-        (np.zeros((4, 0, 0)), ("n", "n"), "x: shape (..., n, n) wanted, got (4, 0, 0)"),
-        ([[1, 2], [3]], (2,), "x: an array of numbers wanted, got rows of unequal length"),
-        ([1j, 0, 0], (3,), "x: real numbers wanted, got dtype complex128"),
+        (np.zeros((4, 0, 0)), ("n", "n"), "x: shape (..., n, n) is wanted, got (4, 0, 0)"),
+        ([[1, 2], [3]], (2,), "x: an array of numbers is wanted, got rows of unequal length"),
+        ([1j, 0, 0], (3,), "x: real numbers are wanted, got dtype complex128"),
         ([[1, 2], [3, -np.inf]], (2,), "x[1, 1] is -inf, a finite number is wanted"),
     ):
         with pytest.raises(ValueError, match=re.escape(message)):

@@ -256,11 +256,11 @@ NEARLY_SO3 = [L1 + 1e-7 * ONE, L2, L3 + 1e-10]
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        ("structure_constants", (ONE,), "basis: shape (m, n, n) wanted"),
+        ("structure_constants", (ONE,), "basis: shape (m, n, n) is wanted"),
         ("structure_constants", ([np.eye(2), 2 * np.eye(2)],), "linearly dependent"),
         ("structure_constants", ([1e6 * ONE, L1, L2],), "a commutator of two"),
         ("structure_constants", (NEARLY_SO3,), "a commutator of two"),
-        ("christoffel", (np.eye(6), rb.BASIS_SO3), "G: shape (..., 3, 3) wanted"),
+        ("christoffel", (np.eye(6), rb.BASIS_SO3), "G: shape (..., 3, 3) is wanted"),
         ("christoffel", (np.eye(3, k=1), rb.BASIS_SO3), "G is not symmetric"),
         ("christoffel", (np.ones((3, 3)), rb.BASIS_SO3), "G is singular"),
         ("geodesic_flow", (ONE, [ONE] * 2, ONE, 1), "broadcast: G (), A0 (2,), v0 (3,)"),

@@ -186,7 +186,7 @@ def takes_each_curve_at_its_own_times(make):
     for i in np.ndindex(2, 3):
         assert off(values[:, *i], jet(stack, t[:, *i])[:, *i]) < 1e-12
     for shape in ((), (3,), (3, 2), (2, 3, 1)):
-        with pytest.raises(ValueError, match=r"^t: shape .* wanted, got"):
+        with pytest.raises(ValueError, match=r"^t: shape .* is wanted, got"):
             stack.at_own_times(np.zeros(shape))
 
 

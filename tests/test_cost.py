@@ -316,9 +316,13 @@ def test_bad_arguments_are_named():
     for cost, given, message in (
         (partial(acceleration, mass=0), motion, "^mass is 0.0"),
         (partial(acceleration, centre=[0, 1]), motion, r"^centre: shape \(3\)"),
-        (partial(acceleration, mass=2.5), line, "^mass, centre: a curve on SO.3. has none of them"),
-        (acceleration, None, "^curve: a Curve wanted, got None"),
-        (jerk, None, "^curve: a Curve wanted, got None"),
+        (
+            partial(acceleration, mass=2.5),
+            line,
+            "^mass, centre: a curve on SO.3. has neither of them",
+        ),
+        (acceleration, None, "^curve: a Curve is wanted, got None"),
+        (jerk, None, "^curve: a Curve is wanted, got None"),
         (jerk, motion, "^curve: one on SO.3. is wanted, got <Rigid"),
         (partial(torque, inertia=BOOK), motion, "^curve: one on SO.3. is wanted, got <Rigid"),
         *((partial(jerk, rtol=x), line, "^rtol") for x in (0, 1e-13, 0.2, np.nan, [1e-6] * 2)),

@@ -187,9 +187,9 @@ def test_f_may_return_numbers_work_in_place_and_end_at_rounding():
     [
         (lambda t, order: t / 2, r"f: f\(0\) = 0 and f\(1\) = 1 are wanted"),
         (lambda t, order: t * 1.000001, r"are wanted, got 0\.0 and 1\.000001"),
-        (lambda t, order: np.zeros(3), r"f\(t, 0\): shape \(2,\) wanted, got \(3,\)"),
+        (lambda t, order: np.zeros(3), r"f\(t, 0\): shape \(2,\) is wanted, got \(3,\)"),
         (lambda t, order: np.nan, r"^t = 0\.0: f\(t, 0\) is not a finite number"),
-        (f, r"^f: it must be bound to an angle"),
+        (f, r"^f: bind it to an angle"),
         *((one, r"f: a callable f\(t, order\) is wanted") for one in (0, 1, [], "f")),
     ],
 )

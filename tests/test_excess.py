@@ -256,7 +256,10 @@ def test_other_names_and_curves_are_refused():
         message = re.escape(f"name: one of {', '.join(FORMS)} is wanted, got {name!r}")
         with pytest.raises(ValueError, match=f"^{message}"):
             rb.leading_excess(name, I3, I3, [0, 0, 1], [0, 0, 1])
-    for curve, message in ((I3, "curve: a Curve wanted"), (rb.geodesic_se3(I4, I4), r"on SO\(3\)")):
+    for curve, message in (
+        (I3, "curve: a Curve is wanted"),
+        (rb.geodesic_se3(I4, I4), r"on SO\(3\)"),
+    ):
         with pytest.raises(ValueError, match=message):
             rb.excess_estimate(curve)
 

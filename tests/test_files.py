@@ -101,41 +101,41 @@ def test_files_of_other_programs_are_read(tmp_path):
 
 
 GOOD, ROW, MOVE, WHEEL = "0 0 0 0 0 0 0 1\n", "0,0,0,0,1,0,0,0\n", "1,0,0,2\n", "duration [s]\n1\n"
-NUMBER = "a finite number wanted, got"
-UNIT = "a quaternion of norm 1 wanted, got one of"
+NUMBER = "a finite number is wanted, got"
+UNIT = "a quaternion of norm 1 is wanted, got one of"
 COLUMNS = ", line 1: the columns must be time [s], "
 BAD_FILES = {
     "a.tum": [
-        ("# x\n\n" + GOOD + "1 0 0 0 0 0 0 1 9\n", ", line 4: numbers wanted: 8, got: 9"),
-        (GOOD + GOOD, ", line 2: a time after 0.0 wanted, got 0.0"),
+        ("# x\n\n" + GOOD + "1 0 0 0 0 0 0 1 9\n", ", line 4: 8 numbers are wanted, got 9"),
+        (GOOD + GOOD, ", line 2: a time after 0.0 is wanted, got 0.0"),
         ("0 0 x 0 0 0 0 1\n", f", line 1, ty: {NUMBER} 'x'"),
         ("0 0 0 0 0 0 0 1.0011\n", f", line 1: {UNIT} 1.0011"),
     ],
     "a.csv": [
         (ROW, COLUMNS),
         (FULL.replace("body", "world") + "\n", COLUMNS),
-        (PLAIN + "\n", ": a pose wanted, the file ends"),
-        (f"{PLAIN}\n{ROW}\n{ROW}", ", line 3: numbers wanted: 8"),
+        (PLAIN + "\n", ": a pose is wanted, but the file ends"),
+        (f"{PLAIN}\n{ROW}\n{ROW}", ", line 3: 8 numbers are wanted"),
     ],
     "world": [
-        ("", f", line 1: {PLAN.strip().replace(',', ', ')} wanted, got "),
+        ("", f", line 1: {PLAN.strip().replace(',', ', ')} are wanted, got "),
         (PLAN.replace("world", "body"), ", line 1: vx world [m/s], "),
         ("\n" + PLAN, ", line 1: vx world [m/s], "),
-        (PLAN + "1,0,0,2,\n", ", line 2: numbers wanted: 4, got: 5"),
-        (f"{PLAN}{MOVE}\n{MOVE}", ", line 3: numbers wanted: 4, got: 0"),
-        (PLAN.replace("\n", "\r") + "1,0,0,2\r1;0;0;2\r", ", line 3: numbers wanted: 4, got: 1"),
+        (PLAN + "1,0,0,2,\n", ", line 2: 4 numbers are wanted, got 5"),
+        (f"{PLAN}{MOVE}\n{MOVE}", ", line 3: 4 numbers are wanted, got 0"),
+        (PLAN.replace("\n", "\r") + "1,0,0,2\r1;0;0;2\r", ", line 3: 4 numbers are wanted, got 1"),
         *(
             (f"{PLAN}1,0,0,1\n1,{cell},0,2\n", f", line 3, vy world [m/s]: {NUMBER} {cell[:40]!r}")
             for cell in ("", "x", "nan", "1e999", "1_0", "١", "1\xa0", "0x1", "x" * 90)
         ),
         (PLAN + "1,0,0,-2\n", ", line 2: duration is -2.0, a duration from 0 up is wanted"),
         (f'{PLAN}{MOVE}"{MOVE}{MOVE}', ", line 3: unexpected end of data"),
-        (f"{PLAN}{MOVE}\udcff,0,0,2\n", ", line 3: no text in UTF-8"),
-        (f"{PLAN}{MOVE}\udcff,0,0,2\n".replace("\n", "\r"), ", line 3: no text in UTF-8"),
+        (f"{PLAN}{MOVE}\udcff,0,0,2\n", ", line 3: the text is not in UTF-8"),
+        (f"{PLAN}{MOVE}\udcff,0,0,2\n".replace("\n", "\r"), ", line 3: the text is not in UTF-8"),
     ],
     "joints": [
-        (WHEEL, ", line 2: a velocity wanted, there is no column for it"),
-        ("", ", line 1: duration [s] wanted, got ''"),
+        (WHEEL, ", line 2: a velocity is wanted, but there is no column for it"),
+        ("", ", line 1: duration [s] are wanted, got ''"),
     ],
 }
 
@@ -152,22 +152,42 @@ def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, kind):
 TWO, MOVES = [0, 1], TWISTS[:2]
 REFUSED = [
     (rb.write_path, "a.tum", (TWO, POSES[:2], MOVES), r"velocities: TUM has no columns .*\.csv$"),
-    (rb.write_path, "a.txt", (TWO, ROTATIONS[:2]), r"poses: TUM has no rotations alone; .*\.csv$"),
+    (
+        rb.write_path,
+        "a.txt",
+        (TWO, ROTATIONS[:2]),
+        r"poses: TUM cannot store rotations alone; .*csv$",
+    ),
     (rb.write_path, "a.dat", (TWO, POSES[:2]), r"file: a name .* in \.csv, \.tum or .*, got .*dat"),
-    (rb.read_path, "a.bag", (), "file: a name wanted that ends in"),
+    (rb.read_path, "a.bag", (), "file: a name that ends in"),
     (rb.write_path, "a.csv", ([1, 0], POSES[:2]), r"times\[1\] is 0.0, a time after 1.0 is wanted"),
-    (rb.write_path, "a.csv", ([0], POSES[:2]), "times, poses: as many of each wanted, got 1 and 2"),
-    (rb.write_path, "a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is no pose \(project_se gives"),
+    (
+        rb.write_path,
+        "a.csv",
+        ([0], POSES[:2]),
+        "times, poses: as many of each are wanted, got 1 and 2",
+    ),
+    (rb.write_path, "a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is not a pose \(project_se gives"),
     (rb.write_path, "a.csv", (TWO, POSES[:2, :2]), "poses: shape"),
     (rb.write_path, "a.csv", (TWO, POSES[:2], MOVES[:, :3]), "velocities: shape"),
     (rb.write_path, "a.csv", (TWO, POSES[:2], MOVES * np.nan), r"velocities\[0, 0\] is nan"),
-    (rb.write_path, "a.csv", ([], np.zeros((0, 4, 4))), "times, poses: one or more wanted, got n"),
+    (
+        rb.write_path,
+        "a.csv",
+        ([], np.zeros((0, 4, 4))),
+        "times, poses: one or more are wanted, got n",
+    ),
     (save_plan, "a.csv", ([([1, 0], 2)], "world"), r"plan\[0\] velocity: shape"),
     (save_plan, "a.csv", ([([1, 0], 2), ([1], 2)], "joints"), r"plan\[1\] velocity: "),
     (save_plan, "a.csv", ([([1, 0, 0], -2)], "body"), r"plan\[0\] duration is -2"),
     (save_plan, "a.csv", (3, "joints"), "plan: a list of"),
-    (save_plan, "a.csv", ([], "arm"), "kind: one of 'world', 'body', 'joints' wanted, got 'arm'"),
-    (save_plan, "a.csv", ([], ["world"]), r"kind: one of .* wanted, got \['world'\]"),
+    (
+        save_plan,
+        "a.csv",
+        ([], "arm"),
+        "kind: one of 'world', 'body', 'joints' is wanted, got 'arm'",
+    ),
+    (save_plan, "a.csv", ([], ["world"]), r"kind: one of .* is wanted, got \['world'\]"),
 ]
 
 

@@ -137,17 +137,21 @@ def test_bad_arguments_are_named_and_the_metrics_are_read_only():
     one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
     inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
     for name, arguments, message in (
-        ("inner_gl", (np.eye(2), one), "X and Y: matrices of one size wanted"),
-        ("inner_ga", ([[1]], [[1]]), "X: shape (..., n+1, n+1) wanted"),
-        ("tangent_from_components", (np.eye(2), [1]), "A: shape (..., 3, 3) or (..., 4, 4) wanted"),
+        ("inner_gl", (np.eye(2), one), "X and Y: matrices of one size are wanted"),
+        ("inner_ga", ([[1]], [[1]]), "X: shape (..., n+1, n+1) is wanted"),
+        (
+            "tangent_from_components",
+            (np.eye(2), [1]),
+            "A: shape (..., 3, 3) or (..., 4, 4) is wanted",
+        ),
         ("tangent_from_components", (one, np.ones(6)), "x: shape (..., 3)"),
         ("tangent_from_components", (R[:2], w[:3]), f"{unlike} broadcast: A (2,), x (3,)"),
         ("components_from_tangent", (np.eye(4), one), "X: shape (..., 4, 4)"),
         (inner, (np.eye(6), *[one] * 3), "G: shape (..., 3, 3)"),
         (inner, (crooked, *[one] * 3), "G is not symmetric"),
         (inner, (many, one, R[:2], R[:2]), f"{unlike} broadcast: G (4,), A (), X (2,), Y (2,)"),
-        ("semi_riemannian_metric_se3", (0, 1), "alpha: a positive number wanted, got 0"),
-        ("semi_riemannian_metric_se3", (1, [1]), "beta: a positive number wanted, got [1"),
+        ("semi_riemannian_metric_se3", (0, 1), "alpha: a positive number is wanted, got 0"),
+        ("semi_riemannian_metric_se3", (1, [1]), "beta: a positive number is wanted, got [1"),
         ("box_inertia", ([[1, 2, 3], [1, -2, 3]],), "sides[1]: lengths from 0 up are wanted, got"),
         ("box_inertia", ([1, 2, 3], 0), "mass"),
         ("inertia_from_weight", (crooked,), "W is not symmetric"),

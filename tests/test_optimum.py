@@ -188,7 +188,7 @@ def test_a_hopeless_problem_is_named_and_harms_no_other(what, speed):
     problems[0][4], problems[1][4] = I3, rb.exp_so3([1, 2, 0])
     good, others = OPTIMA[what](*problems), np.arange(6) != 4
     problems[2][4], problems[3][4] = [speed, 0, 0], [0, speed, 0]
-    message = r"^1 of 6 problems did not converge, .* \[1, 1\]: there the curve is NaN"
+    message = r"^1 of 6 problems did not converge, .* \[1, 1\]: their curves are NaN"
     with pytest.warns(RuntimeWarning, match=message) as said:
         curves = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
     assert [warning.filename for warning in said] == [OPTIMA[what].__code__.co_filename]
@@ -214,7 +214,7 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
     for values in (*(curve(TIMES, order) for order in range(3)), curve.c, curve.cost):
         assert np.isnan(values).all()
-    with pytest.raises(ValueError, match=r"^guess: a curve is NaN, it did not converge"):
+    with pytest.raises(ValueError, match=r"^guess: a curve is NaN, since it did not converge"):
         rb.stationary_so3(curve)
     for what, speed in (*((what, 1) for what in SOLVERS), ("ball", 1e-10), ("ball", 1e148)):
         with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iter") as failed:
@@ -316,7 +316,7 @@ ENDS = I3, I3, REST, REST
         (np.diag([1.0, 2, -1]), "is not positive definite, to rounding: its eigenvalues are -1"),
         (np.stack([I3, -I3]), "[1] is not positive definite"),
         (I3 + 0.1 * I3[1], " is not symmetric"),
-        (5e307 * I3, ": eigenvalues from 1e-150 to 1e150 are wanted, they are 5e+307"),
+        (5e307 * I3, ": eigenvalues from 1e-150 to 1e150 are wanted, got 5e+307"),
         (1e-310 * BOOK, ": eigenvalues from 1e-150 to 1e150 are wanted"),
     ],
 )

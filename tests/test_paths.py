@@ -179,16 +179,24 @@ def turned_by(w):
 @pytest.mark.parametrize(
     ("poses", "leg", "message"),
     [
-        (ROTATIONS, rb.geodesic_se3, "it asks for A0; there are R0, R1, w0, w1, a0, a1; functools"),
-        (POSES, rb.minimum_torque_so3, "it asks for inertia; there are R0, R1, w0, w1, a0, a1, A0"),
+        (
+            ROTATIONS,
+            rb.geodesic_se3,
+            "it needs A0, which is not among R0, R1, w0, w1, a0, a1; use functools",
+        ),
+        (
+            POSES,
+            rb.minimum_torque_so3,
+            "it needs inertia, which is not among R0, R1, w0, w1, a0, a1, A0",
+        ),
         (ROTATIONS, rb.exp_so3, "it has no parameter duration: <function exp_so3"),
-        (ROTATIONS, 3, "a function that makes curves wanted, got 3"),
-        (ROTATIONS, lambda R0, duration: None, "a stack of 2 curves of these durations wanted"),
+        (ROTATIONS, 3, "a function that makes curves is wanted, got 3"),
+        (ROTATIONS, lambda R0, duration: None, "a stack of 2 curves of these durations is wanted"),
         (ROTATIONS, lambda duration: TURNS(duration=9), "a stack of 2 curves of these durations"),
         (ROTATIONS, turned_by([[0] * 3, [0, 1, 0]]), "it does not lead from poses[1] to poses[2]"),
         (FAR, turned_by([0, 0, 2e-6]), "it does not lead from poses[0] to poses[1]"),
-        (POSES, lambda A0, **T: TURNS(**T), "curves of shape (4, 4) wanted, got (3, 3)"),
-        (POSES, lambda R0, **T: MOVES(**T), "curves of shape (3, 3) wanted, got (4, 4)"),
+        (POSES, lambda A0, **T: TURNS(**T), "curves of shape (4, 4) are wanted, got (3, 3)"),
+        (POSES, lambda R0, **T: MOVES(**T), "curves of shape (3, 3) are wanted, got (4, 4)"),
         (ROTATIONS, lambda w0, **T: rb.bezier_so3(*HALF_TURN, w0 + 9, w0, **T), "w0[0]: a norm"),
     ],
 )
@@ -200,11 +208,11 @@ def test_no_leg_is_refused(poses, leg, message):
 PATHS = [
     (([0, 1, 1], ROTATIONS[:3]), "times[2] is 1.0, a time after 1.0 is wanted"),
     (([0, np.nan, 1], POSES[:3]), "times[1] is nan"),
-    (([0, 1e-200], POSES[:2]), "times[0] and times[1] are 1e-200 apart: too near, or too far"),
+    (([0, 1e-200], POSES[:2]), "times[0] and times[1] are 1e-200 apart: too close or too far"),
     (([-1.7e308, 1.7e308], POSES[:2]), "times[0] and times[1] are inf apart"),
-    (([0], POSES[:1]), "times, poses: two or more wanted, got 1"),
-    (([0, 1], POSES[0]), "poses: shape (N, 4, 4) or (N, 3, 3) wanted, got (4, 4)"),
-    (([0, 1], [-np.eye(3)] * 2), "poses[0] is no rotation (project_so gives"),
+    (([0], POSES[:1]), "times, poses: two or more are wanted, got 1"),
+    (([0, 1], POSES[0]), "poses: shape (N, 4, 4) or (N, 3, 3) is wanted, got (4, 4)"),
+    (([0, 1], [-np.eye(3)] * 2), "poses[0] is not a rotation (project_so gives"),
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
 SCREWS = partial(rb.chain, leg=rb.screw_se3)
@@ -217,15 +225,23 @@ UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
     [
         *((rb.chain, *path) for path in PATHS),
         *((rb.bessel_velocities, *path) for path in PATHS),
-        (rb.chain, ([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) wanted, got (2"),
-        (rb.chain, ([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 wanted, one a pose, got 3"),
-        (SCREWS, (TIMES, POSES, TWISTS), "velocities: the legs ask fo"),
+        (
+            rb.chain,
+            ([0, 1], POSES[:2], TWISTS[:2, :3]),
+            "velocities: shape (N, 6) is wanted, got (2",
+        ),
+        (
+            rb.chain,
+            ([0, 1], POSES[:2], TWISTS[:3]),
+            "velocities: 2 are wanted, one for each pose, got 3",
+        ),
+        (SCREWS, (TIMES, POSES, TWISTS), "velocities: the legs take no"),
         (LATE, (3.5,), "t is 3.5, a time in [1000000000, 2000000000] is"),
         (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
-        (rb.retime, (np.sin, 1), "curve: a Curve wanted, got"),
+        (rb.retime, (np.sin, 1), "curve: a Curve is wanted, got"),
         (rb.retime, (UNEVEN[0], 0), "duration is 0.0, a duration from 1e-100"),
         (rb.retime, (UNEVEN[0], [1, 2]), "duration: one, or one for each curve"),
-        (rb.retime, (LATE, 1e-9), "duration is 1e-09: that vanishes beside"),
+        (rb.retime, (LATE, 1e-9), "duration is 1e-09: it vanishes by rounding beside"),
     ],
 )
 def test_bad_paths_velocities_times_and_durations_are_refused(function, arguments, message):

@@ -149,11 +149,11 @@ def test_stacks_follow_a_plan_and_the_plan_undone_leads_back(frame):
     [
         ([np.nan, 0, 0], PLAN, "start[0] is nan"),
         (ORIGIN, [*PLAN[:1], ([1, 0, 0], -2)], "plan[1] duration is -2.0, a duration from 0 up"),
-        (ORIGIN, [([[1, 0, 0]], 1)], "plan[0] velocity: shape (3) wanted, got (1, 3)"),
-        (ORIGIN, [([1e300, 0, 0], 1e300)], "plan[0] leads beyond all numbers"),
-        (ORIGIN, [[1, 0, 0]], "plan[0]: (velocity, duration) wanted, got [1, 0, 0]"),
-        (ORIGIN, 7, "plan: a list of (velocity, duration) wanted, got 7"),
-        (ORIGIN, [("abc", 1)], "plan[0] velocity: real numbers wanted"),
+        (ORIGIN, [([[1, 0, 0]], 1)], "plan[0] velocity: shape (3) is wanted, got (1, 3)"),
+        (ORIGIN, [([1e300, 0, 0], 1e300)], "plan[0] leads beyond the floating-point numbers"),
+        (ORIGIN, [[1, 0, 0]], "plan[0]: (velocity, duration) is wanted, got [1, 0, 0]"),
+        (ORIGIN, 7, "plan: a list of (velocity, duration) is wanted, got 7"),
+        (ORIGIN, [("abc", 1)], "plan[0] velocity: real numbers are wanted"),
     ],
 )
 def test_bad_starts_and_malformed_plans_are_named(frame, start, plan, message):
@@ -162,8 +162,8 @@ def test_bad_starts_and_malformed_plans_are_named(frame, start, plan, message):
 
 
 def test_other_frames_and_bad_steps_are_refused():
-    with pytest.raises(ValueError, match=r"^frame: 'world' or 'body' wanted, got 'World'"):
+    with pytest.raises(ValueError, match=r"^frame: 'world' or 'body' is wanted, got 'World'"):
         planar.propagate_planar([0, 0, 0], PLAN, frame="World")
     for steps in (0, -3, 2.5, True, "10"):
-        with pytest.raises(ValueError, match=r"^steps: an integer from 1 up wanted, got"):
+        with pytest.raises(ValueError, match=r"^steps: an integer from 1 up is wanted, got"):
             planar.interpolate_planar([0, 0, 0], [1, 1, 1], steps)

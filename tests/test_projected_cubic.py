@@ -141,7 +141,7 @@ def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count)
         for order in range(count // 2):
             for at in (0, 1):
                 assert np.array_equal(hermite(ends, np.array(at), order), ends[2 * order + at])
-    with pytest.raises(ValueError, match=f"^ends: two, four or six wanted, got {count + 1}"):
+    with pytest.raises(ValueError, match=f"^ends: two, four or six are wanted, got {count + 1}"):
         hermite([*given, given[0]], t[:, None])
 
 

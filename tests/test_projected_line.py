@@ -125,7 +125,7 @@ def test_bad_angles_orders_and_times_are_named():
         with pytest.raises(ValueError, match=r"^angle is 3\.2, an angle in"):
             one(0.5, 3.2)
         for order, got in ((4, "4"), (np.array([0, 1]), "array")):
-            with pytest.raises(ValueError, match=f"^order: 0, 1, 2 or 3 wanted, got {got}"):
+            with pytest.raises(ValueError, match=f"^order: 0, 1, 2 or 3 is wanted, got {got}"):
                 one(0.5, 1.0, order)
     with pytest.raises(ValueError, match=r"^t is 1.5, a time in \[0, 1\] is wanted"):
         line.f(1.5, 1.0)

@@ -218,7 +218,7 @@ def test_membership_allows_defects_up_to_1e_9_or_atol():
             assert not is_se(np.full((2, n + 1, n + 1), value), atol).any()
     for is_member, one in ((is_so, np.eye(3)), (is_se, np.eye(4)), (is_unit, [1, 0, 0, 0])):
         for atol in (-1e-9, np.nan, [1e-9, 1e-9]):
-            with pytest.raises(ValueError, match="atol: a number from 0 up wanted"):
+            with pytest.raises(ValueError, match="atol: a number from 0 up is wanted"):
                 is_member(one, atol)
 
 

@@ -94,7 +94,7 @@ def test_quaternions_are_the_printed_ones_and_naive_matrices_turn_in_the_other_o
 def test_bad_arguments_are_refused():
     sizes = -1, (2, -3), 2.5, "2", (2, 1.5), {}, b"ab", True, (2, True)
     bad = [(sampler, {"size": size}, "size: ") for sampler in SAMPLERS for size in sizes]
-    seeds, wanted = (-1, 0.5, "seed", object()), "rng: a Generator, a seed or None wanted"
+    seeds, wanted = (-1, 0.5, "seed", object()), "rng: a Generator, a seed or None is wanted"
     bad += [(sampler, {"rng": seed}, wanted) for sampler in SAMPLERS for seed in seeds]
     for draw in (arvo_rotation, shoemake_quaternion):
         bad += [(draw, {"x": [0, x, 0]}, rf"x\[1\] is {x}, a number in") for x in (1.5, -0.1)]

@@ -72,5 +72,5 @@ def test_coordinates_and_components_are_rotation_and_position_and_come_back():
     again = rb.components_from_pose(rb.pose_from_components(R, d))
     assert np.array_equal(again[0], R)
     assert np.array_equal(again[1], np.broadcast_to(d, (2, 5, 3)))
-    with pytest.raises(ValueError, match=r"^A: shape \(\.\.\., 4, 4\) wanted"):
+    with pytest.raises(ValueError, match=r"^A: shape \(\.\.\., 4, 4\) is wanted"):
         rb.components_from_pose(np.eye(3))

@@ -337,9 +337,9 @@ def test_a_saddle_is_not_returned_as_a_minimum():
 
 
 BAD_ENDS = [
-    ("nature", "ends: 'natural', 'periodic' or a pair wanted, got 'nature'"),
-    ([[0, 0, 0]], "ends: a pair of velocities wanted, got 1 of them"),
-    (([0, 0], None), r"ends: shape \(3\) wanted"),
+    ("nature", "ends: 'natural', 'periodic' or a pair is wanted, got 'nature'"),
+    ([[0, 0, 0]], "ends: a pair of velocities is wanted, got 1 of them"),
+    (([0, 0], None), r"ends: shape \(3\) is wanted"),
     (([0, 0, np.nan], None), "ends"),
 ]
 

@@ -302,7 +302,7 @@ UP = rb.geodesic_se3(I4, moved(0, 0, 2))
 REFUSED = [
     (about(TURN), {}, "limits: none of angular_speed, "),
     (about(TURN), {"angular_speed": 1}, "limits: one of angular_acceleration, "),
-    (about(TURN), {"torque": 1}, "inertia: it is needed for a torque"),
+    (about(TURN), {"torque": 1}, "inertia: it is required for a limit on the torque"),
     (about(TURN), {"torque": -1, "inertia": G}, "torque: a number above 0, or three"),
     (about(TURN), {"angular_acceleration": [1, 2]}, "angular_acceleration: a number above 0"),
     (about(TURN), {"angular_acceleration": np.nan}, "angular_acceleration is nan"),
@@ -314,12 +314,16 @@ REFUSED = [
     (
         UP,
         {"force": 9, "gravity": (0, 0, -9.81)},
-        "force: it takes 1.09 times that to hold the body near s = 0",
+        "force: 1.09 times the limit is needed to hold the body near s = 0",
     ),
     (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
     (rb.chain([0, 1, 2], [I4, LINE, LINE]), MOVING, r"near s = 1, between poses\[1\] and poses\[2"),
-    (rb.geodesic_so3(np.eye(3), CORNERS), SPINNING, "curve: a single Curve wanted, no stack"),
-    (np.sin, SPINNING, "curve: a single Curve wanted"),
+    (
+        rb.geodesic_so3(np.eye(3), CORNERS),
+        SPINNING,
+        "curve: a single Curve, not a stack, is wanted",
+    ),
+    (np.sin, SPINNING, "curve: a single Curve, not a stack, is wanted"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Pictures: artists on axes that the caller owns, and figures and animations as files."""
+"""Pictures: artists on the caller's axes, and figures and animations as files."""
 
 from pathlib import Path
 

@@ -34,14 +34,14 @@ class Animation(Player):
     pictures : tuple of Image
         The frames, for a GIF.
     seconds : float
-        How long it takes.
+        The duration of the animation.
     """
 
     pictures: tuple[Image.Image, ...] = ()
     seconds: float = 4.0
 
     def save(self, path: str | Path) -> None:
-        """Write the animation to a file, as a GIF that starts again when it ends."""
+        """Write the animation to a file, as a GIF that repeats without end."""
         if not self.pictures:
             raise ValueError("RBCOURSE_FIGURES is empty: the frames for a file were not drawn")
         Path(path).write_bytes(gif(self.pictures, self.seconds))
@@ -56,15 +56,15 @@ def animate(
     seconds: float = 4.0,
     still: int = -1,
 ) -> Animation:
-    """Return a figure as an animation, and leave it as it is in its still frame."""
+    """Return a figure as an animation; afterwards the figure shows the still frame."""
     if not name.isidentifier():
-        raise ValueError(f"name: a word of letters, digits and _ wanted, got {name!r}")
+        raise ValueError(f"name: a word of letters, digits and _ is wanted, got {name!r}")
     if not 0 < frames <= 50 * seconds:
-        raise ValueError(f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s")
+        raise ValueError(f"frames: 1 to 50 per second are wanted, got {frames} in {seconds} s")
     files = os.environ.get("RBCOURSE_FIGURES") != ""  # see `save_figure`
-    rendered = render(fig, update, frames if files else 0)  # this gives all its place
+    rendered = render(fig, update, frames if files else 0)  # this also lays out the figure
     pictures = tuple(indexed(rendered)) if rendered else ()
-    fig.set_layout_engine("none")  # all stays where it is
+    fig.set_layout_engine("none")  # keeps all artists in place
     display = Display(fig)
     states = [display.record(update(i)) for i in range(frames)]
     moving = update(still % frames)
@@ -97,11 +97,11 @@ def save_animation(
     seconds: float = 4.0,
     still: int = -1,
 ) -> Animation:
-    """Save an animation as GIF, its still frame as PNG and PDF, its numbers as CSV; close it.
+    """Save an animation as GIF, its still frame as PNG and PDF, and its numbers as CSV; close it.
 
-    The files go where `save_figure` puts its own. The same input gives the same bytes.
+    The files go to the folder of `save_figure`. The same input gives the same bytes.
     """
-    csv_text(data)  # before anything is written
+    csv_text(data)  # checks the data before anything is written
     animation = animate(fig, name, alt, update, frames, seconds, still)
     save_figure(fig, name, data, alt)
     if folder := figures_folder():
@@ -113,7 +113,7 @@ def save_animation(
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
     """Return the frames as pictures.
 
-    Fixed artists are drawn once, and restored before each frame. The axes must not change.
+    The fixed artists are drawn once, and restored before each frame. The axes must not change.
     """
     before: Any = fig.canvas
     paint = painter(fig, update(0))
@@ -123,10 +123,10 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
 
 
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
-    """Return pictures with one palette: the 96 commonest colours of eight of them.
+    """Return pictures with a common palette: the 96 most frequent colours of eight of them.
 
-    Pillow looks colours up by the first 6 bits of each channel, as if the others were 0. Of those
-    that agree in them the commonest stands for all.
+    Pillow looks up colours by the first 6 bits of each channel, as if the other bits were 0. Of the
+    colours that agree in these bits, the most frequent one represents all.
     """
     width, height = pictures[0].size
     some = Image.new("RGB", (width, 8 * height))
@@ -146,7 +146,7 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
 
 
 def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return pictures as an endless GIF of a duration in seconds, in steps of 10 ms."""
+    """Return pictures as an endless GIF of this duration, in multiples of 10 ms."""
     content = io.BytesIO()
     ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)
     durations = [int(10 * step) for step in np.diff(ends)]

@@ -1,6 +1,7 @@
-"""An arm on its way: artists on axes that the caller owns.
+"""Drawings of a moving arm, as artists on the caller's axes.
 
-Paths are arrays of joint angles in rad, shape (states, n); `lengths` are those of the links, in m.
+Paths are arrays of joint angles in rad, shape (states, n); `lengths` are the lengths of the links
+in m.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -19,7 +20,7 @@ _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], 
 
 
 def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
-    """Return a path as a table: the joint angles; then where each link ends, the tip last."""
+    """Return a path as a table of the joint angles and the ends of the links, with the tip last."""
     path = np.asarray(path)
     table = {f"theta{i} [rad]": angle for i, angle in enumerate(path.T)}
     for i, end in enumerate(np.moveaxis(_joints(path, lengths)[:, 1:], 1, 0), start=1):
@@ -30,7 +31,7 @@ def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
 def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     """Draw an arm with its joint angles q, shape (n,), and the frames at the centres of its links.
 
-    Return the links; then for each link its two axes (RR 4).
+    Return the artists of the links, and then the two axes of each link (RR 4).
     """
     joints, headings = _joints(q, lengths), np.append(0, np.cumsum(q))
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.75)
@@ -54,8 +55,8 @@ def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
 def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     """Draw an arm, and at its tip the columns of the Jacobian as arrows.
 
-    Return the links; then an arrow for each joint, half as long as the tip goes for each radian
-    (RR 4).
+    Return the artists of the links, and then an arrow for each joint. The arrows are half as long
+    as the tip moves per radian (RR 4).
     """
     show_reach(ax, lengths)
     joints = _joints(q, lengths)
@@ -69,10 +70,11 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
 def moving_arm(
     ax: Axes, path: Array, shown: Iterable[int], lengths: ArrayLike = LINKS
 ) -> Callable[[int], list[Any]]:
-    """Draw an arm, pale, in some of its states; return the function that moves it along its path.
+    """Draw an arm in a pale colour in some of its states; return a function that moves the arm.
 
-    The axes show all that the arm can reach. ``update(i)`` moves the arm to state i, draws the way
-    of the tip up to there, and returns the artists that move (RR 4.3, RR Fig. 8, RR Fig. 9).
+    The axes show all points that the arm can reach. ``update(i)`` moves the arm to state i, draws
+    the path of the tip up to this state, and returns the moving artists (RR 4.3, RR Fig. 8, RR Fig.
+    9).
     """
     joints = _joints(path, lengths)
     show_reach(ax, lengths)
@@ -90,9 +92,9 @@ def moving_arm(
 
 
 def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> list[Any]:
-    """Draw the ways of the tip of an arm, at most three; pale, the arm on the last of them.
+    """Draw at most three paths of the tip of an arm, and the arm on the last path in a pale colour.
 
-    Return the ways (RR 4.3).
+    Return the lines of the paths (RR 4.3).
     """
     *_, last = paths.values()
     show_reach(ax, lengths)
@@ -109,7 +111,7 @@ def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LIN
 
 
 def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
-    """Draw ways of a two-link arm, at most three, in the plane of the joint angles (RR 4.1)."""
+    """Draw at most three paths of a two-link arm in the plane of the joint angles (RR 4.1)."""
     lines = [
         ax.plot(*np.degrees(path).T, color=colour, ls=ls, label=name)[0]
         for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)
@@ -120,7 +122,7 @@ def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
 
 
 def show_reach(ax: Axes, lengths: ArrayLike = LINKS) -> None:
-    """Make axes show all that an arm can reach; dotted circles bound it."""
+    """Make axes show all points that an arm can reach, with dotted circles as bounds."""
     total, longest = np.sum(lengths), np.max(lengths)
     for radius in (total, max(0.0, 2 * longest - total)):
         ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))
@@ -130,7 +132,7 @@ def show_reach(ax: Axes, lengths: ArrayLike = LINKS) -> None:
 
 
 def describe_posture(q: Array, lengths: ArrayLike = LINKS) -> str:
-    """Return in words what `draw_posture` shows."""
+    """Return a description of the picture of `draw_posture`."""
     places = ", ".join(_said(place, np.sum(lengths)) for place in _joints(q, lengths))
     return (
         "Joint angles of an arm and the frames of its links. Each frame, with its axes x and y, is "
@@ -140,7 +142,7 @@ def describe_posture(q: Array, lengths: ArrayLike = LINKS) -> str:
 
 
 def describe_ways(paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> str:
-    """Return in words what `draw_arm_ways` and `draw_joint_ways` show."""
+    """Return a description of the pictures of `draw_arm_ways` and `draw_joint_ways`."""
     said = [
         f"{name}: {_length(_joints(path, lengths)[:, -1]):.1f} m and "
         f"{np.degrees(_length(path)):.0f} degrees"
@@ -155,7 +157,7 @@ def describe_ways(paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> str
 
 
 def describe_arm(path: Array, lengths: ArrayLike = LINKS) -> str:
-    """Return in words how an arm goes."""
+    """Return a description of the motion of an arm."""
     tip, reach = _joints(path, lengths)[:, -1], np.sum(lengths)
     turned = np.abs(np.diff(path, axis=0)).sum(axis=0)
     start, end = (_said(place, reach) for place in tip[[0, -1]])
@@ -169,7 +171,7 @@ def describe_arm(path: Array, lengths: ArrayLike = LINKS) -> str:
 
 
 def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = LINKS) -> str:
-    """Return in words what `draw_tip_velocities` shows on several axes, for joint angles each."""
+    """Return a description of pictures of `draw_tip_velocities` on several axes."""
     said = []
     for name, q in postures.items():
         x, y = _columns(_joints(q, lengths))
@@ -182,12 +184,12 @@ def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = 
 
 
 def _joints(q: ArrayLike, lengths: ArrayLike) -> Array:
-    """Return the joints and the tip, shape (..., n + 1, 2)."""
+    """Return the positions of the joints and the tip, shape (..., n + 1, 2)."""
     return arm_forward_kinematics(q, lengths).joints
 
 
 def _columns(joints: Array) -> Array:
-    """Return the columns of the Jacobian: from each joint to the tip, turned to the left."""
+    """Return the columns of the Jacobian: vectors from joints to tip, turned left by 90°."""
     x, y = (joints[-1] - joints[:-1]).T
     return np.array([-y, x])
 

@@ -1,4 +1,4 @@
-"""Bodies and frames, still or moving: artists on a `Space` that the caller owns.
+"""Drawings of bodies and frames, still or moving, as artists on the caller's `Space`.
 
 Motions are arrays of poses, shape (times, 4, 4); `pose_table` turns them into columns for a file.
 """
@@ -16,7 +16,7 @@ from rbcourse.draw.space import Faces
 
 
 def pose_table(first: Table, poses: Array) -> Table:
-    """Return a first column, such as the times, and the positions and rotation matrices of poses.
+    """Return a table of poses: given first columns, such as the times, positions and matrices.
 
     Examples
     --------
@@ -29,10 +29,10 @@ def pose_table(first: Table, poses: Array) -> Table:
 
 
 def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Table:
-    """Return times, which of them are drawn, and the poses, twists and accelerations of a motion.
+    """Return a table of a motion: times, which of them are drawn, poses, twists, accelerations.
 
     The twists (w, v) and the accelerations (w', a), a = Rᵀ d'', are in the body frame (BK 6.3).
-    `unit` is that of the time: "1", or "s" for what `chain` and `retime` return.
+    `unit` is the unit of time: "1", or "s" for the curves of `chain` and `retime`.
 
     Examples
     --------
@@ -54,9 +54,10 @@ def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Tabl
 
 
 def draw_box(ax: Any, pose: Array, edges: float | Array) -> Faces:
-    """Draw a box with a rectangle on the face of +z, centred at the origin of its frame.
+    """Draw a box, centred at the origin of its frame, with a rectangle on its +z face.
 
-    `edges` are its three edges, or the one of a cube, in m. `move_box` moves it (BK Fig. 5).
+    `edges` are the lengths of its three edges, or the edge of a cube, in m. `move_box` moves the
+    box (BK Fig. 5).
     """
     box: Faces = ax.add_artist(Faces(_box_faces(pose, edges), [*["0.98"] * 6, COLOURS["x"]]))
     return box
@@ -70,10 +71,10 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
 def draw_cube_motion(
     ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
 ) -> list[Any]:
-    """Draw a cube of edge `side` in m at each pose, and over them stars along its centre's path.
+    """Draw a cube of edge `side` in m at each pose, and in front of them stars at its centres.
 
-    Cubes at the poses `compared` are blue outlines, which are seen where they stand out.
-    Return the cubes, then the stars (BK Fig. 5).
+    Cubes at the poses `compared` are drawn behind as blue outlines. Return the artists of the
+    cubes, and then the stars (BK Fig. 5).
     """
     for pose in compared:
         draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["z"], zorder=-1)
@@ -85,16 +86,16 @@ def draw_cube_motion(
 
 
 def draw_centre_path(ax: Any, places: Array) -> Any:
-    """Draw stars at places, shape (times, 3), joined by a thin line."""
+    """Draw stars at points, shape (times, 3), joined by a thin line."""
     return ax.plot(*places.T, "*-", color=COLOURS["optimum"], ms=7, lw=0.8)[0]
 
 
 def set_space(
     ax: Any, places: Array, side: float, view: tuple[float, float] = (18, -22), zoom: float = 1.0
 ) -> None:
-    """Fit the axes to a cube at these places, shape (times, 3), and draw the room around it.
+    """Fit the axes to a cube at these positions, shape (times, 3), and draw the room around it.
 
-    `view` has the elevation and the azimuth in degrees.
+    `view` is the elevation and the azimuth in degrees.
     """
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
     ax.fit(low, high, zoom)
@@ -103,9 +104,9 @@ def set_space(
 
 
 def set_turning(ax: Any, reach: float) -> None:
-    """Fit the axes to a body that turns about the origin and reaches so far, in m.
+    """Fit the axes to a body that turns about the origin and reaches `reach` in m from it.
 
-    Pale are the axes of the room, with their names.
+    Draw the axes of the room, with their names, in a pale colour.
     """
     for name, room in zip("xyz", reach * np.eye(3), strict=True):
         ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
@@ -115,7 +116,7 @@ def set_turning(ax: Any, reach: float) -> None:
 
 
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor between two corners, with a line wherever `draw_room` has a number."""
+    """Draw a floor between two corners, with a line at each number of `draw_room`."""
     pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
     for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
         ax.plot([x, x], [low[1], high[1]], low[2], **pale)
@@ -124,13 +125,13 @@ def draw_ground(ax: Any, low: Array, high: Array) -> None:
 
 
 def draw_room(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor, and three axes with their names and numbers, in m, between two corners.
+    """Draw a floor, and three axes with names and numbers in m, between two corners.
 
-    The upright one stands at the corner that is farthest to the left.
+    The vertical axis is at the corner that is farthest to the left.
     """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
-    # where each axis begins, and where its numbers stand beside it; below, too, as seen from low
+    # the start of each axis, and the offset of its numbers, which are also below the floor's axes
     azimuth = np.radians(ax.azim)
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
@@ -146,7 +147,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # beyond the numbers, and between two of them: the last ones, far from the other axes
+        else:  # beyond the numbers, between the last two, far from the other axes
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
@@ -159,7 +160,7 @@ def _ticks(low: float, high: float) -> list[float]:
 
 
 def describe_cube_motion(poses: Array) -> str:
-    """Return in words what `draw_cube_motion` shows."""
+    """Return a description of the picture of `draw_cube_motion`."""
     steps = np.degrees(angle_between(poses[:-1, :3, :3], poses[1:, :3, :3]))
     ends = " to ".join("(" + ", ".join(f"{x:.3g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
     return (
@@ -170,14 +171,15 @@ def describe_cube_motion(poses: Array) -> str:
 
 
 def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
-    """Draw the paths of the origin in up to three motions, and its frame at the start and the ends.
+    """Draw the paths of the origin in up to three motions, and the frame at the start and the ends.
 
-    The motions begin at one pose; the frame has its letters there. Return a line for each (BK 2.6).
+    The motions begin at the same pose, where the axes of the frame have letters. Return a line for
+    each motion (BK 2.6).
     """
     looks: list[dict[str, Any]] = [
         {"color": COLOURS["optimum"], "ls": "-", "lw": 2},
         {"color": COLOURS["screw"], "ls": "--", "lw": 2.5},
-        {"color": COLOURS["reference"], "ls": ":", "lw": 4, "zorder": 1},  # seen under the others
+        {"color": COLOURS["reference"], "ls": ":", "lw": 4, "zorder": 1},  # seen below others
     ]
     lines = [
         ax.plot(*poses[:, :3, 3].T, label=name, **look)[0]
@@ -199,7 +201,7 @@ def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
 
 
 def describe_ways(ways: Mapping[str, Array]) -> str:
-    """Return in words what `draw_ways` shows."""
+    """Return a description of the picture of `draw_ways`."""
     lengths = []
     for name, poses in ways.items():
         steps = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1)
@@ -213,11 +215,11 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
 def moving_boxes(
     axes: Sequence[Any], motions: Mapping[str, Array], edges: float | Array
 ) -> Callable[[int], list[Any]]:
-    """Draw boxes at the start of motions of equal length, each on its axes.
+    """Draw boxes at the start of motions with equally many poses, each on its own axes.
 
-    `edges` are the edges of a box, or the one of a cube, in m. Boxes that stay at the origin are
-    drawn larger, with the axes of the room in place of a floor. Return ``update(i)``, which moves
-    all boxes to pose i of their motions and returns them.
+    `edges` are the lengths of the edges of a box, or the edge of a cube, in m. Boxes that stay at
+    the origin are drawn larger, with the axes of the room in place of a floor. Return
+    ``update(i)``, which moves all boxes to pose i of their motions and returns their artists.
     """
     ways = list(motions.values())
     boxes = [draw_box(ax, poses[0], edges) for ax, poses in zip(axes, ways, strict=True)]
@@ -238,7 +240,7 @@ def moving_boxes(
 
 
 def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
-    """Return in words what `moving_boxes` shows; the poses are those of the times t."""
+    """Return a description of the picture of `moving_boxes`; the poses are those at the times t."""
     (first, poses), *others = motions.items()
     said = f"Motions of a box: {', '.join(motions)}. A rectangle marks one of its faces."
     for name, other in others:
@@ -253,7 +255,7 @@ def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
 
 
 def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> None:
-    """Draw the columns of R as arrows x, y, z from the origin, labelled with the name."""
+    """Draw the columns of R as arrows x, y, z from the point `origin`, labelled with the name."""
     for axis, direction in zip("xyz", R.T, strict=True):
         draw_arrow(ax, origin, direction, COLOURS[axis])
         letter: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
@@ -261,7 +263,7 @@ def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> None:
 
 
 def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> None:
-    """Draw an arrow from a place, shape (3,), with a cone as its head."""
+    """Draw an arrow from a point, shape (3,), with a cone as its head."""
     tip, length = start + along, float(np.linalg.norm(along))
     size, across = 0.14 * min(1.0, length), np.linalg.svd(along[None])[2][1:]
     foot, turn = tip - size / length * along, np.linspace(0, 2 * np.pi, 32)
@@ -272,7 +274,7 @@ def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> None:
 
 
 def _box_faces(pose: Array, edges: float | Array) -> Array:
-    """Return the corners of the six faces, and of a rectangle on the face of +z: (7, 4, 3)."""
+    """Return the corners of the six faces, and of a rectangle on the +z face, shape (7, 4, 3)."""
     around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     faces = np.empty((7, 4, 3))
     for k in range(6):

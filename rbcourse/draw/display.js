@@ -1,6 +1,6 @@
 // Draw what display.py has kept, over the picture of what does not move.
 const rbcourseDisplay = {
-  // The states of bytes, an array of numbers each.
+  // The states in the bytes, each as an array of numbers.
   split(bytes) {
     const { buffer } = bytes.slice(), [count] = new Uint32Array(buffer, 0, 1);
     const sizes = new Uint32Array(buffer, 4, count), numbers = new Int16Array(buffer, 4 * (count + 1));
@@ -15,7 +15,7 @@ const rbcourseDisplay = {
     return new Uint8Array(await new Response(stream).arrayBuffer());
   },
 
-  // What a state draws: styles, and runs of places in pixels: [x, y], in space [x, y, z].
+  // The drawings of a state: styles, and runs of positions in pixels, [x, y] or in space [x, y, z].
   decode(state, styles) {
     const found = [];
     for (let i = 0; i < state.length; ) {
@@ -31,7 +31,7 @@ const rbcourseDisplay = {
     return found;
   },
 
-  // The canvas is as fine as the screen shows it; `still` is a loaded image. Scenes come first.
+  // Draw a state at the resolution of the screen; `still` is a loaded image. Scenes are drawn first.
   draw(canvas, still, { size: [width, height], rooms }, styles, state) {
     const zoom = (window.devicePixelRatio * (canvas.clientWidth || width)) / width;
     canvas.width = Math.round(width * zoom);
@@ -74,7 +74,7 @@ const rbcourseDisplay = {
     }
   },
 
-  // What is said of a state, [[name, text], ...], and what there is to note, as HTML.
+  // The texts of a state, [[name, text], ...], and its notice, as HTML.
   table(said, notice) {
     const part = document.createElement("div"), table = document.createElement("table");
     table.style = "line-height: 1.35";
@@ -89,7 +89,7 @@ const rbcourseDisplay = {
     return part.innerHTML;
   },
 
-  // Tell screen readers what is drawn: when they ask, and when nothing has moved for a while.
+  // Describe the drawing to screen readers: when they ask, and when nothing has moved for a while.
   tell(canvas, said) {
     const text = canvas.seen ? `${said} ${canvas.seen}` : said, news = canvas.said === said ? canvas.seen : text;
     const style = "position: absolute; top: 0; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";
@@ -102,7 +102,7 @@ const rbcourseDisplay = {
     Object.assign(canvas, { role: "img", ariaLabel: text, said });
   },
 
-  // Put a canvas, and controls of its own, in place of a still. The last control plays.
+  // Replace a still picture by a canvas with its own controls. The last control plays.
   async revive(image, { size, rooms, background, states, known, controls, milliseconds }) {
     if (image.dataset.read || !window.DecompressionStream) return;
     image.dataset.read = true;

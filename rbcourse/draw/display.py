@@ -1,4 +1,4 @@
-"""Display lists: what moving artists draw, as whole numbers that a canvas in a browser can draw."""
+"""Display lists: drawings of moving artists as integers, for a canvas in a browser."""
 
 import base64
 import html
@@ -25,11 +25,11 @@ _SCENE, _DISPLAY = (
     for name in ("scene", "display")
 )
 ENGINE = _SCENE + _DISPLAY
-"""JavaScript: ``rbcourseDisplay``, which draws what `Display` has kept, and ``rbcourseScene``."""
+"""The JavaScript ``rbcourseDisplay``, which draws records of `Display`, and ``rbcourseScene``."""
 PARTS = 8
-"""Of a pixel: in these the places are counted; display.js divides by it."""
+"""The parts of a pixel in which positions are counted; display.js divides by this number."""
 FAR = 16000
-"""No place is further; the difference of two is still an int16."""
+"""The largest coordinate, in parts of a pixel; the difference of two is still an int16."""
 
 _FIGURE = Template("""\
 <figure><img id="$name" width="$width" style="max-width: 100%" alt="$alt" src="$still"/>$caption
@@ -40,33 +40,34 @@ for (const image of document.querySelectorAll("#$name")) rbcourseDisplay.revive(
 
 
 class Display(RendererBase):
-    """A renderer of Matplotlib that returns the drawing as numbers.
+    """A Matplotlib renderer that returns drawings as numbers.
 
     Parameters
     ----------
     fig : Figure
-        The figure, of at most 1500 pixels each way; its size is that of the canvas.
+        The figure, of at most 1500 pixels in each direction. Its size is that of the canvas.
 
     Attributes
     ----------
     size : tuple of int
         Width and height in pixels.
     styles : dict of tuple to int
-        The numbers of the styles: of colour to fill, colour of the line, its width, its dashes,
-        its ends and corners, the rectangle that is drawn in, and the marker: polygons as in
-        `record`. What there is not is None or empty. Lengths are in pixels, but for the marker. Of
-        a piece in space also the number of its room, its kind, and its zorder.
+        The numbers of the styles. A style has the fill colour, the colour of the line, its width,
+        its dashes, its ends and corners, the clip rectangle, and the marker, as polygons as in
+        `record`. Missing parts are None or empty. Lengths are in pixels, except those of the
+        marker. The style of a piece in space also has the number of its room, its kind, and its
+        zorder.
     rooms : list of dict
-        Of each `Space` of the figure the ``origin``, where its middle is seen, in pixels from the
-        upper left, and the ``view``: azimuth and elevation in degrees.
+        For each `Space` of the figure, the ``origin``, the image of its middle in pixels from the
+        upper left, and the ``view``, azimuth and elevation in degrees.
     """
 
     def __init__(self, fig: Figure) -> None:
         super().__init__()
         self._fig = fig
         self.width, self.height = self.size = tuple(round(x) for x in fig.bbox.size)
-        if max(self.size) > 1500:  # farther places would not fit
-            raise ValueError(f"fig: at most 1500 pixels each way wanted, got {self.size}")
+        if max(self.size) > 1500:  # larger coordinates would not fit
+            raise ValueError(f"fig: at most 1500 × 1500 pixels are wanted, got {self.size}")
         self.styles: dict[tuple[Any, ...], int] = {}
         places = [scene.axes.sight().origin * [1, -1] + [0, self.height] for scene in scenes(fig)]
         views = np.round([(scene.axes.azim, scene.axes.elev) for scene in scenes(fig)], 2)
@@ -77,13 +78,13 @@ class Display(RendererBase):
         self._drawn: list[NDArray[np.int16]] = []
 
     def record(self, artists: Iterable[Any]) -> NDArray[np.int16]:
-        """Return what these artists draw.
+        """Return the drawing of these artists.
 
-        A sequence of polygons, of each its style, its number of points, and their places in parts
-        of a pixel from the upper left, each as the difference from the one before. A number below
-        0 is of a polygon that is filled together with the one before it, as a hole perhaps. Where
-        the style has a marker, the marker is drawn at the points. All that is visible in a `Space`
-        is drawn, too, as places in the room.
+        The result is a sequence of polygons. Each polygon has its style, its number of points, and
+        the positions of the points in parts of a pixel from the upper left, each as the difference
+        from the previous one. A negative number of points means that the polygon is filled together
+        with the previous one, for example as a hole. If the style has a marker, the marker is drawn
+        at the points. All visible artists in a `Space` are drawn, too, with positions in the room.
         """
         self._drawn = [np.zeros(0, np.int16)]
         for room, scene in enumerate(scenes(self._fig)):
@@ -96,7 +97,7 @@ class Display(RendererBase):
 
     def _keep_piece(self, room: int, piece: Piece) -> None:
         if piece.kind == "face" and not normal_of(np.round(PARTS * piece.places)).any():
-            piece = piece.edge  # it has no area in whole numbers
+            piece = piece.edge  # the face has no area in whole numbers
         polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
         marker = _marker(outline for outlines in polygons for outline in outlines)
         look = *self._style(piece.gc, piece.fill)[:-1], marker, room, piece.kind, piece.zorder
@@ -111,11 +112,11 @@ class Display(RendererBase):
         return points * self._fig.dpi / 72
 
     def draw_path(self, gc: Any, path: Any, transform: Any, rgbFace: Any = None) -> None:
-        """Keep a path as polygons; Matplotlib calls this for all that it draws."""
+        """Keep a path as polygons; Matplotlib calls this method for all drawings."""
         clip = None if rgbFace is not None else (-400, -400, self.width + 400, self.height + 400)
         simple = path.should_simplify and rgbFace is None
         clean = path.cleaned(transform, remove_nans=True, clip=clip, simplify=simple, curves=True)
-        clean = type(path)(clean.vertices[:-1], clean.codes[:-1])  # the last one is a stop
+        clean = type(path)(clean.vertices[:-1], clean.codes[:-1])  # the last vertex is a stop
         for i, points in enumerate(clean.to_polygons(closed_only=False)):
             number = -len(points) if i and rgbFace is not None else len(points)
             self._keep(self._style(gc, rgbFace), number, points * [1, -1] + [0, self.height])
@@ -129,7 +130,7 @@ class Display(RendererBase):
         trans: Any,
         rgbFace: Any = None,
     ) -> None:
-        """Keep the marker with the style, and where it is drawn."""
+        """Keep the marker with the style, and the points at which it is drawn."""
         points = trans.transform(path.vertices)
         points = points[np.isfinite(points).all(axis=1)] * [1, -1] + [0, self.height]
         outlines = marker_path.to_polygons(marker_trans, closed_only=False)
@@ -160,7 +161,7 @@ class Display(RendererBase):
 
 
 def _within(piece: Piece, reach: float) -> list[Piece]:
-    """Return the parts of a piece that are within a cube, so far on each side."""
+    """Return the parts of a piece inside a cube that extends by `reach` to each side."""
     parts = [piece]
     for side in [*np.eye(3), *-np.eye(3)] if np.abs(piece.places[:, :3]).max() > reach else []:
         cut = (part.cut(reach - part.places[:, :3] @ side) for part in parts)
@@ -173,7 +174,7 @@ def _alpha(colour: Any, forced: float | None) -> float:
 
 
 def _steps(points: Any) -> NDArray[np.int_]:
-    exact = np.round(PARTS * points, 6)  # so that halves are rounded alike on every processor
+    exact = np.round(PARTS * points, 6)  # so that all processors round halves alike
     whole = np.clip(np.round(exact), -FAR, FAR).astype(int)
     return np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).ravel()
 
@@ -183,32 +184,32 @@ def _marker(outlines: Any) -> tuple[tuple[int, ...], ...]:
 
 
 def joined(states: Sequence[NDArray[np.int16]]) -> bytes:
-    """Return states of `Display.record`: their number, their lengths, and their drawings."""
+    """Return states of `Display.record` as bytes: their number, their lengths, and their data."""
     sizes = np.array([len(states), *map(len, states)], "<u4")
     return sizes.tobytes() + np.concatenate(states).astype("<i2").tobytes()
 
 
 @dataclass(frozen=True)
 class Player:
-    """A figure that its reader moves without Python; where scripts do not run it is a still.
+    """A figure that readers can move without Python; without scripts, it is a still picture.
 
     Parameters
     ----------
     name, alt, caption : str
-        Its name, its description, and its caption as HTML.
+        The name of the figure, its description, and its caption as HTML.
     shown, background : bytes
-        PNGs at twice the shown resolution: the still, and the fixed artists.
+        PNGs with twice the displayed resolution: the still picture, and the fixed background.
     display : Display
-        The recorder of the states.
+        The display that has recorded the states.
     states : sequence of ndarray
-        One for each combination of the controls, that of the last one running fastest.
+        One state for each combination of the controls. The last control changes fastest.
     controls : sequence of dict
-        Of each its ``label``, its ``values`` as texts, and the number of its ``first`` one. The
-        last one plays. Without any there is one state, which can be turned.
+        For each control its ``label``, its ``values`` as texts, and the number of its ``first``
+        value. The last control plays. Without controls, there is one state, which can be turned.
     milliseconds : int, optional
-        From one state to the next while it plays.
+        The time from one state to the next while the figure plays.
     texts : sequence, optional
-        The readouts of each state: pairs of texts, a notice, and all of it as one line.
+        For each state, the texts to be shown: pairs of texts, a notice, and all texts as one line.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Figures as pictures: fixed artists are drawn once, and PNGs are small."""
+"""Figures as pictures: the fixed artists are drawn only once, and PNGs are small."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -17,7 +17,8 @@ Paint = Callable[[Sequence[Any] | None], Image.Image]
 def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
     """Draw the fixed artists once; return a function that draws moving artists over them.
 
-    The function draws the scenes of the figure, too; with None instead of artists it draws nothing.
+    The function also draws the scenes of the figure. With None instead of artists, it draws
+    nothing.
     """
     canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
     for artist in [*scenes(fig), *not_in_space(moving)]:
@@ -37,9 +38,9 @@ def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
 def drawn(
     fig: Figure, moving: Sequence[Any], artists: Sequence[Any] | None, zoom: float = 2
 ) -> bytes:
-    """Return a figure with only these of its moving artists as a PNG, enlarged by `zoom`.
+    """Return a PNG of a figure with only these moving artists and `zoom` times the resolution.
 
-    With None instead of artists it is the background alone, without scenes.
+    With None instead of artists, the PNG is the background alone, without scenes.
     """
     before, dpi = fig.canvas, fig.dpi
     fig.set_dpi(zoom * dpi)
@@ -50,7 +51,7 @@ def drawn(
 
 
 def few_colours(picture: Image.Image) -> Image.Image:
-    """Return a picture in 256 colours, without dots in between."""
+    """Return a picture in 256 colours, without dithering."""
     return picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
 
 

@@ -1,4 +1,4 @@
-"""A rectangle on its way through the plane: artists on axes that the caller owns.
+"""Drawings of a rectangle that moves in the plane, as artists on the caller's axes.
 
 Paths are arrays of poses (x, y, theta) in m, m and rad, shape (states, 3).
 """
@@ -16,20 +16,21 @@ from rbcourse.planar import compose_planar
 
 _OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
 _NOSE = np.array([[0.8, -1, 0], [2, 0, 0], [0.8, 1, 0]]) / 4
-"""A body of length 1, half as wide, and the mark on its front; it heads along its x axis."""
+"""A body of length 1 and width 1/2 that heads along its x axis, and the mark on its front."""
 _FILL = "#D6E6F2"
 
 
 def path_table(path: Array) -> Table:
-    """Return a path as a table: one row for each pose."""
+    """Return a path as a table with one row for each pose."""
     return dict(zip(["x [m]", "y [m]", "theta [rad]"], path.T, strict=True))
 
 
 def draw_route(ax: Axes, path: Array, length: float, shown: Iterable[int]) -> list[Any]:
-    """Draw the way of a rectangle's centre, and the rectangle at some of its poses.
+    """Draw the path of a rectangle's centre, and the rectangle at some of its poses.
 
     The rectangle has a `length` in m, is half as wide, and has a mark on its front. The axes are
-    fitted, with equal units. Return the way; then outline and mark for each (RR 3.3).
+    fitted, with equal units. Return the line of the path, and then the outline and the mark of each
+    rectangle (RR 3.3).
     """
     artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["path"], zorder=2)
     for i in shown:
@@ -47,10 +48,11 @@ def draw_compared(
     shown: Iterable[int],
     points: Sequence[ArrayLike] = ((0, 0), (0, 0)),
 ) -> list[Any]:
-    """Draw two rectangles on their ways, the second dashed, at the same states.
+    """Draw two rectangles on their paths at the same states, the second dashed.
 
-    `points` are the points in the frame of each body whose ways are drawn, by default the centres.
-    Return for each the way, with dots at the states; then outline and mark at each (RR 3.3).
+    `points` are the points, in the frame of each body, whose paths are drawn; by default the
+    centres. Return for each body the line of the path, with dots at the states, and then the
+    outline and the mark at each state (RR 3.3).
     """
     artists: list[Any] = []
     looks = (COLOURS["z"], _FILL, "-"), (COLOURS["x"], "none", "--")
@@ -68,10 +70,10 @@ def draw_compared(
 def moving_route(
     ax: Axes, path: Array, length: float, shown: Iterable[int]
 ) -> Callable[[int], list[Any]]:
-    """Draw a rectangle, pale, at some of its poses; return a function that moves it.
+    """Draw a rectangle in a pale colour at some poses; return a function that moves a rectangle.
 
-    ``update(i)`` moves the rectangle to state i, draws the way of its centre up to there, and
-    returns the artists that move (RR 3.3, RR Fig. 6, RR Fig. 7).
+    ``update(i)`` moves the rectangle to state i, draws the path of its centre up to this state, and
+    returns the moving artists (RR 3.3, RR Fig. 6, RR Fig. 7).
     """
     for i in shown:
         draw_body(ax, path[i], length, PALE, fill="none")
@@ -84,7 +86,7 @@ def moving_route(
     def update(i: int) -> list[Any]:
         way.set_data(*path[: i + 1, :2].T)
         move_body(body, path[i], length)
-        return [*body, way]  # the way is drawn over the body
+        return [*body, way]  # the path is drawn over the body
 
     return update
 
@@ -106,7 +108,7 @@ def move_body(body: Sequence[Any], pose: Array, length: float) -> None:
 
 
 def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
-    """Make axes show all places that a rectangle passes, with equal lengths on both."""
+    """Make axes show all positions of a rectangle, with equal units on both axes."""
     places = np.concatenate([path[:, :2] for path in paths])
     margin = 0.75 * length
     (left, low), (right, high) = places.min(axis=0) - margin, places.max(axis=0) + margin
@@ -115,9 +117,9 @@ def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
 
 
 def extent_of(path: Array) -> float:
-    """Return the larger extent of a path; 0 for less than 1e-12 of its distance, or of a metre.
+    """Return the larger extent of a path; it is 0 if below 1e-12 of its distance or of a metre.
 
-    A smaller extent is rounding, of a body that stays on the spot or comes back to it.
+    A smaller extent is due to rounding: the body stays on the spot or comes back to it.
     """
     places = path[:, :2]
     extent = float(np.ptp(places, axis=0).max())
@@ -125,7 +127,7 @@ def extent_of(path: Array) -> float:
 
 
 def describe_route(path: Array) -> str:
-    """Return in words how a rectangle goes."""
+    """Return a description of the motion of a rectangle."""
     steps = np.diff(path, axis=0)
     turns = np.degrees(steps[:, 2])
     sides = {"left": turns[turns > 0].sum(), "right": -turns[turns < 0].sum()}
@@ -141,7 +143,7 @@ def describe_route(path: Array) -> str:
 
 
 def describe_compared(panels: Mapping[str, Mapping[str, Array]]) -> str:
-    """Return in words what `draw_compared` shows on several axes, two paths on each."""
+    """Return a description of `draw_compared` on several axes, with two paths on each."""
     said = []
     for title, paths in panels.items():
         one, other = (path[:, :2] for path in paths.values())
@@ -154,7 +156,7 @@ def describe_compared(panels: Mapping[str, Mapping[str, Array]]) -> str:
 
 
 def describe_routes(paths: Mapping[str, Array]) -> str:
-    """Return in words how rectangles go, with the names of their ways."""
+    """Return a description of the motions of rectangles, with the names of their paths."""
     said = " ".join(f"{name}: {describe_route(path)}" for name, path in paths.items())
     return f"Paths of a rectangle from start to goal: {', '.join(paths)}. In turn, {said}"
 

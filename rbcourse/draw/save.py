@@ -1,6 +1,6 @@
-"""Figures as files: the picture, and the numbers behind it, the same bytes each time.
+"""Figures as files: the picture and its numbers, with the same bytes each time.
 
-A table is a dict of columns of one shape, whose names carry the units:
+A table is a dict of columns of one shape, with units in their names:
 ``{"t [1]": ..., "angle [rad]": ..., "theta [1]": ...}``.
 """
 
@@ -37,9 +37,9 @@ from rbcourse.draw.space import scenes
 
 Table = Mapping[str, ArrayLike]
 UNITS = ("1", "m", "m²", "rad", "rad²", "s", "m/s", "rad/s", "m/s²", "rad/s²", "N m")
-"""With one of these, in brackets, the name of each column of numbers ends."""
+"""The units; the name of each column of numbers ends with one of them in brackets."""
 SHOWN = 120
-"""Pixels on a page for an inch of a figure."""
+"""The number of pixels on a page for an inch of a figure."""
 
 COLOURS = {
     "x": "#D55E00",
@@ -51,9 +51,9 @@ COLOURS = {
     "reference": "#585858",
     "path": "#BB0000",
 }
-"""The same meaning has the same colour everywhere; all can be told apart when colour-blind."""
+"""Colours by meaning, the same in all figures; they are distinct for the colour-blind."""
 PALE = "#8F8F8F"
-"""The colour of what stands behind; this one too has a contrast of 3 on white."""
+"""The colour of the background artists, which has a contrast of 3 on white."""
 FORMS: dict[str, Callable[..., Curve]] = {
     "projection": projected_cubic_so3,
     "exponential": exponential_cubic_so3,
@@ -68,18 +68,19 @@ FORMS: dict[str, Callable[..., Curve]] = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A saved figure, as a notebook shows it: the picture with its description.
+    """A saved figure as shown in a notebook: the picture with its description.
 
     Parameters
     ----------
     name : str
-        The name of its files, without ending.
+        The name of its files without the extension.
     alt : str
-        Alternative text: a description of the figure.
+        The alternative text, which describes the figure.
     png : bytes
-        The picture, finer than it is shown: sharp on fine screens and on large ones.
+        The picture, with a higher resolution than shown, which is sharp on fine and on large
+        screens.
     width : int
-        How wide it is shown, in pixels.
+        The displayed width in pixels.
     """
 
     name: str
@@ -116,10 +117,11 @@ def caption(alt: str, files: str = "") -> str:
 def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Player:
     """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
 
-    A `Space` can be turned in the notebook; the files show its first view.
-    The files go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, by default
-    to ``figures`` in the current folder; if it is empty, no files are written. The same input gives
-    the same bytes. The PNG has 256 colours, which makes it a third as large; no difference is seen.
+    Artists in a `Space` can be turned in the notebook; the files show the initial view. The files
+    go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, by default to
+    ``figures`` in the current folder. If the variable is empty, no files are written. The same
+    input gives the same bytes. The PNG has 256 colours, which makes it a third as large without a
+    visible difference.
     """
     save_table(name, data)
     folder = figures_folder()
@@ -135,7 +137,7 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
 
 
 def _turning(fig: Figure, name: str, alt: str) -> Player:
-    fig.set_layout_engine("none")  # all stays where it is
+    fig.set_layout_engine("none")  # keeps all artists in place
     fig.set_dpi(min(SHOWN, 1500 // fig.get_size_inches().max()))
     display, files = Display(fig), caption(alt, f"{name}.png, .pdf, .csv")
     still = drawn(fig, [], [], zoom=1.25)  # for readers without scripts
@@ -144,14 +146,14 @@ def _turning(fig: Figure, name: str, alt: str) -> Player:
 
 
 def save_table(name: str, data: Table) -> None:
-    """Save numbers as a CSV, in the folder of `save_figure`."""
+    """Save numbers as a CSV file in the folder of `save_figure`."""
     text = csv_text(data)
     if folder := figures_folder():
         (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
 
 
 def figures_folder() -> Path | None:
-    """Return the folder for figures, see `save_figure`; it is made if it is not there."""
+    """Return the folder for figures (see `save_figure`), which is created if it does not exist."""
     named = os.environ.get("RBCOURSE_FIGURES", "figures")
     if not named:
         return None
@@ -160,7 +162,7 @@ def figures_folder() -> Path | None:
 
 
 def csv_text(data: Table) -> str:
-    """Return a table as CSV: a line of names, then numbers with twelve significant digits.
+    """Return a table as CSV: a line of names, and then numbers with twelve significant digits.
 
     Examples
     --------
@@ -172,11 +174,11 @@ def csv_text(data: Table) -> str:
     columns = {name: np.asarray(column) for name, column in data.items()}
     if len({column.shape for column in columns.values()}) > 1:
         shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
-        raise ValueError(f"data: columns of one shape wanted, got {shapes}")
+        raise ValueError(f"data: columns of one shape are wanted, got {shapes}")
     for name, column in columns.items():
         if column.dtype.kind != "U" and not name.endswith(tuple(f" [{unit}]" for unit in UNITS)):
             units = ", ".join(f"[{unit}]" for unit in UNITS)
-            raise ValueError(f"data: {name!r} has to end with a space and a unit: one of {units}")
+            raise ValueError(f"data: {name!r} must end with a space and a unit: one of {units}")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -185,7 +187,7 @@ def csv_text(data: Table) -> str:
 
 
 def named_tables(tables: Mapping[str, Table]) -> dict[str, ArrayLike]:
-    """Return tables as one, each column with the name of its table before its own.
+    """Return tables joined into one; each column name begins with the name of its table.
 
     Examples
     --------
@@ -196,7 +198,7 @@ def named_tables(tables: Mapping[str, Table]) -> dict[str, ArrayLike]:
 
 
 def in_words(value: float, scale: float) -> str:
-    """Return a number as text, with three digits of the scale that it is seen on.
+    """Return a number as text, with three significant digits relative to `scale`.
 
     Examples
     --------

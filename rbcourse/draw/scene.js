@@ -1,7 +1,7 @@
 // What is in space, seen from any side, as space.py draws it from one. A piece is a face, a line, a mark
 // or a ball: { kind, zorder, style, places }; places are [x, y, z, along the line] in pixels of the room.
 const rbcourseScene = {
-  // Where right, up and the eye are, for an azimuth and an elevation in degrees.
+  // Unit vectors to the right, upwards and to the eye, for an azimuth and an elevation in degrees.
   sight([azimuth, elevation]) {
     const [a, e] = [azimuth, elevation].map((angle) => (angle * Math.PI) / 180);
     const [ca, sa, ce, se] = [Math.cos(a), Math.sin(a), Math.cos(e), Math.sin(e)];
@@ -10,7 +10,7 @@ const rbcourseScene = {
 
   dot: (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2],
 
-  // Depths as whole numbers: rounding does not decide which of two is less. Pixels begin at 0.7.
+  // Depths as whole numbers, so that rounding does not determine their order. The intervals begin at 0.7.
   pixels: (depth) => Math.floor(depth + 0.3),
 
   // The unit normal of a whole face.
@@ -25,10 +25,10 @@ const rbcourseScene = {
     return n.map((x) => x / size);
   },
 
-  // So many pixels parts overlap where an opaque piece is cut, or its background would be seen.
+  // The overlap, in pixels, of the parts of a cut opaque piece, which hides the background.
   overlap: 0.9,
 
-  // Give `put` the parts above a plane (1), which go on below it by the overlap, in it (0), and below (-1).
+  // Pass to `put` the parts above a plane (1), which continue below it by the overlap, in it (0), and below (-1).
   cut(piece, height, put) {
     const { places, kind, style: [fill, stroke, , dashes] } = piece, heights = places.map(height);
     const overlap = (fill ?? stroke ?? "").endsWith("ff") && !dashes.length ? rbcourseScene.overlap : 0;
@@ -74,8 +74,8 @@ const rbcourseScene = {
     return walls[cuts.indexOf(Math.min(...cuts))];
   },
 
-  // Pieces from the farthest to the nearest, cut where they pass through faces: what the plane of a face
-  // hides, faces in it, and what is over them or on the side of the eye; on both sides so with the next face.
+  // Pieces from the farthest to the nearest, cut where they pass through faces: first the pieces behind the plane
+  // of a face, then faces in it, then pieces over them or on the side of the eye; the same on both sides.
   order(pieces, eye) {
     const { dot, cut, pixels, wall: first } = rbcourseScene, drawn = [], todo = [[false, pieces]];
     const mean = ({ places }) => pixels(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
@@ -100,11 +100,11 @@ const rbcourseScene = {
     return drawn;
   },
 
-  // What is to be drawn on the screen: styles and places [x, y], and how far along the line they begin.
+  // The drawings on the screen: styles, positions [x, y], and the distance along the line at which they begin.
   seen(pieces, { origin }, view) {
     const { dot, order, sight, normal, pixels } = rbcourseScene, { right, up, eye } = sight(view);
     const flat = (p) => [origin[0] + dot(p, right), origin[1] - dot(p, up)];
-    // A face becomes two: what fills it, and its edge, which is not drawn where the face is cut.
+    // A face becomes two pieces: its filling, and its edge, which is not drawn where the face is cut.
     const parts = pieces.flatMap((piece) => {
       const { kind, style, places } = piece, [fill, stroke, width, ...rest] = style;
       if (kind !== "face") return [piece];
@@ -133,7 +133,7 @@ const rbcourseScene = {
     });
   },
 
-  // Let a canvas be turned by a pointer, by keys and by buttons, which are returned; all rooms turn together.
+  // Make a canvas turn by a pointer, keys and buttons, which are returned; all rooms turn together.
   turn(canvas, rooms, redraw) {
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
     const row = make("div", { className: "rbcourse-view" }), said = make("output", { ariaLive: "off" });

@@ -1,6 +1,6 @@
-"""Pieces of a scene in space, cut and ordered by depth, so that near pieces hide far ones.
+"""Pieces of a scene in space, cut and ordered by depth: near pieces hide pieces behind them.
 
-The browser does the same, for each direction of view, with scene.js.
+In the browser, scene.js does the same for each direction of view.
 """
 
 from dataclasses import dataclass, replace
@@ -13,37 +13,37 @@ from matplotlib.path import Path
 from rbcourse import Array
 
 OVER = 10
-"""What has this zorder, or a higher one, is seen through everything."""
+"""Pieces with at least this zorder are seen through all others."""
 NEAR = 0.2
-"""A piece that is nearer to a plane than this, in pixels, lies in it."""
+"""A piece whose distance from a plane is less than this, in pixels, lies in the plane."""
 OVERLAP = 0.55
-"""So many points parts overlap where an opaque piece is cut, or its background would be seen."""
+"""The overlap, in points, of the parts of a cut opaque piece, which hides the background."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A piece that is drawn at once.
+    """A piece of a scene that is drawn in one step.
 
     Parameters
     ----------
     kind : str
-        A filled "face"; a "line"; a "mark", which is always seen from its front, as letters are; or
-        a "ball", a mark with a plane that parts the others.
+        A filled "face"; a "line"; a "mark", which always faces the viewer, as letters do; or a
+        "ball", a mark with a plane that separates the other pieces.
     places : ndarray, shape (n, 3) or (n, 4)
-        From the middle of the axes, in pixels; of lines also how far each is along the line, as it
-        is seen, for dashes.
+        The positions relative to the middle of the axes, in pixels. For lines, the fourth number is
+        the visible length along the line, for dashes.
     gc : GraphicsContextBase
-        How it is drawn.
+        The look of the piece.
     fill : tuple of float, optional
-        The colour that it is filled with.
+        The fill colour.
     marker : tuple of Path
-        The picture that is drawn at each of its places, in pixels, y upwards.
+        The outlines that are drawn at each position, in pixels, with y upwards.
     zorder : float
-        If no face decides, the piece with the least one is drawn first.
+        The order of pieces that no face separates; the lowest zorder is drawn first.
     normal : ndarray, shape (3,), optional
-        Of a face: the normal of the whole, of which this may be a part.
+        For a face, the normal of the whole face, of which the piece may be a part.
     text : artist, optional
-        Of letters: what draws them in print, with its font.
+        For letters, the artist that draws them in print, with its font.
     """
 
     kind: Literal["face", "line", "mark", "ball"]
@@ -64,8 +64,9 @@ class Piece:
     def cut(self, height: Array, overlap: float = 0.0) -> "list[tuple[int, Piece]]":
         """Return the parts above a plane (1), in it (0), and below (-1).
 
-        `height` is that of the places over the plane, shape (n,). The parts above it go on below it
-        for the overlap, in pixels, unless the piece is transparent or dashed.
+        `height` has the heights of the positions over the plane, shape (n,). The parts above the
+        plane continue below it by the overlap, in pixels, unless the piece is transparent or
+        dashed.
         """
         side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
         if self.marker:
@@ -81,7 +82,7 @@ class Piece:
                 if s in (t, 0):
                     parts[t][-1].append(p)
                 elif not closed and parts[t][-1]:
-                    parts[t].append([])  # the line has left this side in a point of the plane
+                    parts[t].append([])  # the line leaves this side in a point of the plane
             j = (i + 1) % len(side)
             if s * side[j] < 0 and (closed or j):
                 q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)
@@ -103,7 +104,7 @@ class Piece:
 def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces in the order in which they are drawn; `eye` is the direction to the eye.
 
-    The parts of a cut piece overlap by this number of pixels, see `Piece.cut`. A face has become
+    The parts of a cut piece overlap by this number of pixels (see `Piece.cut`). Each face becomes
     two pieces: its filling, and its edge, which is not drawn where the face is cut.
     """
     parts = [part for piece in pieces for part in _filling_and_edge(piece)]
@@ -115,15 +116,15 @@ def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
     """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
     The plane of a face has the eye on one of its sides. Pieces on the other side are drawn first,
-    then pieces in the plane, by their zorder, then pieces on the side of the eye; and so on with
-    the next face, on both sides. A piece in the plane and over the faces there, such as an edge,
-    is drawn with those on the side of the eye, so that the next faces do not cover half of it. The
-    first face is the one whose plane cuts the fewest faces and lines. Pieces that no face parts are
-    drawn by their zorder, then by their mean depth in `whole_pixels`, and then in the given order.
-    `eye` is the direction to the eye, shape (3,).
+    then pieces in the plane in the order of zorder, and then pieces on the side of the eye. On both
+    sides, this continues with the next face. A piece in the plane and over the faces there, such as
+    an edge, is drawn with the pieces on the side of the eye, so that the next faces do not cover
+    half of it. The first face is the one whose plane cuts the fewest faces and lines. Pieces that
+    no face separates are drawn in the order of zorder, then of their mean depth in `whole_pixels`,
+    and then in the given order. `eye` is the direction to the eye, shape (3,).
     """
     drawn: list[Piece] = []
-    todo = [(False, pieces)]  # whether they are in order, the next ones last
+    todo = [(False, pieces)]  # (whether the pieces are in order, pieces); the next is last
     while todo:
         ready, group = todo.pop()
         wall = _wall(group, eye)
@@ -164,9 +165,9 @@ def _wall(group: list[Piece], eye: Array) -> Piece | None:
 
 
 def whole_pixels(depth: Any) -> Any:
-    """Return depths as whole numbers, so that rounding does not decide which of two is less.
+    """Return depths as whole numbers, so that rounding does not determine their order.
 
-    The pixels begin at 0.7, where depths in symmetric scenes hardly lie.
+    The intervals begin at 0.7 pixels, since depths in symmetric scenes are rarely there.
     """
     return np.floor(depth + 0.3)
 
@@ -178,7 +179,7 @@ def _filling_and_edge(piece: Piece) -> list[Piece]:
 
 
 def normal_of(corners: Array) -> Array:
-    """Return the unit normal of a polygon, shape (n, 3); of one without area, zeros."""
+    """Return the unit normal of a polygon, shape (n, 3); it is zero if the area is zero."""
     spokes = corners[1:] - corners[0]
     normal: Array = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
     size = np.linalg.norm(normal)
@@ -186,7 +187,7 @@ def normal_of(corners: Array) -> Array:
 
 
 def context(colour: Any, width: float) -> GraphicsContextBase:
-    """Return how to draw with a colour, perhaps None, and a width in points."""
+    """Return the graphics context of a colour, which may be None, and a width in points."""
     gc = GraphicsContextBase()
     gc.set_foreground(colour or (0.0, 0.0, 0.0, 0.0), isRGBA=True)
     gc.set_linewidth(width)
@@ -195,7 +196,7 @@ def context(colour: Any, width: float) -> GraphicsContextBase:
 
 
 def crossings(one: Piece, other: Piece) -> list[Piece]:
-    """Return where two faces pass through each other, as a line with the look of an edge."""
+    """Return the line in which two faces intersect, with the look of an edge."""
     normal: Any = other.normal
     height = (one.places - other.places[0]) @ normal
     i = np.flatnonzero(height * np.roll(height, -1) < 0)

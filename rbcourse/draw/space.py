@@ -1,7 +1,8 @@
-"""Axes in space: lines, letters, marks and the faces of bodies are one scene.
+"""Axes for drawings in space, in which lines, letters, marks and faces of bodies are one scene.
 
-Matplotlib draws one artist in space after the other, so that a line is before or behind all of a
-body. Here all artists become pieces of a scene, which are cut where they pass through faces.
+Matplotlib draws one artist in space after the other, so a line is entirely in front of a body or
+behind it. In this module, all artists become pieces of a scene, which are cut where they pass
+through faces.
 """
 
 from collections.abc import Iterable
@@ -36,21 +37,21 @@ from rbcourse.draw.scene import (
 )
 
 LIGHT = np.array([0.48, -0.36, 0.8])
-"""Where the light comes from: a unit vector."""
+"""The direction to the light, a unit vector."""
 
 
 class Faces(Artist):
-    """The faces of a convex body, lighter where they are turned to the light.
+    """The faces of a convex body, which are lighter if they are turned to the light.
 
     Parameters
     ----------
     corners : ndarray, shape (n, k, 3)
-        Of each face its corners, one after the other.
+        The corners of each face, in order around it.
     colours : sequence of colours
-        Of each face.
+        The colour of each face.
     edgecolor : colour, optional
     linewidth : float, optional
-        In points.
+        The width of the edges, in points.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class Faces(Artist):
         self.set_linewidth(linewidth)
 
     def set_colours(self, colours: Any) -> None:
-        """Set the colour of each face; "none": it is not filled."""
+        """Set the colour of each face; a face with the colour "none" is not filled."""
         self._colours = to_rgba_array(colours)
 
     def set_edgecolor(self, colour: Any) -> None:
@@ -75,7 +76,7 @@ class Faces(Artist):
         self._linewidth = width
 
     def pieces(self, scale: float, middle: Array) -> Iterable[Piece]:
-        """Return the faces; of those that are not filled their edges."""
+        """Return the faces, or the edges of faces that are not filled."""
         centre = self.corners.mean(axis=(0, 1))
         edge = context(to_rgba(self._edgecolor, self.get_alpha()), self._linewidth)
         opacity = 1.0 if self.get_alpha() is None else self.get_alpha()
@@ -92,12 +93,12 @@ class Faces(Artist):
 
 
 class Ball(Artist):
-    """A ball of white glass: objects behind it, or on its far side, are pale.
+    """A ball of white glass; artists behind it or on its far side look pale.
 
     Parameters
     ----------
     radius : float, optional
-        Its centre is the origin.
+        The radius of the ball, whose centre is the origin.
     """
 
     def __init__(self, radius: float = 1.0) -> None:
@@ -105,7 +106,7 @@ class Ball(Artist):
         self.radius = radius
 
     def pieces(self, scale: float, middle: Array) -> Iterable[Piece]:
-        """Return the disc that is seen; its plane goes through the centre."""
+        """Return the visible disc; its plane passes through the centre."""
         turn = np.linspace(0, 2 * np.pi, 91)
         disc = Path(scale * self.radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         fill = to_rgba("white", 0.7)
@@ -114,29 +115,29 @@ class Ball(Artist):
 
 
 class Scene(Artist):
-    """All that is in a `Space`: its lines, letters, `Faces` and `Ball`, drawn in their order."""
+    """The contents of a `Space`: its lines, letters, `Faces` and `Ball`, drawn by depth."""
 
     axes: Any
 
     def __init__(self) -> None:
         super().__init__()
         self.set_in_layout(False)
-        # what lines and letters are made of, as long as they do not change
+        # the pieces of lines and letters, kept as long as these do not change
         self._known: WeakKeyDictionary[Artist, tuple[Any, list[Piece]]] = WeakKeyDictionary()
 
     @property
     def artists(self) -> list[Any]:
-        """The objects of the scene."""
+        """The artists in the scene."""
         for artist in self.axes.get_children():
             if hasattr(artist, "do_3d_projection"):
                 name = type(artist).__name__
-                raise ValueError(f"{name}: lines, letters, Faces or a Ball wanted in a Space")
+                raise ValueError(f"{name}: lines, letters, Faces or a Ball are wanted in a Space")
         return [artist for artist in self.axes.get_children() if isinstance(artist, IN_SPACE)]
 
     def pieces(self, renderer: Any) -> list[Piece]:
         """Return all visible pieces, uncut, in the view of the axes.
 
-        Of two bodies that pass through each other there are also the lines where they meet.
+        If two bodies intersect, the pieces include the lines in which they intersect.
         """
         found: list[Piece] = []
         bodies: list[list[Piece]] = []
@@ -160,12 +161,12 @@ class Scene(Artist):
         return found
 
     def draw(self, renderer: Any) -> None:
-        """Draw all that is visible."""
+        """Draw all visible pieces."""
         sight, written = self.axes.sight(), set()
         overlap = renderer.points_to_pixels(OVERLAP)
         for piece in in_sight(self.pieces(renderer), sight.eye, overlap):
             if piece.text:
-                if piece.text not in written:  # all of its lines at once
+                if piece.text not in written:  # all lines of its text at once
                     piece.text.draw(renderer)
                 written.add(piece.text)
                 continue
@@ -186,9 +187,10 @@ class Scene(Artist):
 
 
 class Looks(RendererBase):
-    """A renderer that keeps how an artist is drawn: context, filling, and outlines in pixels.
+    """A renderer that records the look of an artist: context, filling, and outlines in pixels.
 
-    Of letters it keeps the outlines; of a line, whose places are known, those of its marker.
+    For letters, it records their outlines. For a line, whose positions are known, it records the
+    outlines of its marker.
     """
 
     def __init__(self, renderer: Any, letters: bool) -> None:
@@ -209,11 +211,11 @@ class Looks(RendererBase):
         kept.copy_properties(gc)
         kept.set_clip_rectangle(None)
         kept.set_clip_path(None)
-        kept.set_capstyle("butt")  # or the parts of a line that is cut would overlap
+        kept.set_capstyle("butt")  # otherwise the parts of a cut line would overlap
         self.found.append((kept, fill, outlines))
 
     def draw_path(self, gc: Any, path: Any, transform: Any, rgbFace: Any = None) -> None:
-        """Keep letters, or how a line is drawn."""
+        """Record letters, or the look of a line."""
         self._keep(gc, rgbFace, (path.transformed(transform),) if self.letters else ())
 
     def draw_markers(
@@ -225,24 +227,24 @@ class Looks(RendererBase):
         trans: Any,
         rgbFace: Any = None,
     ) -> None:
-        """Keep the marker."""
+        """Record the marker."""
         self._keep(gc, rgbFace, (marker_path.transformed(marker_trans),))
 
 
 @dataclass(frozen=True)
 class Sight:
-    """How a `Space` is seen.
+    """The view of a `Space`.
 
     Parameters
     ----------
     scale : float
-        Pixels per unit.
+        The number of pixels per unit of length.
     middle : ndarray, shape (3,)
-        The middle of the limits, which stays where it is when the view turns.
+        The middle of the limits, which does not move when the view turns.
     origin : ndarray, shape (2,)
-        Where it is seen, in pixels.
+        The image of the middle, in pixels.
     right, up, eye : ndarray, shape (3,)
-        Unit vectors; the last one points to the eye.
+        Unit vectors to the right, upwards and to the eye.
     """
 
     scale: float
@@ -254,26 +256,26 @@ class Sight:
 
     @property
     def key(self) -> bytes:
-        """The same bytes for the same sight."""
+        """The bytes of the view, which are equal for equal views."""
         parts = self.middle, self.origin, self.right, self.up
         return np.concatenate([[self.scale], *parts]).tobytes()
 
     def flat(self, places: Array) -> Array:
-        """Return where places, in pixels from the middle, are seen, shape (n, 2)."""
+        """Return the images, shape (n, 2), of positions in pixels from the middle."""
         return self.origin + places @ np.stack([self.right, self.up], axis=-1)
 
 
 class Space(Axes3D):  # type: ignore[misc]
-    """Axes with equal units and an orthographic projection.
+    """Axes in space with equal units and parallel projection.
 
-    They are the projection "space" of Matplotlib: ``plt.subplots(subplot_kw={"projection":
-    "space"})``. ``plot``, ``text`` and ``add_artist``, with `Faces` or a `Ball`, put into them what
-    is to be seen. Elevations run from -90° to 90°, and there is no roll.
+    The axes are the Matplotlib projection "space": ``plt.subplots(subplot_kw={"projection":
+    "space"})``. The methods ``plot`` and ``text``, and ``add_artist`` with `Faces` or a `Ball`, add
+    artists. Elevations are from -90° to 90°, and the roll is 0.
 
     Attributes
     ----------
     scene : Scene
-        The artist that draws all of it.
+        The artist that draws all contents.
     """
 
     name = "space"
@@ -288,16 +290,16 @@ class Space(Axes3D):  # type: ignore[misc]
         self.scene.set_figure(self.get_figure())
 
     def fit(self, low: ArrayLike, high: ArrayLike, zoom: float = 1.0) -> None:
-        """Set the limits to a box between two corners, shape (3,)."""
+        """Fit the axes to the box between two corners, shape (3,)."""
         (x0, y0, z0), (x1, y1, z1) = np.array(low, float), np.array(high, float)
         self.set(xlim=(x0, x1), ylim=(y0, y1), zlim=(z0, z1))
         self._magnified = zoom
 
     def sight(self) -> Sight:
-        """Return the view: elevation and azimuth."""
+        """Return the view of the axes."""
         if self.roll or not -90 <= self.elev <= 90:
             view = f"elev {self.elev:g}, roll {self.roll:g}"
-            raise ValueError(f"view_init: -90 <= elev <= 90 and roll 0 wanted, got {view}")
+            raise ValueError(f"view_init: -90 <= elev <= 90 and roll 0 are wanted, got {view}")
         low, high = np.reshape(self.get_w_lims(), (3, 2)).T
         self.set_box_aspect(high - low, zoom=self._magnified)
         self.apply_aspect()
@@ -311,11 +313,11 @@ class Space(Axes3D):  # type: ignore[misc]
         return Sight(scale, middle, seen[0], right, up, np.cross(right, up))
 
     def draw(self, renderer: Any) -> None:
-        """Draw titles and legends, and the scene over them."""
+        """Draw the artists that are not in space, such as titles, and the scene over them."""
         if not self.get_visible():
             return
         inside = [artist for artist in self.scene.artists if artist.get_visible()]
-        for artist in inside:  # or each of them would be drawn once more
+        for artist in inside:  # otherwise each of them would be drawn again
             artist.set_visible(False)
         try:
             super().draw(renderer)
@@ -363,16 +365,16 @@ def _strokes(artist: Line3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
 
 
 def _marked(every: Any) -> Any:
-    """Return which places of a line have a marker, as an index."""
+    """Return an index of the points of a line that have a marker."""
     if isinstance(every, Integral):
         return slice(None, None, int(every))
     if every is None or isinstance(every, list | slice):
         return slice(None) if every is None else every
-    raise ValueError(f"markevery: None, an integer, a list or a slice wanted, got {every!r}")
+    raise ValueError(f"markevery: None, an integer, a list or a slice is wanted, got {every!r}")
 
 
 def _runs(places: Array) -> list[Array]:
-    """Return the parts of a line between places that are not finite."""
+    """Return the parts of a line between points that are not finite."""
     gaps = np.flatnonzero(~np.isfinite(places).all(axis=1))
     parts = np.split(places, gaps)
     kept = (part[np.isfinite(part).all(axis=1)] for part in parts)
@@ -380,6 +382,6 @@ def _runs(places: Array) -> list[Array]:
 
 
 def _along(places: Array, sight: Sight) -> Array:
-    """Return places, and how far each is along their line, as it is seen."""
+    """Return points with a fourth column: their visible distance along the line."""
     steps = np.linalg.norm(np.diff(sight.flat(places), axis=0), axis=1)
     return np.column_stack([places, np.concatenate([[0.0], np.cumsum(steps)])])

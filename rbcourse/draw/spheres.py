@@ -1,4 +1,4 @@
-"""Random rotations on the sphere, their distributions, and freely rotating bodies."""
+"""Drawings of random rotations on the unit sphere."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from rbcourse.draw.scene import OVER
 from rbcourse.draw.space import Ball
 
 Images = Mapping[str, tuple[Array, Array]]
-"""For each sample of n rotations the images of v0 and of v1, both of shape (n, 3)."""
+"""For each sample of n rotations, the images of v0 and of v1, both of shape (n, 3)."""
 
 ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
 EYE = np.array(
@@ -24,7 +24,7 @@ EYE = np.array(
 
 
 def draw_sphere(ax: Any) -> None:
-    """Draw the unit sphere with meridians and parallels; points on its far side become pale."""
+    """Draw the unit sphere with meridians and parallels; artists on its far side become pale."""
     turn = np.linspace(0, 2 * np.pi, 49)
     thin: Any = {"color": "0.8", "lw": 0.5, "zorder": 0}
     ax.add_artist(Ball())
@@ -38,7 +38,7 @@ def draw_sphere(ax: Any) -> None:
 
 
 def image_table(images: Images) -> Table:
-    """Return where rotations carry two vectors as a table: one row for each rotation."""
+    """Return the images of two vectors under rotations as a table with one row per rotation."""
     return {
         f"{name} {vector} {axis} [1]": column
         for name, pair in images.items()
@@ -48,10 +48,10 @@ def image_table(images: Images) -> Table:
 
 
 def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[Any]]:
-    """Draw a sphere for each sample; return what marks on it where the rotations carry v0 and v1.
+    """Draw a sphere for each sample; return a function that shows images of v0 and v1 on it.
 
-    A dot is the image of v0, and the stroke from it ends at the image of v1, so that a turn about
-    v0 shows too. ``update(i)`` shows the first i rotations and returns
+    A dot is the image of v0. The stroke from the dot ends at the image of v1, so that a turn about
+    v0 is visible, too. ``update(i)`` shows the first i rotations and returns
     the artists that change (RR 2.2, RR Fig. 4, RR Fig. 5).
     """
     panels = []
@@ -61,7 +61,7 @@ def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[A
             ax.plot(*np.outer(direction, [1, 1.2]), color=COLOURS[axis], lw=2)
             ax.text(*(1.18 * direction), f"  {axis}", color=COLOURS[axis], va="center", zorder=OVER)
         ax.set_title(name)
-        gaps = np.full_like(pair[0], np.nan)  # between one stroke and the next
+        gaps = np.full_like(pair[0], np.nan)  # between successive strokes
         strokes = np.stack([*pair, gaps], axis=1)
         lines = ax.plot([], [], [], color=COLOURS["projection"], lw=1.6)[0]
         dots = ax.plot([], [], [], "o", ms=5, mew=0, color=COLOURS["projection"])[0]
@@ -77,7 +77,7 @@ def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[A
 
 
 def describe_images(images: Images) -> str:
-    """Return in words what `moving_images` shows."""
+    """Return a description of the picture of `moving_images`."""
     count = len(next(iter(images.values()))[0])
     said = ", ".join(
         f"{name}: {(np.abs(v0[:, 2]) < 0.5).sum()}" for name, (v0, _) in images.items()

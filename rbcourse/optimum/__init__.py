@@ -225,7 +225,7 @@ def stationary_so3(guess: Curve) -> Optimum:
     unit = retime(guess, 1.0)
     (R0, R1), (w0, w1) = (unit([0, 1], order) for order in (0, 1))
     if not np.isfinite([w0, w1]).all():
-        raise ValueError("guess: a curve is NaN, it did not converge")
+        raise ValueError("guess: a curve is NaN, since it did not converge")
     task = ball(Ends(R0, R1, w0, w1))
     R = np.moveaxis(unit(grid(LIMITS.nodes).t).reshape(LIMITS.nodes, -1, 3, 3), 0, 1)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -274,7 +274,7 @@ class Optimum(Curve):
     """
 
     functional: Functional
-    series: Array  # of the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
+    series: Array  # for the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
     constant: Array  # c for times from 0 to 1
     found: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
 
@@ -402,7 +402,7 @@ def _series(ends: Array, solutions: Sequence[Solution | Failure], nodes: Array) 
 
 def _warn_if_not_converged(curve: Optimum) -> None:
     lost = np.isnan(curve.cost)
-    _warn(curve, lost, "did not converge", "there the curve is NaN")
+    _warn(curve, lost, "did not converge", "their curves are NaN")
     beaten = ~np.asarray(curve.converged) & ~lost
     _warn(curve, beaten, "may not have their optimum", "a curve that was tried costs less")
 

@@ -1,4 +1,4 @@
-"""Functions of time, by values at Chebyshev–Lobatto nodes on [0, 1] and as Chebyshev series."""
+"""Functions of time, as values at Chebyshev–Lobatto nodes on [0, 1] or as Chebyshev series."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from rbcourse._numerics import Array
 
 
 class Grid(NamedTuple):
-    """Nodes, and matrices that act on values there.
+    """Nodes, and matrices that act on values at the nodes.
 
-    `derivative` and `integral` from 0 give values at the nodes, `series` the Chebyshev
+    `derivative`, and `integral` from 0, give values at the nodes; `series` gives the Chebyshev
     coefficients.
     """
 
@@ -26,12 +26,12 @@ class Grid(NamedTuple):
 
 
 class Primitives(NamedTuple):
-    """How k = x⁽ᵐ⁾ at the nodes, and the m end values of x, give x, x', … x⁽ᵐ⁾.
+    """Matrices that give x, x', … x⁽ᵐ⁾ from k = x⁽ᵐ⁾ at the nodes and the m end values of x.
 
-    At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k, without derivatives of k: x is the
-    m-fold integral of k, and the polynomial of least degree that corrects its ends. The other two
-    matrices give the Chebyshev coefficients of x⁽ⁱ⁾. `fit` gives the smooth k of an x with zero
-    ends.
+    At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k, without derivatives of k. Here x is the
+    m-fold integral of k plus the polynomial of least degree that corrects the ends. The matrices
+    `series_from_ends` and `series_from_k` give the Chebyshev coefficients of x⁽ⁱ⁾ in the same way.
+    `fit` gives a smooth k for an x with zero ends.
     """
 
     from_ends: list[Array]
@@ -50,7 +50,7 @@ def chebyshev(t: Array, count: int) -> Array:
 
 @lru_cache
 def grid(n: int) -> Grid:
-    """Return the grid of n nodes: to the bit the same, whatever number of threads BLAS has."""
+    """Return the grid of n nodes, with the same bits for any number of BLAS threads."""
     from numpy.polynomial.chebyshev import chebder, chebint
 
     k = np.arange(n)
@@ -64,13 +64,13 @@ def grid(n: int) -> Grid:
 
 
 def _product(A: Array, B: Array) -> Array:
-    """Return A B, not by BLAS, whose sums depend on its number of threads."""
+    """Return A B without BLAS, whose sums depend on its number of threads."""
     return np.einsum("ij,jk->ik", A, B)
 
 
 @lru_cache
 def primitives(n: int, m: int) -> Primitives:
-    """Return the matrices for n nodes, and m end values: x at 0 and 1, and for m = 4 x' too."""
+    """Return the matrices for n nodes and m end values: x at 0 and 1, and for m = 4 also x'."""
     from numpy.polynomial.chebyshev import chebint
 
     nodes, few, each = grid(n), grid(m), list(np.eye(m)[:, None])
@@ -96,14 +96,14 @@ def primitives(n: int, m: int) -> Primitives:
 
 
 def _shared(matrix: Array) -> Array:
-    """Return a matrix that all callers have, so that none can change it."""
+    """Return the matrix made read-only, since all callers share it."""
     matrix.flags.writeable = False
     return matrix
 
 
 @lru_cache
 def interpolation(few: int, many: int) -> Array:
-    """Return the matrix that goes from the values at some nodes to those at others."""
+    """Return the matrix that maps values at `few` nodes to values at `many` nodes."""
     return _product(chebyshev(grid(many).t, few), grid(few).series)
 
 
@@ -115,6 +115,6 @@ def along(matrix: Array, values: Array) -> Array:
 
 
 def tails(values: Array) -> Array:
-    """Return the larger of the last two Chebyshev coefficients, to estimate truncation."""
+    """Return the larger of the last two Chebyshev coefficients, an estimate of the truncation."""
     last = np.abs(along(grid(values.shape[1]).series[-2:], values))
     return last.max(axis=tuple(range(1, last.ndim)))

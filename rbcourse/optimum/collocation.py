@@ -1,7 +1,7 @@
-"""R p = c solved for the whole curve at once: Newton's method on rotations at Chebyshev nodes.
+"""Solution of R p = c for the whole curve at once: Newton's method at Chebyshev nodes.
 
-`Stationary` is the equation for any functional, `BallStationary` the same for a ball, where it is
-R w'' = c, there are fewer unknowns, and a step is faster.
+`Stationary` is the equation for any functional. `BallStationary` is the equation for a ball, R w''
+= c, which has fewer unknowns and faster steps.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from rbcourse.optimum.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
 STEPS = 25
-EXACT = 3e-12  # what may be left of the equations, and of R in the last Chebyshev coefficients
-SHARE = 0.03  # of EXACT that may be left of p, and of k in the last coefficients, over their size
-LONGEST_STEP = 0.5  # rad: no node is turned by more at once
-ROUGH = 1e-2  # rad: with shorter steps the first nodes are left
+EXACT = 3e-12  # largest residual of the equations, and last Chebyshev coefficients of R
+SHARE = 0.03  # times EXACT: largest relative residual of p, and last coefficients of k
+LONGEST_STEP = 0.5  # rad: a step turns no node by more
+ROUGH = 1e-2  # rad: after a shorter step, the method continues on more nodes
 FAILED, FINER, SOLVED = range(3)
 Arrays: TypeAlias = tuple[Array, ...]
 
 
 class Solution(NamedTuple):
-    """One problem solved: R and the highest derivative k of w at the nodes, c = R p, ∫ ‖u‖² dt.
+    """A solution: R and the highest derivative k of w at the nodes, c = R p, ∫ ‖u‖² dt.
 
-    `beaten` tells that a curve costs less, from which Newton's method did not get to a solution.
+    `beaten` is True if a curve costs less from which Newton's method did not reach a solution.
     """
 
     R: Array
@@ -42,41 +42,41 @@ class Solution(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """One problem not solved: its residual, and the number of steps."""
+    """A failed solution: the residual, and the number of steps."""
 
     residual: float
     iterations: int
 
 
 def cost_of(one: Solution | Failure) -> float:
-    """Return the cost; infinity where there is no solution."""
+    """Return the cost, which is infinite for a failure."""
     return one.cost if isinstance(one, Solution) else np.inf
 
 
 class Equations(Protocol):
-    """R' = R ŵ and R p = c for a stack of problems; the unknowns are R at n nodes, and others."""
+    """The equations R' = R ŵ and R p = c for a stack; the unknowns are R at n nodes, and others."""
 
     R0: Array
     R1: Array
     ends: Array  # w0, w1 (and a0, a1), shape (N, m, 3)
-    together: int  # problems that are solved together: as many as fit into the cache
+    together: int  # number of problems solved together, which fit into the cache
 
     def take(self, index: Any) -> Self:
-        """Return those of some of the problems."""
+        """Return the equations of some of the problems."""
 
     def first(self, R: Array) -> Arrays:
-        """Return the other unknowns to start with, from rotations of shape (N, n, 3, 3)."""
+        """Return initial values of the other unknowns, from rotations of shape (N, n, 3, 3)."""
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return on how many nodes to solve it, from n on."""
+        """Return the increasing numbers of nodes on which to solve, from n on."""
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest error of each problem, and the data for a step."""
 
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
-        """Return the turns of the nodes, in the fixed frame, and the changes of the others.
+        """Return the turns of the nodes, in the fixed frame, and the changes of the other unknowns.
 
-        In the last axis: those of a step, and if asked for of a unit of each end value.
+        The last axis has those of a step, and if `by_ends` those of a unit of each end value.
         """
 
     def bend(self, unknowns: Arrays) -> Array:
@@ -86,7 +86,7 @@ class Equations(Protocol):
         """Return the changes of k that belong to the `responses`."""
 
     def tails(self, unknowns: Arrays) -> Array:
-        """Return the truncation errors."""
+        """Return the last Chebyshev coefficients, which estimate the truncation."""
 
     def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
         """Return k, c and the cost."""
@@ -95,21 +95,21 @@ class Equations(Protocol):
 def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
     """Solve a stack by Newton's method, from rotations at nodes, shape (N, n, 3, 3).
 
-    First on these nodes, until the steps are short; then on more, until the last Chebyshev
-    coefficients have decayed. A problem that is singular or overflows is a `Failure`.
+    The method works on these nodes until the steps are short, and then on more nodes until the last
+    Chebyshev coefficients have decayed. A problem that is singular or overflows is a `Failure`.
     """
     parts = blocks(len(R), equations.together)
     return [one for part in parts for one in _attempt(equations.take(part), R[part])]
 
 
 def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
-    """Return `relax`, with linear systems on the nodes of R."""
+    """Return the solutions of `relax`, with linear systems on the nodes of R."""
     parts = equations.R0, equations.R1, equations.ends
     return relax(BallStationary(*parts, R.shape[1]), R)
 
 
 def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
-    """Treat singular or non-finite problems as failures, one problem at a time."""
+    """Solve a stack; if this fails, solve each problem alone, and return failures."""
     try:
         return _relax(equations, R)
     except (FloatingPointError, np.linalg.LinAlgError, ValueError):
@@ -150,7 +150,7 @@ def _with_ends(equations: Equations, R: Array) -> Array:
 
 
 def _on_nodes(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
-    """Return the unknowns on n nodes; c is the same on all."""
+    """Return the unknowns on n nodes; c does not depend on the nodes."""
     R, *others = unknowns
     up = interpolation(R.shape[1], n)
     R = _with_ends(equations, orthogonal(along(up, R)))
@@ -158,7 +158,7 @@ def _on_nodes(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
 
 
 class Iterate(NamedTuple):
-    """What Newton's method makes of a stack on its nodes: solved, failed, or for finer ones."""
+    """The result of Newton's method on some nodes: solved, failed, or in need of more nodes."""
 
     unknowns: Arrays
     left: Array
@@ -167,7 +167,7 @@ class Iterate(NamedTuple):
 
 
 def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
-    """Improve the unknowns, no node turned by more than half a rad at once."""
+    """Improve the unknowns by steps that turn no node by more than half a rad."""
     unknowns = tuple(x.copy() for x in unknowns)
     R, *others = unknowns
     left, size = np.full((2, len(R)), np.inf)
@@ -198,10 +198,10 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
 
 
 def _verdicts(tail: Array, left: Array, before: Array, size: Array) -> NDArray[np.intp]:
-    """Return for each problem whether it is solved or needs more nodes, after a step; else FAILED.
+    """Return SOLVED, FINER or FAILED for each problem, after a step of the given size.
 
-    It is solved where the equation and the last coefficients are small; it wants finer nodes where
-    the coefficients are the larger, or where rounding stops the iteration.
+    A problem is solved if the residual and the last coefficients are small. It needs finer nodes if
+    the last coefficients dominate, or if rounding stops the iteration.
     """
     stalled = (size < 1e-6) & (left > before / 2)
     enough = stalled | (tail > EXACT) & (size < 1e3 * tail)
@@ -216,7 +216,7 @@ def cayley(turn: Array) -> Array:
 
 
 def orthogonal(R: Array) -> Array:
-    """Return R without its rounding: one step of Newton and Schulz."""
+    """Return R made orthogonal to rounding by one Newton–Schulz step."""
     return R @ (1.5 * np.eye(3) - 0.5 * (R.mT @ R))
 
 
@@ -226,7 +226,7 @@ def in_body(R: Array, c: Array) -> Array:
 
 
 def rates_at_nodes(ends: Array, k: Array) -> list[Array]:
-    """Return w, w', … k, its highest derivative, at the nodes, from k and the end values of w."""
+    """Return w, w', … up to the highest derivative k, at the nodes, from k and the ends of w."""
     by = primitives(k.shape[1], ends.shape[1])
     return [E @ ends + K @ k for E, K in zip(by.from_ends, by.from_k, strict=True)]
 
@@ -238,16 +238,16 @@ def kinematic_error(R0: Array, R: Array, w: Array) -> tuple[Array, Array]:
 
 
 def mending_turns(R: Array, E: Array, W: Array) -> Array:
-    """Return d: to first order turns ε = d + ∫ R δw dt correct E, with δw a change of w.
+    """Return d, for which the turns ε = d + ∫ R δw dt correct E to first order; w changes by δw.
 
-    Turns ε in the fixed frame change R ŵ too: d = vee(E Rᵀ + ∫ E ŵ Rᵀ dt).
+    Since the turns ε, in the fixed frame, also change R ŵ, d = vee(E Rᵀ + ∫ E ŵ Rᵀ dt).
     """
-    Rt = np.ascontiguousarray(R.mT)  # faster to multiply with
+    Rt = np.ascontiguousarray(R.mT)  # faster to multiply
     return vee(E @ Rt + along(grid(R.shape[1]).integral, E @ W @ Rt))
 
 
 def costs(functional: Functional, ends: Array, k: Array) -> Array:
-    """Return ∫ ‖u‖² dt by a rule of twice as many nodes."""
+    """Return ∫ ‖u‖² dt by a quadrature with twice as many nodes."""
     fine = grid(2 * k.shape[1] - 1)
     up = interpolation(k.shape[1], len(fine.t))
     rates = rates_at_nodes(ends, up @ k)
@@ -256,9 +256,9 @@ def costs(functional: Functional, ends: Array, k: Array) -> Array:
 
 
 class Stationary:
-    """R p = c for any functional; the unknowns are R, k = w⁽ᵐ⁾ at the nodes, and c.
+    """The equation R p = c for any functional; the unknowns are R and k = w⁽ᵐ⁾ at nodes, and c.
 
-    `ends` are w0 and w1, and for the jerk a0 and a1, shape (N, m, 3).
+    `ends` contains w0 and w1, and for the jerk a0 and a1, shape (N, m, 3).
 
     Source: beyond BK 2.
     """
@@ -269,21 +269,21 @@ class Stationary:
         self.functional, self.R0, self.R1, self.ends = functional, R0, R1, ends
 
     def take(self, index: Any) -> Self:
-        """Return those of some of the problems."""
+        """Return the equations of some of the problems."""
         parts = self.R0[index], self.R1[index], self.ends[index]
         return type(self)(self.functional.take(index), *parts)
 
     def first(self, R: Array) -> tuple[Array, Array]:
-        """Return the k that gives w most nearly, of half as many polynomials, and c = 0.
+        """Return k, fitted to w by half as many polynomials as nodes, and c = 0.
 
-        The mean of R p is a worse start than 0.
+        The mean of R p is a worse initial value of c than 0.
         """
         nodes, by = grid(R.shape[1]), primitives(R.shape[1], self.ends.shape[1])
         w = vee(R.mT @ along(nodes.derivative, R))
         return by.fit @ (w - by.from_ends[0] @ self.ends), np.zeros((len(R), 3))
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n and the larger numbers of 25, 33, 49, 65, 97, 129."""
+        """Return n and those of 25, 33, 49, 65, 97, 129 that are larger."""
         return n, *(more for more in (25, 33, 49, 65, 97, 129) if more > n)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
@@ -300,12 +300,13 @@ class Stationary:
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the changes of k and c.
 
-        With K the integrals that give w, w', … from k, and P the derivatives of p by them,
+        Let Kᵢ be the integrals that give w, w', … from k, and Pᵢ the derivatives of p by these
+        rates:
 
             p + Σ Pᵢ Kᵢ δk = Rᵀ(c + ĉ ε + δc),    ε = d + ∫ R K₀ δk dt,    ε(1) = 0.
 
-        With the second put into the first these are 3 n + 3 equations for δk and δc. A change of
-        the end values adds to d and p.
+        With the second equation substituted into the first, these are 3 n + 3 equations for δk and
+        δc. A change of the end values adds terms to d and p.
         """
         (R, _, c), (E, W, lacking, *rates) = unknowns, parts
         count, n = R.shape[:2]
@@ -366,7 +367,7 @@ def _turns_by_ends(R: Array, from_ends: Array) -> Array:
 
 
 def _integrals(R: Array, K: Array) -> Array:
-    """Return the matrices, for each node, of ∫ R K x dt of values x at the nodes."""
+    """Return the matrices that give ∫ R K x dt at each node from values x at the nodes."""
     count, n = R.shape[:2]
     entries = R.reshape(count, n, 9).mT[:, :, None]
     blocks_of_nodes = ((grid(n).integral * entries) @ K).reshape(count, 3, 3, n, n)
@@ -374,10 +375,10 @@ def _integrals(R: Array, K: Array) -> Array:
 
 
 class BallStationary:
-    """R w'' = c; the unknowns are R at the nodes, and c: w'' = Rᵀc gives w by integration.
+    """The equation R w'' = c; the unknowns are R at the nodes and c, and w'' = Rᵀc gives w.
 
-    The linear systems are solved on `coarse` nodes, those of the first rotations. For one problem
-    this is 1.3 times as fast as `Stationary`, for stacks of 300 it is 2.5 times as fast.
+    The linear systems are solved on `coarse` nodes, those of the first rotations. This is 1.3 times
+    as fast as `Stationary` for one problem, and 2.5 times as fast for stacks of 300.
 
     Source: BK (19).
     """
@@ -388,11 +389,11 @@ class BallStationary:
         self.R0, self.R1, self.ends, self.coarse = R0, R1, ends, coarse
 
     def take(self, index: Any) -> Self:
-        """Return those of some of the problems."""
+        """Return the equations of some of the problems."""
         return type(self)(self.R0[index], self.R1[index], self.ends[index], self.coarse)
 
     def first(self, R: Array) -> tuple[Array]:
-        """Return c for which w'' = Rᵀc gives w most nearly."""
+        """Return the c for which w'' = Rᵀc fits w best."""
         nodes, by = grid(R.shape[1]), primitives(R.shape[1], 2)
         w = vee(R.mT @ along(nodes.derivative, R))
         lacking = (w - by.from_ends[0] @ self.ends).reshape(len(R), -1, 1)
@@ -400,7 +401,7 @@ class BallStationary:
         return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n and the numbers with 2, 4, 8 and 16 times as many intervals, up to 257."""
+        """Return n and the numbers with 2, 4, 8 and 16 times as many intervals, up to 257 nodes."""
         return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16) if (n - 1) * times <= 256)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
@@ -414,14 +415,14 @@ class BallStationary:
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the change of c.
 
-        With w'' = Rᵀc, so w = (1 − t) w0 + t w1 + K Rᵀc, the unknowns are R and c. When ε turns R,
-        Rᵀc changes by Rᵀ(ĉ ε + δc), and to first order
+        The unknowns are R and c, with w'' = Rᵀc and so w = (1 − t) w0 + t w1 + K Rᵀc. When ε turns
+        R, Rᵀc changes by Rᵀ(ĉ ε + δc), and to first order
 
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
-        It is solved for ĉ ε on the `coarse` nodes; the integrals smooth so much that the right
-        side, worked out on all nodes, is as good as a solution on all of them. A change of the end
-        values adds to d.
+        The equation is solved for ĉ ε on the `coarse` nodes. The integrals are so smoothing that
+        the right side, evaluated on all nodes, is as accurate as a solution on all nodes. A change
+        of the end values adds a term to d.
         """
         R, c = unknowns
         stride = (R.shape[1] - 1) // (self.coarse - 1)
@@ -460,9 +461,10 @@ class BallStationary:
 
 
 def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
-    """Return ĉ ε that comes from each d, and from each unit of δc, at the nodes.
+    """Return ĉ ε at the nodes for each d, and for each unit of δc.
 
-    Only the two components of ε across c count: a linear system for each problem, for these.
+    Only the two components of ε perpendicular to c matter. They solve one linear system for each
+    problem.
     """
     count, n = R.shape[:2]
     nodes, twice, (across, ahead) = grid(n), primitives(n, 2).from_k[0], _across(c)
@@ -478,11 +480,11 @@ def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
 
 
 def _across(c: Array) -> tuple[Array, Array]:
-    """Return two unit vectors across c as rows, shape (N, 2, 3), and c × both as columns.
+    """Return two unit vectors perpendicular to c as rows, (N, 2, 3), and c × both as columns.
 
-    They are rows of Householder's reflection that takes c to the third axis.
+    The vectors are rows of the Householder reflection that maps c to the third axis.
     """
-    v = scaled(c, axis=-1)  # squares of small numbers underflow
+    v = scaled(c, axis=-1)  # so that squares of small numbers do not underflow
     v[:, 2] += np.copysign(np.sqrt(np.sum(v * v, axis=-1)), v[:, 2])
     square = np.sum(v * v, axis=-1)
     twice = v * (2 / np.where(square == 0, 1, square))[:, None]
@@ -492,5 +494,5 @@ def _across(c: Array) -> tuple[Array, Array]:
 
 @lru_cache
 def _for_each_entry(n: int) -> Array:
-    """Return the Kronecker product of the matrix that integrates twice with 2 × 2 ones."""
+    """Return the Kronecker product of the matrix that integrates twice and 2 × 2 ones."""
     return np.kron(primitives(n, 2).from_k[0], np.ones((2, 2)))

@@ -1,18 +1,19 @@
 """The functionals that optima on SO(3) minimise, and the p for which R p is constant.
 
-Each functional is a number times ∫ ‖u‖² dt, with u a function of w, w' and, for the jerk, w''. Vary
-a curve R(t) to R exp(η̂), with η a small function of time. Then w changes by δw = η' + w × η, and,
-with L = ‖u‖²,
+Each functional is a number times ∫ ‖u‖² dt, where u is a function of w, w' and, for the jerk, w''.
+Vary a curve R(t) to R exp(η̂), where η is a small function of time. Then w changes by
+δw = η' + w × η, and with L = ‖u‖²
 
     ½ δ ∫ L dt = ± ∫ p · δw dt,    p = ±½ (∂L/∂w − d/dt ∂L/∂w' + d²/dt² ∂L/∂w''),
 
-where η vanishes at both ends, with as many derivatives as are given there. The integral is
-±∫ (−p' − w × p) · η dt: it is 0 for every η if p' + w × p = 0. As (R p)' = R (p' + w × p), a curve
-is stationary exactly if
+where η and its derivatives vanish at both ends as far as end values are given. The integral is
+±∫ (−p' − w × p) · η dt. It is 0 for every η if p' + w × p = 0. Since (R p)' = R (p' + w × p), a
+curve is stationary if and only if
 
-    R p = c,  constant.
+    R p = c    is constant.
 
-That is Noether's theorem: turning the room changes no cost. p is called the costate.
+This is Noether's theorem: a rotation of the fixed frame does not change the cost. p is called the
+costate.
 """
 
 from __future__ import annotations
@@ -27,22 +28,22 @@ from rbcourse.so3 import hat
 
 
 class Functional(Protocol):
-    """A number times ∫ ‖u‖² dt, for a stack of problems, and its linearisation.
+    """A number times ∫ ‖u‖² dt, for a stack of problems, with its derivatives.
 
-    The rates w, w', … have the shape (N, n, 3): N problems, n times. Derivatives by them are lists
-    of 3 × 3 matrices, shape (N, n, 3, 3), of which the first is by w.
+    The rates w, w', … have the shape (N, n, 3), for N problems and n times. Derivatives by the
+    rates are lists of 3 × 3 matrices, shape (N, n, 3, 3); the first is the derivative by w.
 
     Attributes
     ----------
     name : str
         The name of the optimum.
     ends : int
-        How many end values the optimum has: w, or w and w', at 0 and at 1. So many derivatives of w
-        stand in p.
+        The number of end values of the optimum: w, or w and w', at 0 and at 1. It is also the order
+        of the highest derivative of w in p.
     needs : tuple of int
-        On which derivatives ``c(t, order)`` of a curve the deviation depends.
+        The orders of the derivatives ``c(t, order)`` on which the deviation u depends.
     scale, unit : float or ndarray, shape (N,)
-        What ∫ ‖u‖² dt and `p` are multiplied by.
+        The factors of ∫ ‖u‖² dt and of `p`.
     """
 
     name: str
@@ -52,7 +53,7 @@ class Functional(Protocol):
     unit: Any
 
     def take(self, index: Any) -> Self:
-        """Return that of some of the problems."""
+        """Return the functional of some of the problems."""
 
     @property
     def deviation(self) -> Callable[..., Array]:
@@ -60,14 +61,14 @@ class Functional(Protocol):
 
     @property
     def deviation_by(self) -> Callable[..., list[Array]]:
-        """The function that returns the derivatives of u."""
+        """The function of w, w', … that returns the derivatives of u."""
 
     @property
     def momenta(self) -> Callable[..., tuple[Array, list[Array]]]:
         """The function of w, w', … that returns the momenta, and their derivatives.
 
-        They have the shape (N, n, 3), for the jerk (N, n, 6): along an optimum a change of the end
-        values changes ∫ ‖u‖² dt by [momenta · change] from 0 to 1.
+        The momenta have the shape (N, n, 3), or for the jerk (N, n, 6). If the end values of an
+        optimum change, ∫ ‖u‖² dt changes by [momenta · change] from 0 to 1.
         """
 
     @property
@@ -76,13 +77,13 @@ class Functional(Protocol):
 
     @property
     def p_by(self) -> Callable[..., list[Array]]:
-        """The function that returns the derivatives of p."""
+        """The function of w, w', … that returns the derivatives of p."""
 
 
 class BallAcceleration:
-    """2 ∫ ‖w'‖² dt: the squared covariant acceleration in the metric of a ball, G = 2 I.
+    """The functional 2 ∫ ‖w'‖² dt of the squared covariant acceleration of a ball, G = 2 I.
 
-    u = w' and p = w''. The optimum has R w'' = c.
+    Here u = w' and p = w''. The optimum has R w'' = c.
 
     Source: BK (18), BK (19).
     """
@@ -117,10 +118,10 @@ class BallAcceleration:
 
 
 class Effort:
-    """∫ τᵀ M τ dt of a body with the inertia G: τ = G w' + w × G w is the torque on it.
+    """The functional ∫ τᵀ M τ dt of a body with the inertia G and the torque τ = G w' + w × G w.
 
-    With M = G⁻¹, M τ = w' + G⁻¹ (w × G w) is the covariant acceleration ∇_V V in the metric G of
-    its kinetic energy, and the functional its square. With M = I it is the square of the torque.
+    If M = G⁻¹, M τ = w' + G⁻¹ (w × G w) is the covariant acceleration ∇_V V in the metric G of the
+    kinetic energy, and τᵀ M τ is its square. If M = I, τᵀ M τ is the square of the torque.
 
     With v = M τ and h = G w,
 
@@ -132,10 +133,10 @@ class Effort:
     Parameters
     ----------
     G : ndarray, shape (N, 3, 3)
-        Inertia, symmetric and positive definite. It is divided by a third of its trace, so that
+        The inertia, symmetric and positive definite. It is divided by a third of its trace, so that
         the unit of inertia does not matter.
     of_torque : bool
-        Whether M is I, and not G⁻¹.
+        Whether M is I, rather than G⁻¹.
     """
 
     ends = 2
@@ -151,7 +152,7 @@ class Effort:
         self.scale = self.unit = size**2 if of_torque else size
 
     def take(self, index: Any) -> Self:
-        """Return that of some of the problems."""
+        """Return the functional of some of the problems."""
         chosen = object.__new__(type(self))
         chosen.of_torque, chosen.name = self.of_torque, self.name
         chosen.G, chosen.M, chosen.root = (x[index] for x in (self.G, self.M, self.root))
@@ -159,7 +160,7 @@ class Effort:
         return chosen
 
     def torque(self, w: Array, a: Array) -> Array:
-        """Return τ = G w' + w × G w, over a third of the trace of G."""
+        """Return τ = G w' + w × G w divided by a third of the trace of G."""
         G = self.G[:, None]
         return matvec(G, a) + cross(w, matvec(G, w))
 
@@ -168,7 +169,7 @@ class Effort:
         return matvec(self.root[:, None], self.torque(w, a))
 
     def deviation_by(self, w: Array, a: Array) -> list[Array]:
-        """Return the derivatives of that by w and w'."""
+        """Return the derivatives of the deviation by w and w'."""
         G, root = self.G[:, None], self.root[:, None]
         T0 = hat(w) @ G - hat(matvec(G, w))
         return [root @ T0, np.broadcast_to(root @ G, T0.shape)]
@@ -191,17 +192,17 @@ class Effort:
         """Return the derivatives of p by w, w' and w''."""
         G, M = self.G[:, None], self.M[:, None]
         W, H = hat(w), hat(matvec(G, w))
-        T0, T1 = W @ G - H, hat(a) @ G - hat(matvec(G, a))  # of τ by w; of τ' by w
+        T0, T1 = W @ G - H, hat(a) @ G - hat(matvec(G, a))  # the derivatives of τ and of τ' by w
         V, GM, QM = hat(matvec(M, self.torque(w, a))), G @ M, (G @ W - H) @ M
         by_w = GM @ T1 + QM @ T0 - G @ V + V @ G
         return [by_w, GM @ T0 + QM @ G, np.broadcast_to(GM @ G, W.shape)]
 
 
 class Jerk:
-    """2 ∫ ‖j‖² dt, j = w'' + ½ w × w': the squared covariant jerk in the metric of a ball, G = 2 I.
+    """The functional 2 ∫ ‖j‖² dt of the squared covariant jerk of a ball, j = w'' + ½ w × w'.
 
-    p = j'' + ½ w × j' + w' × j. Of all j = w'' + κ w × w' only this one gives a motion and the
-    motion seen from the body, Rᵀ(t), the same cost.
+    In the metric G = 2 I, p = j'' + ½ w × j' + w' × j. Among all j = w'' + κ w × w', only this one
+    assigns the same cost to a motion R(t) and to its inverse Rᵀ(t).
 
     Source: beyond BK 2, beyond BK 5; Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and
     Crouch 1995.
@@ -224,7 +225,7 @@ class Jerk:
         return [-hat(a) / 2, W / 2, np.broadcast_to(np.eye(3), W.shape)]
 
     def momenta(self, w: Array, a: Array, b: Array, d: Array) -> tuple[Array, list[Array]]:
-        """Return −2 j' − w × j of w, and 2 j of w'."""
+        """Return −2 j' − w × j, which belongs to w, and 2 j, which belongs to w'."""
         j, j_rate = self.deviation(w, a, b), d + cross(w, b) / 2
         W, one = hat(w), np.broadcast_to(np.eye(3), (*w.shape, 3))
         by_j = [-hat(a) / 2, W / 2, one, 0 * one]

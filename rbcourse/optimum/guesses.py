@@ -1,4 +1,4 @@
-"""Curves to start an optimum from, at Chebyshev nodes, and what lowers their cost."""
+"""Starting curves for optima, at Chebyshev nodes, and steps that lower their costs."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-LONGEST = 100.0  # rad: where the legs of a start are longer no more full turns are tried
-SHARES = np.array([1.0, 0.25, 3.0])  # of a step that lowers the cost: the best of these
-SAME = 1e-9  # what differs by less, as a share, is the same: rounding does not decide
-_TOGETHER = 32  # curves that are lowered together, in the cache
+LONGEST = 100.0  # rad: if the legs of a start are longer, no more full turns are tried
+SHARES = np.array([1.0, 0.25, 3.0])  # of a step that lowers the cost: the best of these is used
+SAME = 1e-9  # numbers with a smaller relative difference count as equal
+_TOGETHER = 32  # curves that are lowered together, which fit into the cache
 
 
 def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.intp], Array]:
-    """Return curves with these ends at n nodes, and the numbers of the problems they are for.
+    """Return the numbers of problems, and curves with their ends at n nodes.
 
-    From Bézier's control point C₁ = R0 exp(ŵ0/3) to the other one, R1 exp(−ŵ1/3), turns v: the
-    shortest way and the other way round, and both with k full turns more where the legs ŵ0/3 and
-    ŵ1/3, and what accelerations `bend` them by, are together longer than 2k − 1 full turns. With
-    β = 3t² − 2t³ the curve
+    Let v turn from the Bézier control point C₁ = R0 exp(ŵ0/3) to the other one, R1 exp(−ŵ1/3), the
+    short way or the other way round. Both v with k additional full turns are included if the legs
+    ŵ0/3 and ŵ1/3, plus the `bend` by the accelerations, are together longer than 2k − 1 full turns.
+    With β = 3t² − 2t³, the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
 
-    has the wanted ends. Moved ends give it moved, and R1, R0, −w1, −w0 give it run backwards.
+    has the given ends. It moves with the ends, and R1, R0, −w1, −w0 give the reversed curve.
     """
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
     C1 = ends.R0 @ ahead
     v = log_so3(C1.mT @ ends.R1 @ back)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    # of two turns by π rounding does not choose
+    # rounding must not choose one of two turns by π
     other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
     v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
-    along_v = v + 1e-9 * (first + last)  # a direction where v is 0
+    along_v = v + 1e-9 * (first + last)  # with a direction even if v is 0
     full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
     length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
     problem, turns = [], []
@@ -56,22 +56,23 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
 
 
 def leading_sign(v: Array) -> Array:
-    """Return the sign of the largest component of v; of components as large, of the first one."""
+    """Return the sign of the largest component of v; of equal components, the first one is used."""
     size = np.abs(v)
     largest = np.argmax(size > (1 - SAME) * size.max(axis=-1, keepdims=True), axis=-1)
     return np.sign(np.take_along_axis(v, largest[..., None], axis=-1))
 
 
 def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp], Array]:
-    """Return two curves for each problem, at n nodes, that lead from a free motion into another.
+    """Return two curves for each problem, at n nodes, that lead from one free motion to another.
 
-    With F the free motion of a body of inertia G from R0 with w0, B the one that arrives at R1 with
-    w1, β = 3t² − 2t³, and v a logarithm of FᵀB, continuous in time, the curve
+    Let F be the free motion of a body of inertia G that starts at R0 with w0, and B the free motion
+    that arrives at R1 with w1. With β = 3t² − 2t³ and a logarithm v of FᵀB that is continuous in
+    time, the curve
 
         R = F exp(β v̂)
 
-    has the wanted ends. One v is the shortest at t = ½, the other one the other way round there.
-    The numbers of the problems are returned with the curves.
+    has the given ends. One v is the shortest logarithm at t = ½, and the other v turns the other
+    way round at this time. The numbers of the problems are returned with the curves.
     """
     fine, t = grid(2 * n - 1).t, grid(n).t
     R0, w0 = np.stack([ends.R0, ends.R1]), _bounded(np.stack([ends.w0, -ends.w1]))
@@ -84,11 +85,11 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
 
 
 def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
-    """Return how bodies of inertia G turn without torque: R at the times t, nearly.
+    """Return approximate free motions of bodies of inertia G: R at the times t.
 
-    Euler's equations in principal axes, wᵢ' = (Gⱼ − Gₖ) wⱼ wₖ/Gᵢ, by Runge's and Kutta's method;
-    ‖G w‖ is kept.
-    From t to t + h a body turns by ∫ w dt + h² (w(t) × w(t + h))/12, to fourth order in h.
+    Euler's equations in principal axes, wᵢ' = (Gⱼ − Gₖ) wⱼ wₖ/Gᵢ, are solved by a Runge–Kutta
+    method that keeps ‖G w‖ constant.
+    From t to t + h, a body turns by ∫ w dt + h² (w(t) × w(t + h))/12, to fourth order in h.
     """
     moments, axes = np.linalg.eigh(G)
     axes *= np.linalg.det(axes)[..., None, None]  # right-handed
@@ -120,9 +121,10 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
 
 
 def _continuous_log(R: Array) -> Array:
-    """Return two logarithms v of R, continuous along the first axis, of an odd number of values.
+    """Return two logarithms v of R that are continuous along the first axis, of odd length.
 
-    In the middle they are the shortest one, and the one the other way round.
+    In the middle of this axis, one is the shortest logarithm, and the other turns the other way
+    round.
     """
     shortest = log_so3(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
@@ -137,15 +139,16 @@ def _continuous_log(R: Array) -> Array:
 
 
 def _bounded(w: Array) -> Array:
-    """Return velocities that do not overflow; problems with faster ones are not solved."""
+    """Return velocities clipped against overflow; problems with faster ones are not solved."""
     return np.clip(w, -1e6, 1e6)
 
 
 def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
-    """Return the curves R with a full turn more about each principal axis of G, both ways.
+    """Return the curves R with a full turn added about each principal axis of G, both ways.
 
-    With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes these are R exp(±2π β ê), six
-    for each curve, in six stacks joined; about the axis of a small moment they may cost less.
+    With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes, the new curves are R exp(±2π β
+    ê), six for each curve, in six concatenated stacks. A full turn about the axis of a small moment
+    may lower the cost.
     """
     t = grid(R.shape[1]).t[:, None]
     axes = np.moveaxis(np.linalg.eigh(G)[1], -1, 0)[:, :, None]
@@ -157,10 +160,10 @@ def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
 def with_ends(R: Array, ends: Array) -> Array:
     """Return the curves R exp(η̂) with w0 and w1, or w0, w1, a0 and a1, at their ends.
 
-    Δw₀ and Δw₁ are the differences between the wanted velocities and those of the polynomials
+    Δw₀ and Δw₁ are the differences between the given velocities and those of the polynomials
     through R at the nodes. A fast curve that is sampled at too few nodes has such differences. The
-    first factor has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁; for accelerations, the second one has
-    η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁.
+    factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁. For accelerations, a second
+    factor has η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁.
     """
     t = grid(R.shape[1]).t[:, None]
     for order in range(1, 1 + ends.shape[1] // 2):
@@ -173,13 +176,13 @@ def with_ends(R: Array, ends: Array) -> Array:
 
 
 def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> tuple[Array, Array]:
-    """Return curves with the same ends, after steps of Gauss and Newton, and their costs.
+    """Return curves with the same ends after Gauss–Newton steps, and their costs.
 
-    For R exp(η̂) the rates change by δw = η' + w × η and its derivatives, so the deviation, to first
-    order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step takes the η for which the integral of its
-    square is least, of all polynomials tᵐ (1 − t)ᵐ p(t), p with half as many coefficients as there
-    are nodes; or a quarter or three times as much, where that is better. The last one takes less
-    than `worthwhile` of the cost away.
+    For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation
+    changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
+    the integral of the squared new deviation, among all polynomials tᵐ (1 − t)ᵐ p(t), where p has
+    half as many coefficients as there are nodes. A quarter of η, or three times η, is used if it is
+    better. The steps end when one of them lowers the cost by a share below `worthwhile`.
     """
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
@@ -194,7 +197,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Take one step: the best of `SHARES` of it, or none."""
+    """Take the best of one step, its multiples by `SHARES`, and no step."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))
@@ -205,7 +208,7 @@ def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]
 
 
 def _best_change(functional: Functional, R: Array) -> Array:
-    """Return η of a step, at the nodes."""
+    """Return η of a step at the nodes."""
     order, bumps = functional.ends // 2 + 1, R.shape[1] // 2
     nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order)
     rates = rates_of(R, order)
@@ -218,7 +221,7 @@ def _best_change(functional: Functional, R: Array) -> Array:
 
 
 def by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
-    """Return D₀, D₁, … of `lowered`, from the derivatives of u by w and its derivatives.
+    """Return D₀, D₁, … of `lowered`, from the derivatives of u by w, w', ….
 
     By Leibniz's rule δw⁽ⁱ⁾ = η⁽ⁱ⁺¹⁾ + Σ (i over j) w⁽ⁱ⁻ʲ⁾ × η⁽ʲ⁾.
     """
@@ -234,13 +237,13 @@ def by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
 
 
 def cost_at_nodes(functional: Functional, R: Array) -> Array:
-    """Return ∫ ‖u‖² dt of curves given by R at the nodes, about."""
+    """Return an approximation of ∫ ‖u‖² dt for curves given by R at the nodes."""
     u = functional.deviation(*rates_of(R, functional.ends // 2 + 1))
     return np.sum(u**2, axis=-1) @ grid(R.shape[1]).integral[-1]
 
 
 def rates_of(R: Array, count: int) -> list[Array]:
-    """Return w and its derivatives at the nodes, `count` in all, from R there."""
+    """Return `count` rates w, w', … at the nodes, from R at the nodes."""
     derivative = grid(R.shape[1]).derivative
     rates = [vee(R.mT @ along(derivative, R))]
     for _ in range(count - 1):

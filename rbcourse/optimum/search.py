@@ -1,4 +1,4 @@
-"""The cheapest curve that Newton's method finds: what to start from, and when to look further."""
+"""The search for the cheapest curve: starting curves for Newton's method, and further searches."""
 
 from __future__ import annotations
 
@@ -47,34 +47,34 @@ NOTHING = Failure(np.inf, 0)
 
 @dataclass(frozen=True)
 class Limits:
-    """When the search goes further. Ratios are of costs to the cheapest; turns in rad.
+    """The parameters of the search. Ratios are costs over the lowest cost; angles are in rad.
 
-    A pair limits the lowering of curves: the largest number of steps, and the least gain of a step
-    as a share of the cost.
+    A pair (steps, share) limits the lowering of curves: to this number of steps, each of which
+    lowers the cost by at least this share.
     """
 
-    nodes: int = 17  # on which curves are started, and the linear systems of a ball solved
-    nodes_for_turns: int = 25  # for bodies, where full turns are added
-    nodes_for_jerk: int = 29  # which has higher derivatives
-    nodes_for_all_starts: int = 33  # where no solution on the first ones costs as little as a start
+    nodes: int = 17  # of starting curves, and of the linear systems of a ball
+    nodes_for_turns: int = 25  # for bodies, if full turns are added
+    nodes_for_jerk: int = 29  # the jerk has higher derivatives
+    nodes_for_all_starts: int = 33  # for all starts, if one costs less than all solutions
     nodes_for_very_fast: int = 65
-    followed: float = 1.1  # lowered starts that cost up to this ratio are followed,
-    same_entries: float = 0.1  # but of those whose entries of R differ by less the cheapest only
-    fast: float = 24.0  # where ‖w0‖ + ‖w1‖ is larger all starts are followed, unlowered too,
-    very_fast: float = 80.0  # and where it is larger than this on `nodes_for_very_fast`
-    known_cost: float = 1.01  # the ratio of a cost to that at the nodes of a start, at most
-    one_start: float = 0.5  # where all entries of σ, w0 and w1 are smaller one start does
-    flat: float = 0.1  # where less of w, as a share, is across one axis, curves are bent
-    bend: float = 0.5  # by so much
-    turned: float = 3.0  # full turns are added to curves that cost up to this ratio,
-    turned_again: float = 1.2  # then to the new ones that cost up to this one; and only
-    worth_a_turn: float = 0.3  # where the cheapest costs more, as a share of a turn from rest
-    promising_turn: float = 1.5  # curves with a full turn more that cost more are dropped early
+    followed: float = 1.1  # lowered starts that cost up to this ratio are followed
+    same_entries: float = 0.1  # of starts whose entries of R differ by less, only the cheapest
+    fast: float = 24.0  # if ‖w0‖ + ‖w1‖ is larger, all starts are followed, lowered or not
+    very_fast: float = 80.0  # if it is larger than this, `nodes_for_very_fast` are used
+    known_cost: float = 1.01  # largest ratio of a cost to the cost of a start at its nodes
+    one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
+    flat: float = 0.1  # if a smaller share of w is perpendicular to one axis, curves are bent
+    bend: float = 0.5  # the size of this bend
+    turned: float = 3.0  # full turns are added to curves that cost up to this ratio
+    turned_again: float = 1.2  # and then to the new curves that cost up to this ratio
+    worth_a_turn: float = 0.3  # only if the cheapest costs more than this share of a full turn
+    promising_turn: float = 1.5  # curves with an added turn that cost more are dropped early
     starts: tuple[int, float] = (40, 5e-4)
     new_turns: tuple[int, float] = (3, 5e-4)
     on_more_nodes: tuple[int, float] = (40, 1e-4)
-    bent: tuple[int, float] = (40, 1e-6)  # where two curves part
-    last: tuple[int, float] = (200, 0.0)  # where no other lowering is enough
+    bent: tuple[int, float] = (40, 1e-6)  # for bent curves, where two curves diverge
+    last: tuple[int, float] = (200, 0.0)  # if no other lowering suffices
 
 
 LIMITS = Limits()
@@ -83,18 +83,18 @@ LIMITS = Limits()
 class Task(NamedTuple):
     """A stack of problems with one batch axis, and how to solve them.
 
-    If the functional is an `Effort`, the search also adds full turns to the starts, and bends
-    solutions about one axis, which may be saddles.
+    If the functional is an `Effort`, the search also adds full turns to the starts. It also bends
+    solutions that turn about one axis, which may be saddles.
     """
 
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
-    # from the numbers of some problems, and n: curves at n nodes, and which of these they are for
+    # from the numbers of some problems and n: numbers of problems, and curves for them at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
-    nodes: int = LIMITS.nodes  # on which curves are started
-    known: Mapping[int, Solution] = MappingProxyType({})  # problems that are solved
+    nodes: int = LIMITS.nodes  # of starting curves
+    known: Mapping[int, Solution] = MappingProxyType({})  # solutions that are known beforehand
 
 
 def ball(given: Ends) -> Task:
@@ -112,12 +112,12 @@ def ball(given: Ends) -> Task:
 
 
 def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Return the solutions from one start, where all curves the other way round cost more.
+    """Return the solutions from one start for problems in which the other way round costs more.
 
-    With entries of σ, w0 and w1 below ½, so norms below 1, the optimum costs about ∫ ‖w'‖² =
-    12 ‖e‖² + ‖d‖² < 52, and a curve the other way round, with such ends and a length of 2π − 1 and
-    more, at least 12 (2π − 2)² > 200. That only one curve of the short way is stationary is not
-    shown by this; no other one was found.
+    If the entries of σ, w0 and w1 are below ½, their norms are below 1. The optimum then costs
+    about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve the other way round with such ends has a length of
+    at least 2π − 1 and costs at least 12 (2π − 2)² > 200. This does not prove that only one curve
+    of the short way is stationary, but no other one was found.
     """
     largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
     slow = np.flatnonzero(largest < LIMITS.one_start)
@@ -133,8 +133,8 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
 def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     """Return the problems of minimum acceleration, or torque, of bodies of inertia G.
 
-    They are started from the optimum of a ball, too, and from curves between free motions. Where G
-    is a multiple of I the optimum of a ball is theirs.
+    The starting curves include the optimum of a ball and curves between free motions. If G is a
+    multiple of I, the optimum is that of the ball.
     """
     ends, rates = _flat(given, given.w0, given.w1)
     functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
@@ -163,7 +163,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
 def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     """Return the problems of minimum jerk."""
     ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-    # about one axis the cheapest of all turns is by (w0 + w1)/2 + (a0 − a1)/12
+    # about one axis, the cheapest of all turns is by (w0 + w1)/2 + (a0 − a1)/12
     bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
     def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
@@ -177,20 +177,20 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
 def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
     """Return the ends with one batch axis, the nearest rotations, and the end values (N, m, 3)."""
     ends = given.flat()
-    R0, R1 = (nearest(R)[0] for R in ends[:2])  # of few digits R p = c would not settle
+    R0, R1 = (nearest(R)[0] for R in ends[:2])  # with R of few digits, R p = c would not converge
     return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
 
 
 def _on_nodes(R: Array, n: int) -> Array:
-    """Return rotations at nodes, shape (N, ..., 3, 3), at n nodes."""
+    """Return rotations at nodes, shape (N, ..., 3, 3), interpolated to n nodes."""
     return orthogonal(along(interpolation(R.shape[1], n), R))
 
 
 def cheapest(task: Task) -> list[Solution | Failure]:
-    """Follow the starts that cost little when lowered; if that is not enough, all of them.
+    """Return the cheapest solutions from the starts that cost little when lowered, or from all.
 
-    It is not enough if nothing is found, or if the result costs more than a start, lowered or not.
-    Where all of them are not enough either, they are lowered farther.
+    All starts are followed if no solution is found, or if the solution costs more than a start,
+    lowered or not. If even this does not suffice, the starts are lowered further.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _searched(task)
@@ -202,7 +202,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
     index = np.flatnonzero([one is NOTHING for one in found])
     if not len(index):
         return found
-    share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in the turn of a quintic
+    share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in a quintic's turn
     fast = np.linalg.norm(ends, axis=-1) @ share
     problem, R = _started(task, index, task.nodes)
     R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
@@ -227,11 +227,11 @@ def _searched(task: Task) -> list[Solution | Failure]:
 def _with_more_turns(
     task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
 ) -> tuple[Numbers, Array, Array]:
-    """Lower the cheapest curves on more nodes, with a full turn more about a principal axis too.
+    """Lower the cheapest curves on more nodes, also with a full turn added about a principal axis.
 
-    The motion that costs least may turn once or twice more about the axis of a small moment. From
-    rest to rest a full turn costs at least 12 (2π)² λ, λ the least eigenvalue of G M G; none is
-    added where the cheapest curve costs less than `worth_a_turn` times that.
+    The cheapest motion may turn once or twice more about the axis of a small moment. From rest to
+    rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No turn
+    is added if the cheapest curve costs less than `worth_a_turn` times this cost.
     """
     ends, count = task.equations.ends, len(task.equations.ends)
     full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
@@ -269,10 +269,10 @@ def _with_more_turns(
 def _leave_the_axis(
     task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
 ) -> None:
-    """Bend solutions that turn about one axis, nearly, to four sides of it; follow the cheaper.
+    """Bend solutions that turn nearly about one axis to four sides; follow cheaper curves.
 
-    Such a curve may be a saddle: all starts, and what lowers them, keep to the axis, and a curve
-    that leaves it costs less.
+    Such a solution may be a saddle: all starts, and the steps that lower them, keep to the axis,
+    although a curve that leaves the axis costs less.
     """
     order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
     problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
@@ -293,10 +293,10 @@ def _leave_the_axis(
 
 
 def _across(w: Array, G: Array) -> Array:
-    """Return four sides of the axis that w (n, 3) turns about, nearly: shape (4, 3).
+    """Return four directions perpendicular to the approximate axis of w (n, 3), shape (4, 3).
 
-    The sides are the directions in which w deviates from its axis. Where it does not deviate, the
-    inertia decides, and for equal inertias the order of the axes.
+    They are the directions in which w deviates from its axis. If w does not deviate, the inertia
+    determines them, and for equal moments the order of the axes.
     """
     leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
     axes = np.linalg.svd(leans, full_matrices=False)[2][1:]
@@ -312,7 +312,7 @@ def _follow_on(
     n: int,
     found: list[Solution | Failure],
 ) -> None:
-    """Follow more starts of some problems, on n nodes, where their costs are better known."""
+    """Follow more starts of some problems on n nodes, which give more accurate costs."""
     mine = np.isin(problem, index)
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, index, n)
@@ -343,7 +343,7 @@ def _least(count: int, problem: Numbers, cost: Array) -> Array:
 
 
 def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
-    """Tell which starts are, at all nodes, close to a cheaper one of their problem."""
+    """Return which starts are close, at all nodes, to a cheaper start of the same problem."""
     order, repeated = np.lexsort((cost, problem)), np.zeros(len(problem), bool)
     number, R = problem[order], R[order]
     for after in range(1, np.bincount(problem, minlength=1).max()):
@@ -353,15 +353,15 @@ def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
 
 
 def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
-    """Return curves to start from, and the numbers of their problems."""
+    """Return the numbers of problems, and starting curves for them."""
     problem, R = task.starts(index, n)
     return index[problem], R
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Put the solutions from these curves into `found`, if they cost less.
+    """Store the solutions that these curves lead to in `found` if they cost less.
 
-    Of curves that cost the same the first one stays, so that rounding does not decide.
+    Of solutions with the same cost the first one is kept, so that rounding does not decide.
     """
     for i, one in zip(problem, task.solver(task.equations.take(problem), R), strict=True):
         if found[i] is NOTHING or cost_of(one) < (1 - SAME) * cost_of(found[i]):

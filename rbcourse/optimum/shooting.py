@@ -1,6 +1,6 @@
-"""The optimum by shooting: find the initial values for which the motion reaches its end.
+"""The optimum by shooting: finding initial values for which the motion reaches its end.
 
-`minimum_acceleration_so3`, in `rbcourse.optimum`, is the faster and more robust way.
+`rbcourse.optimum.minimum_acceleration_so3` is faster and more robust.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def shoot_minimum_acceleration_so3(
 ) -> Optimum:
     """Return the minimum-acceleration curve with these ends, by shooting.
 
-    Equation (20), w'' + w × w' = b, is integrated from t = 0; Newton's method improves the unknown
-    w'(0) and b until R(1) and w(1) are right.
+    Equation (20), w'' + w × w' = b, is integrated from t = 0. Newton's method improves the unknown
+    w'(0) and b until R(1) and w(1) are correct.
     Source: BK (20), BK 6.2.
 
     Parameters
@@ -44,12 +44,13 @@ def shoot_minimum_acceleration_so3(
     Returns
     -------
     Optimum
-        As `minimum_acceleration_so3`, with the same errors, warnings and singular set: the same
-        curve to about 1e-11, if both find the same solution of (19).
+        The optimum, with the errors, warnings and singular set of `minimum_acceleration_so3`. The
+        curve is the same to about 1e-11 if both functions find the same solution of (19).
 
     Notes
     -----
-    It seldom fails for ‖w0‖, ‖w1‖ < 12; to fail takes seconds for ‖w‖ = 30, minutes for 1000.
+    The method rarely fails for ‖w0‖, ‖w1‖ < 12. A failure takes seconds for ‖w‖ = 30, and minutes
+    for 1000.
 
     Examples
     --------
@@ -69,7 +70,7 @@ def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:
 
 
 def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
-    """Improve the aim (w'(0), b) by Newton's method, the hit moved by half a unit at most."""
+    """Improve the aim (w'(0), b) by Newton steps that move the end by at most half a unit."""
     try:
         aim = _first_aim(equations, start)
         for iteration in range(STEPS):
@@ -84,7 +85,7 @@ def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
 
 
 def _solution(equations: BallStationary, aim: Array, iterations: int) -> Solution | Failure:
-    """Return the curve of an aim that hits, unless it does not satisfy the equations."""
+    """Return the curve of an aim that hits, or a failure if it violates the equations."""
     R, w, _ = _shot(equations, aim, grid(NODES).t)
     c = equations.R0[0] @ (aim[3:] - np.cross(w[0], aim[:3]))
     residual = float(equations.errors((R[None], c[None]))[0][0])
@@ -104,7 +105,7 @@ def _first_aim(equations: BallStationary, start: Array) -> Array:
 
 
 def _miss(equations: BallStationary, aim: Array) -> tuple[Array, Array]:
-    """Return by how much R1 and w1 are missed, and, near the goal, how that depends on the aim."""
+    """Return the errors of R(1) and w(1), and their derivatives by the aim near the goal."""
     R, w, sensitivity = (values[-1] for values in _shot(equations, aim, np.ones(1)))
     turn = log_so3(equations.R1[0].T @ R)
     return np.concatenate([turn, w - equations.ends[0, 1]]), sensitivity[:6]
@@ -129,7 +130,7 @@ def _flow(_: float, state: Array, b: Array) -> Array:
     """Return R' = R ŵ, w', w'' = b − w × w', and the linearisation of the three."""
     R, w, acceleration = state[:9].reshape(3, 3), state[9:12], state[12:15]
     turn, dw, da = state[15:].reshape(3, 3, 6)
-    W = hat_so3(w)  # a ValueError where the motion overflows ends the attempt
+    W = hat_so3(w)  # if the motion overflows, a ValueError ends the attempt
     dda = np.eye(3, 6, 3) + hat_so3(acceleration) @ dw - W @ da
     rates = R @ W, acceleration, b - W @ acceleration, dw - W @ turn, da, dda
     return np.concatenate([rate.ravel() for rate in rates])

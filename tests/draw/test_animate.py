@@ -130,7 +130,7 @@ def test_a_gif_takes_its_time(count, seconds):
     [("a b", 9, 1), ("1x", 9, 1), ("x", 0, 1), ("x", 51, 1.0), ("x", 9, -1), ("x", 9, np.nan)],
 )
 def test_animations_that_cannot_play_are_refused(name, frames, seconds):
-    message = f"frames: 1 to 50 a second wanted, got {frames} in {seconds} s"
+    message = f"frames: 1 to 50 per second are wanted, got {frames} in {seconds} s"
     with pytest.raises(ValueError, match=message if name == "x" else "name: a word"):
         animate.animate(plt.Figure(), name, "", list, frames, seconds)
 

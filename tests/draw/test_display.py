@@ -89,7 +89,9 @@ def test_lines_that_leave_the_picture_keep_their_slope_and_far_places_their_side
 
 def test_figures_that_are_too_large_are_refused(ax):
     ax.figure.set_size_inches(16, 4)
-    with pytest.raises(ValueError, match=r"at most 1500 pixels each way wanted, got \(1600, 400\)"):
+    with pytest.raises(
+        ValueError, match=r"at most 1500 × 1500 pixels are wanted, got \(1600, 400\)"
+    ):
         Display(ax.figure)
 
 

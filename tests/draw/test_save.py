@@ -98,7 +98,7 @@ def test_the_caption_is_the_first_sentence_and_the_files(alt, sentence):
     assert page.endswith(f"<figcaption>{sentence} <small>{files}</small></figcaption></figure>")
 
 
-RAGGED = {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "one shape wanted, got t [1] (2,), x [m] (3,)"
+RAGGED = {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "one shape are wanted, got t [1] (2,), x [m] (3,)"
 
 
 @pytest.mark.parametrize("name", ["pitch [deg]", "t", "angle (rad)", "x[m]", None])
@@ -106,7 +106,7 @@ def test_tables_that_are_ragged_or_lack_units_are_refused_and_nothing_is_written
     name, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
-    unit = {"body": ["a"], name: [1.0]}, f"data: {name!r} has to end with"
+    unit = {"body": ["a"], name: [1.0]}, f"data: {name!r} must end with"
     table, message = unit if name else RAGGED
     for saved, more in ((save.save_figure, ()), (animate.save_animation, (list, 2))):
         with pytest.raises(ValueError, match=re.escape(message)):

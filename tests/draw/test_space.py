@@ -58,8 +58,8 @@ def test_the_view_is_matplotlibs_with_equal_units_about_a_fixed_middle(fitted):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (("view_init", 20, 0, 30), "^view_init: -90 <= elev <= 90 and roll 0 wanted"),
-        (("view_init", 90.5), "^view_init: -90 <= elev <= 90 and roll 0 wanted"),
+        (("view_init", 20, 0, 30), "^view_init: -90 <= elev <= 90 and roll 0 are wanted"),
+        (("view_init", 90.5), "^view_init: -90 <= elev <= 90 and roll 0 are wanted"),
         (("scatter", [0], [0], [0]), "^Path3DCollection: lines, letters, Faces or a Ball"),
         (("set_title", r"$\frac{1$"), "frac"),
     ],
