@@ -17,7 +17,6 @@ from fractions import Fraction
 from pathlib import Path
 
 TABLE = Path(__file__).with_name("ordering.csv")
-UNIT = 10**7  # the share and the entries are whole numbers over this
 
 
 def _load():
@@ -34,14 +33,9 @@ near = _load()
 VOLUME = ss * ee * dd + 2 * se * sd * ed - ss * ed**2 - ee * sd**2 - dd * se**2
 
 
-def block(odd):
-    """Return the V with an odd number of d, or an even one, by name: "se d" is se times d."""
-    names = [f"{inner} {vector}" for inner in near.NAMES for vector in "sed"]
-    return [name for name in names if name.count("d") % 2 == odd and name != "ss s"]
-
-
-# entries of M between the two are 0: there the product would have an odd number of d
-BLOCKS = [block(0), block(1)]
+# the V by name: "se d" is se times d; those with an even number of d first
+VECTORS = [f"{inner} {vector}" for inner in near.NAMES for vector in "sed"]
+VECTORS = sorted((name for name in VECTORS if name != "ss s"), key=lambda x: x.count("d") % 2)
 
 
 def product(a, b):
@@ -52,12 +46,11 @@ def product(a, b):
 
 
 def entries():
-    """Return the pairs of V, the upper triangles of the blocks of M, by their product."""
+    """Return the pairs of V, the upper triangle of M, by their product."""
     found = {}
-    for names in BLOCKS:
-        for i, a in enumerate(names):
-            for b in names[i:]:
-                found.setdefault(product(a, b), []).append((a, b))
+    for i, a in enumerate(VECTORS):
+        for b in VECTORS[i:]:
+            found.setdefault(product(a, b), []).append((a, b))
     return found
 
 
@@ -78,9 +71,9 @@ def total(upper):
     return sum(x * (1 + (a != b)) * product(a, b) for (a, b), x in upper.items())
 
 
-def is_positive(names, upper):
-    """Return whether a block of M is positive definite: D > 0 in L D L^T."""
-    rows = [[upper.get((a, b)) or upper.get((b, a), 0) for b in names] for a in names]
+def is_positive(upper):
+    """Return whether M is positive definite: D > 0 in L D L^T."""
+    rows = [[upper.get((a, b)) or upper.get((b, a), 0) for b in VECTORS] for a in VECTORS]
     while rows:
         (pivot, *head), *rows = rows
         if pivot <= 0:
@@ -93,12 +86,11 @@ def read(table=TABLE):
     """Return c, the share and the free entries of M, by worse and better form."""
     with open(table, newline="", encoding="utf-8") as file:
         (_, *worse), (_, *better), (_, *ratio), (_, *share), *rows = csv.reader(file)
-    free = [{}, {}, {}]
+    free = [{} for _ in worse]
     for name, *row in rows:
         for column, entry in zip(free, row, strict=True):
-            column[tuple(name.split("."))] = Fraction(entry or 0) / UNIT
-    shares = [Fraction(x) / UNIT for x in share]
-    found = zip(map(Fraction, ratio), shares, free, strict=True)
+            column[tuple(name.split("."))] = Fraction(entry or 0)
+    found = zip(map(Fraction, ratio), map(Fraction, share), free, strict=True)
     return dict(zip(zip(worse, better, strict=True), found, strict=True))
 
 
@@ -109,7 +101,7 @@ def verify(table=TABLE):
         left = form[worse] - near.QQ(ratio) * form[better]
         upper = matrix(left - near.QQ(share) * VOLUME, free)
         same = total(upper) + near.QQ(share) * VOLUME == left
-        if not (same and share >= 0 and all(is_positive(names, upper) for names in BLOCKS)):
+        if not (same and share >= 0 and is_positive(upper)):
             raise ValueError(f"not proven: {worse} >= {float(ratio)} {better}")
         proven[worse, better] = ratio
     return proven
