@@ -87,7 +87,7 @@ CLASS = [
         tamper,
         {"half": "half = 3"},
         "2 0",
-        ["cell 2, answer of", "is there again", "more"],
+        ["cell 2, answer of", "has the same name", "more"],
     ),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),
@@ -97,7 +97,7 @@ CLASS = [
     ("stripped", strip_metadata, {}, " ", ["the cells are not those of this problem set"]),
 ]
 FILES = [
-    ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is no notebook, but a PDF or an archive"),
+    ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is a PDF or an archive, not a notebook"),
     ("wrong name", "PS0.ipynb", b"{}", "there is no ps0.ipynb, but PS0.ipynb"),
 ]
 
@@ -181,8 +181,8 @@ class Killed(ProcessPoolExecutor):
 
 LISTED = [
     ("refused", "Bob_1_assignsubmission_file_/ps0.ipynb", "it is empty"),
-    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "its cells are of no set"),
-    ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "its cells are of no set"),
+    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "its cells do not belong to a set"),
+    ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "its cells do not belong to a set"),
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "tampers, ps0", "Ann Ames"),
     ("missing", "cid, ps1", "Cid Cole"),
@@ -241,7 +241,7 @@ def test_who_was_not_graded_or_not_collected_has_a_line_in_the_table(again):
         "half right": "refused: its process ended, or took too long",
         "stuck": f"refused: {HALF} cannot be stopped",
         LISTED[0][1]: "not collected: it is empty",
-        LISTED[1][1]: "not collected: its cells are of no set",
+        LISTED[1][1]: "not collected: its cells do not belong to a set",
         "cid": "nothing was collected",
     }
 
@@ -272,5 +272,5 @@ def test_the_commands_of_nbgrader_are_configured_in_the_same_way():
 
 def test_nothing_runs_without_a_box_that_was_there(tmp_path, monkeypatch):
     monkeypatch.setattr(sandbox, "missing", lambda: "it failed")
-    with pytest.raises(Refused, match="there is no box any more: it failed"):
+    with pytest.raises(Refused, match="the sandbox does not work any more: it failed"):
         grade_one("ps0", "ann", tmp_path, boxed=True)
