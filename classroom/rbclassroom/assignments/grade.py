@@ -81,7 +81,7 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
     config = course_config(name, assignments)
     students = sorted(path.parent.name for path in assignments.glob(f"submitted/*/{name}/"))
     if not students:
-        raise ValueError(f"There are no submissions submitted/STUDENT/{name}/{name}.ipynb.")
+        raise ValueError(f"{name}: a submission in submitted/STUDENT/{name}/ is wanted, got none")
     table = assignments / f"{name}-grades.csv"
     try:
         table.open("a").close()
