@@ -49,7 +49,7 @@ def test_a_seed_gives_the_same_problems_again(make):
     one, again, other = make(2, rng=5), make(2, rng=5), make(2, rng=6)
     assert all(np.array_equal(a, b) for a, b in zip(one, again, strict=True))
     assert not any(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
-    with pytest.raises(ValueError, match=r"an integer from 1 up wanted, got 0"):
+    with pytest.raises(ValueError, match=r"an integer from 1 up is wanted, got 0"):
         make(0, rng=5)
 
 
