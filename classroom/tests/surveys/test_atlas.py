@@ -57,7 +57,7 @@ def test_bad_sizes_and_families_are_named():
     for size in (0, -1, 3.2, np.nan, "a", [1, 2]):
         with pytest.raises(ValueError, match=r"^size"):
             atlas.random_problems(2, size)
-    with pytest.raises(ValueError, match=r"^families: along, across and any .*\['around'\]"):
+    with pytest.raises(ValueError, match=r"^families: along, across or any .*\['around'\]"):
         atlas.atlas_problems(1, ["along", "around"])
 
 
