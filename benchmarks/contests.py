@@ -314,7 +314,7 @@ def _true_optimum(ends, G, near=None):
 
 
 def timing_of_poses(n, rng):
-    """Compare fastest timings of a leg, with limits on components, on norms, and of n poses."""
+    """Compare fastest timings of a leg, with limits on components or norms, and of n poses."""
     steps = rb.exp_se3(rng.uniform(-0.7, 0.7, (n - 1, 6)))
     poses = np.array(list(accumulate(steps, np.matmul, initial=np.eye(4))))
     path, leg, does = rb.chain(np.arange(n), poses), rb.geodesic_se3(*poses[:2]), "fastest, norms"

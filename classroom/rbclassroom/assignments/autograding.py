@@ -43,7 +43,7 @@ SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
 def configure(config: Config) -> None:
     """Set the steps of nbgrader for submissions and feedback, and the path of its tools."""
-    # nbgrader calls alembic by name to make a gradebook, and finds it in an activated environment
+    # nbgrader calls alembic by name, which is found only in an activated environment
     if not shutil.which("alembic"):
         path = os.environ.get("PATH", os.defpath)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
@@ -136,7 +136,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         self.folder, path = Path(tempfile.mkdtemp()), resources["metadata"]["path"]
         work = self.folder / "work"
         try:
-            # only files of the set: a student's file could replace a module of the tests
+            # only files of the set are copied: a student's file could replace a module of the tests
             shutil.copytree(source, work, ignore=shutil.ignore_patterns("*.ipynb", *course.ignore))
             sandbox.prepare(self.folder)
             resources["metadata"]["path"] = str(work)
@@ -152,7 +152,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             faults += [CUT] * (at in self.cut)
             faults += ["takes too much memory"] * ("MemoryError" in errors)
             remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in faults]
-            if at in self.slow:  # without the traceback, which may quote tests
+            if at in self.slow:  # replace the traceback, which may quote tests
                 outputs[:] = [output for output in outputs if output.output_type != "error"]
                 said = f"This cell took longer than {self.timeout} s and was stopped."
                 outputs.append(new_output("error", ename="Timeout", evalue="", traceback=[said]))

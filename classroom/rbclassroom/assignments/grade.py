@@ -129,9 +129,9 @@ def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[J
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
-    """Yield unusable files of `collect` that may belong to this set, and missing students.
+    """Yield files that `collect` could not use, which may be of this set, and missing students.
 
-    Each comes with the reason.
+    The reason is the second item of each pair.
     """
     report = assignments / "submitted" / "report.csv"
     if not report.exists():
@@ -200,7 +200,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     if boxed and sandbox.missing():
         raise Refused(f"the sandbox does not work any more: {sandbox.missing()}")
     config = course_config(name, folder)
-    if hasattr(signal, "alarm"):  # a last limit on the time, for two runs
+    if hasattr(signal, "alarm"):  # a second limit on the time of the two runs
         signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"

@@ -75,7 +75,7 @@ class Problem:
             raise NotYet(hint)
         numbers = [(value, as_numbers(value)) for value in given]
         meant = [value if number is None else np.radians(number) for value, number in numbers]
-        if hint := self._hint(meant):  # is the result of a known mistake, in degrees
+        if hint := self._hint(meant):  # the results are in degrees
             raise NotYet(f"{IN_RADIANS} There is a second mistake: {hint}")
         first = right.index(False)
         arguments = zip(self.names, self.inputs[first], strict=False)
@@ -84,7 +84,7 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            trials = zip(given, *mistake.results, strict=True)  # each input may match another
+            trials = zip(given, *mistake.results, strict=True)  # inputs may match different ones
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""
@@ -183,7 +183,7 @@ def curves_of(axes: Any) -> list[Array]:
         if (style := line.get_drawstyle()) != "default":
             outlines.append(np.column_stack(STEP_LOOKUP_MAP[style](*line.get_xydata().T)))
     for a, b in ((np.array(outline[:-1]), np.array(outline[1:])) for outline in outlines):
-        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # treads of steps run to the right
+        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # the tread of a step runs to the right
         found.append((a + b)[treads] / 2)
     for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
         found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))

@@ -55,7 +55,8 @@ def prepare(folder: Path) -> None:
     """Make the folders in which the kernel works and keeps its files."""
     for name in ("work", "tmp", "matplotlib"):
         (folder / name).mkdir(exist_ok=True)
-    for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):  # a new one takes seconds
+    # without its list of fonts Matplotlib searches for seconds
+    for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):
         shutil.copy(fonts, folder / "matplotlib")
 
 
@@ -99,7 +100,7 @@ def box(folder: Path, seconds: int) -> list[str]:
         words += ["--symlink", os.readlink(path), path] if link else ["--ro-bind-try", path, path]
     for path in ("/tmp", "/dev/shm"):  # in memory these folders would have no limit
         words += ["--bind", str(folder / "tmp"), path]
-    for parent in sorted(seen)[1:]:  # otherwise parents have their permissions outside
+    for parent in sorted(seen)[1:]:  # otherwise they keep their permissions from outside
         words += ["--dir", parent]
     for path in python:
         words += ["--ro-bind", path, path]

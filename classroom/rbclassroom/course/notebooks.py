@@ -23,7 +23,7 @@ from tornado.web import HTTPError
 from rbclassroom.course.agreement import reconciled_notebook, stale_figures
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
-# JupyterLab writes these metadata into a notebook that it opens; if they differ, it is "changed"
+# JupyterLab adds these metadata to a notebook, and marks a notebook without them as changed
 OPENED = {
     "kernelspec": {**KERNEL, "display_name": "Python 3 (ipykernel)"},
     "language_info": {

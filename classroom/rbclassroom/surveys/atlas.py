@@ -25,7 +25,7 @@ FAMILIES = "along", "across"
 """Directions of the end velocities in lesson 12: along the axis of the displacement, or across."""
 
 NEAR_ZERO = 1e-4
-"""An optimum below this share of ‖σ‖² + ‖w0‖² + ‖w1‖² has no excess, since it is almost zero."""
+"""Excesses are not computed if the optimum costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖²."""
 
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> rb.ProjectedPolynomial:
@@ -152,7 +152,7 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
 
 
 def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> NDArray[np.bool_]:
-    """Tell which optima have a cost so small that its ratio to another cost is meaningless.
+    """Tell which optima have a cost that is too small for ratios of costs.
 
     The cost is compared with ‖σ‖² + ‖w0‖² + ‖w1‖², in which ‖x‖² stands for ½ xᵀ G x. For a ball,
     G = 2 I.

@@ -36,9 +36,9 @@ CLOSED_FORMS = (
 )
 """The closed forms among the curves; "weighted" and "normal" use the inertia."""
 CURVES = (*CLOSED_FORMS, "two Béziers", "three", "ball's optimum")
-"""The curves that are compared. "two Béziers" is the cheaper of the Bézier curves the short and the
-long way round, and "three" the cheapest of these two and "normal". "ball's optimum" is the optimum
-for a ball, which is not a closed form."""
+"""The curves that are compared. "two Béziers" is the cheaper of two Bézier curves, one of them the
+long way round. "three" is the cheapest of these two and "normal". "ball's optimum" is the
+optimum for a ball, which is not a closed form."""
 DOMAINS = {"small": 2, "medium": 5, "all": CELLS}
 """The number of steps, from 0, of displacement and end velocity that belong to each domain."""
 SEEDS = 31, 32, 33

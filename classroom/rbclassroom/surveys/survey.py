@@ -96,7 +96,7 @@ def survey(
                 f"ways: make(R0, R1, w0, w1) is wanted, got {name!r}: {error}"
             ) from error
     if "optimum" in ways:
-        raise ValueError("ways: names except 'optimum', that of the reference, are wanted")
+        raise ValueError("ways: names except 'optimum' are wanted, since this is the reference")
     measures = {name: partial(costs, make, inertia=inertia) for name, make in ways.items()}
     return _in_chunks({"optimum": partial(_least, inertia), **measures}, problems, executor, report)
 
@@ -138,7 +138,8 @@ def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Arra
 
 
 def _least(inertia: ArrayLike | None, chunk: Ends) -> Array:
-    with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):  # the NaN is enough
+    # a cost of NaN replaces the warning
+    with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):
         return np.asarray(rb.minimum_acceleration_so3(*chunk, inertia).cost)
 
 
