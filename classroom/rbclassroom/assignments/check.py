@@ -112,8 +112,7 @@ def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
         ends.append(f"the cells after cell {client.at + 1} were not run")
     except (OSError, RuntimeError, KeyError) as error:
         why = f"Python could not be started, or stopped ({error})"
-        cure = "install the packages in requirements.txt of the handout"
-        raise ValueError(f"{why}; {cure}") from error
+        raise ValueError(f"{why}; install requirements.txt of the handout again") from error
     print(flush=True)
     near = f" took more than half of the {seconds} s that grading allows: make it faster"
     slow = {at for at, took in client.took.items() if took > seconds / 2} - {*client.slow}
