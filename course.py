@@ -1,10 +1,10 @@
 # /// script
 # requires-python = ">=3.11"
 # ///
-"""Tasks of the course: python3 course.py TASK ...
+"""Run a task of the course: python3 course.py TASK ...
 
-The first task makes the environment .venv from environment.txt; later ones extend it.
-When environment.txt changes or the folder is moved, .venv is made anew.
+The first task makes the environment .venv from environment.txt; later tasks extend it.
+If environment.txt changes or the folder is moved, .venv is made again.
 """
 
 import sys
@@ -27,7 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 UV = os.environ.get("UV") or shutil.which("uv")
-LISTS = {  # of exact versions, each with all before it; "course.py lock" writes them
+LISTS = {  # lists of exact versions; an environment needs its list and all lists before it
     "lessons": "environment.txt",
     "teach": "classroom/environment-teach.txt",
     "book": "classroom/environment-book.txt",
@@ -35,35 +35,35 @@ LISTS = {  # of exact versions, each with all before it; "course.py lock" writes
 }
 PYTEST = "pytest -n auto --dist loadfile --no-loadscope-reorder"
 BROWSER = "pytest -n auto --dist worksteal classroom/tests/browser"
-TASKS = {  # task: environment, commands, of which the last takes the further words, help
+TASKS = {  # environment, commands (the last one takes the further arguments), and help
     "lab": ("lessons", ["rbclassroom.course.lab"], "open the lessons in JupyterLab"),
     "check": ("lessons", ["rbclassroom.assignments.check"], "check a problem set: check FILE"),
     "book": ("book", ["rbclassroom.book.build"], "write the course as web pages, in book/"),
     "lecture": ("book", ["rbclassroom.lecture.serve"], "show slides to a class: lecture 01"),
     "handout": ("teach", ["rbclassroom.assignments handout"], "pack a problem set: handout ps1"),
     "collect": ("teach", ["rbclassroom.assignments collect"], "sort LMS downloads: collect FOLDER"),
-    "grade": ("teach", ["rbclassroom.assignments grade"], "grade what was collected: grade ps1"),
+    "grade": ("teach", ["rbclassroom.assignments grade"], "grade collected submissions: grade ps1"),
     "test": ("test", [PYTEST], "run the tests and the lessons"),
-    "releases": ("test", ["rbclassroom.course.releases"], "test oldest or newest releases"),
+    "releases": ("test", ["rbclassroom.course.releases"], "test with oldest or newest releases"),
     "hostile": ("test", [PYTEST + " classroom/tests/hostile"], "grade harmful submissions"),
     "browser": ("test", ["rbclassroom.book.build --live", BROWSER], "test pages in Chromium"),
     "figures": ("lessons", ["rbclassroom.explorers.recorded"], "run lessons again; store changes"),
     "ledger": ("test", ["rbclassroom.course.ledger"], "write docs/ledger.md"),
     "atlas": ("lessons", ["rbclassroom.surveys.body_atlas"], "compute the atlas of real bodies"),
-    "bench": ("test", ["benchmarks"], "time the package beside others"),
+    "bench": ("test", ["benchmarks"], "compare times with other packages"),
     "lint": ("test", ["ruff check", "ruff format --check", "mypy"], "check style and types"),
     "lock": ("test", ["rbclassroom.course.lock"], "write the lists of exact versions"),
 }
-PATHS = "check", "collect"  # these take a path, from where the command is typed
-PLAIN = "ledger", "atlas", "bench"  # these take no further words
+PATHS = "check", "collect"  # tasks with a path, relative to the folder of the terminal
+PLAIN = "ledger", "atlas", "bench"  # tasks without further arguments
 
 
 class SetUpError(Exception):
-    """A command of the set-up failed; the end of its output."""
+    """An error of a command of the set-up, with the end of its output."""
 
 
 def main():
-    """Set up the environment of a task, and run it."""
+    """Set up the environment of a task, and run the task."""
     task, words = (sys.argv[1:] or ["--help"])[0], sys.argv[2:]
     if task in ("-h", "--help"):
         print(__doc__)
@@ -79,17 +79,17 @@ def main():
         words = [os.path.abspath(word) if os.path.exists(word) else word for word in words]
     environment, commands, _ = TASKS[task]
     set_up(environment)
-    if "pytest" in commands[-1]:  # a worker for each processor, with one thread each
+    if "pytest" in commands[-1]:  # each worker uses one processor, so it has one thread
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # or each of a hundred processes compiles
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles
     for command in commands:
         run(*command.split(), *(words if command is commands[-1] else []))
 
 
 def run(*words):
-    """Run a module in .venv, in the folder of the course; stop if it fails.
+    """Run a module in .venv, in the folder of the course; exit if it fails.
 
-    Ctrl-C reaches the module too, and the module decides: JupyterLab asks first.
+    Ctrl-C also reaches the module, which decides whether it ends; JupyterLab asks first.
     """
     job = subprocess.Popen([python(), "-m"] + list(words), cwd=ROOT)
     while True:
@@ -115,22 +115,22 @@ def set_up(environment):
         print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
         install(*[word for name in missing for word in ("-r", LISTS[name])])
         if "lessons" in missing:
-            patiently(python(), "-c", "import matplotlib.pyplot")  # looks for fonts, once
+            patiently(python(), "-c", "import matplotlib.pyplot")  # this looks for fonts once
         write_stamp(dict(found, **{name: wanted[name] for name in missing}))
         print(" done.", flush=True)
 
 
 def create(found):
-    """Make an empty .venv in place of the one that was found."""
+    """Make an empty .venv in place of the existing one."""
     if found is None and os.path.lexists(VENV):
         delete = "Remove-Item -Recurse" if os.name == "nt" else "rm -r"
         sys.exit(
-            ".venv was not made by course.py. Move it away, or delete it with '%s \"%s\"'; then "
+            ".venv was not made by course.py. Move it away, or delete it with '%s \"%s\"', and "
             "try again." % (delete, VENV)
         )
     if Path(sys.prefix).resolve() == VENV.resolve():
         sys.exit(
-            "The environment has to be made anew, and this Python is in it: leave it with "
+            "The environment has to be made again, but this Python belongs to it. Leave it with "
             "'deactivate', or call %s course.py." % getattr(sys, "_base_executable", "python3")
         )
     try:
@@ -139,7 +139,7 @@ def create(found):
     except OSError as error:
         sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
-    write_stamp({"unfinished": True})  # first: the next call sees that this one was interrupted
+    write_stamp({"unfinished": True})  # written first, so that the next call sees an interruption
     print("Making .venv", end=" ", flush=True)
     if UV:
         how = "--seed", "--allow-existing", "--python", sys.executable
@@ -150,7 +150,7 @@ def create(found):
 
 
 def install(*words):
-    """Install into .venv with uv, which pip fetches if it is missing; if that fails, with pip."""
+    """Install into .venv with uv, which pip fetches if it is missing, or with pip if this fails."""
     pip = python(), "-m", "pip"
     uv, settings = UV, {}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -166,7 +166,7 @@ def install(*words):
 
 
 def settings_of_pip(*pip):
-    """Return pip's indexes and certificates, as variables of uv."""
+    """Return the indexes and certificates of pip, as environment variables of uv."""
     names = {
         "index-url": "UV_DEFAULT_INDEX",
         "extra-index-url": "UV_INDEX",
@@ -183,14 +183,14 @@ def settings_of_pip(*pip):
 
 
 def python():
-    """Return the path of the Python of .venv."""
+    """Return the path of the Python in .venv."""
     return str(VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python"))
 
 
 def patiently(*command, **settings):
-    """Run a command, a dot every two seconds; if it fails, raise the end of its output.
+    """Run a command and print a dot every two seconds; if it fails, raise the end of its output.
 
-    uv takes the certificates of the system, as pip does: networks of schools have their own.
+    uv uses the certificates of the system, as pip does, because networks of schools have their own.
     """
     uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
     environment = dict(dict(uv, **settings), **dict(os.environ, PIP_USER="0"))
@@ -209,22 +209,22 @@ def patiently(*command, **settings):
 
 
 def read_stamp():
-    """Return what course.py installed into .venv; None if it did not make it."""
+    """Return the record of the lists installed into .venv; None if course.py did not make .venv."""
     try:
         return json.loads((VENV / "made-by-course.txt").read_text())
     except FileNotFoundError:
         return None
-    except ValueError:  # of an earlier version
+    except ValueError:  # an earlier version of course.py wrote it
         return {}
 
 
 def write_stamp(content):
-    """Record the environment that .venv holds."""
+    """Record the lists that are installed into .venv."""
     (VENV / "made-by-course.txt").write_text(json.dumps(content))
 
 
 def fingerprint(path):
-    """Return a text that changes when a file or the folder of the course does."""
+    """Return a text that changes if the file or the path of the course changes."""
     return hashlib.sha256(path.read_bytes() + str(ROOT).encode("utf-8", "replace")).hexdigest()
 
 
@@ -233,6 +233,6 @@ if __name__ == "__main__":
         main()
     except SetUpError as error:
         print("\n%s" % error)
-        sys.exit("Set-up failed; README.md, 'When something goes wrong', may help.")
+        sys.exit("The set-up failed; README.md, 'When something goes wrong', may help.")
     except KeyboardInterrupt:
         sys.exit(130)

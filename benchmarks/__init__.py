@@ -1,1 +1,1 @@
-"""Times of the package beside others, for the same tasks: `python3 course.py bench`."""
+"""Compare times of the package with those of others on the same tasks: `course.py bench`."""

@@ -1,4 +1,4 @@
-"""Hold every contest, print the results, and write the CSV, the figure and the README's table."""
+"""Run all contests, print the results, and write the CSV, the figure and the README's table."""
 
 from pathlib import Path
 
@@ -9,9 +9,9 @@ from benchmarks import contests, figure, report, timing
 
 
 def run(chosen, rng, **options):
-    """Return the rows of contests, and print them; the options are those of `timing.in_turn`."""
+    """Run contests, print and return their rows; the options are those of `timing.in_turn`."""
     machine, rows = timing.describe_machine(), []
-    print(f"{machine}\nTimes of a call and their ratios are medians over rounds.")
+    print(f"{machine}\nThe times of a call and their ratios are medians over rounds.")
     for contest in chosen:
         for n in contest.sizes:
             print(f"{contest.task} {contest.case} N = {n}")
@@ -24,7 +24,7 @@ def run(chosen, rng, **options):
 def main(chosen=contests.CONTESTS, folder=Path(__file__).parent, readme=report.README, **options):
     """Run the contests with the packages that are installed, and write the results."""
     if not contests.roma:
-        print("roma is not installed: the run goes on without it.")
+        print("roma is not installed; the run continues without it.")
     rows = run(chosen, np.random.default_rng(), **options)
     report.write_csv(rows, folder / "benchmarks.csv")
     written = report.read_csv(folder / "benchmarks.csv")

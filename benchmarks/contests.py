@@ -1,4 +1,4 @@
-"""The contests: the tasks as a table, and the methods that are timed on each of them."""
+"""The contests: a table of the tasks, and the methods that are timed on each of them."""
 
 import sys
 import tempfile
@@ -39,18 +39,19 @@ try:
 except ImportError:
     toppra = None
 OURS, SAMPLE, MOMENTS = "rbcourse", 100, np.linspace(0, 1, 101)
-"""The first method of each contest, the number of items with an error, times on an optimum."""
+"""The first method of each contest, the number of items whose error is computed, and the times at
+which an optimum is evaluated."""
 LEGS = {"projected cubics": rb.projected_cubic_se3, "geodesics": rb.geodesic_se3}
 ALONG, E1 = np.pi / 6 * np.array([1, 2, 3]), np.array([1.0, 0, 0])
 CASES = {x: (ALONG, ALONG, ALONG + k * E1) for x, k in (("4a", 0), ("4b", 1), ("4c", 5))}
 CASES["5"] = np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])
 """The rotation vectors and the end velocities of the figures of BK."""
 ENDS = {name: (np.eye(3), rb.exp_so3(turn), w0, w1) for name, (turn, w0, w1) in CASES.items()}
-BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])  # of 1 kg, in kg m²
+BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])  # inertia of a book of 1 kg, in kg m²
 
 
 class Method(NamedTuple):
-    """One way to do a task: the functions that it calls, and the call with prepared input.
+    """A method for a task: the names of its functions, and the call with prepared input.
 
     `value` converts the result for the error; it is None if the results are not comparable. The
     time is divided by `items`, the number of problems that a call solves.
@@ -74,7 +75,7 @@ def nearest_rotation(n, rng):
     if roma:
         tensor = torch.from_numpy(M)
         methods["RoMa"] = Method("special_procrustes", lambda: roma.special_procrustes(tensor))
-    if n <= 1000:  # a millisecond for each
+    if n <= 1000:  # it takes a millisecond for each
         methods["pytransform3d"] = Method(polar.__name__, lambda: [polar(A) for A in M])
     methods["NumPy, SVD alone"] = Method("svd", lambda: np.linalg.svd(M), None)
     return methods, _distance([oracles.nearest_rotation(A) for A in M[:SAMPLE]])
@@ -106,7 +107,7 @@ def geodesic(n, rng):
 
 
 def projected_cubic(n, rng, orders):
-    """Compare a projected cubic at n times; the error of derivatives is from the textbook's."""
+    """Compare a projected cubic at n times; the textbook's derivatives are the reference."""
     t, ends, knots = rng.random(n), ENDS["5"], np.linspace(0, 1, 5)
     few, (R0, R1, w0, w1) = t[:SAMPLE], ends
     ours, theirs = rb.projected_cubic_so3(*ends), textbook.projected_cubic_so3
@@ -164,7 +165,7 @@ def random_samples(n, rng, kind, author, form, name):
 
 
 def chain_of_poses(n, rng, legs, poses=1000):
-    """Compare a chain of poses at n times, in their order; only the evaluation is timed."""
+    """Compare a chain of poses at n increasing times; only the evaluation is timed."""
     when, places = np.cumsum(rng.uniform(0.5, 1.5, poses)), rng.normal(size=(poses, 3)).cumsum(0)
     R, t = rb.exp_so3(rng.normal(0, 0.5, (poses, 3)).cumsum(0)), np.linspace(when[0], when[-1], n)
     motion = rb.chain(when, rb.pose_from_components(R, places), leg=LEGS[legs])
@@ -186,7 +187,7 @@ def chain_of_poses(n, rng, legs, poses=1000):
 
 
 def splines(n, rng):
-    """Compare how curves of n legs, each of 30°, are made; the costs are named."""
+    """Compare the construction of curves with n legs of 30°; the names include the excess costs."""
     axes, t = rng.normal(size=(n, 3)), np.cumsum(rng.uniform(0.5, 1.5, n + 1))
     turns = rb.exp_so3(np.pi / 6 * axes / np.linalg.norm(axes, axis=1)[:, None])
     R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
@@ -228,7 +229,7 @@ def one_optimum(n, rng, case):
 
 
 def one_body(n, rng, case):
-    """Compare a book's least torque, from its ends to 101 rotations; and similar optima."""
+    """Compare a book's least torque, and similar optima, from the ends to 101 rotations."""
     bvp, does = textbook.minimum_torque_so3, "minimum_acceleration_so3, of the book"
     rest = np.zeros(3)
     least = _ours(case, rb.minimum_acceleration_so3, BOOK)
@@ -242,9 +243,9 @@ def one_body(n, rng, case):
 
 
 def stacked_optima(n, rng, least, bvps=20):
-    """Compare n random optima at once with the first of them by `solve_bvp`, one by one.
+    """Compare n random optima at once with the first `bvps` of them by `solve_bvp`, one by one.
 
-    The times are for one problem with a solution. That of `solve_bvp` may be another optimum.
+    The times are for one problem with a solution. `solve_bvp` may find another optimum.
     """
     name, bodily = f"minimum_{least}_so3", least == "torque"
     ours, theirs = getattr(rb, name), getattr(textbook, name)
@@ -300,20 +301,20 @@ def _ours(case, make, *further):
 
 
 def _distance(truth):
-    """Return the function that computes how far the first values are from the true ones."""
+    """Return a function that computes the largest distance of the first values from the truth."""
     n, truth = len(truth), np.asarray(truth)
     return lambda value: np.linalg.norm((value[:n] - truth).reshape(n, -1), axis=1).max()
 
 
 def _true_optimum(ends, G, near=None):
-    """Return 101 rotations of a body's least torque by `solve_bvp`, from a curve nearby."""
+    """Return 101 rotations of a body's least torque by `solve_bvp`, with the guess `near`."""
     near = near or rb.minimum_torque_so3(*ends, G)
     found, _ = oracles.stationary(("effort", G, np.eye(3)), tuple(ends), near)
     return oracles.rotation_of_quaternions(found.sol(MOMENTS)[:4])
 
 
 def timing_of_poses(n, rng):
-    """Compare the fastest timing of a leg within boxes; beside it within norms, and of n poses."""
+    """Compare fastest timings of a leg, with limits on components or norms, and of n poses."""
     steps = rb.exp_se3(rng.uniform(-0.7, 0.7, (n - 1, 6)))
     poses = np.array(list(accumulate(steps, np.matmul, initial=np.eye(4))))
     path, leg, does = rb.chain(np.arange(n), poses), rb.geodesic_se3(*poses[:2]), "fastest, norms"
@@ -330,7 +331,7 @@ def timing_of_poses(n, rng):
 
 
 def _by_toppra(curve, cells):
-    """Return the least time for a curve on [0, 1], within the same boxes, in as many cells."""
+    """Return the least time for a curve on [0, 1] by toppra, with the same limits and cells."""
     linear, s = toppra.constraint.linear_constraint, np.linspace(0, 1, cells + 1)
     V, A = curve(s, 1), curve(s, 2)
 
@@ -351,10 +352,10 @@ def _by_toppra(curve, cells):
 
 
 class Contest(NamedTuple):
-    """Methods for the same task and case, as the CSV names them, for each of some sizes N.
+    """A contest of methods for a task and case, with their names in the CSV, and some sizes N.
 
-    `make` takes N, a generator and the options. It returns the methods, ours first, and the
-    function that computes the error of a value, which `bound` limits, or None.
+    `make` takes N, a generator and the options. It returns the methods, ours first, and a function
+    that computes the error of a value, or None. `bound` is the largest error that is allowed.
     """
 
     task: str

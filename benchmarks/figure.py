@@ -1,4 +1,4 @@
-"""The figure of a run: the time for each item over N, and the times of the optimum."""
+"""Draw the figure of a run: the time for each item over N, and the times of the optimum."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -62,7 +62,7 @@ def draw_over_size(ax, rows):
 
 
 def draw_optimum(ax, rows):
-    """Draw the times of the optimum: a line for each method, a mark for each case."""
+    """Draw the times of the optimum, with a line for each method and a mark for each case."""
     one = [row for row in rows if row["task"] == "optimum, one problem"]
     many = [row for row in rows if row["task"] == "optimum, stacked"]
     names = list(dict.fromkeys(row["method"] for row in one))
@@ -82,7 +82,7 @@ def draw_optimum(ax, rows):
 
 
 def save(fig, path):
-    """Save the figure as PNG and PDF, the same bytes each time, and close it."""
+    """Save the figure as PNG and PDF, with the same bytes each time, and close it."""
     for ending, varying in ((".png", "Software"), (".pdf", "CreationDate")):
         fig.savefig(path.with_suffix(ending), metadata={varying: None})
     plt.close(fig)

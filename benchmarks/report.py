@@ -1,4 +1,4 @@
-"""The report of a run: the printed lines, the CSV, and the table of ratios in README.md."""
+"""Report a run: the printed lines, the CSV, and the table of ratios in README.md."""
 
 import csv
 import math
@@ -18,7 +18,7 @@ TABLE = [
     ("{} random rotation matrices", "random rotation matrices", ""),
     ("{} random quaternions", "random quaternions", ""),
     ("a chain of 1,000 poses at {} times", "chain at N times", "projected cubics"),
-    ("the same of geodesics", "chain at N times", "geodesics"),
+    ("the same with geodesic legs", "chain at N times", "geodesics"),
     ("minimum acceleration through the ends of {} legs", "spline of N legs", "30°"),
     ("the fastest timing of a leg, in 1,000 cells", "fastest timing", "chain of N"),
     ("minimum acceleration, BK Figure 4c", "optimum, one problem", "4c"),
@@ -27,7 +27,7 @@ TABLE = [
     ("least torque, {} random bodies at once", "optimum of a body, stacked", "random"),
     ("{} frames of two cubes as GIF", "cubes as GIF", ""),
 ]
-"""The rows of the README: words with {} for N, task, case."""
+"""The rows of the README: a text with {} in place of N, the task, and the case."""
 
 
 def line(row, bound):
@@ -40,14 +40,14 @@ def line(row, bound):
 
 
 def write_csv(rows, path):
-    """Write rows, all with the same columns, as CSV; numbers with four digits."""
+    """Write rows with the same columns as CSV; numbers have four digits."""
     with open(path, "w", encoding="utf-8", newline="") as file:
         texts = ([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()] for row in rows)
         csv.writer(file, lineterminator="\n").writerows([rows[0], *texts])
 
 
 def read_csv(path):
-    """Return the rows of a CSV that `write_csv` has written; an empty number is None."""
+    """Return the rows of a CSV that `write_csv` wrote; a missing number is None."""
 
     def value(name, text):
         number = int if text.isdigit() else float if text else lambda _: None
@@ -58,7 +58,7 @@ def read_csv(path):
 
 
 def readme_table(rows):
-    """Return the README's table: the times over ours, rounded down, at the largest N."""
+    """Return the README's table of times divided by ours, rounded down, at the largest N."""
     text = "\n| task | time over ours |\n|---|---|\n"
     for words, task, case in TABLE:
         here = [row for row in rows if (row["task"], row["case"]) == (task, case)]
@@ -77,7 +77,7 @@ def rounded_down(ratio):
 
 
 def update_readme(rows, path):
-    """Put the table between the marks of the README."""
+    """Write the table between the marks of the README."""
     before, rest = path.read_text("utf-8").split(START)
     text = before + START + readme_table(rows) + END + rest.split(END)[1]
     path.write_text(text, encoding="utf-8", newline="\n")

@@ -1,4 +1,4 @@
-"""Time the methods of a contest in turn, so that all of them meet the same state of the machine."""
+"""Time the methods of a contest in turn, so that the machine is in the same state for all."""
 
 import os
 import platform
@@ -14,18 +14,18 @@ from benchmarks.contests import roma, torch
 
 TIMES = ("time [s]", "time low [s]", "time high [s]")
 RATIOS = ("times ours [1]", "times ours low [1]", "times ours high [1]")
-"""The columns of median, lower and upper quartile."""
+"""The columns of the median, the lower and the upper quartile."""
 
 
 def compete(contest, n, rng, machine, **timing):
-    """Return the rows of a contest with this N, one for each method: column to value."""
+    """Return a row for each method of a contest with this N, as a dict from columns to values."""
     methods, error = contest.make(n, rng, *contest.options)
     times = in_turn([method.call for method in methods.values()], **timing)
     times /= [method.items for method in methods.values()]
     rows = []
     for (name, method), column in zip(methods.items(), times.T, strict=True):
         off = error and method.value and float(error(np.asarray(method.value(method.call()))))
-        most, hidden = None, name.startswith(("RoMa", "SciPy"))  # from Python
+        most, hidden = None, name.startswith(("RoMa", "SciPy"))  # hidden from Python
         if min(contest.sizes) < n == max(contest.sizes) and not hidden:
             tracemalloc.start()
             method.call()
@@ -41,7 +41,7 @@ def compete(contest, n, rng, machine, **timing):
 
 
 def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter):
-    """Return the seconds for a call, shape (rounds, calls): in each round every one has its turn.
+    """Return the seconds for a call, shape (rounds, calls); each round runs every call.
 
     A short call is repeated until about `loop` seconds have passed. All rounds together take about
     `total` seconds, but there are at least `fewest` and at most `most`.
@@ -61,7 +61,7 @@ def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter)
 
 
 def describe_machine():
-    """Return a line: the processor, the threads, and the versions of the packages."""
+    """Return a line with the processor, the threads, and the versions of the packages."""
     file = Path("/proc/cpuinfo")
     known = re.search(r"model name\s*: (.*)", file.read_text() if file.exists() else "")
     processor = known[1].strip() if known else platform.processor() or platform.machine()

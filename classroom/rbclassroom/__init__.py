@@ -1,6 +1,6 @@
 """The classroom of rbcourse: explorers, surveys, lessons, lectures, problem sets and the book.
 
-It uses only the names that `rbcourse` exports.
+This package uses only the names that `rbcourse` exports.
 """
 
 __version__ = "0.34.0"

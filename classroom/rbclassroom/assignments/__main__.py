@@ -1,4 +1,4 @@
-"""Hand out, collect and grade from the command line, in the folder of the course."""
+"""Hand out, collect and grade problem sets from the command line, in the course's folder."""
 
 import argparse
 import io
@@ -12,23 +12,23 @@ from rbclassroom.assignments.collect import LISTS, collect
 
 
 def main() -> None:
-    """Run ``python -m rbclassroom.assignments``: handout, collect or grade."""
+    """Run a task of ``python -m rbclassroom.assignments``: handout, collect or grade."""
     parser = argparse.ArgumentParser(prog="python -m rbclassroom.assignments")
     tasks = parser.add_subparsers(dest="task", required=True)
     task = tasks.add_parser("handout", help="pack a problem set for students")
-    task.add_argument("set", help="its name: ps1")
-    task.add_argument("--solutions", action="store_true", help="the model answers")
-    task = tasks.add_parser("collect", help="sort what was downloaded from Moodle and Canvas")
+    task.add_argument("set", help="the name of the problem set, such as ps1")
+    task.add_argument("--solutions", action="store_true", help="write the model answers instead")
+    task = tasks.add_parser("collect", help="sort the downloads from Moodle and Canvas")
     task.add_argument("folder", type=Path)
-    task.add_argument("--due", type=datetime.fromisoformat, help='"2026-12-01 23:59"')
-    task = tasks.add_parser("grade", help="grade what was collected")
-    task.add_argument("sets", nargs="*", metavar="set", help="as ps1; all that are submitted")
-    task.add_argument("--require-box", action="store_true", help="refuse to grade without a box")
+    task.add_argument("--due", type=datetime.fromisoformat, help='such as "2026-12-01 23:59"')
+    task = tasks.add_parser("grade", help="grade the collected submissions")
+    task.add_argument("sets", nargs="*", metavar="set", help="such as ps1; by default all sets")
+    task.add_argument("--require-box", action="store_true", help="grade only in a sandbox")
     known, assignments = parser.parse_args(), Path("notebooks", "assignments")
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
+    if isinstance(sys.stdout, io.TextIOWrapper):  # some consoles cannot print every letter
         sys.stdout.reconfigure(errors="replace")
     try:
-        if known.task == "grade":  # nbgrader takes a second to import
+        if known.task == "grade":  # nbgrader is imported here because the import takes a second
             from rbclassroom.assignments.grade import grade
 
             grade(known.sets, assignments, known.require_box)

@@ -1,7 +1,7 @@
-"""nbgrader preprocessors: restore cells, run in a box, make feedback that gives nothing away.
+"""nbgrader preprocessors that restore cells, run in a sandbox, and make feedback without secrets.
 
-`configure` names them in the configuration of nbgrader, so that they also work in its own commands
-and in the formgrader.
+`configure` enters them into the configuration of nbgrader, so that they also work in nbgrader's own
+commands and in the formgrader.
 """
 
 import html
@@ -30,20 +30,20 @@ from rbclassroom.assignments.forbidden import find_in_cells
 from rbclassroom.assignments.locked_cells import Refused, marks_of, name_cell
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 
-UNSEEN = "The tests that are shown here pass; others, which are not shown, fail.\n"
-# pages show students' HTML without parts that run, load files or imitate the page
+UNSEEN = "The visible tests pass, but a hidden test fails.\n"
+# pages show students' HTML without elements that run, load files or imitate the page
 TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt"}
 TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
 TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
 TAGS |= {"th", "thead", "tr", "ul"}
-LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # of MathJax
+LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # a command of MathJax
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
 
 def configure(config: Config) -> None:
-    """Set what nbgrader does with submissions and feedback, and where it finds its tools."""
-    # to make a gradebook it calls alembic by name, which a shell finds in an activated environment
+    """Set the steps of nbgrader for submissions and feedback, and the path of its tools."""
+    # nbgrader calls alembic by name, which is found only in an activated environment
     if not shutil.which("alembic"):
         path = os.environ.get("PATH", os.defpath)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
@@ -51,21 +51,21 @@ def configure(config: Config) -> None:
     config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
     run = [BoxedExecute, nbgrader.IgnorePattern, nbgrader.SaveAutoGrades]
     config.Autograde.autograde_preprocessors = [*run, nbgrader.AssignLatePenalties, end]
-    # nbgrader gives no points where anything is written to stderr, be it a mere warning
+    # by default nbgrader gives no points if a cell writes to stderr, even a warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."
-    # the feedback is of a run that never held the hidden tests; the scores are in the gradebook
+    # the feedback comes from a run without hidden tests; the scores come from the gradebook
     clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
     shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
     config.GenerateFeedback.preprocessors = shown
-    # in the feedback and in the formgrader
+    # the feedback and the formgrader show HTML that cannot run anything
     config.HTMLExporter.sanitize_html = True
     filters = {"clean_html": "inert_html", "markdown2html": "inert_markdown"}
     config.HTMLExporter.filters = {key: f"{__name__}.{name}" for key, name in filters.items()}
 
 
 def inert_html(content: object) -> str:
-    """Return HTML without scripts, styles, frames, forms and links; pictures are embedded ones.
+    """Return HTML without scripts, styles, frames, forms, links and external pictures.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def inert_html(content: object) -> str:
 
 
 class _Renderer(IPythonRenderer):
-    """A renderer of Markdown that writes the addresses of links and of missing pictures."""
+    """A renderer of Markdown that shows addresses of links and of missing pictures as text."""
 
     def link(self, text: str, url: str, title: str | None = None) -> str:
         return f"{text} ({html.escape(url)})"
@@ -95,48 +95,48 @@ class _Renderer(IPythonRenderer):
 
 @pass_context
 def inert_markdown(context: Any, source: str) -> str:
-    """Return the HTML of Markdown, with nothing in it that runs or loads."""
+    """Return the HTML of Markdown without elements that run or load files."""
     attached = context.get("cell", {}).get("attachments", {})
     renderer = _Renderer(escape=False, attachments=attached, exclude_anchor_links=True)
     return inert_html(MarkdownWithMath(renderer=renderer).render(source))
 
 
-class RestoreCells(nbgrader.OverwriteCells):  # which adds the hidden tests
-    """Restore the cells that students must not change; refuse what overrides what tests rely on."""
+class RestoreCells(nbgrader.OverwriteCells):  # its base class adds the hidden tests
+    """Restore the locked cells; refuse code that overrides names and objects of the tests."""
 
     def preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
-        """Restore the notebook as it was released, and note the changes in its metadata."""
+        """Restore the notebook as it was released, and store the remarks in its metadata."""
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
         remarks = locked_cells.restore(nb, original)
         if len(remarks) > 2:
             remarks[1:] = [f"and {len(remarks) - 1} more changes"]
-        for cell in nb.cells:  # what looks like a region stops nbgrader
+        for cell in nb.cells:  # nbgrader stops at text that looks like the mark of a region
             if locked_cells.is_answer(cell) or not marks_of(cell):
                 regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
                 cell.source = re.sub(regions, r"\1-\2", cell.source)
         nb, resources = super().preprocess(nb, resources)
         for at, line, what in find_in_cells(nb.cells):
-            raise Refused(f"{name_cell(nb.cells, at)}, line {line} {what}: grade by hand")
+            raise Refused(f"{name_cell(nb.cells, at)}, line {line} {what}; grade by hand")
         nb.metadata = NotebookNode({"remarks": remarks})
         return nb, resources
 
 
 class BoxedExecute(BoundedClient, nbgrader.Execute):
-    """Run a notebook in a new folder, and in a box where there is one."""
+    """Run a notebook in a new folder, and in a sandbox if one is available."""
 
-    seconds = Integer(600, help="for all cells together, in a box").tag(config=True)
+    seconds = Integer(600, help="the time limit of a notebook in the sandbox").tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: Any, km: Any = None) -> Any:
-        """Run all cells; errors are among the outputs."""
+        """Run all cells, and store errors among the outputs."""
         step: Any = self.parent
         course, name = step.parent.coursedir, resources["nbgrader"]["assignment"]
         source = course.format_path(course.source_directory, ".", name)
         self.folder, path = Path(tempfile.mkdtemp()), resources["metadata"]["path"]
         work = self.folder / "work"
         try:
-            # the files of the set; those of the student could pass for modules of the tests
+            # only files of the set are copied: a student's file could replace a module of the tests
             shutil.copytree(source, work, ignore=shutil.ignore_patterns("*.ipynb", *course.ignore))
             sandbox.prepare(self.folder)
             resources["metadata"]["path"] = str(work)
@@ -152,7 +152,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             faults += [CUT] * (at in self.cut)
             faults += ["takes too much memory"] * ("MemoryError" in errors)
             remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in faults]
-            if at in self.slow:  # in place of where in the tests it was interrupted
+            if at in self.slow:  # replace the traceback, which may quote tests
                 outputs[:] = [output for output in outputs if output.output_type != "error"]
                 said = f"This cell took longer than {self.timeout} s and was stopped."
                 outputs.append(new_output("error", ename="Timeout", evalue="", traceback=[said]))
@@ -161,28 +161,29 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
                     output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
-            failed = marks.get("points") and not marks.get("score", True)  # in the feedback
+            # scores are known only in the run for the feedback
+            failed = marks.get("points") and not marks.get("score", True)
             if locked_cells.is_test(cell) and failed and not errors:
                 outputs.append(new_output("stream", name="stdout", text=UNSEEN))
         return nb, resources
 
     def create_kernel_manager(self) -> Any:
-        """Return a manager of a kernel in a box."""
+        """Return a manager of a kernel in a sandbox."""
         manager = super().create_kernel_manager()
         if not sandbox.missing():
             sandbox.put_in_box(manager, self.folder, self.seconds)
         return manager
 
     def start_new_kernel(self, **kwargs: Any) -> None:
-        """Start the kernel."""
+        """Start the kernel with the environment variables of the sandbox."""
         super().start_new_kernel(env=sandbox.environment(self.folder), **kwargs)
 
     def preprocess_cell(self, cell: NotebookNode, resources: Any, index: int) -> Any:
-        """Run a cell."""
+        """Run a cell; raise `Refused` if the kernel ends or cannot be interrupted."""
         try:
             return super().preprocess_cell(cell, resources, index)
         except (DeadKernelError, CellTimeoutError) as error:
             where = name_cell(self.nb.cells, index)
-            why = f"Python ended in or before {where}, or {self.seconds} s were over: grade by hand"
+            why = f"Python ended in or before {where}, or {self.seconds} s were over; grade by hand"
             stuck = isinstance(error, CellTimeoutError)
             raise Refused(f"{where} cannot be stopped" if stuck else why) from error

@@ -1,6 +1,6 @@
-"""Check a problem set before submission: report changed cells and errors, write the file to submit.
+"""Check a problem set, report changed cells and errors, and write the file to submit.
 
-A student runs this, without nbgrader.
+Students run this module before they submit. It does not need nbgrader.
 """
 
 import argparse
@@ -30,23 +30,23 @@ from rbclassroom.course.notebooks import KERNEL
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
 
-    The student's files are only read. In the file to submit locked cells are as in the original.
+    The student's files are not changed. The file to submit has the locked cells of the original.
     """
     if not path.exists():
-        raise ValueError(f"{path} is missing: there is no such file")
+        raise ValueError(f"{path} does not exist")
     if path.suffix != ".ipynb":
-        raise ValueError(f"{path.name} is no notebook; give the file that ends with .ipynb")
+        raise ValueError(f"{path.name} is not a notebook; give the file that ends with .ipynb")
     notebook = locked_cells.read_notebook(path.read_bytes(), path.name)
     name, given = _find_original(path)
     original = locked_cells.read_notebook(given, name)
     saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     print(f"checking {path.name}, last saved {saved}", flush=True)
     if path.name != name:
-        print(f"it is to be submitted under the name {name}")
+        print(f"the file has to be submitted under the name {name}")
     remarks = locked_cells.restore(notebook, original)
-    for at, line, what in find_in_cells(notebook.cells):  # it could be meant to deceive the tests
+    for at, line, what in find_in_cells(notebook.cells):  # such code could deceive the tests
         where = f"{name_cell(notebook.cells, at)}, line {line}"
-        remarks.append(f"{where} {what}: change it, or a person has to look")
+        remarks.append(f"{where} {what}: change it, or your lecturer has to look at it")
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
         for file in path.parent.iterdir():
@@ -59,17 +59,17 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     content = (nbformat.writes(notebook) + "\n").encode()
     target = write_whole(path.parent / "to_submit" / name, content)
     print(
-        f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run when it is graded; "
+        f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run in grading; "
         f"the file to submit is {target}"
     )
     return target
 
 
 def _find_original(path: Path) -> tuple[str, bytes]:
-    """Return the name and the content of the set as it was handed out; the course can make it."""
+    """Return the name and the content of the original of a set; in the course, generate it."""
     folder, course = path.parent / "original", Path("notebooks", "assignments")
     if course.is_dir() and not folder.exists():
-        from rbclassroom.assignments.handout import release  # a student does not have nbgrader
+        from rbclassroom.assignments.handout import release  # this needs nbgrader
 
         sets = [place.parent.name for place in course.glob("*/*/*.ipynb")]
         name = max((s for s in sets if path.stem.startswith(s)), key=len, default=path.stem)
@@ -77,12 +77,12 @@ def _find_original(path: Path) -> tuple[str, bytes]:
     same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
     if len(same) != 1:
         missing = f"{folder / path.name} is missing"
-        raise ValueError(f"{missing}; unpack the handout again, and work there")
+        raise ValueError(f"{missing}; unpack the handout again, and work in its folder")
     return same[0].name, same[0].read_bytes()
 
 
 class _Client(BoundedClient):
-    """A client that tells where it is, and how long each cell took."""
+    """A client that prints the number of the running cell, and records the time of each cell."""
 
     at, began, took = 0, 0.0, dict[int, float]()
 
@@ -96,9 +96,9 @@ class _Client(BoundedClient):
 
 
 def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
-    """Run all cells, and report errors outside of the problems."""
+    """Run all cells, and return remarks on errors outside of the problems."""
     log = logging.getLogger(__name__)
-    log.setLevel(logging.CRITICAL + 1)  # what there is to say is said here
+    log.setLevel(logging.CRITICAL + 1)  # this module reports the errors itself
     cells, ends = notebook.cells, list[str]()
     client = _Client(notebook, log=log, kernel_name=KERNEL["name"], timeout=seconds)
     client.folder, client.resources = own, {"metadata": {"path": str(own)}}
@@ -106,13 +106,13 @@ def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
         client.execute(env={**os.environ, "IPYTHONDIR": str(own)})
     except (DeadKernelError, CellTimeoutError) as error:
         if isinstance(error, DeadKernelError):
-            why = "it called exit, or used up the memory"
+            why = "the code called exit, or used up the memory"
             ends.append(f"the kernel died in cell {client.at + 1}: {why}")
         cells[client.at].execution_count = None
         ends.append(f"the cells after cell {client.at + 1} were not run")
     except (OSError, RuntimeError, KeyError) as error:
         why = f"Python could not be started, or stopped ({error})"
-        raise ValueError(f"{why}; install what requirements.txt of the handout lists") from error
+        raise ValueError(f"{why}; install requirements.txt of the handout again") from error
     print(flush=True)
     near = f" took more than half of the {seconds} s that grading allows: make it faster"
     slow = {at for at, took in client.took.items() if took > seconds / 2} - {*client.slow}
@@ -130,12 +130,12 @@ def _error(cell: NotebookNode) -> str:
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
-    hint = lines[-1] and errors[-1].ename == "NotYet"  # it speaks for itself
+    hint = lines[-1] and errors[-1].ename == "NotYet"  # its text needs no name of an error
     return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
 
 
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
-    """Print a line a problem, under its title; return which of the visible tests passed."""
+    """Print a line with the title of each problem; return which of the visible tests passed."""
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered = [], True
@@ -153,7 +153,7 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
         elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
             found.append(("hidden", f"{where} has hidden tests only"))
         elif is_test(cell):
-            error = error or ("" if cell.execution_count else "it was not run to its end")
+            error = error or ("" if cell.execution_count else "was not run to its end")
             passed.append(not error)
             if answered or not error:
                 found.append(("FAILED", f"{where} {error}") if error else ("passed", ""))
@@ -169,8 +169,8 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
 def main() -> None:
     """Check a problem set: ``python -m rbclassroom.assignments.check FILE.ipynb``."""
     parser = argparse.ArgumentParser(prog="python -m rbclassroom.assignments.check")
-    parser.add_argument("file", type=Path, help="the notebook to be handed in: ps1.ipynb")
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a console may not know every letter
+    parser.add_argument("file", type=Path, help="the notebook to hand in, such as ps1.ipynb")
+    if isinstance(sys.stdout, io.TextIOWrapper):  # some consoles cannot print every letter
         sys.stdout.reconfigure(errors="replace")
     try:
         check(parser.parse_args().file.absolute())

@@ -1,7 +1,7 @@
 """Find code in a submission that overrides names and objects of the tests.
 
-The code is read and not run. Accidents and simple tricks are found; code that an expert hides
-carefully is not.
+The code is read but not run. The search finds accidents and simple tricks, but not code that an
+expert hides carefully.
 """
 
 import ast
@@ -15,9 +15,9 @@ from nbformat import NotebookNode
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
 
-# each gives access to objects that do not appear in the code
+# each of these names gives access to objects that do not appear in the code
 NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
-NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # executed code and tests
+NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # In and _ih hold the tests
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
@@ -38,13 +38,13 @@ LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast
 
 
 def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
-    """Return each place where a student overrides names of tests: index of cell, line, action."""
+    """Return the index of the cell, the line and the action where code overrides names of tests."""
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
     names = {_defines(node) for node in given} - {""}
     attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
-    modules = set[str]()  # and names of their contents
+    modules = set[str]()  # names of modules and of their contents
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))
@@ -55,7 +55,7 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
 
 
 def _parsed(source: str) -> ast.Module:
-    """Return the code; nothing if it is not Python, and so does not run."""
+    """Return the syntax tree of the code; an empty tree if it is not Python and so cannot run."""
     for text in (HARMLESS.sub("pass", TIMED.sub("", source)), source):
         try:
             tree = ast.parse(TransformerManager().transform_cell(text))
@@ -66,7 +66,7 @@ def _parsed(source: str) -> ast.Module:
 
 
 def _defines(node: ast.AST) -> str:
-    """Return the name to which a node of a locked cell gives a meaning, or nothing."""
+    """Return the name that a node of a locked cell defines, or "" if it does not define a name."""
     if isinstance(node, ast.alias):
         return node.asname or node.name.partition(".")[0]
     if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -75,14 +75,14 @@ def _defines(node: ast.AST) -> str:
 
 
 def _root(node: ast.AST) -> str:
-    """Return the name at the root of a chain of attributes, or nothing."""
+    """Return the name at the root of a chain of attributes, or "" if the root is not a name."""
     while isinstance(node, ast.Attribute):
         node = node.value
     return node.id if isinstance(node, ast.Name) else ""
 
 
 def _rebound(node: ast.AST, local: bool) -> list[str]:
-    """Return the names that a node binds in the notebook, except by customary imports."""
+    """Return the names that a node binds in the notebook, without those of customary imports."""
     match node:
         case ast.Global(names=names):
             return names
@@ -93,7 +93,7 @@ def _rebound(node: ast.AST, local: bool) -> list[str]:
         case ast.alias(name=name, asname=short) if not local:
             usual = CUSTOMARY.get(short or "", short)
             return [short] if short and usual != name.rpartition(".")[2] else []
-    return [] if local else [getattr(node, "name", "")]  # of definitions, and in match
+    return [] if local else [getattr(node, "name", "")]  # definitions and patterns of match
 
 
 def _overrides(
@@ -112,7 +112,7 @@ def _overrides(
             case ast.Attribute(attr=name, ctx=ast.Load()) if name in ATTRIBUTES:
                 yield node.lineno, f"uses {name}"
             case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
-                root = _root(node)  # `self` is an object that the student describes
+                root = _root(node)  # `self` is an object of a class of the student
                 if root in modules or (name in attributes and root != "self"):
                     yield node.lineno, f"replaces {ast.unparse(node)}"
             case ast.Call(func=ast.Name(id="getattr"), args=args):

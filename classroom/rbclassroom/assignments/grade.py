@@ -1,4 +1,4 @@
-"""Grade problem sets: each submission on its own, with feedback and a table of the points."""
+"""Grade each submission of a problem set; write the feedback and a table of the points."""
 
 import csv
 import glob
@@ -36,26 +36,26 @@ from rbclassroom.assignments.tables import update
 WORKERS = 2  # number of students that are graded at once
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
-Job = tuple[str, str]  # a set and a student
+Job = tuple[str, str]  # the names of a set and of a student
 Row = dict[str, Any]
 
 
 def grade(names: Iterable[str], assignments: Path, require_box: bool = False) -> list[Path]:
-    """Grade all submissions of some sets, or of all sets that there are submissions of.
+    """Grade all submissions of some sets, by default of all sets with submissions.
 
-    A line is printed for each submission; feedback and a table for each set are written. Points
-    given by hand are kept. A submission that is refused loses the points that a
-    machine gave it before, and its feedback. When points of one student change while another is
-    graded, or exceed the maximum, a ValueError names them and no table is written;
-    ``gradebook.before-NAME.db`` holds the gradebook as it was.
+    The function prints a line for each submission, and writes feedback and a table for each set.
+    Points given by hand are kept. A submission that is refused loses its feedback and its earlier
+    automatic points. If points of one student change while another is graded, or exceed the
+    maximum, a ValueError names the student and no table is written. The file
+    ``gradebook.before-NAME.db`` is a copy of the gradebook before the run.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:
-        raise ValueError("There are no submissions: submitted/STUDENT/ps1/ps1.ipynb")
+        raise ValueError("There are no submissions, such as submitted/STUDENT/ps1/ps1.ipynb.")
     if why := sandbox.missing():
         if require_box:
-            raise ValueError(f"There is no box for submissions: {why}")
-        print(f"Submissions run without a box, and can do what you can: {why}", flush=True)
+            raise ValueError(f"There is no sandbox for submissions: {why}")
+        print(f"Submissions run without a sandbox and with all your rights: {why}", flush=True)
     jobs, tables = [job for name in chosen for job in _prepare(name, assignments)], []
     rows: dict[Job, Row] = {}
     for (name, student), row in _graded(jobs, assignments, not why):
@@ -77,16 +77,16 @@ def grade(names: Iterable[str], assignments: Path, require_box: bool = False) ->
 
 
 def _prepare(name: str, assignments: Path) -> list[Job]:
-    """Bring the gradebook and the files of a set up to date; return what there is to grade."""
+    """Update the gradebook and the files of a set; return the submissions to grade."""
     config = course_config(name, assignments)
     students = sorted(path.parent.name for path in assignments.glob(f"submitted/*/{name}/"))
     if not students:
-        raise ValueError(f"There is no submission of {name}: submitted/STUDENT/{name}/{name}.ipynb")
+        raise ValueError(f"{name}: a submission in submitted/STUDENT/{name}/ is wanted, got none")
     table = assignments / f"{name}-grades.csv"
     try:
         table.open("a").close()
     except PermissionError as error:
-        raise ValueError(f"{table} cannot be written: close it where it is open") from error
+        raise ValueError(f"{table} cannot be written; close it in other programs") from error
     before = Path(config.CourseDirectory.root, "gradebook.db")
     if before.exists():
         shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
@@ -98,7 +98,7 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
 
 
 def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[Job, Row]]:
-    """Grade submissions, several at once but one of a student; yield the row of each."""
+    """Grade several submissions at once, but one per student at a time; yield the row of each."""
     course, todo = CourseDirectory(config=course_config(jobs[0][0], assignments)), list(jobs)
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY,))
@@ -123,13 +123,16 @@ def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[J
                     known, before = _points(gradebook), known
                 if others := sorted({other for other, *_ in known ^ before} - at_work):
                     when = f"during the grading of {' and '.join(sorted(at_work))}"
-                    where = f"gradebook.before-{name}.db holds what they were"
+                    where = f"The earlier points are in gradebook.before-{name}.db."
                     raise ValueError(f"The points of {others[0]} changed {when}. {where}")
                 yield (name, student), row
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
-    """Yield the files that `collect` could not use, perhaps for this set, and who is missing."""
+    """Yield files that `collect` could not use, which may be of this set, and missing students.
+
+    The reason is the second item of each pair.
+    """
     report = assignments / "submitted" / "report.csv"
     if not report.exists():
         return
@@ -137,7 +140,7 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
     for row in csv.DictReader(io.StringIO(report.read_text("utf-8-sig"), newline="")):
         what, student = row["what"], row["what"].removesuffix(f", {name}")
         if row["list"] == "missing" and student != what and student not in students:
-            yield student, "nothing was collected"
+            yield student, "no file was collected"
         elif row["list"] in ("refused", "unmatched"):
             named = {each for each in sets if each in what.casefold()}
             if name in named or not named:
@@ -156,7 +159,7 @@ def course_config(name: str, assignments: Path) -> Config:
 
 
 def run_step(converter: Any, config: Config) -> dict[str, Any]:
-    """Run a step of nbgrader, replacing earlier results, and print nothing."""
+    """Run a step of nbgrader without printing; replace earlier results."""
     log = logging.getLogger(__name__)
     log.propagate, log.handlers = False, [logging.NullHandler()]
     step = converter(CourseDirectory(config=config), config=config, log=log)
@@ -165,7 +168,7 @@ def run_step(converter: Any, config: Config) -> dict[str, Any]:
 
 
 def last_line(done: dict[str, str]) -> str:
-    """Return what went wrong in a run of nbgrader, as one line."""
+    """Return the error in a run of nbgrader, as one line."""
     log, kinds = done.get("log", ""), "Error|Exception|Entry|Refused"
     raised = re.findall(rf"(?m)^ *([\w.]*({kinds}))(?:: (.*))?$", log)
     refused = [what for _, kind, what in raised if kind == "Refused"]
@@ -180,13 +183,13 @@ def _points(gradebook: Any) -> set[tuple[str, str, float]]:
 
 
 def _begin(memory: int) -> None:
-    """Silence this process, bound its memory, and let it end with its parent."""
+    """Silence this process, limit its memory, and let it end with its parent."""
     parent: Any = parent_process()
     Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
     with open(os.devnull, "r+b") as nowhere:
         for stream in (0, 1, 2):
             os.dup2(nowhere.fileno(), stream)
-    if sys.platform == "linux":  # others have the limit, and do not keep it
+    if sys.platform == "linux":  # other systems do not enforce this limit
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
@@ -195,15 +198,15 @@ def _begin(memory: int) -> None:
 def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     """Grade one submission; return remarks on it."""
     if boxed and sandbox.missing():
-        raise Refused(f"there is no box any more: {sandbox.missing()}")
+        raise Refused(f"the sandbox does not work any more: {sandbox.missing()}")
     config = course_config(name, folder)
-    if hasattr(signal, "alarm"):  # should all else fail, in two runs
+    if hasattr(signal, "alarm"):  # a second limit on the time of the two runs
         signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)
-    if glob.escape(student) != student:  # nbgrader would take it for a pattern
-        raise Refused("the name of the folder holds [, * or ?: give it another")
+    if glob.escape(student) != student:  # nbgrader would read the name as a pattern
+        raise Refused("the name of the folder contains [, * or ?; rename the folder")
     given = {path.name for path in find_set(name, folder).iterdir()}
     check_submission(folder / "submitted" / student / name, name, given)
     done = run_step(Autograde, config)
@@ -211,18 +214,18 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
         raise Refused(last_line(done))
     remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
     changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
-    remarks += [f"{key} is another answer than when it was graded before" for key in changed]
+    remarks += [f"the answer {key} differs from the one that was graded before" for key in changed]
     done = run_step(GenerateFeedback, config)
     if done["success"]:
         page = folder / "feedback" / student / name / f"{name}.html"
         page.write_text(_with_titles(page.read_text("utf-8"), graded), "utf-8")
     else:
-        remarks.append(f"no feedback: {last_line(done)}")
+        remarks.append(f"no feedback was written: {last_line(done)}")
     return remarks
 
 
 def _with_titles(page: str, graded: Path) -> str:
-    """Return a page of feedback whose list names problems, where nbgrader has "Test cell"."""
+    """Return a page of feedback whose list has titles of problems in place of "Test cell"."""
     cells, names = nbformat.read(graded, as_version=4).cells, {}
     for at, cell in enumerate(cells):
         title = re.sub(r" \(\d+ points?\)$", "", locked_cells.title_of(cells, at))
@@ -232,33 +235,33 @@ def _with_titles(page: str, graded: Path) -> str:
 
 
 def _words(path: Path) -> dict[str, str]:
-    """Return the answers that a human grades, as they were graded last."""
+    """Return the texts of the answers that a person grades, in a notebook that was graded."""
     cells = nbformat.read(path, as_version=4).cells if path.exists() else []
     words = (cell for cell in cells if is_answer(cell) and locked_cells.marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}
 
 
 def check_submission(folder: Path, name: str, given: set[str]) -> None:
-    """Refuse notebooks that nbgrader cannot read, and links and foreign files."""
+    """Raise `Refused` if nbgrader cannot read the notebook, or for links or additional files."""
     wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
     path = folder / wanted
     if wanted not in there:
-        raise Refused(f"there is no {wanted}, but {', '.join(there) or 'nothing'}")
+        raise Refused(f"the file {wanted} is wanted, got {', '.join(there) or 'nothing'}")
     if any(place.is_symlink() for place in (folder, folder.parent, *folder.rglob("*"))):
-        raise Refused(f"{wanted}, or what is beside it, is a link")
+        raise Refused(f"{wanted} or a file or folder beside it is a link")
     if others := sorted(set(there) - given - {wanted, "timestamp.txt"}):
-        raise Refused(f"there is more than {wanted}: take away {', '.join(others)}")
+        raise Refused(f"the folder has more files than {wanted}: remove {', '.join(others)}")
     if path.stat().st_size > LARGEST:
         raise Refused(f"{wanted} has more than {LARGEST:,} bytes")
     content = path.read_bytes()
     locked_cells.read_notebook(content, wanted)
     if content.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
-        raise Refused(f"{wanted} is not plain UTF-8: collect it again, or save it in Jupyter")
+        raise Refused(f"{wanted} is not in plain UTF-8; collect it again, or save it in Jupyter")
 
 
 def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[str]]) -> Row:
     """Return the row of a student in the table."""
-    if error := work.exception():  # the others are graded
+    if error := work.exception():  # grading of the others goes on
         _withdraw(gradebook, root, name, student)
         why = str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
         why = "its process ended, or took too long" if isinstance(error, BrokenExecutor) else why
@@ -269,7 +272,7 @@ def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[
     extra = sum(grade.extra_credit or 0 for grade in grades)
     if submission.score > submission.max_score + extra:
         total = f"{submission.score:g} of {submission.max_score:g}"
-        raise ValueError(f"{student} has {total} points: look at the gradebook")
+        raise ValueError(f"{student} has {total} points; look at the gradebook")
     to_do = [g.name for g in grades if g.auto_score is None and g.manual_score is None]
     late = submission.assignment.total_seconds_late
     return {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades} | {
@@ -289,7 +292,7 @@ def _tidy(words: str) -> str:
 
 
 def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:
-    """Remove the automatic points of a submission that is refused now."""
+    """Remove the feedback and the automatic points of a submission that is refused now."""
     for step in ("autograded", "feedback"):
         if (root / step / student / name).exists():
             rmtree(str(root / step / student / name))

@@ -1,4 +1,4 @@
-"""Pack a problem set for students: the notebook, the package, and a page on how to begin."""
+"""Pack a problem set for students: the notebook, the package, and instructions."""
 
 import copy
 import io
@@ -29,31 +29,34 @@ LEFTOVER = re.compile(
     r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
     re.IGNORECASE,
 )
-# as `nbgrader generate_assignment` does
+# the steps of `nbgrader generate_assignment`
 STEPS = [nbgrader.LockCells, nbgrader.ClearSolutions, nbgrader.ClearOutput]
 STEPS += [nbgrader.CheckCellMetadata, nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme]
 STEPS += [nbgrader.ComputeChecksums]
 
 
 def find_set(name: str, assignments: Path) -> Path:
-    """Return the folder of a problem set; a private one goes before that of the course."""
+    """Return the folder of a problem set; a private set replaces the course's set of that name."""
     folders = [p for step in ("source", "private") for p in sorted(assignments.glob(f"{step}/*/"))]
     sets = {p.name: p for p in folders if (p / f"{p.name}.ipynb").is_file()}
     if name not in sets:
-        there = ", ".join(sorted(sets)) or "none; this is run in the folder of the course"
-        raise ValueError(f"There is no problem set {name}; there are: {there}.")
+        there = ", ".join(sorted(sets)) or "none; run this in the folder of the course"
+        raise ValueError(f"set: one of the problem sets is wanted ({there}), got {name}")
     return sets[name]
 
 
 def read_config(assignments: Path) -> Config:
-    """Return what nbgrader_config.py says."""
+    """Return the settings in nbgrader_config.py."""
     if not (assignments / "nbgrader_config.py").is_file():
         return Config()
     return PyFileConfigLoader("nbgrader_config.py", path=str(assignments)).load_config()
 
 
 def release(name: str, assignments: Path) -> dict[str, bytes]:
-    """Return what ``nbgrader generate_assignment`` makes, checked to give nothing away."""
+    """Return the files that students get, as ``nbgrader generate_assignment`` makes them.
+
+    Raise ValueError if a file shows a solution, a hidden test or a mark scheme.
+    """
     source, config = find_set(name, assignments), read_config(assignments)
     update(source)
     given = nbformat.read(source / f"{name}.ipynb", as_version=4)
@@ -74,17 +77,17 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
 
 
 def _leak(name: str, given: NotebookNode, notebook: NotebookNode, files: dict[str, bytes]) -> str:
-    """Return which file shows solutions, hidden tests or mark schemes of a notebook, if any."""
+    """Return a message about a file that shows solutions, hidden tests or mark schemes, or ""."""
     taken, common = _lines(given) - _lines(notebook), ("import ", "from ", "raise ")
     secrets = sorted(line for line in taken if len(line) >= 12 and not line.startswith(common))
     if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
-        return "nbgrader leaves the attachment of an answer there"
+        return "an answer has an attachment, and nbgrader does not remove attachments"
     for path, content in files.items():
         text = content.decode("utf-8", errors="replace")
         if path == f"{name}.ipynb":
             text = "\n".join(f"{cell.source}\n{cell.metadata}" for cell in notebook.cells)
         elif path.endswith(".ipynb"):
-            return f"{path} is a second notebook; a set has one"
+            return f"a set has one notebook, and {path} is a second one"
         if shown := [*(line for line in secrets if line in text), *LEFTOVER.findall(text)]:
             return f"{path} gives away {shown[0]!r}"
     return ""
@@ -95,10 +98,10 @@ def _lines(notebook: NotebookNode) -> set[str]:
 
 
 def build_wheel(course: Path) -> tuple[str, bytes]:
-    """Build a distribution, the same byte for byte each time, without the network."""
+    """Build the wheel of a distribution, with the same bytes each time, without the network."""
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, "-m", "flit_core.wheel", "--outdir", folder]
-        own = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the first day a zip knows
+        own = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the earliest date in a zip
         subprocess.run(words, cwd=course, env=own, check=True, capture_output=True)
         (built,) = Path(folder).glob("*.whl")
         return built.name, built.read_bytes()
@@ -119,24 +122,24 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
         **wheels,
     }
     if taken := files.keys() & own.keys():
-        raise ValueError(f"{name}: {min(taken)} is a name that the handout needs")
+        raise ValueError(f"{name}: the handout needs the name {min(taken)} for a file of its own")
     packed = pack({f"{name}/{path}": data for path, data in {**files, **own}.items()})
     return write_whole(assignments / "handouts" / f"{name}.zip", packed)
 
 
 def pack(files: dict[str, bytes]) -> bytes:
-    """Return files as a zip, the same bytes each time."""
+    """Return a zip of files, with the same bytes each time."""
     packed = io.BytesIO()
     with ZipFile(packed, "w") as archive:
         for path, data in sorted(files.items()):
-            entry = ZipInfo(path)  # of the first day a zip knows
+            entry = ZipInfo(path)  # with the earliest date in a zip
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
     return packed.getvalue()
 
 
 def make_solutions(name: str, assignments: Path) -> Path:
-    """Write ``handouts/NAME-solutions.ipynb``: model answers, run, without hidden tests."""
+    """Write ``handouts/NAME-solutions.ipynb``: model answers and outputs, without hidden tests."""
     source = find_set(name, assignments)
     update(source)
     notebook = nbformat.read(source / f"{name}.ipynb", as_version=4)

@@ -1,7 +1,7 @@
 """Read a problem set, and restore the locked cells from the original.
 
-Students and graders use the same functions. Cells are identified by their grade_id, as nbgrader
-does, but without nbgrader: students do not have it.
+The check and the grading use the same functions. Cells are identified by their grade_id, as in
+nbgrader. The module does not import nbgrader, because students do not have it.
 """
 
 import copy
@@ -16,7 +16,7 @@ from nbformat import NotebookNode
 
 
 class Refused(ValueError):
-    """A submission that cannot be graded by machine; the message says why."""
+    """An error for a submission that cannot be graded automatically; the message has the reason."""
 
 
 def decode(content: bytes) -> str:
@@ -26,22 +26,22 @@ def decode(content: bytes) -> str:
 
 
 def read_notebook(content: bytes, name: str) -> NotebookNode:
-    """Return the notebook in a file; the error describes the file and suggests a solution."""
+    """Return the notebook in a file; raise `Refused` with a remedy if it cannot be read."""
     if not content.strip():
-        raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start anew")
+        raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start again")
     if content.startswith((b"%PDF", b"PK")):
-        raise Refused(f"{name} is no notebook, but a PDF or an archive; hand in the notebook")
-    logging.disable()  # nbformat logs and warns of cells without ids, which get them later
+        raise Refused(f"{name} is a PDF or an archive, not a notebook; hand in the notebook")
+    logging.disable()  # nbformat warns of cells without ids, which `restore` adds
     try:
         with warnings.catch_warnings(action="ignore"):
             notebook = nbformat.reads(decode(content), as_version=4)
             nbformat.validate(notebook)
         if not notebook.cells:
             raise ValueError("it has no cells")
-    except Exception as error:  # nbformat raises many kinds
+    except Exception as error:  # nbformat raises many kinds of errors
         why = (str(error).splitlines() or [type(error).__name__])[0][:80]
         cure = "take an earlier copy, or open it in JupyterLab and save it again"
-        raise Refused(f"{name} is damaged or no notebook ({why}); {cure}") from error
+        raise Refused(f"{name} is damaged or not a notebook ({why}); {cure}") from error
     finally:
         logging.disable(logging.NOTSET)
     return notebook
@@ -54,12 +54,12 @@ def marks_of(cell: NotebookNode) -> dict[str, Any]:
 
 
 def grade_id(cell: NotebookNode) -> str:
-    """Return the name by which nbgrader knows a cell."""
+    """Return the name that nbgrader gives to a cell."""
     return str(marks_of(cell).get("grade_id") or "")
 
 
 def is_answer(cell: NotebookNode) -> bool:
-    """Tell whether a cell is to be written by the student."""
+    """Tell whether a cell holds an answer of the student."""
     return bool(marks_of(cell).get("solution"))
 
 
@@ -69,14 +69,14 @@ def is_test(cell: NotebookNode) -> bool:
 
 
 def title_of(cells: list[NotebookNode], at: int) -> str:
-    """Return the last heading above a cell, or in it, that is not the student's."""
+    """Return the last heading in or above a cell, except for headings of the student."""
     given = [c for c in cells[: at + 1] if c.cell_type == "markdown" and not is_answer(c)]
     text = "\n".join(cell.source for cell in given if grade_id(cell))
     return (re.findall(r"^#+\s+(.+?)\s*$", text, re.MULTILINE) or [""])[-1]
 
 
 def name_cell(cells: list[NotebookNode], at: int) -> str:
-    """Return words by which a person finds a cell."""
+    """Return a description by which a person finds a cell."""
     cell, title = cells[at], title_of(cells, at)
     given = "answer" if is_answer(cell) else "test" if is_test(cell) else "locked cell"
     kind = given if grade_id(cell) else "added cell"
@@ -86,8 +86,9 @@ def name_cell(cells: list[NotebookNode], at: int) -> str:
 def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     """Restore the locked cells of a notebook, and return a remark for each change.
 
-    The answers stay. Of several cells with a name the last one counts, and the others become
-    cells of the student; these lose their metadata, which could keep them from being run.
+    Answers are not changed. If several cells have the same name, the last one counts, and the
+    others become cells of the student. Cells of the student lose their metadata, which could keep
+    them from being run.
     """
     cells, wanted = notebook.cells, {grade_id(c): c for c in original.cells if grade_id(c)}
     last = {grade_id(cell): at for at, cell in enumerate(cells) if grade_id(cell)}
@@ -101,17 +102,17 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
             remarks += _put_back(cells, at, wanted[name])
             continue
         if name in wanted:
-            counts = f"is there again as cell {last[name] + 1}, which counts"
+            counts = f"cell {last[name] + 1} has the same name, and counts"
             remarks.append(f"{name_cell(cells, at)}: {counts}")
         cell.metadata = NotebookNode()
     above = -1
     for name, missing in wanted.items():
         if name not in map(grade_id, cells):
             cells.insert(above + 1, copy.deepcopy(missing))
-            remarks.append(f"{name_cell(cells, above + 1)} was missing; it is put back")
+            remarks.append(f"{name_cell(cells, above + 1)} was missing; it is restored")
         above = [grade_id(cell) for cell in cells].index(name)
     if [grade_id(cell) for cell in cells if grade_id(cell)] != list(wanted):
-        remarks.append("cells are not in the order of the original; they are run in yours")
+        remarks.append("cells are not in the order of the original; they are run in your order")
     used = {""}
     for cell in cells:
         if cell.get("id", "") in used:
@@ -139,4 +140,4 @@ def _put_back(cells: list[NotebookNode], at: int, wanted: NotebookNode) -> list[
             kept.attachments = cell.attachments
     cells[at] = kept
     what = " and ".join(change for change, made in changes.items() if made)
-    return [f"{name_cell(cells, at)} {what}; it is put back"] if what else []
+    return [f"{name_cell(cells, at)} {what}; it is restored"] if what else []

@@ -1,8 +1,8 @@
-"""Problems that give hints: a student's function compared with answers and known mistakes.
+"""Compare a student's function with the right answers and with known mistakes, and give hints.
 
-A right function is accepted; for any other `NotYet` is raised, with one hint as its text. The data
+A correct function is accepted. For any other function, `NotYet` is raised with one hint. The data
 of a problem are numbers: inputs, right answers, and the results of functions that make a known
-mistake. A student's function that agrees with one of these on each input gets its hint.
+mistake. If a student's function agrees with a mistake on each input, it gets the hint.
 """
 
 import copy
@@ -16,12 +16,12 @@ from rbclassroom.assignments.student_code import NotYet, call_student
 from rbcourse import Array
 
 IN_RADIANS = (
-    "Angles are in radians here, and NumPy's functions take and give radians: convert none."
+    "Angles are in radians here, and NumPy's functions take and return radians: convert nothing."
 )
 
 
 class Mistake(NamedTuple):
-    """A common mistake: the hint, and the results of some functions that make it on all inputs."""
+    """A common mistake: a hint, and the results on all inputs of functions that make it."""
 
     hint: str
     results: Sequence[Sequence[Any]]
@@ -29,11 +29,11 @@ class Mistake(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """A function to be written, which returns numbers.
+    """A problem whose answer is a function that returns numbers.
 
     The `inputs` distinguish every mistake from the answer and from the other mistakes. A result may
-    be off by `accuracy`, in units of the largest entry, or of 1; its entries with the indices
-    `angles` count up to full turns.
+    differ from the answer by `accuracy` times the largest entry of the answer, or times 1 if this
+    is larger. Entries with the indices `angles` are compared up to full turns.
     """
 
     names: Sequence[str]  # of the arguments
@@ -47,7 +47,7 @@ class Problem:
     def accepts(self, function: Callable[..., Any]) -> bool:
         """Compare a function with the answer on all inputs."""
         self._examine(function)
-        print("As it should be, on these inputs. Others are tried when it is graded.")
+        print("The function is correct on these inputs. Grading tries others.")
         return True
 
     def on(self, inputs: Sequence[Sequence[Any]], answers: Sequence[Any]) -> Self:
@@ -55,7 +55,7 @@ class Problem:
         return replace(self, inputs=inputs, answers=answers, mistakes=())
 
     def same(self, got: Any, wanted: Any) -> bool:
-        """Return whether two results are the same, to the accuracy of the problem."""
+        """Return whether two results agree to the accuracy of the problem."""
         one, other, angles = as_numbers(got), as_numbers(wanted), list(self.angles)
         if one is None or other is None or one.shape != other.shape:
             return False
@@ -75,7 +75,7 @@ class Problem:
             raise NotYet(hint)
         numbers = [(value, as_numbers(value)) for value in given]
         meant = [value if number is None else np.radians(number) for value, number in numbers]
-        if hint := self._hint(meant):  # in degrees
+        if hint := self._hint(meant):  # the results are in degrees
             raise NotYet(f"{IN_RADIANS} There is a second mistake: {hint}")
         first = right.index(False)
         arguments = zip(self.names, self.inputs[first], strict=False)
@@ -84,7 +84,7 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            trials = zip(given, *mistake.results, strict=True)  # at each input one or another
+            trials = zip(given, *mistake.results, strict=True)  # inputs may match different ones
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""
@@ -93,7 +93,7 @@ class Problem:
         arguments = tuple(copy.deepcopy(trial))
         (result,) = call_student(function, arguments, self.allowed)
         if not _unchanged(tuple(trial), arguments):
-            raise NotYet("Your function changes the arguments that it is given. Work on a copy.")
+            raise NotYet("Your function changes its arguments. Work on a copy.")
         return result
 
     def _describe(self, called: str, got: Any, wanted: Any) -> str:
@@ -103,11 +103,11 @@ class Problem:
         if numbers is None:
             complex_ = isinstance(got, np.ndarray | complex) and np.iscomplexobj(got)
             why = " It is complex: return its real part." if complex_ else ""
-            return f"{called} your function returns no real numbers but {show(got)}.{why}"
+            return f"{called} your function should return real numbers, not {show(got)}.{why}"
         if numbers.shape != wanted.shape:
             return f"{called} the shape {wanted.shape} is wanted; yours is {numbers.shape}."
         if not np.isfinite(numbers).all():
-            why = "Is something divided by 0?"
+            why = "Do you divide by 0?"
             return f"{called} your result is not finite: {show(numbers)}. {why}"
         text = f"{called} the result should be {show(wanted)}; yours is {show(numbers)}"
         return f"{text}, off by {np.abs(numbers - wanted).max(initial=0):.1g}."
@@ -115,11 +115,11 @@ class Problem:
 
 @dataclass(frozen=True)
 class Drawing(Problem):
-    """A function to be written that draws: judged by the data of its artists.
+    """A problem whose answer is a function that draws; the data of its artists are compared.
 
     The student's function gets axes before the arguments of `inputs`. A result is a list of
-    curves, each an array of points, shape (n, 2); others may be drawn besides. The bars of a
-    histogram are a curve too: middle and height of each. Both axes need a label.
+    curves, each an array of points, shape (n, 2); the function may draw others, too. The bars of a
+    histogram are a curve through the middle of the top of each bar. Both axes need a label.
     """
 
     accuracy: float = 1e-6
@@ -129,11 +129,11 @@ class Drawing(Problem):
         axes = self._draw(function, self.inputs[0])
         for name, label in (("x", axes.get_xlabel()), ("y", axes.get_ylabel())):
             if not label.strip():
-                needs = f"The {name} axis needs a label: what, and its unit."
+                needs = f"The {name} axis needs a label with the quantity and its unit."
                 raise NotYet(f"The curves are right. {needs}")
 
     def same(self, got: Any, wanted: Any) -> bool:
-        """Return whether each wanted curve is among those that were drawn, from either end."""
+        """Return whether each wanted curve was drawn, in either direction."""
         drawn = [*got, *(curve[::-1] for curve in got)]
         return all(any(super(Drawing, self).same(d, w) for d in drawn) for w in wanted)
 
@@ -145,7 +145,7 @@ class Drawing(Problem):
 
     def _describe(self, called: str, got: Any, wanted: Any) -> str:
         if not got:
-            return "Nothing was drawn on the axes that your function was given."
+            return "Your function drew nothing on the axes that it was given."
         lost = next(curve for curve in wanted if not self.same(got, [curve]))
         near = next((curve for curve in got if curve.shape == lost.shape), None)
         if near is None:
@@ -183,7 +183,7 @@ def curves_of(axes: Any) -> list[Array]:
         if (style := line.get_drawstyle()) != "default":
             outlines.append(np.column_stack(STEP_LOOKUP_MAP[style](*line.get_xydata().T)))
     for a, b in ((np.array(outline[:-1]), np.array(outline[1:])) for outline in outlines):
-        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # each runs to the right
+        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # the tread of a step runs to the right
         found.append((a + b)[treads] / 2)
     for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
         found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))
@@ -192,7 +192,7 @@ def curves_of(axes: Any) -> list[Array]:
 
 
 def as_numbers(value: Any) -> Array | None:
-    """Return a result as an array of floats, or None if it is no such thing."""
+    """Return a result as an array of floats, or None if it cannot be converted."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -201,7 +201,7 @@ def as_numbers(value: Any) -> Array | None:
 
 
 def show(value: Any) -> str:
-    """Return a value as one reads it: arrays as lists, rounded, or by their shape."""
+    """Return a value as short text: small arrays as rounded lists, large ones by their shape."""
     if isinstance(value, np.ndarray) and value.size > 16:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]

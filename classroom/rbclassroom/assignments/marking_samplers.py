@@ -1,4 +1,4 @@
-"""Problems with random answers: a student's sampler, tested against known distributions."""
+"""Test a student's sampler against known distributions, for problems with random answers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,38 +11,38 @@ from rbclassroom.assignments.student_code import NotYet, call_student
 from rbcourse import Array, exp_so3, matrix_from_quaternion
 from rbcourse.sampling import Rng, angle_law
 
-DELTA = 1e-6  # a correct sampler is refused less often than this
+DELTA = 1e-6  # upper bound of the probability that a correct sampler is rejected
 Rows = dict[str, Array]
 
 
 @dataclass(frozen=True)
 class Sampler:
-    """A function to be written, which draws at random: ``function(rng)`` returns one draw.
+    """A problem whose answer is a sampler: the student's ``function(rng)`` returns one draw.
 
-    A correct sampler is refused with a probability below `DELTA`, whatever generator it uses: by
-    the inequality of Dvoretzky, Kiefer and Wolfowitz, with Massart's constant, the observed
-    distribution of n independent numbers is off by more than e with a probability of at most
-    2 exp(−2 n e²), for every n.
+    A correct sampler is rejected with a probability below `DELTA`, whatever generator it uses. The
+    reason is the inequality of Dvoretzky, Kiefer and Wolfowitz, with Massart's constant. For every
+    n, it bounds the probability that the observed distribution of n independent numbers is off by
+    more than e: the probability is at most 2 exp(−2 n e²).
 
-    The rows of `uniforms` are numbers that are independent, and uniform on [0, 1], if the draws
-    are as they should be. The results of `mistakes` are quantiles of their distributions.
+    The rows of `uniforms` are independent numbers, uniform on [0, 1], if the sampler is correct.
+    The results of `mistakes` are quantiles of the distributions of these numbers.
     """
 
     shape: tuple[int, ...]  # of one draw
-    fault: Callable[[Array], str]  # of stacked draws: a hint if one is not allowed at all, or ""
-    uniforms: Callable[[Array], Rows]  # of stacked draws
+    fault: Callable[[Array], str]  # a hint if one of the stacked draws is invalid, or ""
+    uniforms: Callable[[Array], Rows]  # named rows of numbers from stacked draws
     mistakes: Sequence[Mistake]
-    allowed: Sequence[str] = ()  # as for a `Problem`
+    allowed: Sequence[str] = ()  # as in `Problem`
     draws: int = 20_000
 
     def accepts(self, function: Callable[..., Any], rng: Rng = None) -> bool:
-        """Draw many times, one at a time, and compare their distributions with the right ones."""
+        """Call a function for many draws, and compare their distributions with the right ones."""
         rng = np.random.default_rng(rng)
         drawn = self._as_draws(call_student(function, (rng,), self.allowed, self.draws))
         if (drawn[:10] == drawn[0]).all():
             raise NotYet(
                 "Every call returns the same draw. Does your function make, and seed, a new "
-                "generator each time? Draw from the rng that it is given."
+                "generator in each call? Draw from the rng that your function is given."
             )
         if hint := self.fault(drawn):
             raise NotYet(hint)
@@ -50,17 +50,17 @@ class Sampler:
         gaps = {name: _gap(row) for name, row in rows.items()}
         worst = max(gaps, key=lambda name: gaps[name] / self._bound(rows, name))
         if gaps[worst] <= self._bound(rows, worst):
-            print(f"{self.draws} draws look as they should.")
+            print(f"The {self.draws} draws agree with the distribution that is wanted.")
             return True
         raise NotYet(
             self._hint(rows)
-            or f"These draws are not uniform. What gives it away: {worst}, whose distribution is "
-            f"off by {gaps[worst]:.3f}; chance alone stays below {self._bound(rows, worst):.3f}."
+            or f"These draws are not uniform. The distribution of {worst} is off by "
+            f"{gaps[worst]:.3f}; by chance alone it is below {self._bound(rows, worst):.3f}."
         )
 
     def _hint(self, rows: Rows) -> str:
-        """Return the hint of the mistake whose draws look most like these, if any does."""
-        near, hint = 2.0, ""  # two samples of one law are not farther apart, in units of the bound
+        """Return the hint of the mistake with the nearest distributions, or "" if none is near."""
+        near, hint = 2.0, ""  # in units of the bound: samples of the same distribution are nearer
         for mistake in self.mistakes:
             for result in mistake.results:
                 pairs = zip(rows.items(), result, strict=True)
@@ -76,11 +76,11 @@ class Sampler:
             numbers = as_numbers(got)
             if numbers is None:
                 why = " Does a branch end without return?" if got is None else ""
-                raise NotYet(f"Draw {i} is to be numbers; yours is {show(got)}.{why}")
+                raise NotYet(f"Draw {i} should be numbers; yours is {show(got)}.{why}")
             if numbers.shape != self.shape:
-                raise NotYet(f"A draw has the shape {self.shape}; yours has {numbers.shape}.")
+                raise NotYet(f"A draw should have shape {self.shape}; yours has {numbers.shape}.")
             if not np.isfinite(numbers).all():
-                raise NotYet(f"Draw {i} is not finite: {show(numbers)}. Is it divided by 0?")
+                raise NotYet(f"Draw {i} is not finite: {show(numbers)}. Do you divide by 0?")
         return np.array(given, dtype=float)
 
     def _bound(self, rows: Rows, name: str) -> float:
@@ -88,18 +88,18 @@ class Sampler:
 
 
 def _gap(ordered: Array) -> float:
-    """Return how far the distribution of numbers is from the uniform one."""
+    """Return the largest distance of the distribution of sorted numbers from the uniform one."""
     steps = np.arange(len(ordered) + 1) / len(ordered)
     return float(max((steps[1:] - ordered).max(), (ordered - steps[:-1]).max()))
 
 
 def quantiles(row: Array) -> Array:
-    """Return numbers that divide a sample into 100 parts of one size."""
+    """Return the quantiles of a sample at the levels 0.005, 0.015, …, 0.995."""
     return np.quantile(row, np.arange(0.005, 1, 0.01))
 
 
 def _gap_to(ordered: Array, others: Array) -> float:
-    """Return how far the distribution of numbers is from that with some quantiles."""
+    """Return the largest distance of a distribution from the one with the given quantiles."""
     levels = (np.arange(len(others)) + 0.5) / len(others)
     return float(np.abs(np.searchsorted(ordered, others) / len(ordered) - levels).max())
 
@@ -108,15 +108,15 @@ def _off_length(what: str, drawn: Array) -> str:
     lengths = np.linalg.norm(drawn, axis=1)
     worst = lengths[np.argmax(np.abs(lengths - 1))]
     right = abs(worst - 1) <= 1e-9
-    return "" if right else f"{what} has the length 1; one of yours has {worst:.10g}."
+    return "" if right else f"{what} should have the length 1; one of yours has {worst:.10g}."
 
 
 def _quaternion_fault(drawn: Array) -> str:
     lengths = np.linalg.norm(drawn, axis=1)
     if lengths.min() > 0.7 and lengths.max() <= 1 and np.ptp(lengths) > 0.1:
         return (
-            "The length is between 0.71 and 1, and should be 1: the two radii are √s and √(1 − s), "
-            "whose squares add up to 1. Are the roots there?"
+            "The length is between 0.71 and 1, and should be 1. The two radii should be √s and "
+            "√(1 − s), whose squares add up to 1. Does your code have the roots?"
         )
     return _off_length("A unit quaternion", drawn)
 
@@ -125,17 +125,17 @@ def _rotation_fault(R: Array) -> str:
     off = np.abs((stretch := np.linalg.svd(R, compute_uv=False)) - 1)
     if off.max() > 1e-9 > off[:, :2].max():
         return (
-            "A draw is no rotation. If you reflect by I − 2VVᵀ: V has not the length 1. Its "
-            "radius is √z and its height √(1 − z); are both roots there?"
+            "A draw is not a rotation. If you reflect by I − 2VVᵀ, the length of V is not 1. Its "
+            "radius should be √z and its height √(1 − z); does your code have both roots?"
         )
     if off.max() > 1e-9:
         worst = stretch[np.argmax(off.max(axis=1))].round(10).tolist()
-        return f"A draw is no rotation: its singular values are {worst}."
+        return f"A draw is not a rotation: its singular values are {worst}."
     if negative := (np.linalg.det(R) < 0).mean():
         how = "all" if negative == 1 else f"{negative:.0%}"
         return (
-            f"The determinant is −1 for {how} of your draws: mirrors. A reflection times a turn is "
-            "a mirror; one sign more makes it a rotation."
+            f"The determinant is −1 for {how} of your draws: these are mirrors. A reflection times "
+            "a turn is a mirror; a change of sign makes it a rotation."
         )
     return ""
 
@@ -157,7 +157,7 @@ def _direction_rows(drawn: Array) -> Rows:
 
 
 def _rotation_rows(R: Array) -> Rows:
-    """Return uniform numbers: every entry, in several frames, and three angles by their law."""
+    """Return rows that are uniform for uniform R: entries in several frames, and three angles."""
     heights = {f"the entry R[{i}, {j}]": R[:, i, j] for i in range(3) for j in range(3)}
     for i, x in enumerate(_DIAGONALS):
         for j, y in enumerate(_DIAGONALS):
@@ -181,7 +181,7 @@ LAWS: dict[str, dict[str, Any]] = {
     "quaternion": {
         "shape": (4,),
         "fault": _quaternion_fault,
-        "uniforms": lambda q: _rotation_rows(matrix_from_quaternion(q)),  # q and −q are one
+        "uniforms": lambda q: _rotation_rows(matrix_from_quaternion(q)),  # q and −q give one R
     },
 }
-"""How draws of each kind are judged: the shape, the fault and the uniforms of a `Sampler`."""
+"""The shape, the fault and the uniforms of a `Sampler`, for each kind of draws."""

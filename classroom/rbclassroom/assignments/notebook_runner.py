@@ -1,4 +1,4 @@
-"""Run a notebook of a student: time and output are bounded, and no error is lost."""
+"""Run a student's notebook with limits on time and output, and keep every error."""
 
 import json
 from pathlib import Path
@@ -11,23 +11,23 @@ from traitlets import Integer
 
 from rbclassroom.course.notebooks import kernel_address
 
-CELL_SECONDS = 30  # for a cell, at home and in grading
-ROOM = {"stream": 100_000, "data": 2_000_000}  # characters of a cell: print; pictures and pages
+CELL_SECONDS = 30  # for a cell, in the student's check and in grading
+ROOM = {"stream": 100_000, "data": 2_000_000}  # characters of a cell's outputs, by kind
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
-CUT = "the output is too large; the rest is left out"
+CUT = "the output is too large, and the rest is left out"
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
 
 class BoundedClient(NotebookClient):
-    """A client for a notebook whose cells may loop, flood or die.
+    """A client for a notebook whose cells may loop, print without end, or end their kernel.
 
-    Its kernel keeps its files in `folder`, which is to be set before it starts. `slow` and `cut`
-    are the indices of the cells that took too long, and of those whose output is not complete.
+    The kernel keeps its files in `folder`, which has to be set before the start. `slow` has the
+    indices of the cells that took too long, and `cut` of those whose output is not complete.
     """
 
-    timeout = Integer(CELL_SECONDS, help="seconds for a cell").tag(config=True)
-    iopub_timeout = Integer(20, help="seconds for an interrupted cell").tag(config=True)
+    timeout = Integer(CELL_SECONDS, help="the time limit of a cell in seconds").tag(config=True)
+    iopub_timeout = Integer(20, help="the time in which an interrupted cell stops").tag(config=True)
     folder = Path()
 
     def __init__(self, *args: Any, **settings: Any) -> None:
@@ -38,13 +38,13 @@ class BoundedClient(NotebookClient):
         self.extra_arguments, self.record_timing = ["--log-level=CRITICAL"], False
 
     def reset_execution_trackers(self) -> None:
-        """Begin to count."""
+        """Reset the counts of time and output before a run."""
         super().reset_execution_trackers()
         self.slow, self.cut = list[int](), list[int]()
         self._at, self._left, self._room = -1, ALL_OUTPUT, dict(ROOM)
 
     def create_kernel_manager(self) -> Any:
-        """Return a manager of a kernel that listens in the folder."""
+        """Return a manager of a kernel whose sockets are files in the folder."""
         manager = super().create_kernel_manager()
         for name, value in kernel_address(str(self.folder)).items():
             setattr(manager, name, value)
@@ -52,11 +52,11 @@ class BoundedClient(NotebookClient):
 
     async def _async_handle_timeout(self, timeout: int, cell: NotebookNode | None = None) -> Any:
         self.slow.append(self._at)
-        self.raise_on_iopub_timeout = True  # a cell that does not stop now cannot be stopped
+        self.raise_on_iopub_timeout = True  # a cell that ignores the interrupt cannot be stopped
         return await super()._async_handle_timeout(timeout, cell)
 
     def process_message(self, msg: dict[str, Any], cell: NotebookNode, cell_index: int) -> Any:
-        """Add an output to its cell, unless the cell has too many."""
+        """Add an output to its cell, unless the cell's output is too large."""
         if cell_index != self._at:
             self._at, self.raise_on_iopub_timeout, self._room = cell_index, False, dict(ROOM)
         kind, content = msg["msg_type"], msg["content"]
@@ -64,7 +64,7 @@ class BoundedClient(NotebookClient):
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
-            if kind != "stream":  # a widget lives with its kernel
+            if kind != "stream":  # widgets are dropped because they need their kernel
                 data, kind = content["data"].items(), "data"
                 content["data"] = {k: v for k, v in data if isinstance(v, str) and k != WIDGET}
             size = len(content["text"] if kind == "stream" else json.dumps(content["data"]))
@@ -79,17 +79,17 @@ class BoundedClient(NotebookClient):
         return super().process_message(msg, cell, cell_index)
 
     def handle_comm_msg(self, outs: Any, msg: dict[str, Any], cell_index: int) -> None:
-        """Ignore messages of widgets; the outputs that a widget captures stay in the cell.
+        """Ignore messages of widgets, so that the outputs that a widget captures stay in the cell.
 
-        The answers of nbclient to an Output widget can make it miss the reply of the cell.
+        If nbclient answered an Output widget, it could miss the reply of the cell.
         """
 
     def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
-        """Keep the error that the reply names: without it a test would seem to pass."""
+        """Store the error that the reply names, because without it a test would seem to pass."""
         reply = execute_reply["content"]
         if reply["status"] != "ok":
             cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]
-            empty = {"ename": "Error", "evalue": "it was not run", "traceback": []}
+            empty = {"ename": "Error", "evalue": "the cell was not run", "traceback": []}
             error = {key: reply.get(key, value) for key, value in empty.items()}
             if not any(out.get("ename") == error["ename"] for out in cell.outputs):
                 cell.outputs.append(new_output("error", **error))

@@ -1,4 +1,4 @@
-"""The problems of a set, from the file ``NAME.json`` beside its notebook."""
+"""Read the problems of a set from the file ``NAME.json`` beside its notebook."""
 
 import json
 from pathlib import Path
@@ -12,10 +12,9 @@ from rbclassroom.assignments.student_code import NotYet
 
 
 def problem(name: str, slug: str) -> Problem | Sampler:
-    """Return a problem of the set in this folder.
+    """Return the problem `slug` of the set `name`, whose folder is the current one.
 
-    Where a table of the set is beside the folder, as in the folder of the course, the data are
-    brought up to date first.
+    If the table of the set is beside the folder, as in the course, the data are updated first.
     """
     if Path("..", f"{name}.toml").is_file():
         from rbclassroom.assignments.tables import update
@@ -23,7 +22,7 @@ def problem(name: str, slug: str) -> Problem | Sampler:
         update(Path.cwd())
     file = Path(f"{name}.json")
     if not file.is_file():
-        raise NotYet(f"{file} is missing. It came with the notebook: copy it into this folder.")
+        raise NotYet(f"{file} is missing. Copy it from the handout into this folder.")
     data = json.loads(file.read_text("utf-8"), object_hook=_as_array)[slug]
     data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
     if law := data.pop("law", None):

@@ -1,4 +1,4 @@
-"""Write files whole or not at all, and tables that people open in spreadsheets."""
+"""Write files completely or not at all, and write tables for spreadsheets."""
 
 import csv
 import io
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file and its folder; a reader sees the old content or the new one."""
+    """Write a file, and make its folder; readers see the old or the new content, never a part."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(f".{os.getpid()}.part")
     part.write_bytes(content)
@@ -16,7 +16,7 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write a table for spreadsheets; its columns are the keys of the rows, and none a formula."""
+    """Write a CSV table whose columns are the keys of the rows; no cell is read as a formula."""
     columns = {key: "" for row in sorted(rows, key=len, reverse=True) for key in row}
     content = io.StringIO(newline="")
     table = csv.writer(content, lineterminator="\n")
@@ -24,4 +24,4 @@ def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
         cells = [str(row.get(key, "")) for key in columns]
         formula = ("=", "+", "-", "@", "\t", "\r")
         table.writerow(f"'{cell}" if cell.startswith(formula) else cell for cell in cells)
-    write_whole(path, content.getvalue().encode("utf-8-sig"))  # as Excel wants it
+    write_whole(path, content.getvalue().encode("utf-8-sig"))  # Excel needs the byte order mark

@@ -1,8 +1,8 @@
-"""A box for the kernel that runs a submission: bubblewrap, on Linux.
+"""The sandbox ("box") of the kernel that runs a submission; it uses bubblewrap on Linux.
 
-In the box the kernel sees its own folder, the system's programs, this Python with its libraries
-and the package, and nothing else of the disk; it has no network and few environment variables.
-Its processes end with it. Outside Linux, or if bubblewrap does not work, there is no box.
+On the disk, the kernel sees only its own folder, the system's programs, the package, and this
+Python with its libraries. It has no network and few environment variables. When the kernel ends,
+its processes end, too. Outside Linux, or if bubblewrap does not work, there is no sandbox.
 """
 
 import functools
@@ -22,10 +22,10 @@ import matplotlib
 import rbclassroom
 import rbcourse
 
-PROCESSES = 128  # and threads
+PROCESSES = 128  # the largest number of processes and threads
 FILE_BYTES = 100_000_000
-NOBODY = 2**30  # and above: who is nobody else; where root grades, limits would not hold
-# Linux keeps the keys of a session beyond its processes: a command begins a session of its own
+NOBODY = 2**30  # if root grades, kernels run as unused users from this id on: root has no limits
+# keys of a Linux session outlive its processes: each command begins a session of its own
 KEYCTL = {"x86_64": 250, "aarch64": 219}.get(platform.machine(), -1)
 ALONE = f"import ctypes, os, sys; ctypes.CDLL(None).syscall({KEYCTL}, 1, None); "
 ALONE += "os.execvp(sys.argv[1], sys.argv[1:])"
@@ -36,17 +36,17 @@ SYSTEM += ["/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtim
 
 @functools.cache
 def missing() -> str:
-    """Return why there is no box here and what helps, in one line; nothing where there is one."""
+    """Return why there is no sandbox here, and a remedy, in one line; "" if there is a sandbox."""
     if sys.platform != "linux":
-        return "there is none on this system; grade on Linux with bubblewrap to have one"
+        return "this system has no sandbox; to have one, grade on Linux with bubblewrap"
     if not shutil.which("bwrap"):
-        return "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
+        return "bubblewrap is not installed; on Debian and Ubuntu, sudo apt install bubblewrap"
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
         words = [*box(Path(folder), 60), sys.executable, "-c", "import ipykernel, rbclassroom"]
         tried = subprocess.run(words, capture_output=True, text=True, errors="replace")
     if tried.returncode:
-        said = (tried.stderr.strip() or f"it ended with {tried.returncode}").splitlines()[-1]
+        said = (tried.stderr.strip() or f"its exit code is {tried.returncode}").splitlines()[-1]
         return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
     return ""
 
@@ -55,13 +55,14 @@ def prepare(folder: Path) -> None:
     """Make the folders in which the kernel works and keeps its files."""
     for name in ("work", "tmp", "matplotlib"):
         (folder / name).mkdir(exist_ok=True)
-    for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):  # seconds to make anew
+    # without its list of fonts Matplotlib searches for seconds
+    for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):
         shutil.copy(fonts, folder / "matplotlib")
 
 
 def delete(folder: Path) -> None:
-    """Delete a folder, whatever a kernel left there: locked, deep, or links to elsewhere."""
-    for _ in range(50):  # a kernel that is ended may still write
+    """Delete a folder with all files of a kernel: locked ones, deep folders, and links."""
+    for _ in range(50):  # a kernel may still write while it ends
         if os.name == "nt":
             shutil.rmtree(folder, ignore_errors=True)
         else:
@@ -73,7 +74,7 @@ def delete(folder: Path) -> None:
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """Return the environment variables of the kernel: none of them is anybody's secret."""
+    """Return the environment variables of the kernel, none of which is secret."""
     own = dict.fromkeys(("HOME", "USERPROFILE", "IPYTHONDIR"), str(folder))
     own |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder / "tmp"))
     own |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
@@ -82,13 +83,13 @@ def environment(folder: Path) -> dict[str, str]:
 
 
 def box(folder: Path, seconds: int) -> list[str]:
-    """Return the words that run a command in a box, which can write to a folder only."""
+    """Return the words that begin a command in the sandbox, which can write only to a folder."""
     packages = (path for package in (rbcourse, rbclassroom) for path in package.__path__)
     python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
-    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # dropped when the user changes
-    # it ends with this process, and after some seconds
+    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # the change of the user drops these
+    # the command ends with this process, or after some seconds
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
     words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]
     words += [*(f"--unshare-{kind}" for kind in kinds), "--cap-drop", "ALL"]
@@ -97,16 +98,16 @@ def box(folder: Path, seconds: int) -> list[str]:
     for path in SYSTEM:
         link = os.path.islink(path)
         words += ["--symlink", os.readlink(path), path] if link else ["--ro-bind-try", path, path]
-    for path in ("/tmp", "/dev/shm"):  # in memory they would have no limit
+    for path in ("/tmp", "/dev/shm"):  # in memory these folders would have no limit
         words += ["--bind", str(folder / "tmp"), path]
-    for parent in sorted(seen)[1:]:  # without this they are as closed as they are outside
+    for parent in sorted(seen)[1:]:  # otherwise they keep their permissions from outside
         words += ["--dir", parent]
     for path in python:
         words += ["--ro-bind", path, path]
     words += ["--bind", str(folder), str(folder), "--chdir", str(folder / "work")]
     words += ["--remount-ro", "/dev", "--remount-ro", "/", "--"]
     if is_root:
-        user = NOBODY + secrets.randbelow(NOBODY)  # the limit of processes is that of a user
+        user = NOBODY + secrets.randbelow(NOBODY)  # the limit on processes counts by user
         for inner in (folder, *folder.rglob("*")):
             os.chown(inner, user, user)
         words += ["setpriv", f"--reuid={user}", f"--regid={user}", "--clear-groups"]
@@ -115,9 +116,9 @@ def box(folder: Path, seconds: int) -> list[str]:
 
 
 def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
-    """Let a manager start its kernel in a box, for some seconds; it listens in the folder."""
+    """Let a manager start its kernel in the sandbox for some seconds, with files in the folder."""
     spec = manager.kernel_spec
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()
     spec.argv = [*box(folder, seconds), sys.executable, *spec.argv[1:]]
-    spec.interrupt_mode = "message"  # a signal would end the box
+    spec.interrupt_mode = "message"  # a signal would end the sandbox

@@ -1,6 +1,6 @@
-"""Call a student's function: tell where it stops, and which functions it uses that it should not.
+"""Call a student's function; report the line of an error and functions that are not allowed.
 
-Only the names in a function are examined: this is help for honest students, not protection.
+Only the names in a function are examined. This helps honest students; it is not protection.
 """
 
 import linecache
@@ -16,7 +16,7 @@ LIBRARIES |= {"quaternion"}
 
 
 class NotYet(AssertionError):
-    """An error message for the student; a notebook shows it without a traceback."""
+    """An error with a message for the student, which a notebook shows without a traceback."""
 
     def _render_traceback_(self) -> list[str]:
         return textwrap.wrap(str(self), 80)
@@ -25,10 +25,13 @@ class NotYet(AssertionError):
 def call_student(
     function: Any, arguments: tuple[Any, ...], allowed: Sequence[str], times: int = 1
 ) -> list[Any]:
-    """Return the results of a student's function, one for each call."""
+    """Return the results of a student's function, one for each call.
+
+    Raise `NotYet` if the function stops or uses an object of a library that is not allowed.
+    """
     for foreign in _foreign_names(function, allowed):
-        how = "Write it yourself: with Python, NumPy, and what the problem set allows."
-        raise NotYet(f"This uses {foreign}. {how}")
+        how = "Write it yourself with Python, NumPy, and the functions that the problem set allows."
+        raise NotYet(f"Your function uses {foreign}. {how}")
     try:
         return [function(*arguments) for _ in range(times)]
     except NotImplementedError:
@@ -56,10 +59,10 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             continue
         if isinstance(value, FunctionType) and module == "__main__":
             names = _names(value.__code__)
-            # imported inside, a name is not among the globals
+            # a name that the function imports is not among its globals
             found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
         elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
-            # a name does not tell where it stands: all that a module has is taken
+            # the code does not show whose attribute a name is: all that the module has are checked
             found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
         elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:
             yield f"{own}.{name}"

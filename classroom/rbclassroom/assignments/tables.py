@@ -1,9 +1,9 @@
-"""Tables of problems, and the data that they become: inputs, answers and results of mistakes.
+"""Convert the table of a problem set to data: inputs, answers and results of mistakes.
 
-The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder, and never leaves the
-teacher. It has a section for each problem, under the name of its cells, ``SLUG-answer`` and
-``SLUG-test``: the inputs, and common mistakes, each with a hint and the bodies of functions that
-make it. The right answers are those of the notebook.
+The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder. Students do not get the
+table. It has a section ``SLUG`` for the problem with the cells ``SLUG-answer`` and ``SLUG-test``. A
+section has the inputs and common mistakes. Each mistake has a hint, and the bodies of functions
+that make the mistake. The right answers are those of the notebook.
 """
 
 import copy
@@ -30,17 +30,17 @@ Function = Callable[..., Any]
 
 
 def update(folder: Path) -> None:
-    """Write the data of a set into its folder, if its table or notebook has changed since."""
+    """Write the data of a set into its folder if its table or its notebook has changed."""
     table, notebook = folder.parent / f"{folder.name}.toml", folder / f"{folder.name}.ipynb"
     if not table.is_file():
         if "assignments.problems import problem" in notebook.read_text("utf-8"):
-            raise ValueError(f"{table} is missing: the tests of {notebook.name} need it")
+            raise ValueError(f"{table} is missing, and the tests of {notebook.name} need it")
         return
     state = hashlib.sha256(table.read_bytes() + notebook.read_bytes()).hexdigest()
     target = folder / f"{folder.name}.json"
     if not target.exists() or json.loads(target.read_text("utf-8")).get("state") != state:
 
-        def plain(value: Any) -> Any:  # in a form that JSON has
+        def plain(value: Any) -> Any:  # arrays and scalars of NumPy in a form that JSON has
             return {"array": value.tolist()} if isinstance(value, np.ndarray) else value.item()
 
         text = json.dumps({"state": state, **evaluate(folder)}, default=plain)
@@ -99,7 +99,7 @@ def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> di
 
 
 def function_of(answer: str, code: str, space: dict[str, Any]) -> Function:
-    """Return the function of an answer cell with another body."""
+    """Return the function of an answer cell, with the given code as its body."""
     head = re.split(r" *### BEGIN SOLUTION", answer)[0]
     own = dict(space)
     exec(compile(head + indent(code.strip(), "    "), "<mistake>", "exec"), own)

@@ -1,1 +1,1 @@
-"""Lessons: run and stored, shown to a class, and indexed by equation."""
+"""Run, store and open the lessons, and list where equations are used."""

@@ -1,10 +1,10 @@
-"""Compare the results of a run of a lesson with the stored ones, up to rounding.
+"""Compare the results of a lesson with the stored ones, up to the rounding of processors.
 
-Processors round differently. Text is the same to the byte. Numbers in a table differ by at most
-1e-12 of the largest in their column, or by 2 units of their eleventh digit. Of the pixels of a
-picture at most 1 in 10,000 differs visibly, and at most 12 in a square of 16 × 16. A living
-picture, which a browser draws from whole numbers, has the same polygons in the same styles, and no
-coordinate differs by more than one unit, 1/8 of a pixel.
+Results agree under the following conditions. Texts have the same bytes. Numbers in a table differ
+by at most 1e-12 of the largest number in their column, or by 2 units of their eleventh digit. In a
+picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. A living
+picture is drawn by a browser from whole numbers. It has the same polygons in the same styles, and
+no coordinate differs by more than one unit, 1/8 of a pixel.
 """
 
 import base64
@@ -30,11 +30,11 @@ BASE64 = r"base64,([A-Za-z0-9+/=]+)"
 LIVING = r'revive\(image, (\{"size":.*\})\);'
 PICTURE = re.compile(f"{LIVING}|{BASE64}")
 UNIT = 1 / 8
-"""The unit of places in living pictures, in pixels."""
+"""The unit of coordinates in living pictures, in pixels."""
 
 
 def changed_lines(stored: str, again: str) -> Iterator[str]:
-    """Yield the lines in which two notebooks differ, as a diff; pictures are shortened."""
+    """Yield a diff of two notebooks in which checksums stand for pictures."""
     pictures = rf'revive\(image, \{{\\"size\\":.*\}}\);|{BASE64}'
     texts = stored, reconciled_notebook(stored, again)
     before, after = (re.sub(pictures, _checksum, text).split("\n") for text in texts)
@@ -46,7 +46,7 @@ def _checksum(picture: re.Match[str]) -> str:
 
 
 def reconciled_notebook(stored: str, again: str) -> str:
-    """Return a notebook that was run again, with the stored pictures where they are the same."""
+    """Return a notebook that was run again, with the stored pictures where these agree."""
     if stored == again:
         return again
     notebook = nbformat.reads(again, as_version=4)
@@ -63,7 +63,7 @@ def reconciled_notebook(stored: str, again: str) -> str:
 
 
 def reconciled(stored: str, again: str) -> str:
-    """Return a page that was made again, with the stored pictures where they are the same."""
+    """Return a page that was made again, with the stored pictures where these agree."""
     kept = [match[0] for match in PICTURE.finditer(stored)]
     if len(kept) != len(PICTURE.findall(again)):
         return again
@@ -87,7 +87,7 @@ def _same_in_page(one: str, other: str) -> bool:
 
 
 def same_living_pictures(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    """Tell whether the data of two living pictures agree, see `rbcourse.draw.display.Player`."""
+    """Tell whether the data of two living pictures of `rbcourse.draw.display.Player` agree."""
     backgrounds = (base64.b64decode(data["background"].partition(",")[2]) for data in (one, other))
     (exact, places), (exact_2, places_2) = map(_contents, (one, other))
     if exact != exact_2 or np.abs(places - places_2).max(initial=0) > 1:
@@ -96,9 +96,10 @@ def same_living_pictures(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 def _contents(data: dict[str, Any]) -> tuple[list[Any], NDArray[np.float64]]:
-    """Return what of a living picture has to be the same, and coordinates that may differ by 1.
+    """Return the exact parts of a living picture, and coordinates that may differ by 1.
 
-    Their units are 1/8 of a pixel; of centres of rooms and views 0.015, as they have two decimals.
+    The unit of coordinates is 1/8 of a pixel. For the centres of rooms and for views it is 0.015,
+    because these numbers have two decimals.
     """
     styles, texts = json.loads(_inflated(data["known"]))
     rest = data | dict.fromkeys(("states", "known", "background", "rooms"))
@@ -119,21 +120,22 @@ def _inflated(text: str) -> bytes:
 
 
 def split(content: bytes) -> list[Numbers]:
-    """Return the states of `rbcourse.draw.display.joined`, an array of numbers each."""
+    """Return the states in the output of `rbcourse.draw.display.joined`, as arrays of numbers."""
     count = int(np.frombuffer(content, "<u4", 1)[0])
     sizes = np.frombuffer(content, "<u4", count, 4)
     numbers = np.frombuffer(content, "<i2", offset=4 * (count + 1))
     if sizes.sum() != len(numbers):
-        raise ValueError(f"content: {sizes.sum()} numbers wanted, got {len(numbers)}")
+        raise ValueError(f"content: {sizes.sum()} numbers are wanted, got {len(numbers)}")
     ends = np.cumsum(sizes, dtype=int).tolist()
     return [numbers[start:end] for start, end in pairwise([0, *ends])]
 
 
 def polygons(state: Numbers, styles: list[Any]) -> list[tuple[Any, bool, NDArray[np.float64]]]:
-    """Return the drawing of a state of `rbcourse.draw.display.Display.record`.
+    """Return the polygons in a state of `rbcourse.draw.display.Display.record`.
 
-    Of each polygon: its style, whether it is filled together with the one before it, and its
-    places in pixels. In space styles have more than eight parts, and places three numbers.
+    Each polygon is a tuple: its style, whether it is filled together with the polygon before it,
+    and its points in pixels. Polygons in space have styles with more than eight parts, and points
+    with three coordinates.
     """
     found, i = [], 0
     while i < len(state):
@@ -147,7 +149,7 @@ def polygons(state: Numbers, styles: list[Any]) -> list[tuple[Any, bool, NDArray
 
 
 def stale_figures(drawn: Path, stored: Path) -> list[str]:
-    """Return the names of the files drawn in a folder that are not stored, or stored otherwise."""
+    """Return the names of drawn files that are not stored, or that differ from the stored ones."""
     return [file.name for file in sorted(drawn.iterdir()) if not _is_stored(file, stored)]
 
 
@@ -157,20 +159,20 @@ def _is_stored(file: Path, folder: Path) -> bool:
     try:
         if file.read_bytes() == kept.read_bytes():
             return True
-        if file.suffix == ".pdf":  # it may differ where the picture or a number does
+        if file.suffix == ".pdf":  # a PDF may differ only if the picture or a number does
             pairs = ([path.with_suffix(end) for path in (file, kept)] for end in (".png", ".csv"))
             return any(one.read_bytes() != other.read_bytes() for one, other in pairs)
         return file.suffix in same and same[file.suffix](file.read_bytes(), kept.read_bytes())
-    except (OSError, ValueError):  # it is not there, or damaged
+    except (OSError, ValueError):  # the stored file is missing or damaged
         return False
 
 
 def look_the_same(one: bytes, other: bytes) -> bool:
-    """Tell whether two pictures, or all frames of two GIFs, are as two processors draw them.
+    """Tell whether two pictures, or all frames of two GIFs, agree up to rounding.
 
-    A pixel differs visibly by more than 16 of 255 levels in some colour: at most 1 in 10,000, and
-    at most 12 in a square of 16 × 16, where another letter makes some thirty. The mean difference
-    is less than 0.05 levels. Frames last as long.
+    A pixel differs visibly if a colour differs by more than 16 of 255 levels. At most 1 pixel in
+    10,000 may differ visibly, and at most 12 in a square of 16 × 16; a different letter changes
+    about thirty. The mean difference has to be below 0.05 levels. Frames have the same durations.
     """
     if one == other:
         return True
@@ -179,7 +181,7 @@ def look_the_same(one: bytes, other: bytes) -> bool:
 
 
 def _frames(content: bytes) -> Iterator[tuple[Any, NDArray[np.uint8]]]:
-    """Yield for how many milliseconds each frame of a picture is shown, and its pixels."""
+    """Yield the duration in milliseconds and the pixels of each frame of a picture."""
     with Image.open(io.BytesIO(content)) as picture:
         mode = "RGB" if picture.format == "GIF" else "RGBA"
         for frame in ImageSequence.Iterator(picture):
@@ -211,7 +213,7 @@ def _same_columns(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
         return False
     try:
         ours, theirs = (np.array(column[1:], dtype=float) for column in (one, other))
-    except ValueError:  # words, which are not the same
+    except ValueError:  # the columns are words and differ
         return False
     largest = np.abs(theirs).max(initial=0, where=np.isfinite(theirs))
     allowed = np.maximum(2e-11 * np.abs(theirs), max(1e-12 * largest, 1e-13))

@@ -28,8 +28,9 @@ get_config().ContentsManager.pre_save_hook = before_saving
 def configure() -> Path:
     """Write the configuration of JupyterLab into the environment; return its folder.
 
-    JupyterLab asks for no news, shows names in full, leaves out the extensions for teachers,
-    encrypts what kernels send, inverts pictures in a dark theme, and saves explorers as stills.
+    With it, JupyterLab does not ask for news, shows full names, and does not load the extensions
+    for lecturers. It encrypts the messages of kernels, inverts pictures in a dark theme, and saves
+    explorers as stills.
     """
     shared = Path(sys.prefix, "share")
     _write(shared / "jupyter" / "lab" / "settings" / "overrides.json", OVERRIDES)
@@ -40,7 +41,7 @@ def configure() -> Path:
     server = {
         "jpserver_extensions": extensions,
         "tornado_settings": {"static_custom_path": [str(folder / "custom")]},
-        "answer_yes": True,  # Ctrl-C ends it at once
+        "answer_yes": True,  # Ctrl-C ends the server at once
     }
     settings = {
         "ServerApp": server,
@@ -60,11 +61,11 @@ def _write(path: Path, content: Any) -> None:
 
 
 def main() -> None:
-    """Open lesson 00, in the folder of the course, until Ctrl-C."""
+    """Open lesson 00 in JupyterLab, which runs until Ctrl-C."""
     parser = argparse.ArgumentParser(
         prog="course.py lab", epilog="Further arguments go to JupyterLab."
     )
-    parser.add_argument("--edit", action="store_true", help="the originals, not copies in work/")
+    parser.add_argument("--edit", action="store_true", help="edit originals, not copies in work/")
     known, words = parser.parse_known_args()
     if known.edit:
         os.environ["RBCOURSE_EDIT"] = "1"
@@ -77,8 +78,8 @@ def main() -> None:
         words.append("--allow-root")
     paths = [str(configure()), os.environ.get("JUPYTER_CONFIG_PATH")]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
-    print("JupyterLab opens in the browser. Stop it here, with Ctrl-C.", flush=True)
-    # of JupyterLab's own extensions; it reads its configuration twice
+    print("JupyterLab opens in the browser. To stop it, press Ctrl-C here.", flush=True)
+    # JupyterLab's own extensions warn, and JupyterLab reads its configuration twice
     warnings.filterwarnings("ignore", category=DeprecationWarning)
     warnings.filterwarnings("ignore", "Overriding existing pre_save_hook")
     from jupyterlab.labapp import LabApp

@@ -1,4 +1,4 @@
-"""The ledger: where each equation of the texts is implemented, tested and taught."""
+"""The ledger: a list of where each equation of the texts is implemented, tested and taught."""
 
 import ast
 import re
@@ -24,7 +24,7 @@ SOURCES: dict[str, Any] = tomllib.loads(
 )
 MISPRINTS = {f"errata {i}": row for i, row in enumerate(SOURCES["misprints"], start=1)}
 WHAT: dict[str, str] = SOURCES["entries"] | SOURCES["beyond"]
-"""What each entry is, of the texts and beyond them."""
+"""The description of each entry, of the texts and beyond them."""
 GROUPS: dict[str, list[str]] = {
     f"{text}: {title}": [key for key in SOURCES["entries"] if key.startswith(text)]
     for text, title in SOURCES["texts"].items()
@@ -33,22 +33,23 @@ GROUPS: dict[str, list[str]] = {
 _HEAD = """\
 # Ledger
 
-Which modules and which lessons belong to each equation, proposition,
-remark and figure of the two texts, and what is misprinted in our copies of them. Written
-by `python3 course.py ledger`, not by hand. The ledger of the book, which
-`python3 course.py book` makes, links functions, tests, sections and pictures, too."""
+This page lists the modules and lessons for each equation, proposition, remark and figure of the two
+texts, and the misprints in our copies of the texts. `python3 course.py ledger` writes the page; do
+not edit it. The ledger of the book, which `python3 course.py book` makes, also links functions,
+tests, sections and pictures."""
 _MISPRINTS = """\
 ## Misprints
 
-The tests show that the one does not hold, and the other does. (21 only looks like one.)"""
+The tests show that the printed form is wrong and the corrected form is right. (Entry 21 only looks
+like a misprint.)"""
 
 
 @dataclass
 class Entry:
     """The places where one entry of the texts occurs.
 
-    Functions and constants, such as ``so3.hat_so3``, are named within their package, tests, such as
-    ``test_so3.py::test_hat``, and lessons, as ``06_geodesics.ipynb, 3``, within their folder.
+    Functions and constants are named within their package, such as ``so3.hat_so3``. Tests and
+    lessons are named within their folder: ``test_so3.py::test_hat``, ``06_geodesics.ipynb, 3``.
     """
 
     functions: list[str] = field(default_factory=list)
@@ -56,15 +57,16 @@ class Entry:
     lessons: list[str] = field(default_factory=list)
 
     def lacks(self) -> list[str]:
-        """Return which of the three are not there."""
+        """Return the kinds of places that the entry does not have."""
         return [kind for kind in ("functions", "tests", "lessons") if not getattr(self, kind)]
 
 
 def collect(root: Path) -> dict[str, Entry]:
     """Return the places of each entry and each misprint.
 
-    Functions come from "Source: …" in their docstrings, constants from the text below them, tests
-    from their marks ``source``, lessons from the keys in small type below their headings.
+    The keys of functions are in "Source: …" in their docstrings, and those of constants in the text
+    below them. Tests have the mark ``source``. Sections of lessons have keys in small type below
+    their headings.
     """
     found = {key: Entry() for key in [*WHAT, *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
@@ -72,7 +74,7 @@ def collect(root: Path) -> dict[str, Entry]:
         for place, text in finder(root):
             for key in dict.fromkeys(KEY.findall(text)):
                 if key not in found:
-                    raise ValueError(f"{place}: {key} is no entry of sources.toml")
+                    raise ValueError(f"{place}: a key of sources.toml is wanted, got {key}")
                 getattr(found[key], kind).append(place)
     return found
 
@@ -92,7 +94,7 @@ def _functions(root: Path) -> Iterator[tuple[str, str]]:
 
 
 def _sources(docstring: str) -> str:
-    """Return the paragraph "Source: …"; of a docstring without one, the text before sections."""
+    """Return the paragraph "Source: …" of a docstring; without it, the text before the sections."""
     if source := re.search(r"^Source: (.*?)(?=\n\n|\Z)", docstring, re.MULTILINE | re.DOTALL):
         return source[1]
     return " ".join(re.split(r"\n\n\w+( \w+)?\n-+\n", docstring)[0].split())
@@ -119,13 +121,13 @@ def _headings(root: Path) -> Iterator[tuple[str, str]]:
 
 
 def render(found: dict[str, Entry]) -> str:
-    """Return the ledger in short: the modules and the lessons of each entry."""
+    """Return the page docs/ledger.md with the modules and the lessons of each entry."""
     parts = [_HEAD]
     for title, keys in GROUPS.items():
         rows = []
         for key in keys:
             places = dict.fromkeys(map(_place, found[key].functions))
-            modules = sorted(places, key=lambda name: name.startswith("_"))  # these last
+            modules = sorted(places, key=lambda name: name.startswith("_"))  # private ones last
             lessons = dict.fromkeys(lesson[:2] for lesson in found[key].lessons)
             rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
         parts.append(f"## {title}\n\n{_table(('', 'what', 'modules', 'lessons'), rows)}")
@@ -138,7 +140,7 @@ def render(found: dict[str, Entry]) -> str:
 
 
 def _place(function: str) -> str:
-    """Return the module of a function; in a folder, as `draw` and the classroom's, the folder."""
+    """Return the module of a function, or its folder for `draw` and the classroom."""
     module = function.rsplit(".", 1)[0]
     return module if module.startswith("optimum") else module.split(".")[0]
 
@@ -149,7 +151,7 @@ def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def main() -> None:
-    """Write docs/ledger.md, in the folder of the course."""
+    """Write docs/ledger.md; the current folder is the course."""
     try:
         Path("docs/ledger.md").write_text(render(collect(Path())), encoding="utf-8", newline="\n")
     except (OSError, ValueError) as error:

@@ -7,18 +7,18 @@ import tempfile
 from pathlib import Path
 
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
-LISTS = {  # what each list adds to those before it
+LISTS = {  # the distributions that each list adds to the lists before it
     "environment.txt": COURSE,
     "classroom/environment-teach.txt": "-e ./classroom[grading]\n",
     "classroom/environment-book.txt": "-e ./classroom[book]\n",
     "tests/environment-test.txt": "-e .[test,lint]\n-e ./classroom[browser]\n",
 }
-SLOW = "jsonschema<4.25\n"  # later releases take 1.5 s longer to import wherever notebooks are read
+SLOW = "jsonschema<4.25\n"  # the import of later releases takes 1.5 s longer
 HEAD = "# Exact versions, for every system and Python; written by 'course.py lock'.\n"
 
 
 def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
-    """Return the distributions that are wanted, one a line, with the preferred versions."""
+    """Return the required distributions, one per line, with the preferred versions if possible."""
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder, "output.txt")
         output.write_text(preferred, "utf-8")
@@ -30,7 +30,7 @@ def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
 
 
 def main() -> None:
-    """Write all lists, in the folder of the course."""
+    """Write all lists into the folder of the course, which is the current one."""
     parser = argparse.ArgumentParser(prog="course.py lock")
     parser.add_argument("--upgrade", action="store_true", help="take the newest versions")
     upgrade = ["--upgrade"] * parser.parse_args().upgrade

@@ -1,4 +1,4 @@
-"""Execute and store the lessons, byte for byte the same each time."""
+"""Execute and store the lessons, with the same bytes each time."""
 
 import hashlib
 import json
@@ -23,7 +23,7 @@ from tornado.web import HTTPError
 from rbclassroom.course.agreement import reconciled_notebook, stale_figures
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
-# what JupyterLab writes into a notebook that it opens, and marks as changed if it was not there
+# JupyterLab adds these metadata to a notebook, and marks a notebook without them as changed
 OPENED = {
     "kernelspec": {**KERNEL, "display_name": "Python 3 (ipykernel)"},
     "language_info": {
@@ -45,7 +45,7 @@ def lesson_paths(folder: Path) -> list[Path]:
 
 
 def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
-    """Return the cells for the class, and the run sheet, which has the answers."""
+    """Return the cells for the class, and the text of the run sheet, which has the answers."""
     for i, cell in enumerate(notebook.cells):
         if cell.source.startswith(SHEET):
             sheet = "\n\n".join(other.source for other in notebook.cells[i:])
@@ -54,13 +54,13 @@ def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
 
 
 def living(name: str, root: Path) -> str:
-    """Return an explorer that moves without Python, as HTML."""
+    """Return the HTML of an explorer that moves without Python."""
     page = (root / "figures" / "explorers" / f"{name}.html").read_text(encoding="utf-8")
     return page[page.index("<figure>") : page.index("</html>")]
 
 
 def execute(path: Path, figures: Path) -> str:
-    """Run a lesson from top to bottom in a new kernel, and return the notebook to be stored."""
+    """Run a lesson from top to bottom in a new kernel, and return the text of the notebook."""
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(
         notebook,
@@ -84,10 +84,10 @@ def execute(path: Path, figures: Path) -> str:
 
 
 def kernel_address(folder: str) -> dict[str, str]:
-    """Return where a kernel shall listen, as settings of its manager.
+    """Return the address of a kernel, as settings of its manager.
 
-    At files, except on Windows: a port that is found free may be taken by another program before
-    the kernel takes it.
+    A kernel listens at files, except on Windows. If it listened at a free port, another program
+    could take the port before the kernel does.
     """
     if os.name == "nt":
         return {}
@@ -95,10 +95,10 @@ def kernel_address(folder: str) -> dict[str, str]:
 
 
 def normalised(notebook: NotebookNode) -> str:
-    """Return a notebook as text without what differs from run to run or machine to machine.
+    """Return the text of a notebook without differences between runs or between machines.
 
-    Kernel and language are stored by name only. In the outputs memory addresses are blanked, and
-    random ids of 32 hexadecimal digits are numbered in the order of appearance.
+    Only the names of kernel and language are stored. In the outputs, memory addresses become 0x0,
+    and random ids of 32 hexadecimal digits are numbered in the order of appearance.
     """
     notebook.metadata.kernelspec = dict(KERNEL)
     notebook.metadata.language_info = {"name": "python"}
@@ -115,7 +115,7 @@ def normalised(notebook: NotebookNode) -> str:
 
 
 def keep_stills(notebook: Any) -> None:
-    """Drop widgets that have a still beside them: they live with their kernel, the still stays."""
+    """Remove widgets that have a still beside them, because widgets need their kernel."""
     for cell in notebook["cells"]:
         for output in cell.get("outputs", []):
             if "text/html" in (data := output.get("data", {})):
@@ -123,11 +123,11 @@ def keep_stills(notebook: Any) -> None:
 
 
 def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> None:
-    """Keep the stills of what JupyterLab saves, and the lessons as they are stored.
+    """Save stills in place of widgets, and do not change the stored lessons.
 
-    Without ``course.py lab --edit`` a lesson that has a copy in ``work/`` and was only opened or
-    run keeps its stored outputs; one that was changed is not saved, and its reader is told where
-    the copy is.
+    Without ``course.py lab --edit``, an original with a copy in ``work/`` keeps its stored outputs
+    if it was only opened or run. An original that was changed is not saved, and the error message
+    gives the path of the copy.
     """
     if model["type"] != "notebook" or not model.get("content"):
         return
@@ -145,7 +145,7 @@ def _as_stored(path: Path, content: Any) -> Any:
         stored = nbformat.read(path, as_version=4)
         now = nbformat.from_dict(content)
         same = _sources(stored) == _sources(now) and _tags(stored) == _tags(now)
-    except Exception as error:  # of others JupyterLab would say nothing, and save
+    except Exception as error:  # JupyterLab ignores other errors and saves the file
         raise HTTPError(500, f"{path.name} is not saved: {error}") from error
     if not same:
         why = f"{path.name} is an original, and is not saved. Your copy is in work/"
@@ -167,15 +167,15 @@ def _with_numbered_ids(ran: list[Any]) -> list[Any]:
 def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
     """Execute lessons, then rewrite the stored outputs and figures that have changed.
 
-    All lessons, or those whose names begin with one of `names`. What is the same as far as
-    processors agree stays as it is. Nothing is rewritten unless every lesson ran. When all lessons
-    run, figures that none of them draws are removed.
+    By default all lessons run; with `names`, those whose names begin with one of these. Results
+    that agree up to the rounding of processors are not rewritten. If a lesson fails, no file is
+    rewritten. If all lessons run, figures that none of them draws are removed.
     """
     every = lesson_paths(lessons)
     if not every:
-        raise ValueError(f"{lessons}: no lessons here; this is run in the folder of the course")
+        raise ValueError(f"{lessons} has no lessons; run this in the folder of the course")
     if unknown := [name for name in names if not any(p.stem.startswith(name) for p in every)]:
-        raise ValueError(f"no lesson's name begins with {unknown[0]!r}")
+        raise ValueError(f"names: prefixes of lessons' names are wanted, got {unknown[0]!r}")
     chosen = [path for path in every if not names or path.stem.startswith(tuple(names))]
     with tempfile.TemporaryDirectory() as folder:
         texts = {}
@@ -202,11 +202,11 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
-    """Copy the lessons, trusted, to a folder to work in; files that were changed there are kept.
+    """Copy the lessons as trusted notebooks to a folder to work in, and keep changed copies.
 
-    A lesson that is new to the folder is copied. One that has changed since it was copied takes
-    the place of its copy if the cells of that are as they were, run or not, and is laid beside it
-    otherwise.
+    A lesson without a copy is copied. If a lesson has changed since it was copied, the new version
+    replaces a copy with unchanged cells, even if they were run. It is stored beside a copy with
+    changed cells.
     """
     work.mkdir(exist_ok=True)
     record = work / ".copied.json"
@@ -222,7 +222,7 @@ def copy_lessons(lessons: Path, work: Path) -> None:
             copy = (nbformat.writes(notebook) + "\n").encode()
             if not _left_alone(target, copy, last):
                 target = next(p for p in _numbered(target) if not p.exists())
-                print(f"{path.name} has changed; your copy stays, the new one is {target.name}")
+                print(f"{path.name} has changed; your copy is kept, the new one is {target.name}")
             target.write_bytes(copy)
             try:
                 notary.sign(notebook)
@@ -235,7 +235,7 @@ def copy_lessons(lessons: Path, work: Path) -> None:
 
 
 def _read_record(record: Path) -> dict[str, list[str]]:
-    """Return the record of copies; an empty one if it is lost or damaged."""
+    """Return the record of copies, or an empty record if the file is lost or damaged."""
     try:
         copied = json.loads(record.read_bytes())
     except (OSError, ValueError):
@@ -244,7 +244,7 @@ def _read_record(record: Path) -> dict[str, list[str]]:
 
 
 def _left_alone(target: Path, lesson: bytes, last: list[str] | None) -> bool:
-    """Tell whether a copy is absent, the lesson itself, or unchanged apart from its outputs."""
+    """Tell whether a copy is absent, equals the lesson, or is unchanged except for its outputs."""
     if not target.exists():
         return True
     content = target.read_bytes()
@@ -255,7 +255,7 @@ def _parsed(path: Path) -> NotebookNode:
     try:
         return nbformat.read(path, as_version=4)
     except ValueError as error:
-        raise ValueError(f"{path.name} is no notebook: {str(error)[:80]}") from error
+        raise ValueError(f"{path.name} is not a notebook: {str(error)[:80]}") from error
 
 
 def _digest(content: bytes) -> str:
@@ -263,7 +263,7 @@ def _digest(content: bytes) -> str:
 
 
 def _cells(content: bytes) -> bytes:
-    """Return the sources of a notebook; the whole text if it is not a valid notebook."""
+    """Return the sources of the cells, or the whole text if it is not a valid notebook."""
     try:
         return json.dumps(_sources(nbformat.reads(content.decode(), as_version=4))).encode()
     except Exception:

@@ -1,1 +1,1 @@
-"""How near closed forms are to the optimum: the atlas of lesson 12."""
+"""Surveys of how near closed forms are to the optimum, such as the atlas of lesson 12."""

@@ -1,4 +1,4 @@
-"""The atlas: for which ends a closed form is near the optimum, and for which body."""
+"""The atlas: a survey of the ends and bodies for which a closed form is near the optimum."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from rbcourse.sampling import Rng
 Maker = Callable[[Array, Array, Array, Array], Curve]
 
 CELLS = 10
-"""Into so many steps the atlas divides the displacement and the end velocity."""
+"""The number of steps into which the atlas divides the displacement and the end velocity."""
 FASTEST = 9.0
 """The largest √(‖w0‖² + ‖w1‖²) of the atlas, in rad per unit time."""
 FAMILIES = "along", "across"
-"""Where the end velocities of lesson 12 point: along the axis of the displacement, or across."""
+"""Directions of the end velocities in lesson 12: along the axis of the displacement, or across."""
 
 NEAR_ZERO = 1e-4
-"""What costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖² is not divided by."""
+"""Excesses are not computed if the optimum costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖²."""
 
 
 def projection(R0: Array, R1: Array, w0: Array, w1: Array) -> rb.ProjectedPolynomial:
-    """Return the stack of `projected_cubic_so3`, without looking for its margins, which is slow."""
+    """Return the stack of `projected_cubic_so3`, without the slow computation of its margins."""
     M = R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1)
     ends = np.stack(np.broadcast_arrays(*M), axis=-3)
     return rb.ProjectedPolynomial(duration=np.ones(ends.shape[:-3]), ends=ends)
 
 
 WAYS: dict[str, Maker] = {**FORMS, "projection": projection}
-"""The closed forms for a ball, with the names that figures and tables have for them."""
+"""The closed forms for a ball, with their names in figures and tables."""
 
 
 def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
-    """Return the closed forms that are compared for a body: `WAYS`, and two that know its inertia.
+    """Return the closed forms that are compared for a body: `WAYS`, and two that use its inertia.
 
-    Those are "weighted", `weighted_cubic_so3`, and "normal", `normal_cubic_so3`.
+    These two are "weighted", `weighted_cubic_so3`, and "normal", `normal_cubic_so3`.
     """
     if inertia is None:
         return WAYS
@@ -59,10 +59,11 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
     """Return `draws` random problems in every cell of the atlas.
 
     A cell is a family, a step of the displacement ‖σ‖ from 0 to π, and a step of the end velocity
-    v = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`; within it both are uniform. v is divided between w0
-    and w1 by a random angle. "along": both point along the axis of σ or against it; "across": each
-    in a random direction across it; "any": each in a random direction. The problems are in the
-    order family, displacement, end velocity, draw. R0 and the axis of σ are uniform, too.
+    v = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`. Within a cell, ‖σ‖ and v are uniform. A random angle
+    divides v between w0 and w1. In the family "along", both point along the axis of σ or against
+    it. In "across", each points in a random direction perpendicular to the axis, and in "any" in a
+    random direction. The problems are in the order family, displacement, end velocity, draw. R0 and
+    the axis of σ are uniform, too.
 
     Examples
     --------
@@ -72,7 +73,7 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
     draws, rng = _as_count("draws", draws), np.random.default_rng(rng)
     unknown = set(families) - {"along", "across", "any"}
     if unknown or not families:
-        raise ValueError(f"families: along, across and any are wanted, got {sorted(unknown)}")
+        raise ValueError(f"families: along, across or any is wanted, got {sorted(unknown)}")
     family, turn, speed = np.indices((len(families), CELLS, CELLS, draws))[:3].reshape(3, -1)
     count = len(family)
     angle = (turn + rng.random(count)) * np.pi / CELLS
@@ -93,7 +94,7 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
 
 
 def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
-    """Return random problems: σ in a ball of the radius `size`, w0 and w1 in one of twice that.
+    """Return random problems: σ in a ball of radius `size`, w0 and w1 in one of radius 2 `size`.
 
     Examples
     --------
@@ -114,16 +115,16 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
 
 def _as_count(name: str, value: int) -> int:
     if not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"{name}: an integer from 1 up wanted, got {value!r}")
+        raise ValueError(f"{name}: an integer from 1 up is wanted, got {value!r}")
     return int(value)
 
 
 def starts() -> dict[str, Maker]:
-    """Return guesses that Newton's method is started from, to see how much the start decides.
+    """Return initial guesses of Newton's method, to see how the result depends on the guess.
 
-    They are the closed forms except Cayley's, which seldom leads anywhere when it is far off, and
-    the corrected one, which leads where Bézier's does, and the exponential cubic the long way
-    round.
+    They are the exponential cubic the long way round, and all closed forms except two. From the
+    Cayley cubic, if it is far from the optimum, the method seldom converges. The corrected Bézier
+    curve leads to the same result as the Bézier curve.
     """
     return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
         "long way round": rb.exponential_cubic_long_so3
@@ -131,11 +132,12 @@ def starts() -> dict[str, Maker]:
 
 
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
-    """Return by how much curves differ when their ends are moved, or exchanged.
+    """Return the defects of the invariance of curves when their ends are moved or exchanged.
 
-    The values are the largest angles in rad, over all problems and 33 times, between L R(t) and the
-    curve of the "left"-moved ends, R(t) Q and that of the "right"-moved ones, and R(1 − t) and that
-    of the "reversed" ones, for random rotations L and Q (BK Prop. 3).
+    The values are the largest angles in rad over all problems and 33 times, for random rotations L
+    and Q (BK Prop. 3). "left" compares L R(t) with the curve of the ends moved by L, "right"
+    compares R(t) Q with the curve of the ends moved by Q, and "reversed" compares R(1 − t) with the
+    curve of the exchanged ends.
     """
     R0, R1, w0, w1 = ends
     L, Q = sample_rotation(2, rng=rng)
@@ -150,9 +152,10 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
 
 
 def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> NDArray[np.bool_]:
-    """Tell which optima cost so little, compared with their ends, that a ratio is meaningless.
+    """Tell which optima have a cost that is too small for ratios of costs.
 
-    ‖x‖² stands for ½ xᵀ G x; for a ball G = 2 I.
+    The cost is compared with ‖σ‖² + ‖w0‖² + ‖w1‖², in which ‖x‖² stands for ½ xᵀ G x. For a ball,
+    G = 2 I.
     """
     half = np.eye(3) if inertia is None else np.asarray(inertia) / 2
     sigma = rb.log_so3(ends.R0.mT @ ends.R1)
@@ -163,9 +166,9 @@ def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> N
 def excesses(
     ends: Ends, found: Mapping[str, Array], inertia: ArrayLike | None = None
 ) -> dict[str, Array]:
-    """Return the costs of a survey over the optimum, minus 1.
+    """Return the excesses in a survey: each cost over that of the optimum, minus 1.
 
-    NaN where the optimum is near zero or not found.
+    The excess is NaN if the optimum is near zero or was not found.
     """
     lost = near_zero(ends, found["optimum"], inertia)
     optimum = np.where(lost, np.nan, found["optimum"])
@@ -177,8 +180,8 @@ def cell_table(
 ) -> dict[str, Array]:
     """Return the quantile `share` of `excesses` in each cell of `atlas_problems`, as a table.
 
-    Its columns are the family, the middle of the cell, how many problems count, and a `quantile`
-    for each closed form; a row for each cell.
+    The table has a row for each cell. Its columns are the family, the middle of the cell, the
+    number of problems that count, and a `quantile` for each closed form.
     """
     family, turn, speed = np.indices((len(families), CELLS, CELLS)).reshape(3, -1)
     cells = {way: x.reshape(-1, draws) for way, x in excess.items()}
@@ -192,7 +195,7 @@ def cell_table(
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
-    """Return the smallest number that is not below `share` of the numbers in the last axis.
+    """Return the smallest number that is at least as large as `share` of those in the last axis.
 
     NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 
@@ -212,7 +215,7 @@ def rounded(x: Array, decimals: int = 8) -> Array:
 
 
 def in_words(excess: float) -> str:
-    """Return an excess as text: in percent, or how many times the optimum.
+    """Return an excess as text, in percent or as a multiple of the optimum.
 
     Examples
     --------

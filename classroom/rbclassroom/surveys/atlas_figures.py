@@ -1,4 +1,4 @@
-"""Still figures of the atlas: heat maps, quantiles over the excursion, excess over the margin."""
+"""Figures of the atlas: heat maps, quantiles over the excursion, and excess over the margin."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -36,7 +36,7 @@ def of_family(data: Table, family: str) -> dict[str, Array]:
 
 
 def _groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
-    """Return the rows of a table that have the same word in a column, by this word."""
+    """Return the rows of a table, grouped by the words in a column."""
     columns = {name: np.asarray(column) for name, column in data.items()}
     return {
         word: {name: column[columns[by] == word] for name, column in columns.items()}
@@ -45,10 +45,10 @@ def _groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
 
 
 def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> None:
-    """Draw for a family a heat map of each closed form: a colour for each power of ten.
+    """Draw a heat map of each closed form for a family, with a colour for each power of ten.
 
-    A dashed line runs at 10 %. `data` is what `rbclassroom.surveys.atlas.cell_table` gives; its
-    `quantile` is named beside the colours, which fill the upper right corner (BK 1, BK 7).
+    A dashed line marks 10 %. `data` is a table of `rbclassroom.surveys.atlas.cell_table`. The
+    scale of colours is in the upper right corner, with the name of the `quantile` (BK 1, BK 7).
     """
     axes = fig.subplots(2, 4, sharex=True, sharey=True)
     cells = of_family(data, family)
@@ -61,10 +61,10 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> None:
 
 
 def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
-    """Draw heat maps of medians: a row for each body, a column for each curve.
+    """Draw heat maps of medians, with a row for each body and a column for each curve.
 
-    `data` is what `rbclassroom.surveys.body_atlas.maps` gives; `curves` are the names of columns
-    in it, and the headings above them (beyond BK 3).
+    `data` is a table of `rbclassroom.surveys.body_atlas.maps`. `curves` maps names of its columns
+    to headings of the figure (beyond BK 3).
     """
     bodies = _groups(data, "body")
     axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)
@@ -77,7 +77,7 @@ def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None
 
 
 def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
-    """Return in words what `draw_body_atlas` shows."""
+    """Return a description of the figure of `draw_body_atlas`."""
     titles, said = {x: title.replace("\n", " ") for x, title in curves.items()}, []
     for body, cells in _groups(data, "body").items():
         shares = {x: _shares(cells[f"{x} median [1]"], [_TENTH]) for x in titles}
@@ -91,9 +91,9 @@ def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
 
 
 def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
-    """Draw the excess in each cell, in their order, and a dashed line at 10 %.
+    """Draw the excess in each cell, in the order of the cells, and a dashed line at 10 %.
 
-    A map on which it is below all levels says so.
+    If the excess is below all levels everywhere, a text on the map states this.
     """
     turns, speeds = (np.linspace(0, end, CELLS + 1) for end in (180, FASTEST))
     x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
@@ -112,7 +112,7 @@ def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
 
 
 def _label(fig: Figure, bar: Any, ways: str, quantile: str) -> None:
-    """Label the axes of heat maps and their bar of colours."""
+    """Label the axes of heat maps and their scale of colours."""
     fig.supylabel(f"end velocity, {ways} (rad)", fontsize="medium")
     fig.supxlabel("displacement (°)", fontsize="medium")
     bar.set_label(f"cost / optimum − 1,\n{quantile}")
@@ -126,7 +126,7 @@ def _set_percents(ax: Axes, levels: list[float]) -> None:
 
 
 def _percents(levels: list[float]) -> list[str]:
-    """Return levels in percent; if any is far from 1 %, all are powers of ten."""
+    """Return levels as text in percent; if any is far from 1 %, write all as powers of ten."""
     powers = np.log10(levels).round().astype(int) + 2
     if np.abs(powers).max() > 4:
         return [f"$10^{{{power}}}$ %" for power in powers]
@@ -134,7 +134,7 @@ def _percents(levels: list[float]) -> list[str]:
 
 
 def describe_atlas(data: Table, family: str, quantile: str) -> str:
-    """Return in words what `draw_atlas` shows."""
+    """Return a description of the figure of `draw_atlas`."""
     cells = of_family(data, family)
     levels = 0.01, _TENTH, 1
     said = "; ".join(f"{way} {_shares(cells[f'{way} excess [1]'], levels)}" for way in WAYS)
@@ -153,7 +153,7 @@ def _shares(excess: Array, levels: Sequence[float]) -> str:
 def draw_growth(ax: Axes, data: Table) -> None:
     """Draw, on logarithmic axes, the excess of each closed form over the excursion.
 
-    The medians have marks; thin and dashed is the 90 % quantile (BK 1, BK 7).
+    The medians have marks; the 90 % quantiles are thin dashed lines (BK 1, BK 7).
     """
     size, medians = np.asarray(data["size [rad]"]), _medians(data)
     for way, median in medians.items():
@@ -170,7 +170,7 @@ def draw_growth(ax: Axes, data: Table) -> None:
 
 
 def describe_growth(data: Table) -> str:
-    """Return in words what `draw_growth` shows."""
+    """Return a description of the figure of `draw_growth`."""
     size = np.asarray(data["size [rad]"])
     said = "; ".join(
         f"{way} from {f'{x[0]:.1e}' if x[0] > 1e-11 else 'less than 1e-11'} to {x[-1]:.1e}"
@@ -190,10 +190,10 @@ def _medians(data: Table) -> dict[str, Array]:
 
 
 def draw_margins(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the excess over the margin: of projections left, of cubics of quaternions right.
+    """Draw the excess over the margin: projections on the left, quaternion cubics on the right.
 
-    The first family in the column "family" becomes dots, up to two others large black marks, the
-    same in both panels. A line of slope −3 runs beside the projections.
+    In both panels, problems of the first family in the column "family" are dots, and those of up to
+    two others are large black marks. A line of slope −3 runs beside the projections.
     """
     for ax, (way, (name, ticks)) in zip(axes, _MARGINS.items(), strict=True):
         dots: Any = {"color": COLOURS[_LOOKS[way][0]], "ms": 4, "rasterized": True}
@@ -211,7 +211,7 @@ def draw_margins(axes: Sequence[Axes], data: Table) -> None:
 
 
 def describe_margins(data: Table) -> str:
-    """Return in words what `draw_margins` shows."""
+    """Return a description of the figure of `draw_margins`."""
     first, *others = _groups(data, "family").items()
     margin, excess = _margins(first[1], "projection")
     low, high = (np.nanmedian(excess[x]) for x in (margin < 0.2, margin > 1))
@@ -234,9 +234,9 @@ def _margins(data: Table, way: str) -> tuple[Array, Array]:
 
 
 def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
-    """Draw by what closed forms differ from the optimum near a geodesic: a panel for d and for e.
+    """Draw the deviations of closed forms from the optimum near a geodesic, in a panel for d and e.
 
-    `data` has the time, and a column "way d [1]" and "way e [1]" for each of them (beyond BK 10).
+    `data` has the time, and columns "NAME d [1]" and "NAME e [1]" for each form (beyond BK 10).
     """
     titles = {"d": "difference d, across the axis", "e": "mean e, across the axis"}
     for ax, (letter, title) in zip(axes, titles.items(), strict=True):
@@ -252,7 +252,7 @@ def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
 
 
 def describe_deviations(data: Table) -> str:
-    """Return in words what `draw_deviations` shows."""
+    """Return a description of the figure of `draw_deviations`."""
     largest = "; ".join(
         f"{name[:-4]} {np.abs(data[name]).max():.1e}" for name in data if name != "t [1]"
     )

@@ -1,6 +1,6 @@
-"""The atlas of real bodies, lesson 13: which curve is near the optimum, for which body.
+"""The atlas of real bodies in lesson 13: a survey of the curves near the optimum of each body.
 
-``course.py atlas`` calls this module. It takes some minutes and shows its progress.
+``course.py atlas`` runs this module. The run takes some minutes and shows its progress.
 """
 
 from __future__ import annotations
@@ -34,26 +34,28 @@ CLOSED_FORMS = (
     *("projection", "weighted", "exponential", "Bézier"),
     *("cumulative", "quaternion", "Cayley", "normal"),
 )
-"""The closed forms among the curves; "weighted" and "normal" know the inertia."""
+"""The closed forms among the curves; "weighted" and "normal" use the inertia."""
 CURVES = (*CLOSED_FORMS, "two Béziers", "three", "ball's optimum")
-"""What is compared: "two Béziers" is the cheaper of the two ways round, "three" the cheapest of
-these and "normal", and "ball's optimum" the optimum for a ball, which is no closed form."""
+"""The curves that are compared. "two Béziers" is the cheaper of two Bézier curves, one of them the
+long way round. "three" is the cheapest of these two and "normal". "ball's optimum" is the
+optimum for a ball, which is not a closed form."""
 DOMAINS = {"small": 2, "medium": 5, "all": CELLS}
-"""So many steps of the displacement, from 0, and of the end velocity belong to a domain."""
+"""The number of steps, from 0, of displacement and end velocity that belong to each domain."""
 SEEDS = 31, 32, 33
 DRAWS = 200
-"""Seeds of the problems, the maps are of the first; and problems in each of the 10 × 10 cells."""
+"""The seeds of the problems, and the number of problems in each of the 10 × 10 cells; the maps use
+the first seed."""
 TABLES = Path(__file__).parent
-"""Where the tables of the atlas are stored."""
+"""The folder of the tables of the atlas."""
 
 
 def body_problems(draws: int, seed: int) -> Ends:
-    """Return the problems of the atlas, `atlas_problems`: end velocities in any direction."""
+    """Return the problems of `atlas_problems` with end velocities in any direction."""
     return atlas.atlas_problems(draws, ["any"], rng=seed)
 
 
 def curves_for(body: str) -> dict[str, atlas.Maker]:
-    """Return the curves that a survey needs for the excesses of `CURVES`."""
+    """Return the curves that a survey has to compute for the excesses of `CURVES`."""
     compared = atlas.closed_forms(BODIES[body])
     return {
         **{name: compared[name] for name in CLOSED_FORMS},
@@ -63,20 +65,20 @@ def curves_for(body: str) -> dict[str, atlas.Maker]:
 
 
 def with_choices(excess: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the excesses of all `CURVES`, from those of the curves of a survey."""
+    """Return the excesses of all `CURVES` from those of the curves in a survey."""
     two = np.fmin(excess["Bézier"], excess["other way"])
     chosen = {"two Béziers": two, "three": np.fmin(two, excess["normal"])}
     return {name: {**excess, **chosen}[name] for name in CURVES}
 
 
 def domain(name: str, draws: int) -> NDArray[np.bool_]:
-    """Return which of the `body_problems` belong to a domain."""
+    """Tell which of the `body_problems` belong to a domain."""
     turn, speed, _ = np.indices((CELLS, CELLS, draws)).reshape(3, -1)
     return (turn < DOMAINS[name]) & (speed < DOMAINS[name])
 
 
 def domain_in_words(name: str) -> str:
-    """Return the limits of a domain.
+    """Return the limits of a domain as text.
 
     Examples
     --------
@@ -101,14 +103,15 @@ def maps(excess: Mapping[str, Mapping[str, Array]], draws: int) -> dict[str, Arr
 
 
 def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
-    """Return for each domain and curve the quantiles of its excess, with 95 % intervals.
+    """Return quantiles and shares of the excess, with 95 % intervals, for each domain and curve.
 
-    The columns: the median and the 90 % quantile, the share of the problems within a tenth of the
-    optimum, and the share for which it is the cheapest of the `CLOSED_FORMS`, the first of equals,
-    NaN for other curves; each with the ends of its interval, "low" and "high". Those of quantiles
-    are numbers of the sample, by the binomial law, NaN where it is too small; those of shares are
-    Clopper and Pearson's. Both hold for independent problems, and are too long, rather than too
-    short, for a sample with the same number of problems in each cell. All are rounded to four
+    The columns are the median, the 90 % quantile, the share of the problems with an excess below a
+    tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. Among equals the
+    first is the cheapest, and for other curves this share is NaN. Each value has the ends of its
+    interval, "low" and "high". Intervals of quantiles end at numbers of the sample, from the
+    binomial distribution, or are NaN if the sample is too small. Intervals of shares are those of
+    Clopper and Pearson. Both hold for independent problems; for a sample with the same number of
+    problems in each cell they are too long rather than too short. All values are rounded to four
     digits. Problems with a NaN do not count.
     """
     cheapest = np.argmin([excess[curve] for curve in CLOSED_FORMS], axis=0)
@@ -143,7 +146,7 @@ def _share(chosen: NDArray[np.bool_]) -> list[float]:
 
 
 def stored(table: str) -> dict[str, NDArray[Any]]:
-    """Return a table of the atlas that comes with the package: "maps" or "intervals".
+    """Return a stored table of the atlas: "maps" or "intervals".
 
     Examples
     --------
@@ -153,7 +156,7 @@ def stored(table: str) -> dict[str, NDArray[Any]]:
     [0.08113, 0.07856, 0.08171]
     """
     if table not in ("maps", "intervals"):
-        raise ValueError(f"table: 'maps' or 'intervals' wanted, got {table!r}")
+        raise ValueError(f"table: 'maps' or 'intervals' is wanted, got {table!r}")
     with (TABLES / f"atlas_{table}.csv").open(encoding="utf-8", newline="") as file:
         names, *rows = csv.reader(file)
     columns = zip(names, zip(*rows, strict=True), strict=True)
@@ -166,7 +169,7 @@ def make_tables(
     draws: int = DRAWS,
     seeds: Sequence[int] = SEEDS,
 ) -> None:
-    """Compute the atlas, and write `maps` of the first seed and the `intervals` of each."""
+    """Compute the atlas; write the `maps` of the first seed and the `intervals` of all seeds."""
     parts, first = list[dict[str, Array]](), dict[str, dict[str, Array]]()
     for seed, (body, inertia) in product(seeds, BODIES.items()):
         problems = body_problems(draws, seed)

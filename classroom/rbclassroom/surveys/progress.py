@@ -1,4 +1,4 @@
-"""A progress bar for notebooks, which ends as a line of text."""
+"""A progress bar for notebooks, which becomes a line of text at the end."""
 
 import html
 import sys
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def bar(what: str) -> Callable[[int, int], None]:
-    """Return a function that shows how much is done: a bar; outside of notebooks, a line.
+    """Return a function that shows progress as a bar or, outside of notebooks, as a line.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Surveys: costs of curves for many ends, in chunks, on one machine or a cluster."""
+"""Compute costs of curves for many ends, in chunks, on one machine or a cluster."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Report = Callable[[int, int], object]
 Measures = Mapping[str, Callable[[Ends], Array]]
 
 CHUNK = 500
-"""So many problems are computed together."""
+"""The number of problems that are computed together."""
 
 
 def survey(
@@ -47,30 +47,34 @@ def survey(
     problems : Ends
         Arrays of one batch axis, N problems.
     executor : concurrent.futures.Executor, optional
-        It computes the chunks of `CHUNK` problems: any executor whose workers can import
-        `rbcourse`, for example ``Client(...).get_executor()`` of dask.distributed for a cluster. By
-        default `processes`, on all processors of this machine, for which a script has to call this
-        function below ``if __name__ == "__main__":``; a single chunk is computed in this process.
+        The executor that computes the chunks of `CHUNK` problems. Its workers have to be able to
+        import `rbcourse`; an example is ``Client(...).get_executor()`` of dask.distributed for a
+        cluster. The default is `processes` on all processors of this machine. A script then has to
+        call this function below ``if __name__ == "__main__":``. A single chunk is computed in this
+        process.
     inertia : array_like, shape (3, 3), optional
-        Of the body, in body axes. By default the body is a ball.
+        The inertia of the body in body axes. By default the body is a ball.
     ways : mapping of str to callable, optional
-        The curves that are compared, ``make(R0, R1, w0, w1)``; by default `closed_forms`. Those
-        that are sent to other processes are functions of a module, or partials of these.
+        Functions ``make(R0, R1, w0, w1)`` of the curves that are compared, by default
+        `closed_forms`. Functions that are sent to other processes have to be functions of a module,
+        or partials of these.
     report : callable, optional
-        ``report(done, total)`` is called after each chunk with numbers of problems.
+        A function that is called as ``report(done, total)`` after each chunk, with numbers of
+        problems.
 
     Returns
     -------
     dict of str to ndarray, shape (N,)
-        ∫ τᵀ G⁻¹ τ dt, for a ball ∫ 2 ‖w'‖² dt: of the "optimum", NaN where none is found, and of
-        each of the ways, to 1e-5 relative, mostly to 1e-8. The chunks are always the same, each
-        computed with one BLAS thread, so the number of workers does not change a single bit.
+        The costs ∫ τᵀ G⁻¹ τ dt, for a ball ∫ 2 ‖w'‖² dt, of the "optimum" and of each of the ways.
+        The cost of an optimum that is not found is NaN. The relative error is at most 1e-5, mostly
+        1e-8. The chunks do not depend on the number of workers, and each is computed with one BLAS
+        thread, so the number of workers does not change a single bit.
 
     Raises
     ------
     ValueError, RuntimeError
         If `ways` cannot be sent to another process, if a way has no curve for one of the problems,
-        or if an integral does not settle. The message names the way and the chunk.
+        or if an integral does not converge. The message names the way and the chunk.
 
     Examples
     --------
@@ -82,15 +86,17 @@ def survey(
     if inertia is not None:
         rb.acceleration_cost(
             rb.geodesic_so3(np.eye(3), np.eye(3)), inertia
-        )  # raises if it is invalid
+        )  # raises ValueError if the inertia is invalid
     ways = closed_forms(inertia) if ways is None else ways
     for name, make in ways.items():
         try:
             signature(make).bind(*Ends._fields)
         except TypeError as error:
-            raise ValueError(f"ways: {name!r} is called with R0, R1, w0, w1: {error}") from error
+            raise ValueError(
+                f"ways: make(R0, R1, w0, w1) is wanted, got {name!r}: {error}"
+            ) from error
     if "optimum" in ways:
-        raise ValueError("ways: 'optimum' is the name of what all are compared with")
+        raise ValueError("ways: names except 'optimum' are wanted, since this is the reference")
     measures = {name: partial(costs, make, inertia=inertia) for name, make in ways.items()}
     return _in_chunks({"optimum": partial(_least, inertia), **measures}, problems, executor, report)
 
@@ -100,9 +106,9 @@ def several_starts(
 ) -> dict[str, Array]:
     """Return the costs of the curves that Newton's method finds from several guesses, by guess.
 
-    The guesses are `starts`; the body is a ball; `problems`, `executor` and `report` are those of
-    `survey`. The curves are stationary; none is proven to be the best. NaN where none is found
-    (BK (19)).
+    The guesses are `starts`, and the body is a ball. `problems`, `executor` and `report` are those
+    of `survey`. The curves are stationary, but none is proven to be the best. If no curve is found,
+    the cost is NaN (BK (19)).
     """
     measures = {name: partial(_stationary, make) for name, make in starts().items()}
     return _in_chunks(measures, problems, executor, report)
@@ -111,7 +117,7 @@ def several_starts(
 def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Array:
     """Return the costs of the curves ``make(R0, R1, w0, w1)`` for N problems, as `survey` does.
 
-    See `acceleration_cost` for 1e-10, and for any curve (BK (18)).
+    `acceleration_cost` computes the cost of any curve, to 1e-10 (BK (18)).
 
     Examples
     --------
@@ -125,12 +131,15 @@ def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Arra
     curve = make(*problems)
     wanted = 3, (0, 1), problems.w0.shape[:-1]
     if not isinstance(curve, rb.Curve) or (curve.size, curve.domain, curve.batch_shape) != wanted:
-        raise ValueError(f"make: curves on SO(3) and [0, 1] are wanted, one each, got {curve!r}")
+        raise ValueError(
+            f"make: one curve on SO(3) and [0, 1] per problem is wanted, got {curve!r}"
+        )
     return rb.acceleration_cost(curve, inertia, rtol=1e-6)
 
 
 def _least(inertia: ArrayLike | None, chunk: Ends) -> Array:
-    with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):  # there, NaN says it
+    # a cost of NaN replaces the warning
+    with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):
         return np.asarray(rb.minimum_acceleration_so3(*chunk, inertia).cost)
 
 
@@ -158,11 +167,11 @@ def _in_chunks(
                 pickle.dumps(work)
             except (pickle.PicklingError, AttributeError, TypeError) as error:
                 raise ValueError(
-                    "ways: functions of a module, or partials of these, are wanted, for they are "
-                    f"sent to other processes ({error})"
+                    "ways: functions of a module, or partials of these, are wanted, because they "
+                    f"are sent to other processes ({error})"
                 ) from error
             executor = stack.enter_context(processes())
-        stack.enter_context(threadpool_limits(1))  # of threads, which share it, until all are done
+        stack.enter_context(threadpool_limits(1))  # threads share the limit until all are done
         compute = map if executor is None else executor.map
         for part in compute(work, firsts, chunks):
             parts.append(part)
@@ -185,13 +194,13 @@ def _of_chunk(measures: Measures, first: int, chunk: Ends) -> Array:
 
 @contextmanager
 def processes(workers: int | None = None) -> Iterator[Executor]:
-    """Give an executor of `workers` processes of this machine, by default one per processor.
+    """Give an executor of `workers` processes on this machine, by default one per processor.
 
-    The processes are new ones: they share nothing with a notebook's threads. They end with the
-    block, and when this process is killed. When an error or Ctrl-C ends the block, the chunks that
-    have not begun are dropped.
+    The processes are new and share nothing with the threads of a notebook. They end with the block,
+    and if this process is killed. If an error or Ctrl-C ends the block, chunks that have not begun
+    are not computed.
     """
-    from concurrent.futures import ProcessPoolExecutor  # the Python of web pages does not have it
+    from concurrent.futures import ProcessPoolExecutor  # missing in the Python of web pages
 
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent)
     try:
@@ -201,7 +210,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _end_with_parent() -> None:
-    """Leave Ctrl-C to the parent, and end when it is killed: the queue of work does not tell."""
+    """Leave Ctrl-C to the parent, and end if it is killed, which the queue of work cannot show."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None

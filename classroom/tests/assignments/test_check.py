@@ -82,7 +82,7 @@ def test_an_answered_set_is_run_and_written_without_nbgrader(hand_in):
     assert (done.returncode, done.stderr) == (0, ""), done
     assert "running cell 9 of 9" in done.stdout
     last = done.stdout.splitlines()[-1]
-    assert last.startswith("2 of 2 visible tests passed; hidden tests run when it is graded")
+    assert last.startswith("2 of 2 visible tests passed; hidden tests run in grading")
     assert last.endswith("ps0.ipynb")
     assert submitted(path).cells[-1].outputs[0].text == "é∞ 1\n"
     assert submitted(path).metadata.kernelspec.name == "python3"
@@ -106,8 +106,8 @@ def test_faults_are_named_and_do_not_keep_from_handing_in(hand_in, capsys, monke
     said = capsys.readouterr().out
     for words in (
         "submitted under the name ps0.ipynb",
-        "- cell 6, test of “A tiny set” was changed; it is put back\n",
-        "- cell 5, answer of “A tiny set”, line 2 replaces math.isclose: change it, or a person",
+        "- cell 6, test of “A tiny set” was changed; it is restored\n",
+        "- cell 5, answer of “A tiny set”, line 2 replaces math.isclose: change it, or your",
         "- cell 9, added cell of “A tiny set” fails: NameError: name 'nowhere' is not",
         "FAILED  A tiny set: cell 4 AssertionError: times itself; cell 6 AssertionError; cell 8 is",
         "0 of 2 visible tests passed",
@@ -158,7 +158,7 @@ def test_an_endless_loop_is_stopped_its_output_is_cut_and_a_dead_kernel_is_named
     assert "the output is too large" in said
     assert "more than half" not in said
     assert "the kernel died in cell 5" in said
-    assert "cell 6 it was not run" in said
+    assert "cell 6 was not run" in said
     assert "0 of 2 visible tests passed" in said
     assert (path.parent / "to_submit" / "ps0.ipynb").stat().st_size < 3_000_000
 
@@ -220,14 +220,14 @@ TEST = "cell 4, test of “A tiny set”"
 @pytest.mark.parametrize(
     ("edit", "said"),
     [
-        (without("title"), ["cell 1, locked cell of “A tiny set” was missing; it is put back"]),
-        (without("square-answer"), ["cell 3, answer of “A tiny set” was missing; it is put back"]),
-        (without("square-test"), [f"{TEST} was missing; it is put back"]),
-        (without("words-answer"), ["cell 8, answer of “A tiny set” was missing; it is put back"]),
-        (keep_one, ["was missing; it is put back"] * 7),
-        (copy_answer, ["cell 5, answer of “A tiny set”: is there again as cell 9", "order"]),
-        (make_code, ["cell 8, answer of “A tiny set” was made a code cell; it is put back"]),
-        (with_test(make_raw), [f"{TEST} was made a raw cell; it is put back"]),
+        (without("title"), ["cell 1, locked cell of “A tiny set” was missing; it is restored"]),
+        (without("square-answer"), ["cell 3, answer of “A tiny set” was missing; it is restored"]),
+        (without("square-test"), [f"{TEST} was missing; it is restored"]),
+        (without("words-answer"), ["cell 8, answer of “A tiny set” was missing; it is restored"]),
+        (keep_one, ["was missing; it is restored"] * 7),
+        (copy_answer, ["cell 5, answer of “A tiny set”: cell 9 has the same name", "order"]),
+        (make_code, ["cell 8, answer of “A tiny set” was made a code cell; it is restored"]),
+        (with_test(make_raw), [f"{TEST} was made a raw cell; it is restored"]),
         (with_test(lambda t: t.metadata.nbgrader.update(points=20)), [f"{TEST} has other points"]),
         (with_test(lambda t: t.metadata.nbgrader.update(grade=False)), ["has other points or m"]),
         (with_test(lambda t: t.metadata.update(editable=True)), [f"{TEST} was unlocked; it is"]),
@@ -268,7 +268,7 @@ BROKEN = b"no json", b'{"cells": 3}', b"\xff\xfe", b'{\n<<<<<<< HEAD\n"a": 1\n==
 @pytest.mark.parametrize(
     ("content", "word"),
     [(b"", "empty"), (b"%PDF-1.7", "a PDF or an archive")]
-    + [(content, "damaged or no notebook") for content in BROKEN],
+    + [(content, "damaged or not a notebook") for content in BROKEN],
 )
 def test_a_file_that_is_no_notebook_is_refused_in_one_line(content, word, hand_in):
     path = hand_in()
@@ -295,7 +295,7 @@ def test_the_original_is_made_from_the_source_in_the_course_and_missing_elsewher
     path = path.rename(tmp_path / "ps0 (1).ipynb")
     checked(path)
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
-    with pytest.raises(SystemExit, match="no problem set mine; there are: ps0"):
+    with pytest.raises(SystemExit, match=r"one of the problem sets is wanted \(ps0\), got mine"):
         checked(path.rename(tmp_path / "mine.ipynb"))
 
 

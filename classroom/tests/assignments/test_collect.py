@@ -126,7 +126,7 @@ def test_known_names_tell_the_student(entry, student, packing, course):
 def test_other_encodings_are_stored_in_utf8_and_named(encoding, course):
     content, name = answered(course, "ü"), moodle("A_1")
     rows = collected(course, {name: content.decode().encode(encoding)})
-    assert of("collected", rows) == [(name, "a, ps1; it is stored in UTF-8, which it was not")]
+    assert of("collected", rows) == [(name, "a, ps1; it is now stored in UTF-8")]
     assert (course / "submitted/a/ps1/ps1.ipynb").read_bytes() == content
 
 
@@ -156,10 +156,10 @@ def test_sets_are_told_by_cells_and_names(course):
     }
     rows = collected(course, given)
     assert [why for _, why in of("unmatched", rows)] == [
-        "named ps1, but its cells are of ps2",
-        "its cells are of no set",
-        "its cells are of no set",
-        "its name names no student",
+        "its name is ps1, its cells are of ps2",
+        "its cells do not belong to a set",
+        "its cells do not belong to a set",
+        "its name does not contain a student",
     ]
     assert "no notebook" in of("refused", rows)[0][1]
     wanted = {f"{who}/ps1" for who in "abce"} | {"d/ps2"}
@@ -181,7 +181,7 @@ def test_names_in_undeclared_utf8_and_in_parts_are_one_student(course):
 def test_students_of_one_name_are_kept_apart_whenever_they_come(course):
     collected(course, {moodle("Al Li_11"): answered(course, "first")})
     rows = collected(course, {moodle("Al Li_22"): answered(course, "second")})
-    why = "2 have this name, and now their numbers too; delete this folder"
+    why = "2 students have this name, and now numbered folders; delete this one"
     assert of("duplicates", rows) == [("submitted/al_li/ps1", why)]
     found = files(course)
     assert found["al_li_11/ps1"] == "first"
@@ -213,11 +213,11 @@ def test_rosters_of_spreadsheets_are_read_and_others_refused(course):
     collected(course, {moodle("Müller Jörg_500"): answered(course)})
     assert list(files(course)) == ["s1/ps1"]
     roster.write_text("id,first_name,last_name\ns1,Jörg,Müller\n", "cp1252")
-    with pytest.raises(ValueError, match=r"students\.csv: save it as CSV in UTF-8"):
+    with pytest.raises(ValueError, match=r"students\.csv: a CSV file in UTF-8 is wanted"):
         collected(course, {})
     for row in ("../x,A,B,", "a/b,A,B,", ",A,B,"):
         roster.write_text(f"id,first_name,last_name,email\n{row}\n", "utf-8")
-        with pytest.raises(ValueError, match="names no folder"):
+        with pytest.raises(ValueError, match="an id that can name a folder is wanted"):
             collected(course, {})
 
 
@@ -278,7 +278,7 @@ def test_unsafe_files_are_refused_and_the_others_are_collected(course):
     assert files(course).keys() == {f"{who}/ps1" for who in ("a", "b", "d", "good_one")}
     why = [reason for _, reason in of("refused", rows)]
     assert len(why) == 9
-    assert why.count("it is a zip in a zip, or too much; unpack it by hand") == 2
+    assert why.count("it contains a zip, or too many bytes; unpack it by hand") == 2
     for words in ("encrypted", "too large"):
         assert sum(words in reason for reason in why) == 1, words
     assert len(of("ignored", rows)) == 2
@@ -289,7 +289,7 @@ def test_links_in_the_folder_are_not_followed(course):
     folder = course.parents[1] / "downloads"
     (folder / "A_1_assignsubmission_file_ps1.ipynb").symlink_to(course / "source/ps1")
     rows = collected(course, {})
-    assert of("refused", rows) == [("A_1_assignsubmission_file_ps1.ipynb", "a link")]
+    assert of("refused", rows) == [("A_1_assignsubmission_file_ps1.ipynb", "it is a link")]
 
 
 def test_of_several_uploads_to_canvas_the_last_is_taken_whatever_the_dates(course):
@@ -307,7 +307,7 @@ def test_only_newer_downloads_replace_and_mended_files_stay(course):
     before = files(course)
     assert [kind for kind, *_ in collected(course, {})] == ["unchanged", "unchanged"]
     rows = collected(course, {"a.zip": packed({name: answered(course, "old")}, DAY)})
-    assert "what was collected before is newer" in of("duplicates", rows)[0][1]
+    assert "the file collected before is newer" in of("duplicates", rows)[0][1]
     assert files(course) == before
     rows = collected(course, {"b.zip": packed({name: answered(course, "newest")}, NEWEST)})
     assert "replaces" in of("collected", rows)[0][1]
@@ -323,7 +323,7 @@ def test_late_is_what_canvas_marks_and_perhaps_a_date_after_the_due_date(course)
     rows = collected(course, {"a.zip": packed(entries, LATER)}, datetime(2026, 12, 1, 23, 59))
     late = dict(of("late", rows))
     assert set(late) == {"a, ps1", "c_3, ps1"}
-    assert late["a, ps1"].startswith("perhaps: dated 2026-12-02 12:00")
+    assert late["a, ps1"].startswith("perhaps: 2026-12-02 12:00")
     assert len(of("collected", rows)) == 3
 
 
@@ -342,5 +342,5 @@ def test_the_command_prints_each_list(course, monkeypatch):
     heads = [line for line in done.stdout.splitlines() if not line.startswith(" ")]
     assert heads == ["collected: 1", "late: 1", "ignored: 1"]
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
-    with pytest.raises(SystemExit, match="nowhere: there is no such folder"):
+    with pytest.raises(SystemExit, match="folder: an existing folder is wanted, got nowhere"):
         main()

@@ -87,18 +87,18 @@ CLASS = [
         tamper,
         {"half": "half = 3"},
         "2 0",
-        ["cell 2, answer of", "is there again", "more"],
+        ["cell 2, answer of", "has the same name", "more"],
     ),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),
     ("nosy", None, {"square": NOSY}, "0 1", []),
-    ("replaces", None, {"half": "\nmath.tau = 6"}, " ", [f"{HALF}, line 2 replaces math.tau: "]),
+    ("replaces", None, {"half": "\nmath.tau = 6"}, " ", [f"{HALF}, line 2 replaces math.tau; "]),
     ("dies", None, {"half": DIES}, " ", [f"Python ended in or before {HALF}, or 600 s were over"]),
     ("stripped", strip_metadata, {}, " ", ["the cells are not those of this problem set"]),
 ]
 FILES = [
-    ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is no notebook, but a PDF or an archive"),
-    ("wrong name", "PS0.ipynb", b"{}", "there is no ps0.ipynb, but PS0.ipynb"),
+    ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is a PDF or an archive, not a notebook"),
+    ("wrong name", "PS0.ipynb", b"{}", "the file ps0.ipynb is wanted, got PS0.ipynb"),
 ]
 
 
@@ -159,7 +159,7 @@ def test_feedback_shows_points_and_where_tests_fail_and_no_hidden_tests(course):
     assert "False False" in course.feedback("nosy")
     listed = re.findall(r'<li><a href="#[^"]+">([^<]*)</a> \(Score', course.page("good one"))
     assert listed == ["A tiny set, tests", "A tiny set, tests", "A tiny set, in words"]
-    unseen = "others, which are not shown, fail"
+    unseen = "but a hidden test fails"
     assert unseen in course.feedback("half right")
     assert unseen not in course.feedback("good one")
     endless = course.feedback("endless")
@@ -181,8 +181,8 @@ class Killed(ProcessPoolExecutor):
 
 LISTED = [
     ("refused", "Bob_1_assignsubmission_file_/ps0.ipynb", "it is empty"),
-    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "its cells are of no set"),
-    ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "its cells are of no set"),
+    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "its cells do not belong to a set"),
+    ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "its cells do not belong to a set"),
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "tampers, ps0", "Ann Ames"),
     ("missing", "cid, ps1", "Cid Cole"),
@@ -237,12 +237,12 @@ def test_who_was_not_graded_or_not_collected_has_a_line_in_the_table(again):
     remarks = {student: row["remarks"] for student, row in again.rows().items()}
     del remarks["good one"], remarks["nosy"]
     assert remarks == {
-        "tampers": "words-answer is another answer than when it was graded before",
+        "tampers": "the answer words-answer differs from the one that was graded before",
         "half right": "refused: its process ended, or took too long",
         "stuck": f"refused: {HALF} cannot be stopped",
         LISTED[0][1]: "not collected: it is empty",
-        LISTED[1][1]: "not collected: its cells are of no set",
-        "cid": "nothing was collected",
+        LISTED[1][1]: "not collected: its cells do not belong to a set",
+        "cid": "no file was collected",
     }
 
 
@@ -255,9 +255,9 @@ def test_alembic_is_found_where_the_environment_is_not_activated(monkeypatch):
 
 def test_sets_without_submissions_and_unknown_sets_are_named(tmp_path):
     write_tiny_set(tmp_path)
-    with pytest.raises(ValueError, match="There is no submission of ps0"):
+    with pytest.raises(ValueError, match="ps0: a submission in"):
         grade(["ps0"], tmp_path)
-    with pytest.raises(ValueError, match="no problem set ps7; there are: ps0"):
+    with pytest.raises(ValueError, match=r"one of the problem sets is wanted \(ps0\), got ps7"):
         grade(["ps7"], tmp_path)
     with pytest.raises(ValueError, match="There are no submissions"):
         grade([], tmp_path)
@@ -272,5 +272,5 @@ def test_the_commands_of_nbgrader_are_configured_in_the_same_way():
 
 def test_nothing_runs_without_a_box_that_was_there(tmp_path, monkeypatch):
     monkeypatch.setattr(sandbox, "missing", lambda: "it failed")
-    with pytest.raises(Refused, match="there is no box any more: it failed"):
+    with pytest.raises(Refused, match="the sandbox does not work any more: it failed"):
         grade_one("ps0", "ann", tmp_path, boxed=True)

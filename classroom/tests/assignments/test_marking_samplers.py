@@ -53,7 +53,7 @@ def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
 def test_a_right_sampler_is_accepted_with_any_generator(name, capsys):
     rng = np.random.Generator(getattr(np.random, name)(5))
     assert COIN.accepts(student("def answer(rng): return rng.random()"), rng)
-    assert capsys.readouterr().out == "4000 draws look as they should.\n"
+    assert capsys.readouterr().out == "The 4000 draws agree with the distribution that is wanted.\n"
 
 
 def test_a_sampler_may_have_its_own_generator():
@@ -74,10 +74,10 @@ def told(problem, source, rng=1):
         ("rng.random() * 2", "outside"),
         ("0.3", "Every call returns the same draw"),
         ("__import__('numpy').random.default_rng(0).random()", "Every call returns the same"),
-        ("rng.random(3)", "A draw has the shape (); yours has (3,)"),
-        ("'x'", "Draw 0 is to be numbers; yours is x"),
+        ("rng.random(3)", "A draw should have shape (); yours has (3,)"),
+        ("'x'", "Draw 0 should be numbers; yours is x"),
         ("float('nan')", "Draw 0 is not finite: nan"),
-        ("rng.random() / 2", "These draws are not uniform. What gives it away: the number"),
+        ("rng.random() / 2", "These draws are not uniform. The distribution of the number"),
     ],
 )
 def test_wrong_samplers_get_the_reason(body, said):
@@ -88,7 +88,7 @@ def test_wrong_samplers_get_the_reason(body, said):
     ("late", "said"),
     [
         ("2.0", "outside"),
-        ("None", "Draw 2999 is to be numbers; yours is None. Does a branch end without return?"),
+        ("None", "Draw 2999 should be numbers; yours is None. Does a branch end without return?"),
         ("float('inf')", "Draw 2999 is not finite: inf"),
         ("1 / 0", "Your function stops: ZeroDivisionError"),
     ],
@@ -124,13 +124,17 @@ def test_draws_that_are_used_twice_are_seen():
 @pytest.mark.parametrize(
     ("law", "change", "said"),
     [
-        ("direction", lambda p: 2 * p, "A direction has the length 1; one of yours has 2."),
-        ("quaternion", lambda q: 0.5 * q, "A unit quaternion has the length 1"),
+        ("direction", lambda p: 2 * p, "A direction should have the length 1; one of yours has 2."),
+        ("quaternion", lambda q: 0.5 * q, "A unit quaternion should have the length 1"),
         ("quaternion", lambda q: q * (1 - 0.3 * q[:, :1] ** 2), "The length is between 0.71 and 1"),
         ("rotation", lambda R: -R, "The determinant is −1 for all"),
         ("rotation", lambda R: np.r_[R[:300], -R[300:]], "The determinant is −1 for 70%"),
-        ("rotation", lambda R: 2 * R, "A draw is no rotation: its singular values are [2.0, 2.0"),
-        ("rotation", lambda R: R * [1, 1, 0.5], "A draw is no rotation. If you reflect"),
+        (
+            "rotation",
+            lambda R: 2 * R,
+            "A draw is not a rotation: its singular values are [2.0, 2.0",
+        ),
+        ("rotation", lambda R: R * [1, 1, 0.5], "A draw is not a rotation. If you reflect"),
     ],
 )
 def test_draws_that_are_not_allowed_are_described(law, change, said):

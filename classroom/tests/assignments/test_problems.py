@@ -245,7 +245,7 @@ def test_missing_or_broken_tables_and_data_are_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "ps2")
     with pytest.raises(NotYet, match=r"^ps2\.json is missing"):
         problem("ps2", "turn")
-    with pytest.raises(ValueError, match=r"ps2\.toml is missing: the tests of ps2\.ipynb need it"):
+    with pytest.raises(ValueError, match=r"ps2\.toml is missing, and the tests of ps2\.ipynb need"):
         update(tmp_path / "ps2")
     for text, said in (("[turn", r"^ps2\.toml: "), ("[turn]\ninputs = 1", r"^ps2\.toml, turn: ")):
         (tmp_path / "ps2.toml").write_text(text, "utf-8")

@@ -40,7 +40,7 @@ BORROWED = {
 @pytest.mark.parametrize("source", BORROWED.values(), ids=BORROWED)
 def test_functions_of_libraries_are_named(source):
     library = "scipy" if "scipy" in source else r"rb(course|classroom)\."
-    with pytest.raises(NotYet, match=rf"This uses {library}.*Write it yourself"):
+    with pytest.raises(NotYet, match=rf"Your function uses {library}.*Write it yourself"):
         call_student(student(source), ([0.1, 0.2, 0.3],), ())
 
 

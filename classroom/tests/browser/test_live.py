@@ -255,7 +255,7 @@ def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     words = page.locator(".answer-in-words").get_by_role("textbox")
     assert words.evaluate("(area) => area.tagName") == "TEXTAREA"  # it is no code
     checks.first.click()
-    expect(page.locator(".outputs.right")).to_contain_text("As it should be")
+    expect(page.locator(".outputs.right")).to_contain_text("The function is correct")
     checks.nth(5).click()
     expect(page.get_by_alt_text("The figure that the cell draws")).to_be_visible()
     expect(page.locator(".kept")).to_contain_text("kept in this browser")

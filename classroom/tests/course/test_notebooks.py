@@ -68,7 +68,7 @@ def test_differences_between_runs_and_machines_are_not_stored():
 
 def test_without_lessons_nothing_is_removed(tmp_path):
     (tmp_path / "thesis.pdf").touch()
-    with pytest.raises(ValueError, match="no lessons here"):
+    with pytest.raises(ValueError, match="has no lessons; run this"):
         notebooks.regenerate(tmp_path, tmp_path)
     assert (tmp_path / "thesis.pdf").exists()
 
@@ -113,7 +113,7 @@ def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path, monkey
     notebooks.regenerate(tmp_path, figures)
     assert '"arm"' in paths[1].read_text()
     assert {file.name for file in figures.iterdir()} == {"arm.png", "plane.png"}
-    with pytest.raises(ValueError, match="no lesson's name begins with '03'"):
+    with pytest.raises(ValueError, match="prefixes of lessons' names are wanted, got '03'"):
         notebooks.regenerate(tmp_path, figures, ["03"])
 
 
@@ -177,14 +177,14 @@ def test_a_copy_that_was_worked_in_is_never_touched(folders, capsys, there, work
         assert mine.read_text() == work
         assert f'"{version}"' in (folders[1] / f"01_plane_{version}.ipynb").read_text()
     assert len(list(folders[1].glob("*.ipynb"))) == 3
-    assert "your copy stays, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
+    assert "your copy is kept, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
 
 
 def test_a_lesson_that_is_no_notebook_is_named_and_not_copied(folders, monkeypatch):
     closed, close = [], SQLiteSignatureStore.close
     monkeypatch.setattr(SQLiteSignatureStore, "close", lambda s: closed.append(close(s)))
     (folders[0] / "02_arm.ipynb").write_text("<<<<<<< HEAD")
-    with pytest.raises(ValueError, match=r"02_arm\.ipynb is no notebook"):
+    with pytest.raises(ValueError, match=r"02_arm\.ipynb is not a notebook"):
         notebooks.copy_lessons(*folders)
     assert len(closed) == 1  # signatures are in a database
     assert not (folders[1] / "02_arm.ipynb").exists()

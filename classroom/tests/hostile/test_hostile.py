@@ -167,22 +167,37 @@ OTHERS = [
     ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
     ("ends itself", "import os\nos.kill(os.getpid(), 9)", " ", "Python ended in or before cell 5"),
     # test_forbidden.py has more ways round the tests
-    ("transforms", TRANSFORMS, " ", f"{CELL_5}, line 2 uses get_ipython: grade by hand"),
+    ("transforms", TRANSFORMS, " ", f"{CELL_5}, line 2 uses get_ipython; grade by hand"),
     ("an alias", "m = [math][0]\nm.isclose = print", " ", f"{CELL_5}, line 2 replaces m.isclose"),
     ("a shell", "!ls", " ", f"{CELL_5}, line 1 uses a magic or a shell"),
-    ("[ab]*", "half = 0.5", " ", "the name of the folder holds [, * or ?: give it another"),
+    ("[ab]*", "half = 0.5", " ", "the name of the folder contains [, * or ?; rename the folder"),
 ]
 FILES = [
     ("crlf", lambda good: good.replace(b"\n", b"\r\n"), "2 1", ""),
-    ("bom", lambda good: codecs.BOM_UTF8 + good, " ", "ps0.ipynb is not plain UTF-8: collect it"),
-    ("utf-16", lambda good: good.decode().encode("utf-16"), " ", "ps0.ipynb is not plain UTF-8"),
-    ("half a file", lambda good: good[:999], " ", "ps0.ipynb is damaged or no notebook"),
-    ("deep", lambda good: b'{"cells": ' + b"[" * 10**5, " ", "ps0.ipynb is damaged or no notebook"),
+    (
+        "bom",
+        lambda good: codecs.BOM_UTF8 + good,
+        " ",
+        "ps0.ipynb is not in plain UTF-8; collect it",
+    ),
+    ("utf-16", lambda good: good.decode().encode("utf-16"), " ", "ps0.ipynb is not in plain UTF-8"),
+    ("half a file", lambda good: good[:999], " ", "ps0.ipynb is damaged or not a notebook"),
+    (
+        "deep",
+        lambda good: b'{"cells": ' + b"[" * 10**5,
+        " ",
+        "ps0.ipynb is damaged or not a notebook",
+    ),
     ("long", lambda good: b" " * 31_000_000, " ", "ps0.ipynb has more than 30,000,000 bytes"),
-    ("more files", lambda good: good, " ", "there is more than ps0.ipynb: take away feedback.html"),
+    (
+        "more files",
+        lambda good: good,
+        " ",
+        "the folder has more files than ps0.ipynb: remove feedback.html",
+    ),
 ]
 RESULTS = [(student, *result) for student, _, *result in OTHERS + FILES]
-RESULTS += [("a link", " ", "ps0.ipynb, or what is beside it, is a link")]
+RESULTS += [("a link", " ", "ps0.ipynb or a file or folder beside it is a link")]
 RESULTS += [("prints", "2 1", f"{CELL_5}: the output is too large")]
 RESULTS += [(student, "2 1", "") for student in HONEST]  # without a remark
 RESULTS += [(student, "2 0", None) for student in SNEAKS]
@@ -308,7 +323,7 @@ def test_grading_without_a_box_is_announced_or_refused(tmp_path, template, monke
     monkeypatch.setattr(sandbox, "missing", lambda: why)
     course = Class(tmp_path, template)
     course.submit("ann")
-    with pytest.raises(ValueError, match=f"There is no box for submissions: {why}"):
+    with pytest.raises(ValueError, match=f"There is no sandbox for submissions: {why}"):
         grade(["ps0"], course.folder, require_box=True)
     grade(["ps0"], course.folder)
     assert why in capsys.readouterr().out

@@ -49,7 +49,7 @@ def test_a_seed_gives_the_same_problems_again(make):
     one, again, other = make(2, rng=5), make(2, rng=5), make(2, rng=6)
     assert all(np.array_equal(a, b) for a, b in zip(one, again, strict=True))
     assert not any(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
-    with pytest.raises(ValueError, match=r"an integer from 1 up wanted, got 0"):
+    with pytest.raises(ValueError, match=r"an integer from 1 up is wanted, got 0"):
         make(0, rng=5)
 
 
@@ -57,7 +57,7 @@ def test_bad_sizes_and_families_are_named():
     for size in (0, -1, 3.2, np.nan, "a", [1, 2]):
         with pytest.raises(ValueError, match=r"^size"):
             atlas.random_problems(2, size)
-    with pytest.raises(ValueError, match=r"^families: along, across and any .*\['around'\]"):
+    with pytest.raises(ValueError, match=r"^families: along, across or any .*\['around'\]"):
         atlas.atlas_problems(1, ["along", "around"])
 
 
