@@ -89,6 +89,6 @@ def test_a_record_has_its_states_in_order_the_same_bytes_each_time_and_its_first
     assert one._repr_html_() == other._repr_html_()
     for k, angle in enumerate((60.0, 120.0)):
         assert one.texts[101 * k + 30] == theta.state(angle=angle, t=0.3).texts
-    assert "Here these stay" not in one.caption
+    assert "These controls are fixed here" not in one.caption
     with pytest.raises(ValueError, match="120"):
         recorded.record(theta, "theta", {"angle": [60.0]})
