@@ -60,7 +60,7 @@ def body_explorer() -> Explorer:
         shares = {name: np.array(of_laws) / min(of_laws) for name, of_laws in costs.items()}
         return {name: f"{numbers(share, 2)} × the least" for name, share in shares.items()}
 
-    return Explorer("A book turned by three laws", fig, artists, controls, show, plays="t")
+    return Explorer("A book turned in three ways", fig, artists, controls, show, plays="t")
 
 
 @lru_cache(maxsize=64)
