@@ -1,4 +1,4 @@
-"""The explorer of real bodies: a book that is turned by three laws."""
+"""The explorer of real bodies: a book that is turned in three ways."""
 
 from functools import lru_cache
 from typing import Any
@@ -27,9 +27,9 @@ _COSTS = {"acceleration": rb.acceleration_cost, "torque": rb.torque_cost}
 def body_explorer() -> Explorer:
     """Return an explorer of a book of 1 kg that is turned from rest to rest in 1 s.
 
-    It turns by the optimum for a ball, by least acceleration, and by least torque. Controls: the
-    axis of the displacement, ``about``; the ``turn`` in degrees; the ``thickness`` of the book in
-    cm; and the time ``t``, which plays (beyond BK 3, beyond BK 4).
+    It shows three motions: the optimum for a ball, the motion of least acceleration, and that of
+    least torque. Its controls are the axis of the displacement, ``about``, the ``turn`` in degrees,
+    the ``thickness`` of the book in cm, and the time ``t``, which plays (beyond BK 3, beyond BK 4).
     """
     artists: dict[str, Any] = {}
     with new_figure() as fig:
@@ -60,12 +60,12 @@ def body_explorer() -> Explorer:
         shares = {name: np.array(of_laws) / min(of_laws) for name, of_laws in costs.items()}
         return {name: f"{numbers(share, 2)} × the least" for name, share in shares.items()}
 
-    return Explorer("A book turned by three laws", fig, artists, controls, show, plays="t")
+    return Explorer("A book turned in three ways", fig, artists, controls, show, plays="t")
 
 
 @lru_cache(maxsize=64)
 def _solved(about: str, turn: float, thickness: float) -> Any:
-    """Return the curves of the laws, the sizes of their torques, and their costs by name."""
+    """Return the three motions, the norms of their torques, and their costs by name."""
     G, rest = rb.metrics.box_inertia([_LENGTH, _WIDTH, thickness / 100]), np.zeros(3)
     ends = np.eye(3), rb.exp_so3(np.radians(turn) * _AXES[about]), rest, rest
     curves: list[rb.Curve] = [

@@ -11,7 +11,7 @@ export default {
     URL.revokeObjectURL(back.src);
     el.append(canvas);
 
-    // The states of one version, by their numbers; stale from when another control moves.
+    // The states of one version, by their numbers. They are stale once another control moves.
     let known = new Map(), version, stale = false, shown, noted = "";
     let waiting = false, place = null, near = false, timer, late, panel = null;
     const text = "Python does not answer: wait, or run this cell again.";
@@ -24,7 +24,7 @@ export default {
     const send = (message) => {
       if (waiting) return;
       waiting = true;
-      try { model.send(message); } catch { /* Python has ended: `give` says so */ }
+      try { model.send(message); } catch { /* Python has ended: `give` shows the message */ }
     };
     const paint = () => {
       const { state, styles, texts: [rows, notice, line] } = shown;
@@ -34,7 +34,7 @@ export default {
       canvas.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
     };
 
-    // The state of the moment, or the nearest to it while that is on its way.
+    // Show the present state, or the nearest known state until the present one arrives.
     const show = () => {
       if (stale) return;
       const index = time.get("index"), off = (i) => Math.abs(i - index);
@@ -44,7 +44,7 @@ export default {
       if (now !== shown && shown !== silent) paint((shown = now));
     };
 
-    // Ask for what may be played, when nothing else has been asked for a while.
+    // Ask for the missing states of the control that plays, after a pause without requests.
     const prepare = (pause) => {
       clearTimeout(timer);
       timer = setTimeout(() => {
@@ -87,7 +87,7 @@ export default {
 
     const view = rooms.length ? rbcourseScene.turn(canvas, rooms, () => paint()) : "";
 
-    // What only the panel beside the picture has: names for screen readers, and the reset of time.
+    // Names for screen readers and the reset of the time belong to the panel beside the picture.
     const label = (panel) => {
       for (const slider of panel.querySelectorAll(".widget-slider")) {
         const [name, value] = [".widget-label", ".widget-readout"].map((part) => slider.querySelector(part));
@@ -114,7 +114,7 @@ export default {
       label(panel);
       labels.observe(panel, { childList: true, subtree: true });
       panel.addEventListener("click", reset);
-      panel.addEventListener("keydown", (event) => event.stopPropagation()); // or JupyterLab takes it
+      panel.addEventListener("keydown", (event) => event.stopPropagation()); // otherwise JupyterLab handles the key
       const enter = () => { near = true; prepare(1000); };
       ["pointerenter", "focusin"].forEach((name) => panel.addEventListener(name, enter));
     });
@@ -126,7 +126,7 @@ export default {
       play.set("value", time.get("index"));
       show();
     }, canvas);
-    // While it plays Python is told nothing; it hears in the end where time has come to.
+    // While the explorer plays, Python gets no messages; at the end it gets the present time.
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches, step = calm ? Math.ceil(count / 6) : 1;
     play.on("change:value", () => {
       const value = play.get("value");

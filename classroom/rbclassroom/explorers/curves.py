@@ -20,15 +20,15 @@ _MOMENTS = np.diag(rb.metrics.box_inertia(_EDGES, 0.5))
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
 _SPINS = {"axis 1": 0, "axis 2": 1, "axis 3": 2}
-_SEEN_FIRST = np.array([0.8, 0.8, 1])  # at the start one looks at the ends with a number
+_SEEN_FIRST = np.array([0.8, 0.8, 1])  # at the start the ends with a number are in front
 
 
 def theta_explorer() -> Explorer:
-    """Return an explorer of the straight line and its shadow, θ(t).
+    """Return an explorer of the straight line between two rotations and its projection, θ(t).
 
-    On the left the circle of the rotations between the two ends, with the chord; on the right θ
-    over time. Controls: the ``angle`` a in degrees, and the time ``t``, which plays (BK Prop. 6,
-    BK (15), BK (16), BK Cor. 1, BK Fig. 2).
+    The left picture shows the circle of the rotations between the two ends, with the chord; the
+    right one shows θ over time. The controls are the ``angle`` a in degrees, and the time ``t``,
+    which plays (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
@@ -38,7 +38,7 @@ def theta_explorer() -> Explorer:
         side.plot([0, 1], [0, 1], color=COLOURS["reference"], lw=1)
         side.set(xlim=(0, 1), ylim=(0, 1), xlabel="time t", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
         black, pink = ({"color": COLOURS[name]} for name in ("optimum", "projection"))
-        side.tick_params("y", pad=8)  # beyond the dots
+        side.tick_params("y", pad=8)  # so that the dots do not cover the numbers
         dot: dict[str, Any] = {"marker": "o", "ms": 10, "ls": ""}
         artists = {
             "arc": new_line(ax, **black, lw=2.5),
@@ -77,10 +77,10 @@ def theta_explorer() -> Explorer:
 
 
 def screw_explorer() -> Explorer:
-    """Return an explorer of two ways from the room's frame to a pose: geodesic and screw.
+    """Return an explorer of two motions from the room's frame to a pose: geodesic and screw.
 
-    Controls: the ``angle`` of the turn in degrees, how far its axis is ``tilt``ed from z towards x,
-    in degrees, where the body goes, ``x`` and ``z`` in m, and the time ``t``, which plays (BK 2.6,
+    The controls are the ``angle`` of the turn, the ``tilt`` of its axis from z towards x, both in
+    degrees, the position ``x`` and ``z`` of the goal in m, and the time ``t``, which plays (BK 2.6,
     BK (10), BK (14)).
     """
     with new_figure() as fig:
@@ -132,10 +132,10 @@ def screw_explorer() -> Explorer:
 def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
-    Its axes stick out of it on both sides, one end with a number. Its angular momentum is upright
-    and stays. Controls: the ``axis`` that it spins about; how far it is ``off`` that axis, in
-    degrees; the time ``t`` in s, which plays, and starts again when another axis is chosen (BK (8),
-    BK 2.4).
+    Its three axes stick out of it on both sides, and one end of each has a number. Its angular
+    momentum is vertical and constant. The controls are the ``axis`` of the spin, the angle ``off``
+    this axis in degrees, and the time ``t`` in s, which plays, and starts again when another axis
+    is chosen (BK (8), BK 2.4).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)
@@ -181,9 +181,10 @@ def flip_explorer() -> Explorer:
 
 @lru_cache(maxsize=1)
 def _spins() -> tuple[rb.Array, rb.Array]:
-    """Return orientations and angular velocities by time, axis and angle off it.
+    """Return orientations and angular velocities by time, axis, and angle off this axis.
 
-    All are integrated at once, before a slider is touched: even one takes too long to follow it.
+    All motions are integrated at once, before a slider moves: to integrate even one of them takes
+    too long while a slider moves.
     """
     tilt = np.radians(np.arange(0, _OFF_MOST + _OFF_STEP / 2, _OFF_STEP))[:, None]
     main = np.eye(3)[:, None]
@@ -192,5 +193,5 @@ def _spins() -> tuple[rb.Array, rb.Array]:
     ahead = _SEEN_FIRST - (L @ _SEEN_FIRST)[..., None] * L
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
     body = np.stack([ahead, np.cross(L, ahead), L], axis=-2)
-    upright = rb.exp_so3([0, 0, AZIMUTH]) @ body  # the momentum upwards
+    upright = rb.exp_so3([0, 0, AZIMUTH]) @ body  # the angular momentum points up
     return rb.geodesic_flow(np.diag(_MOMENTS), upright, w0, _SPIN_TIMES)

@@ -1,4 +1,4 @@
-"""The base of all explorers: a picture that follows its sliders."""
+"""The base of all explorers: a picture that the reader changes by sliders."""
 
 import base64
 import html
@@ -29,13 +29,13 @@ _STYLES: Any = ["default", "rbcourse.rbcourse", dict.fromkeys(_SIZED, LABELS)]
 
 
 class Canvas(anywidget.AnyWidget):
-    """The picture in the browser, which draws the states that it is sent; see canvas.js.
+    """The picture in the browser, which draws the states that Python sends; see canvas.js.
 
     ``made`` never changes. A ``run`` has consecutive states of the control that plays. All runs of
-    one version have the same values of the other controls; the first has the notice, if there is
-    one (after a click, for example). The browser sends a message with the ``index`` of a state that
-    it lacks, or with the ``place`` of a click: the share of the width from the left, and of the
-    height from the top.
+    one version have the same values of the other controls, and the first run may have a notice
+    (after a click, for example). The browser sends a message with the ``index`` of a missing state,
+    or with the ``place`` of a click. A place consists of the distance from the left as a fraction
+    of the width, and the distance from the top as a fraction of the height.
     """
 
     _esm = ENGINE + Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
@@ -49,30 +49,30 @@ class State:
 
     shown: list[Any]
     drawn: NDArray[np.int16]
-    texts: list[Any]  # pairs of a name and a value, a notice, and all of it as one line
+    texts: list[Any]  # pairs of a name and a value, a notice, and the same texts as one line
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
     """A picture, its controls, and the displayed values.
 
-    The background is drawn once. The browser plays recorded states, and asks for the states that it
-    lacks; each change of another control is sent as one state. Where nothing can be shown, the
-    panel says why, and nothing is drawn that moves.
+    The background is drawn once. The browser plays recorded states, and asks Python for missing
+    states; each change of another control is sent as one state. If the values of the controls have
+    no picture, the panel gives the reason, and the artists that move are hidden.
 
     Parameters
     ----------
     name, fig
-        Its title, and the figure with everything on it; the axes of the figure must not change.
+        The title of the explorer, and its figure with all artists; the axes must not change.
     artists, controls : mapping of str
-        The artists that move, in the order in which they are drawn; sliders and choices.
+        The artists that move, in the order in which they are drawn, and the sliders and choices.
     show : callable
         ``show(**values)`` moves the artists to the values of the controls, and returns the
         displayed texts, by name. It may raise a ValueError or a RuntimeError, or warn.
     plays, seconds
-        The control that the play button moves, made by `widgets.stepped`; and how long it plays.
+        The control that the play button moves, made by `widgets.stepped`, and its playing time.
     point : callable, optional
-        ``point(x, y)`` gets the place of a click in the pixels of Matplotlib, and returns the
-        controls to be set, as a dict; it may raise a ValueError.
+        ``point(x, y)`` gets the position of a click in the pixels of Matplotlib, and returns the
+        new values of controls, as a dict; it may raise a ValueError.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return {name: control.value for name, control in self.controls.items()}
 
     def put(self, **values: Any) -> None:
-        """Set some of the controls, in their order, and send the result once."""
+        """Set some of the controls, in their order, and send only the final state."""
         self._resting = True
         try:
             for name in [name for name in self.controls if name in values]:
@@ -139,12 +139,12 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             self._follow()
 
     def restart(self) -> None:
-        """Set all controls to their first values; stop playing."""
+        """Set all controls to their first values, and stop playing."""
         self.play.playing = False
         self.put(**self._first)
 
     def state(self, **values: Any) -> State:
-        """Return the state with these values, and those of the other controls."""
+        """Return the state with these values; the other controls keep their present values."""
         shown, said, notice = list(self.artists.values()), {}, ""
         with warnings.catch_warnings(record=True, action="always") as warned:
             try:
@@ -159,21 +159,21 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return State(shown, self.display.record(shown), [list(said.items()), notice, line])
 
     def draw(self, shown: Sequence[Any] | None, zoom: float = 1) -> bytes:
-        """Return these artists as a PNG over the background, `zoom` times as fine.
+        """Return these artists as a PNG over the background, with `zoom` times the resolution.
 
-        None: without the rooms in space, which the reader can turn.
+        If `shown` is None, the rooms in space, which the reader can turn, are left out.
         """
         with plt.style.context(_STYLES):
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
 
     def _follow(self, _: Any = None, notice: str = "") -> None:
-        """Send the present state, with a notice that stays until something moves."""
+        """Send the present state, with a notice that is shown until a control moves."""
         if not self._resting:
             self._version += 1
             self._push(self.time.index, [self.state()], notice)
 
     def _answer(self, _: Any, asked: Mapping[str, Any], __: Any) -> None:
-        """Send states for 50 ms, from the one on that is asked for; or follow a click."""
+        """Send states for 50 ms, beginning with the requested state, or react to a click."""
         if "place" in asked and self._point:
             (right, down), (width, height) = asked["place"], self.display.size
             try:
@@ -199,11 +199,11 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         }
 
     def __repr__(self) -> str:
-        """Return the name, and all displayed texts."""
+        """Return the name of the explorer and all displayed texts."""
         return self.state().texts[-1]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:
-        """Return the explorer, and a still of it for readers without a kernel."""
+        """Return the explorer, and a still picture for readers without a kernel."""
         source = base64.b64encode(self.draw(self.state().shown)).decode()
         still = (
             f'<figure><img style="max-width: 100%" alt="{html.escape(repr(self))}" '
@@ -215,7 +215,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 
 @contextmanager
 def new_figure() -> Iterator[Figure]:
-    """Give a figure for an explorer, to be drawn upon in the style of the course."""
+    """Yield a figure for an explorer; drawings on it have the style of the course."""
     with plt.style.context(_STYLES):
         fig = Figure(figsize=(5.6, 3.8), dpi=100)
         fig.set_layout_engine("none")
@@ -223,7 +223,7 @@ def new_figure() -> Iterator[Figure]:
 
 
 def new_space(fig: Figure, place: tuple[float, float, float, float], reach: float) -> Any:
-    """Add axes for bodies that turn about the origin; pale: the axes of the room."""
+    """Add axes for bodies that turn about the origin, with pale lines for the axes of the room."""
     ax: Any = fig.add_axes(place, projection="space")
     for room in reach * np.eye(3):
         ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=1.5, zorder=0)
@@ -233,16 +233,16 @@ def new_space(fig: Figure, place: tuple[float, float, float, float], reach: floa
 
 
 def new_line(ax: Any, **style: Any) -> Any:
-    """Draw a line without points, in the plane or in space, to be filled."""
+    """Draw an empty line, in the plane or in space; its points are set later."""
     return ax.plot(*[[]] * (3 if ax.name == "space" else 2), **style)[0]
 
 
 def apart(R: Any, S: Any) -> str:
-    """Return the largest angle between rotations, or stacks of them, in degrees, as text."""
+    """Return the largest angle between two rotations or two stacks, in degrees, as text."""
     return f"{numbers(np.degrees(angle_between(R, S)).max(), 1)}°"
 
 
 def numbers(values: Any, digits: int) -> str:
-    """Return numbers as text, with commas between them, and without a minus before zero."""
+    """Return numbers as text, separated by commas; zero has no minus sign."""
     rounded = np.round(np.atleast_1d(values), digits) + 0.0
     return ", ".join(f"{x:.{digits}f}".replace("-", "−") for x in rounded)

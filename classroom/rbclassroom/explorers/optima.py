@@ -1,4 +1,4 @@
-"""Explorers of minimum acceleration: optimum and projection, solved again for other ends."""
+"""Explorers of minimum acceleration: optimum and projection for ends that the reader chooses."""
 
 from functools import lru_cache
 from typing import Any
@@ -25,9 +25,9 @@ _WAYS = {"optimum": "-", "projection": "--"}
 def minimum_acceleration_explorer() -> Explorer:
     """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
 
-    From I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the cost is that of
-    `acceleration_cost`. The box moves as the optimum does, its pink outline as the closed form.
-    Controls: the ``rival``, the projection or one of the others; the ``size`` s; the time ``t``;
+    Both curves run from I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the
+    cost is that of `acceleration_cost`. The box follows the optimum, its pink outline the closed
+    form. The controls are the ``rival``, which is the closed form, the ``size`` s, the time ``t``,
     and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig.
     4).
     """
@@ -63,7 +63,8 @@ def minimum_acceleration_explorer() -> Explorer:
                 artists[f"{way} {axis}"].set_data(_TIMES, line)
             move_box(artists[f"{way} box"], rb.pose_from_components(curve(t), np.zeros(3)), _BOX)
         artists["now"].set_xdata([t, t])
-        heights = size * _SIGMA[1] + max(size, 0.5) * (_SIGMA - _SIGMA[1])  # apart from each other
+        # the labels must not overlap
+        heights = size * _SIGMA[1] + max(size, 0.5) * (_SIGMA - _SIGMA[1])
         for number, height in zip("₁₂₃", heights, strict=True):
             artists[f"σ{number}"].set_position((1.03, height))
         return {**said, "apart at most": apart(*(curve(_TIMES) for curve in curves))}
@@ -72,12 +73,12 @@ def minimum_acceleration_explorer() -> Explorer:
 
 
 def cube_explorer() -> Explorer:
-    """Return an explorer of Figure 5: two cubes on their ways, the optimum and the projection.
+    """Return an explorer of Figure 5: a cube moves by the optimum, another by the projection.
 
-    The ends are the paper's, except three that can be changed; the goal is pale. Controls: the
-    ``turn``, as a share of the paper's; ``spin``, the last component of ω(1) in rad per unit time;
-    ``rise``, that of the velocity at the end in m per unit time; and the time ``t``, which plays
-    (BK 6.3, BK (14), BK Fig. 5).
+    The boundary conditions are those of the paper, except for three that can be changed; the goal
+    is pale. The controls are the ``turn``, as a fraction of the paper's, ``spin``, the last
+    component of ω(1) in rad per unit time, ``rise``, the last component of the final velocity in m
+    per unit time, and the time ``t``, which plays (BK 6.3, BK (14), BK Fig. 5).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -117,7 +118,7 @@ def cube_explorer() -> Explorer:
 
 @lru_cache(maxsize=64)
 def _solved_rotations(rival: str, size: float, k: float) -> Solved:
-    """Solve BK (21) with these two changed."""
+    """Solve the problem of BK (21) with another size and another k."""
     sigma = size * _SIGMA
     ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
     return _compared(rival, rb.minimum_acceleration_so3(*ends), FORMS[rival](*ends))
@@ -125,7 +126,7 @@ def _solved_rotations(rival: str, size: float, k: float) -> Solved:
 
 @lru_cache(maxsize=64)
 def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
-    """Solve BK 6.3 with these three changed, once for all times."""
+    """Solve the problem of BK 6.3 with these three changes; the result is kept for all times."""
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
     goal = rb.pose_from_coordinates([*sigma, 8, 10, 12])
     ends = np.eye(4), goal, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
@@ -134,7 +135,7 @@ def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
 
 
 def _compared(rival: str, *curves: rb.Curve) -> Solved:
-    """Return the optimum and its rival, and the texts on their costs."""
+    """Return the optimum and the closed form, and the texts about their costs."""
     low, high = (float(rb.acceleration_cost_parts(curve)[0]) for curve in curves)
     if low > 1e-12:
         ratio = numbers(high / low, 3)

@@ -21,10 +21,10 @@ POSES = rb.pose_from_coordinates(
 )
 """Four poses: σ in rad and d in m."""
 SHARES = np.array([0.0, 0.35, 0.65, 1.0])
-"""When each is reached, of the whole time."""
+"""The times of the four poses, as fractions of the duration."""
 JOINED = ["geodesics", "cubics, parabolas", "cubics, spline", "the optimum"]
 EDGES = np.array([0.9, 0.6, 0.3])
-"""Of the box, in m."""
+"""The edges of the box in m."""
 _LONGEST = 12.0
 _WAYS = {"angular speed (rad/s)": 2.5, "speed (m/s)": 3.5}
 
@@ -38,11 +38,12 @@ _BETWEEN = np.linspace(0, 1, 25)
 def spline_explorer() -> Explorer:
     """Return an explorer of two curves through four rotations, with their accelerations over time.
 
-    On the left projected cubics with the velocities of parabolas, on the right with those of the
-    spline. A line is the path of the first body axis on the sphere of directions, a stroke the
-    third axis, a dot a given orientation. Below, ‖ω′‖ up to the present time. Controls: the
-    ``ends``, "natural" or "at rest"; ``pitch``, of the third orientation in degrees; ``third``, the
-    time when it is reached; and the time ``t`` in s, which plays (beyond BK 12, beyond BK 13).
+    Both curves are projected cubics: on the left with the velocities of parabolas, on the right
+    with those of the spline. On each sphere of directions a line is the path of the first body
+    axis, a short stroke the third axis, and dots are the given orientations. Below it, a line shows
+    ‖ω′‖ up to the present time. The controls are the ``ends``, "natural" or "at rest", the
+    ``pitch`` of the third orientation in degrees, its time ``third`` in s, and the time ``t`` in s,
+    which plays (beyond BK 12, beyond BK 13).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -83,7 +84,7 @@ def spline_explorer() -> Explorer:
         w[[0, -1]] *= ends == "natural"
         curves = rb.chain(times, R, w), rb.projected_spline_so3(times, R, rest)
         starts, h = times[:-1, None], np.diff(times)[:, None]
-        inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()  # both sides of each joint
+        inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()  # both sides of each knot
         inside[:: len(_BETWEEN)] = times[:-1]
         said, costs = {}, []
         for kind, curve in zip(KINDS, curves, strict=True):
@@ -110,11 +111,12 @@ def spline_explorer() -> Explorer:
 
 
 def chain_explorer() -> Explorer:
-    """Return an explorer of a box on its way through four poses.
+    """Return an explorer of a box that moves through four poses.
 
-    Controls: the ``curve``: geodesics, projected cubics with the velocities of parabolas or of the
-    spline, or the optimum, all but the geodesics at rest at both ends; the ``duration`` of the
-    whole in s; and the time ``t`` in [0, 1], as a share of it, which plays (BK 6.3, beyond BK 14).
+    The controls are the ``curve``, the ``duration`` of the motion in s, and the time ``t`` as a
+    fraction of the duration, which plays. The curve consists of geodesics, or of projected cubics
+    with the velocities of parabolas or of the spline, or it is the optimum. Except for the
+    geodesics, it is at rest at both ends (BK 6.3, beyond BK 14).
     """
     with new_figure() as fig:
         space = new_space(fig, (-0.06, -0.1, 0.74, 1.2), 2.15)

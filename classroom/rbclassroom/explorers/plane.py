@@ -21,16 +21,16 @@ _RATES = {
     "vy": ("vy (m/s)", 0.0, 1.0, 0.1),
     "omega": ("vθ (°/s)", 0.0, 90.0, 5.0),
 }
-"""Of each velocity of a command its label, what it is at first, its greatest value, its step."""
+"""The label, first value, greatest value and step of each velocity of a command."""
 _START = np.radians([-20.0, 110.0])
 
 
 def planar_explorer() -> Explorer:
-    """Return an explorer of plans: two commands, meant in the world's frame or in the body's.
+    """Return an explorer of a plan, whose velocities are in the world's frame or in the body's.
 
-    Controls: ``vx1 vy1 omega1`` and ``vx2 vy2 omega2``, the velocities of the two commands of two
-    seconds each, in m/s and degrees/s, and the time ``t`` in s, which plays (RR 3.2, RR (17), RR
-    (18), RR (19)).
+    The plan has two commands of two seconds each. The controls are their velocities in m/s and
+    degrees/s, ``vx1 vy1 omega1`` and ``vx2 vy2 omega2``, and the time ``t`` in s, which plays (RR
+    3.2, RR (17), RR (18), RR (19)).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.87, 0.7))
@@ -69,11 +69,11 @@ def planar_explorer() -> Explorer:
 
 
 def arm_explorer() -> Explorer:
-    """Return an explorer of the two-link arm: set its angles, or click where its hand is to be.
+    """Return an explorer of the two-link arm: set its angles, or click on a goal for its hand.
 
-    A pale arm shows where it starts; both motors run evenly from there. Controls: the goal
-    ``theta0`` and ``theta1``, in degrees, and the time ``t`` in [0, 1], which plays. When a
-    goal is set, the arm is shown there (RR 4, RR 4.1, RR (20), RR (21)).
+    A pale arm shows the start, from which both motors run evenly. The controls are the goal
+    ``theta0`` and ``theta1``, in degrees, and the time ``t`` in [0, 1], which plays. If you set a
+    goal, the arm is shown at the goal (RR 4, RR 4.1, RR (20), RR (21)).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.63, 0.81))

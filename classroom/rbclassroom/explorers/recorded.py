@@ -1,4 +1,4 @@
-"""Explorers for pages without Python: the states of some controls, recorded."""
+"""Explorers for pages without Python, with recorded states of some controls."""
 
 import argparse
 import html
@@ -29,7 +29,7 @@ _PAGE = Template("""\
 $figure</html>
 """)
 
-_ABOUT = "A recording: in the lesson, with Python, every control moves, with all of its steps."
+_ABOUT = "This is a recording. In the lesson, with Python, you can move every control in all steps."
 MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "arm": ({"theta0": range(-170, 131, 60), "theta1": range(-180, 181, 60)}, 4),
     "body": (
@@ -53,27 +53,28 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "theta": ({"angle": range(10, 171, 10)}, 1),
     "timing": ({"angular_speed": [0.5, 1, 2], "acceleration": [0.5, 1, 2, 4, 6]}, 4),
 }
-"""Of each explorer the recorded values of controls, and of how many steps of what plays one is."""
+"""The recorded values of controls of each explorer, and the stride of the control that plays."""
 
 
 def record(
     explorer: Explorer, name: str, moved: Mapping[str, Sequence[Any]], stride: int = 1
 ) -> Player:
-    """Return an explorer as a figure that moves without Python, in exactly these states.
+    """Return an explorer as a figure that moves without Python and has exactly these states.
 
-    `moved` has values of controls, their present ones among them. Of the control that plays, every
-    `stride`-th step is recorded, the present one among them. The other controls stay as they are.
+    `moved` contains values of controls, including their present values. Every `stride`-th step of
+    the control that plays is recorded, including the present step. The other controls keep their
+    present values.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
     label = {each: control.description for each, control in explorer.controls.items()}
     stays = [f"{label[each]} = {_text(now[each])}" for each in now if each not in {*moved, plays}]
-    fixed = f" Here these stay: {'; '.join(stays)}." if stays else ""
+    fixed = f" These controls are fixed here: {'; '.join(stays)}." if stays else ""
     caption = (
         f"{html.escape(explorer.name)} <details><summary>About this picture</summary>"
         f"{html.escape(_ABOUT + fixed)}</details>"
     )
     shown = explorer.state()
-    still = explorer.draw(shown.shown, zoom=2)  # before the artists move on
+    still = explorer.draw(shown.shown, zoom=2)  # before the artists move to other states
     start = time.index % stride
     steps = explorer.steps[start::stride]
     states = [
@@ -109,7 +110,7 @@ def _text(value: Any) -> str:
 
 
 def write_pages(folder: Path) -> None:
-    """Write a page for each explorer into a folder."""
+    """Write a page for each explorer to a folder."""
     folder.mkdir(exist_ok=True)
     for name, moved in MOVED.items():
         print(f"{name} ...", flush=True)
@@ -123,9 +124,9 @@ def write_pages(folder: Path) -> None:
 
 
 def main() -> None:
-    """Run lessons and explorers again, in the folder of the course; store the changes."""
+    """Run lessons and explorers again, in the folder of the course, and store the changes."""
     parser = argparse.ArgumentParser(prog="course.py figures")
-    help_ = "its number, such as 03; by default all lessons and the explorers"
+    help_ = "the number of a lesson, such as 03; by default all lessons and the explorers"
     parser.add_argument("lessons", nargs="*", metavar="LESSON", help=help_)
     lessons = parser.parse_args().lessons
     try:

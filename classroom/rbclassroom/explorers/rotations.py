@@ -22,10 +22,10 @@ _BINS = np.linspace(-1, 1, 21)
 def rotation_explorer() -> Explorer:
     """Return an explorer of orientations: three angles, and other representations.
 
-    A box with its axes. Dashed: the axes of the three turns, of the first one z of the room, of the
-    second the y that the first has turned, of the third the body's own x. Dotted: the axis of the
-    one turn that replaces them. Controls: ``alpha beta gamma``, the ZYX angles in degrees; ``beta``
-    plays (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
+    The picture shows a box with its axes. Dashed lines are the axes of the three turns: the room's
+    z, the y axis after the first turn, and the body's own x. A dotted line is the axis of the
+    single turn that replaces them. The controls are ``alpha beta gamma``, the ZYX angles in
+    degrees; ``beta`` plays (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.3)
@@ -71,11 +71,11 @@ def rotation_explorer() -> Explorer:
 
 
 def projection_explorer() -> Explorer:
-    """Return an explorer of repairs: a matrix pulled away from SO(3), and two methods to repair it.
+    """Return an explorer of a matrix that is not a rotation, and of two methods to repair it.
 
-    Grey: the columns of I + pull · E. Full: the nearest rotation. Dashed: Gram–Schmidt. Controls:
-    the entries ``e12`` and ``e23`` of E, and ``e33``, and how far it is pulled, ``pull``, which
-    plays (BK 4, BK Prop. 2, RR 1.4).
+    Grey lines are the columns of I + pull · E, full lines those of the nearest rotation, and dashed
+    lines those of Gram–Schmidt. The controls are the entries ``e12``, ``e23`` and ``e33`` of E, and
+    the factor ``pull``, which plays (BK 4, BK Prop. 2, RR 1.4).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.2)
@@ -127,8 +127,9 @@ def _gram_schmidt(M: rb.Array) -> tuple[rb.Array, str]:
 def random_explorer() -> Explorer:
     """Return an explorer of random rotations: the images of e₁, and tests of uniformity.
 
-    Controls: the ``sampler``, "three angles" or "uniform"; the ``number`` of rotations, which
-    plays: always the first of the same 2000; and the ``seed`` of these (RR 2, RR 2.1, RR 2.2).
+    The controls are the ``sampler``, "three angles" or "uniform", the ``number`` of rotations,
+    which plays, and the ``seed``. The rotations are always the first of the same 2000 for this seed
+    (RR 2, RR 2.1, RR 2.2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="space")
@@ -174,7 +175,7 @@ def _sample(sampler: str, seed: int) -> rb.Array:
 
 
 def _axes_of(ax: Any, name: str, colour: str | None = None, **style: Any) -> dict[str, Any]:
-    """Draw three axes, to be moved by `_move_axes`; full coloured ones have their letters."""
+    """Draw three axes, which `_move_axes` moves; coloured axes with full lines have letters."""
     artists: dict[str, Any] = {}
     for axis in "xyz":
         artists[f"{name} {axis}"] = new_line(ax, color=colour or COLOURS[axis], **style)
@@ -192,6 +193,6 @@ def _move_axes(artists: dict[str, Any], name: str, M: rb.Array) -> None:
 
 
 def _lines(M: rb.Array) -> str:
-    """Return a matrix as lines, in which all numbers are equally wide."""
+    """Return a matrix as lines of text in which all numbers have the same width."""
     rows = (numbers(row, 3).split(", ") for row in M)
     return "\n".join("  ".join(x.rjust(6, "\u2007") for x in row) for row in rows)

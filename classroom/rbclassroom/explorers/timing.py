@@ -19,13 +19,13 @@ _IN_USE = 0.995
 
 
 def timing_explorer() -> Explorer:
-    """Return an explorer of a path that is run through as fast as limits allow.
+    """Return an explorer of the fastest timing of a path within limits.
 
-    On the right the phase plane: the path parameter s, with a pose at each whole number, and its
-    rate. Above the limit curves no timing is allowed; grey: the whole path at one rate. The box
-    moves with the fastest timing. Controls: the most that the ``angular_speed``, the ``speed`` and
-    the ``acceleration`` of its centre may be, and ``t``, the share of the time that has passed,
-    which plays (beyond BK 16).
+    The right picture is the phase plane: the rate of the path parameter s over s, with a pose at
+    each integer s. No timing may lie above the limit curves; a grey line shows the whole path at
+    one rate. The box moves with the fastest timing. The controls are the largest allowed
+    ``angular_speed``, ``speed`` and ``acceleration`` of its centre, and ``t``, the time as a
+    fraction of the duration, which plays (beyond BK 16).
     """
     path = rb.projected_spline_se3(np.arange(4.0), POSES)
     with new_figure() as fig:

@@ -1,4 +1,4 @@
-"""The controls of explorers. A label ends with the unit, where there is one."""
+"""The controls of explorers. If a control has a unit, its label ends with the unit."""
 
 from typing import Any
 
@@ -18,20 +18,20 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
 
 
 def stepped(label: str, value: float, low: float, high: float, step: float) -> Any:
-    """Return a slider for playing, with these steps and no values in between."""
+    """Return a slider that can play; it has only the values of these steps."""
     values = np.round(np.arange(low, high + step / 2, step), _digits(step)) + 0.0
     options = [(numbers(x, _digits(step)), x) for x in values.tolist()]
     return ipywidgets.SelectionSlider(options=options, value=value, description=label, **_LOOK)
 
 
 def choice(label: str, options: list[str]) -> Any:
-    """Return buttons, one of which is chosen, the first to begin with."""
+    """Return a row of buttons for one choice; at first the first option is chosen."""
     style = {**_WIDE, "button_width": "auto"}
     return ipywidgets.ToggleButtons(options=options, description=label, style=style)
 
 
 def menu(label: str, options: list[str]) -> Any:
-    """Return a menu, one line of which is chosen, the first to begin with: for many options."""
+    """Return a menu for one choice of many options; at first the first option is chosen."""
     return ipywidgets.Dropdown(options=options, description=label, **_LOOK)
 
 

@@ -28,7 +28,7 @@ def draw_angles(axes: Sequence[Axes], data: Table) -> None:
 
 
 def describe_angles(data: Table) -> str:
-    """Return in words what `draw_angles` shows."""
+    """Return a description of the picture of `draw_angles`."""
     motions, said = vectors("{} {} [rad]", data, "αβγ"), []
     for name, angles in motions.items():
         alpha, beta = np.unwrap(angles[:, 0]), np.degrees(angles[:, 1])
@@ -45,9 +45,9 @@ def describe_angles(data: Table) -> str:
 
 
 def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> None:
-    """Draw a box with its frame in orientations R, shape (n, 3, 3), each in its own space.
+    """Draw a box with its frame in orientations R, shape (n, 3, 3), each on its own axes.
 
-    The names become titles; pale are the axes of the room (RR 2.1).
+    The names become titles; pale lines are the axes of the room (RR 2.1).
     """
     for ax, name, turned in zip(axes, names, R, strict=True):
         pose = pose_from_components(turned, np.zeros(3))
@@ -63,7 +63,7 @@ def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> None:
 
 
 def describe_turns(names: Sequence[str], R: Array) -> str:
-    """Return in words what `draw_turns` shows."""
+    """Return a description of the picture of `draw_turns`."""
     said = []
     for name, turned in zip(names, R, strict=True):
         nearest = zip("xyz", np.abs(turned).argmax(axis=0), turned.T, strict=True)

@@ -1,8 +1,8 @@
-"""Matrices that should be rotations: how they drift, and where repairs take them (lesson 04).
+"""Lesson 4: the drift of matrices that should be rotations, and their repair.
 
-A 2 × 2 matrix is a turn with a stretch plus a mirror with a stretch. As a map of complex numbers it
-takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends on z alone: the `shadows`
-are these z, and the rotations are the unit circle.
+A 2 × 2 matrix is a multiple of a turn plus a multiple of a mirror. As a map of complex numbers it
+takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends only on z. The `shadows` are
+these z, and the rotations are the unit circle.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,11 +24,12 @@ _COLOURS = {"nearest rotation": COLOURS["projection"], "Gram–Schmidt": COLOURS
 
 
 def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> Table:
-    """Multiply a matrix again and again in single precision, and return how it leaves SO(3).
+    """Multiply a matrix repeatedly in single precision, and return its distance from SO(3).
 
-    `ways` gives for each name the factor, shape (3, 3), and what repairs the matrix after every
-    100 products. The table has the defect ‖RᵀR − I‖ of each way, before the repair, at up to 60
-    numbers of steps, evenly spread over the powers of ten, beyond 100 multiples of it (RR 1.4).
+    `ways` has for each name the factor, shape (3, 3), and the function that repairs the matrix
+    after every 100 products, or None. The table has the defect ‖RᵀR − I‖ of each name, before the
+    repair, at up to 60 numbers of steps. These are evenly spread on a logarithmic scale, and those
+    above 100 are multiples of 100 (RR 1.4).
     """
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))
@@ -38,7 +39,7 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
         R, defects = np.eye(3, dtype=np.float32), []
         x, y, z = factor.astype(np.float32)
         for count in range(1, int(counts[-1]) + 1):
-            R = R[:, :1] * x + R[:, 1:2] * y + R[:, 2:] * z  # libraries round products differently
+            R = R[:, :1] * x + R[:, 1:2] * y + R[:, 2:] * z  # library products round differently
             if count in wanted:
                 exact = R.astype(np.float64)
                 defects.append(np.linalg.norm(exact.T @ exact - np.eye(3)))
@@ -49,7 +50,7 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
 
 
 def draw_drift(ax: Axes, data: Table) -> None:
-    """Draw how matrices leave the rotations as they are multiplied."""
+    """Draw the defects of a `drift_table` over the number of products."""
     (_, steps), *ways = named(" [1]", data).items()
     looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
     for (name, defect), (colour, dash) in zip(ways, looks, strict=True):
@@ -60,7 +61,7 @@ def draw_drift(ax: Axes, data: Table) -> None:
 
 
 def describe_drift(data: Table) -> str:
-    """Return in words what `draw_drift` shows."""
+    """Return a description of the picture of `draw_drift`."""
     (_, steps), *ways = named(" [1]", data).items()
     return (
         "Defect ‖RᵀR − I‖ of products of many rotation matrices over their number, on logarithmic "
@@ -70,7 +71,7 @@ def describe_drift(data: Table) -> str:
 
 
 def column_table(matrices: Mapping[str, Array]) -> Table:
-    """Return x and y of the two columns of each 2 × 2 matrix, a row for each column, as a table."""
+    """Return a table of the columns of 2 × 2 matrices; it has a row for each matrix column."""
     return columns("{} {} [1]", {name: M.T for name, M in matrices.items()})
 
 
@@ -78,8 +79,8 @@ def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     """Draw the columns of 2 × 2 matrices as arrows, each matrix on its own axes.
 
     The first matrix is the given one. Its arrows are repeated in grey behind those of the others,
-    and a dotted line joins each tip with its grey one. The titles say what the two lines come to,
-    the root of the sum of their squares: the Frobenius distance (BK Prop. 2, RR 1.4).
+    and a dotted line joins the two tips of each column. The titles state the Frobenius distance,
+    which is the root of the sum of the squares of the two lines (BK Prop. 2, RR 1.4).
     """
     given = next(iter(matrices.values()))
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
@@ -101,7 +102,7 @@ def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
 
 
 def describe_columns(matrices: Mapping[str, Array]) -> str:
-    """Return in words what `draw_columns` shows."""
+    """Return a description of the picture of `draw_columns`."""
     (first, given), *others = matrices.items()
     said = [f"{name} {_sense(M)}, {np.linalg.norm(M - given):.2f} away" for name, M in others]
     return (
@@ -118,10 +119,10 @@ def _sense(M: Array) -> str:
 
 
 def shadows(M: Array) -> dict[str, Array]:
-    """Return the shadows of matrices "M" and of what repairs make of them, each of shape (n, 2).
+    """Return the shadows of matrices "M" and of the repaired matrices, each of shape (n, 2).
 
-    M are matrices [[a, b], [c, d]], shape (n, 2, 2), with a positive determinant; the shadow is
-    x = (a + d)/2, y = (c − b)/2.
+    M contains matrices [[a, b], [c, d]], shape (n, 2, 2), with a positive determinant. The shadow
+    of a matrix is the point x = (a + d)/2, y = (c − b)/2.
     """
     return {
         name: np.stack([A[:, 0, 0] + A[:, 1, 1], A[:, 1, 0] - A[:, 0, 1]], axis=-1) / 2
@@ -135,9 +136,9 @@ def shadow_table(points: Mapping[str, Array]) -> Table:
 
 
 def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> None:
-    """Draw the `shadows` of matrices, and where each of the two repairs takes them, on its axes.
+    """Draw the `shadows` of matrices and of the repaired matrices, each repair on its own axes.
 
-    (BK 4, BK Prop. 2)
+    Lines lead from the given to the repaired matrices (BK 4, BK Prop. 2).
     """
     circle = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
     for ax, (name, colour) in zip(axes, _COLOURS.items(), strict=True):
@@ -152,7 +153,7 @@ def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> None:
 
 
 def describe_shadows(points: Mapping[str, Array]) -> str:
-    """Return in words what `draw_shadows` shows."""
+    """Return a description of the picture of `draw_shadows`."""
     start, found = (points[name] @ [1, 1j] for name in ("M", "Gram–Schmidt"))
     off = np.degrees(np.abs(np.angle(found / start))).max()
     return (
@@ -163,10 +164,10 @@ def describe_shadows(points: Mapping[str, Array]) -> str:
 
 
 def frame_table(M: Array, angles: ArrayLike) -> Table:
-    """Return which rotation repairs find when a 2 × 2 matrix is measured in a turned body frame.
+    """Return the rotations that repairs find if a 2 × 2 matrix is measured in a turned body frame.
 
-    For each angle of the frame in rad, and each repair, it is the angle of fix(M L) Lᵀ, L the turn
-    of the frame. M has a positive determinant.
+    The table has, for each angle of the frame in rad and each repair, the angle of the rotation
+    fix(M L) Lᵀ, where L is the turn of the frame. M has a positive determinant.
     """
     angles = np.asarray(angles, dtype=np.float64)
     cos, sin = np.cos(angles), np.sin(angles)
@@ -179,7 +180,7 @@ def frame_table(M: Array, angles: ArrayLike) -> Table:
 
 
 def draw_frames(ax: Axes, data: Table) -> None:
-    """Draw which rotation two repairs find, over the angle of the frame (BK Prop. 3)."""
+    """Draw the angles of a `frame_table` over the angle of the frame (BK Prop. 3)."""
     (_, frame), *found = named(" [rad]", data).items()
     frame = np.degrees(frame)
     for (name, angle), dash in zip(found, ("-", "--"), strict=True):
@@ -190,7 +191,7 @@ def draw_frames(ax: Axes, data: Table) -> None:
 
 
 def describe_frames(data: Table) -> str:
-    """Return in words what `draw_frames` shows."""
+    """Return a description of the picture of `draw_frames`."""
     _, *found = named(" [rad]", data).items()
     ranges = [
         f"{name} finds {angle.min():.1f} to {angle.max():.1f} degrees"

@@ -11,7 +11,7 @@ from rbcourse.draw.save import COLOURS, Table
 from rbcourse.sampling import angle_law
 
 Bins = Mapping[str, tuple[Array, Mapping[str, Array]]]
-"""For each column of a histogram the edges of its bins, and the densities of each sample."""
+"""The edges of the bins and the densities of each sample, for each quantity of `histograms`."""
 
 _HEIGHT: Any = (-1, 1), lambda z: (z + 1) / 2
 _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
@@ -19,14 +19,14 @@ _LAWS: dict[str, tuple[str, tuple[float, float], Callable[[Array], Array]]] = {
     "height of e₁": ("height of the image of e₁", *_HEIGHT),
     "height of e₃": ("height of the image of e₃", *_HEIGHT),
 }
-"""The columns of a histogram: label, range, and their distribution for uniform rotations."""
+"""The label, the range, and the distribution for uniform rotations of each quantity."""
 
 
 def histograms(R: Mapping[str, Array]) -> Bins:
-    """Return the densities of samples of rotations, shape (n, 3, 3), in 20 bins for each column.
+    """Return histograms of three quantities of random rotations, shape (n, 3, 3), in 20 bins.
 
-    The columns are the angle and the heights of the images of e₁ and e₃; a density is the number
-    in a bin over its width and n.
+    The quantities are the angle and the heights of the images of e₁ and e₃. A density is the number
+    of values in a bin, divided by n and the width of the bin.
     """
     bins = {
         c: (np.linspace(*limits, 21), dict[str, Array]()) for c, (_, limits, _) in _LAWS.items()
@@ -50,14 +50,16 @@ def histogram_table(bins: Bins) -> Table:
 
 
 def draw_histograms(axes: Sequence[Axes], bins: Bins) -> None:
-    """Draw the histograms of two samples of rotations, and the law of uniform ones (RR 2)."""
+    """Draw the histograms of two samples, and the densities of uniform rotations (RR 2)."""
     for ax, (column, (label, limits, law)) in zip(axes, _LAWS.items(), strict=True):
         edges, densities = bins[column]
         for (name, density), look in zip(densities.items(), ("projection", "z"), strict=True):
             ax.stairs(density, edges, baseline=None, color=COLOURS[look], lw=2, label=name)
         fine = np.linspace(*limits, 201)
         density, middle = np.diff(law(fine)) / np.diff(fine), (fine[:-1] + fine[1:]) / 2
-        ax.plot(middle, density, color="black", ls="--", lw=1.5, label="law of uniform rotations")
+        ax.plot(
+            middle, density, color="black", ls="--", lw=1.5, label="density of uniform rotations"
+        )
         ax.set_xticks(np.linspace(*limits, 3))
         ax.set(xlabel=label, xlim=limits, ylim=(0, None))
     axes[0].set_xticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
@@ -67,7 +69,7 @@ def draw_histograms(axes: Sequence[Axes], bins: Bins) -> None:
 
 
 def describe_histograms(bins: Bins) -> str:
-    """Return in words what `draw_histograms` shows."""
+    """Return a description of the picture of `draw_histograms`."""
     said = []
     for column, (label, _, law) in _LAWS.items():
         edges, densities = bins[column]
@@ -76,6 +78,6 @@ def describe_histograms(bins: Bins) -> str:
             said.append(f"{label.split(' (')[0]}, {name}: {100 * off:.0f} %")
     return (
         "Histograms of the angles of random rotations and of the heights of the images of e₁ and "
-        "e₃, with the law of uniform rotations. The share of the draws that lies in the wrong "
+        "e₃, with the densities of uniform rotations. The proportion of the draws in the wrong "
         f"bins: {'; '.join(said)}."
     )

@@ -24,7 +24,7 @@ _MOTIONS: dict[str, dict[str, Any]] = {
     "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 5, **_MARKED},
 }
 _COLOURS = ListedColormap(plt.get_cmap("viridis_r")(np.linspace(0.4, 1, 256)))
-"""Without the bright end, which is hard to see on white."""
+"""The colours of viridis without the bright end, which is hard to see on white."""
 _DASHES: list[Any] = ["-", "--", "-.", ":", (0, (6, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1))]
 _LABELS = {"t": "time t", "angle": "angle a (rad)", "theta": "θ"}
 _LABELS |= {"theta_dot": "dθ/dt", "f_dot": "df/dt"}
@@ -43,9 +43,9 @@ def draw_family(ax: Axes, data: Table) -> None:
 
 
 def draw_surface(ax: Any, data: Table) -> None:
-    """Draw such a table as a surface, with the colours of the curves (BK Fig. 2, BK Fig. 3)."""
+    """Draw the table of `draw_family` as a surface, in the same colours (BK Fig. 2, BK Fig. 3)."""
     (p_label, p), (x_label, x), (y_label, y) = _columns(data)
-    mesh: Any = {"lw": 0.4, "edgecolor": (0, 0, 0, 0.25)}  # the surface shows through it
+    mesh: Any = {"lw": 0.4, "edgecolor": (0, 0, 0, 0.25)}  # a transparent mesh
     look = {"facecolors": _COLOURS(p / np.pi), "shade": False}
     ax.plot_surface(x, p, y, rcount=24, ccount=25, **look, **mesh)
     ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
@@ -54,13 +54,13 @@ def draw_surface(ax: Any, data: Table) -> None:
     ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
     ax.zaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     (left, _), (_, far), (_, top) = ax.get_xlim(), ax.get_ylim(), ax.get_zlim()
-    ax.text(left, far, 1.1 * top, y_label, ha="center")  # over the upright axis
+    ax.text(left, far, 1.1 * top, y_label, ha="center")  # above the vertical axis
     ax.view_init(elev=24, azim=-128)
     ax.set_box_aspect((1, 1, 0.75), zoom=0.95)
 
 
 def describe_family(data: Table) -> str:
-    """Return in words what `draw_family` and `draw_surface` show."""
+    """Return a description of the pictures of `draw_family` and `draw_surface`."""
     (_, p), (_, x), (y_label, y) = _columns(data)
     at = np.linspace(0, x.shape[1] - 1, 5).round().astype(int)
     ends = [
@@ -93,7 +93,7 @@ def draw_chord(ax: Axes, data: Table) -> None:
 
 
 def describe_chord(data: Table) -> str:
-    """Return in words what `draw_chord` shows."""
+    """Return a description of the picture of `draw_chord`."""
     _, _, _, x, y = (np.asarray(column) for column in data.values())
     steps = np.degrees(np.diff(np.unwrap(np.arctan2(y, x))))
     return (
@@ -126,7 +126,7 @@ def draw_paths(ax: Any, paths: Mapping[str, Array]) -> None:
 
 
 def draw_speeds(ax: Axes, t: Array, speeds: Mapping[str, Array]) -> None:
-    """Draw the angular speeds of these two motions over time."""
+    """Draw the angular speeds of the "geodesic" and the "projected line" over time."""
     for name, style in _MOTIONS.items():
         ax.plot(t, speeds[name], label=name, **style)
     ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
@@ -134,7 +134,7 @@ def draw_speeds(ax: Axes, t: Array, speeds: Mapping[str, Array]) -> None:
 
 
 def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> str:
-    """Return in words what `draw_paths` and `draw_speeds` show."""
+    """Return a description of the pictures of `draw_paths` and `draw_speeds`."""
     said = []
     for name in _MOTIONS:
         speed, marks = speeds[name], paths[name][::10]
@@ -153,7 +153,7 @@ def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> s
 
 
 def _columns(data: Table) -> list[tuple[str, Array]]:
-    """Return the columns of a table with their labels on axes."""
+    """Return the columns of a table with the labels of their axes."""
     plain = {name.split(" [")[0]: np.asarray(column, float) for name, column in data.items()}
     return [(_LABELS.get(name, name), column) for name, column in plain.items()]
 
@@ -166,9 +166,9 @@ def _pi_fraction(angle: float) -> str:
 
 
 def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
-    """Draw a fixed frame, a moving one on its body, and the vector between them (BK Fig. 1).
+    """Draw a fixed frame, a moving frame with its body, and the vector between them (BK Fig. 1).
 
-    `names` and `poses`, shape (2, 4, 4), are those of the two frames.
+    `names` and `poses`, shape (2, 4, 4), belong to the two frames.
     """
     d, R = poses[:, :3, 3], poses[:, :3, :3]
     draw_box(ax, poses[1], np.array([1.1, 0.8, 0.6])).set_alpha(0.5)
@@ -184,7 +184,7 @@ def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
 
 
 def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
-    """Return in words what `draw_moving_frame` shows."""
+    """Return a description of the picture of `draw_moving_frame`."""
     fixed, moving = names
     place = ", ".join(f"{x:g}" for x in poses[1, :3, 3])
     turn = np.degrees(angle_between(np.eye(3), poses[1, :3, :3]))

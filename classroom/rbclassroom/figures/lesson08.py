@@ -1,4 +1,4 @@
-"""Lesson 8: spins of a book, its angular momentum, and carried arrows."""
+"""Lesson 8: spins of a book, its angular momentum, and arrows that a turning body carries."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -15,12 +15,12 @@ from rbcourse.draw.spheres import AZIMUTH, ELEVATION, draw_sphere
 
 
 def spin_table(t: Array, spins: Mapping[str, Array]) -> Table:
-    """Return angular velocities over time, shape (times, 3), body frame, as a table."""
+    """Return a table of angular velocities over time, shape (times, 3), in the body frame."""
     return {"t [1]": t} | columns("{} w{} [rad]", spins, "123")
 
 
 def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> None:
-    """Draw the components of angular velocities, shape (times, 3), over time, each on its axes."""
+    """Draw the components of angular velocities over time, each motion on its own axes."""
     for ax, (name, w) in zip(axes, spins.items(), strict=True):
         for axis, number, part, dash in zip("xyz", "₁₂₃", w.T, ("-", "--", "-."), strict=True):
             ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"ω{number}")
@@ -31,12 +31,13 @@ def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> No
 
 
 def describe_spins(spins: Mapping[str, Array]) -> str:
-    """Return in words what `draw_spins` shows."""
+    """Return a description of the picture of `draw_spins`."""
     said = []
     for name, w in spins.items():
         main = w[:, np.abs(w[0]).argmax()]
         flips = np.count_nonzero(np.diff(main > 0))
-        said.append(f"{name}: it changes its sign {flips} times" if flips else f"{name}: it stays")
+        fate = f"changes its sign {flips} times" if flips else "keeps its sign"
+        said.append(f"{name}: it {fate}")
     return (
         "Angular velocity ω(t), in body axes, of a free body that first spins nearly about "
         f"{', '.join(spins)}. The largest component of each: {'; '.join(said)}."
@@ -54,17 +55,17 @@ def momentum_directions(moments: ArrayLike, w: Array) -> Array:
 
 
 def momentum_table(directions: Array) -> Table:
-    """Return `momentum_directions` as a table, with the number of the path."""
+    """Return `momentum_directions` as a table, with the number of each path."""
     numbers = np.broadcast_to(np.arange(len(directions))[:, None], directions.shape[:2])
     columns = {f"{axis} [1]": directions[..., i] for i, axis in enumerate("xyz")}
     return {"path [1]": numbers, **columns}
 
 
 def draw_momenta(ax: Any, directions: Array) -> None:
-    """Draw closed paths of the angular momentum through the body, on the unit sphere.
+    """Draw the closed paths of the angular momentum in the body frame, on the unit sphere.
 
-    A path has the colour of the axis that it goes round; black are those that pass close to the
-    middle one.
+    A path has the colour of the axis that it goes round; paths that pass close to the middle axis
+    are black.
     """
     draw_sphere(ax)
     for path in directions:
@@ -77,7 +78,7 @@ def draw_momenta(ax: Any, directions: Array) -> None:
 
 
 def describe_momenta(directions: Array) -> str:
-    """Return in words what `draw_momenta` shows."""
+    """Return a description of the picture of `draw_momenta`."""
     rounds, near = zip(*map(_course, directions), strict=True)
     return (
         "Paths of the angular momentum of a free body, on a sphere that is fixed in the body, with "
@@ -88,9 +89,10 @@ def describe_momenta(directions: Array) -> str:
 
 
 def _course(path: Array) -> tuple[int, bool]:
-    """Return the axis that a path goes round, and whether it passes close to the middle one.
+    """Return the axis that a path goes round, and whether it passes close to the middle axis.
 
-    It goes round the axis along which its component keeps its sign, the farthest from 0.
+    A path goes round an axis if its component along this axis keeps its sign. If there are several
+    such axes, it is the one whose component remains farthest from 0.
     """
     keeps_sign = path.min(axis=0) * path.max(axis=0) > 0
     nearest, farthest = np.abs(path).min(axis=0), np.abs(path).max(axis=0)
@@ -98,11 +100,12 @@ def _course(path: Array) -> tuple[int, bool]:
 
 
 def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
-    """Draw a book in its first orientation, with a pin in its middle axis; return what turns it.
+    """Draw a book with a pin along its middle axis, and return the function that turns the book.
 
-    R are its orientations at the times t, such that the angular momentum is vertical, as a line
-    through its centre says; `edges` are its edges along its axes, in m, the pin along the second.
-    ``update(i)`` turns the book to orientation i and returns the artists that move.
+    R contains its orientations at the times t. In these the angular momentum is vertical; a line
+    through the centre of the book shows its direction. `edges` are the edges along the axes of the
+    book, in m; the pin is along the second. ``update(i)`` turns the book to orientation i and
+    returns the artists that move.
     """
     poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
@@ -126,7 +129,7 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
 
 
 def describe_book(t: Array, R: Array) -> str:
-    """Return in words what `moving_book` shows."""
+    """Return a description of the picture of `moving_book`."""
     height = R[:, 2, 1]
     start = "up" if height[0] > 0 else "down"
     over = ", ".join(f"{x:.1f}" for x in t[1:][np.diff(height > 0)])
@@ -142,18 +145,18 @@ CARRIED = {
     "parallel": ("path", 0.5),
     "constant in the body": ("z", 1.0),
 }
-"""How an arrow may be carried by a body that turns: its colour, and its share of the turn."""
+"""The colours of three arrows on a turning body, and the fractions of the turn they follow."""
 
 
 def carried_table(turned: Array) -> dict[str, Array]:
-    """Return the ends of arrows that a body carries three ways, turned by these angles."""
+    """Return the ends of the arrows of `CARRIED` after turns of the body by these angles."""
     angles = {name: np.pi / 6 + share * turned for name, (_, share) in CARRIED.items()}
     ends = {name: np.stack([np.cos(a), np.sin(a)], axis=-1) for name, a in angles.items()}
     return {"turn [rad]": turned} | columns("{} {} [1]", ends)
 
 
 def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
-    """Draw a body that turns in the plane, and an arrow carried three ways: BK (9)."""
+    """Draw a body that turns in the plane, and the three arrows of `CARRIED` (BK (9))."""
     ends = vectors("{} {} [1]", carried_table(turned), "xy")
     for k, (ax, angle) in enumerate(zip(axes, turned, strict=True)):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -173,7 +176,7 @@ def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
 
 
 def describe_carried(turned: Array) -> str:
-    """Return in words what `draw_carried` shows."""
+    """Return a description of the picture of `draw_carried`."""
     angles = ", ".join(f"{np.degrees(angle):.0f}" for angle in turned)
     return (
         f"An arrow that a body carries in three ways while it turns in the plane. After {angles} "

@@ -1,4 +1,4 @@
-"""Lesson 9: coordinates of compared curves, and the excess."""
+"""Lesson 9: coordinates of the optimum and the projection, and the excess."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,15 +21,16 @@ _SIGMA = "{} sigma{} [rad]"
 
 
 def coordinate_table(curves: Mapping[str, Curve], t: ArrayLike) -> Table:
-    """Return the exponential coordinates σ of rotations over time, as a table (BK 6.2, BK (21))."""
+    """Return a table of the exponential coordinates σ of curves over time (BK 6.2, BK (21))."""
     sigma = {name: log_so3(curve(t)) for name, curve in curves.items()}
     return {"t [1]": np.asarray(t)} | columns(_SIGMA, sigma, "123")
 
 
 def draw_comparison(fig: Figure, data: Table) -> None:
-    """Draw the paths in the space of σ, the coordinates over time, and their difference.
+    """Draw the "optimum" and the "projection" in the coordinates σ.
 
-    They are those of an "optimum" and a "projection"; every tenth time is marked (BK Fig. 4).
+    The picture has their paths in the space of σ, the coordinates over time, and the difference
+    over time. Every tenth time is marked (BK Fig. 4).
     """
     space: Any = {"a": {"projection": "3d"}}
     axes: Any = fig.subplot_mosaic("ab;ac", per_subplot_kw=space, height_ratios=[2, 1])
@@ -69,7 +70,7 @@ def _draw_paths(ax: Any, sigma: Mapping[str, Array]) -> None:
 
 
 def describe_coordinates(data: Table) -> str:
-    """Return in words what `draw_comparison` shows."""
+    """Return a description of the picture of `draw_comparison`."""
     best, near = (vectors(_SIGMA, data, "123")[name] for name in _STYLES)
     apart = np.linalg.norm(best - near, axis=-1)
     start, end = (", ".join(f"{x:.3g}" for x in best[k].round(9) + 0.0) for k in (0, -1))
@@ -85,7 +86,7 @@ def describe_coordinates(data: Table) -> str:
 
 
 def draw_excess(ax: Axes, data: Table) -> None:
-    """Draw, on logarithmic axes, what near-optimal curves cost too much over their excursion."""
+    """Draw the excess of curves over the size of the excursion, on logarithmic axes."""
     scale, families = np.asarray(data["scale [1]"]), named(" excess [1]", data)
     looks = [("x", "o-"), ("y", "s--"), ("z", "^-."), ("projection", "d:")]
     for (name, excess), (look, mark) in zip(families.items(), looks, strict=False):
@@ -99,11 +100,11 @@ def draw_excess(ax: Axes, data: Table) -> None:
 
 
 def describe_excess(data: Table) -> str:
-    """Return in words what `draw_excess` shows."""
+    """Return a description of the picture of `draw_excess`."""
     scale, families = np.asarray(data["scale [1]"]), named(" excess [1]", data)
     ends = "; ".join(f"{name} from {x[0]:.1e} to {x[-1]:.2g}" for name, x in families.items())
     return (
-        "Cost of the projection above the optimum, as a share, over the size of the excursion, on "
-        f"logarithmic axes. From size {scale.min():g} to {scale.max():g} it goes: {ends}. "
-        "All follow a line of slope four where they are small."
+        "Excess of the projection over the size of the excursion, on logarithmic axes. From size "
+        f"{scale.min():g} to {scale.max():g} it grows: {ends}. "
+        "Where it is small, all curves follow a line of slope four."
     )

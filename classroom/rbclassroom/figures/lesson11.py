@@ -1,4 +1,4 @@
-"""De Casteljau's construction as it moves: straight legs in the plane, geodesics on SO(3)."""
+"""Lesson 11: an animation of de Casteljau's construction, in the plane and on SO(3)."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from rbcourse import Array, Ends, angle_between, exp_so3, geodesic_so3
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 
-_SHARES = np.linspace(0, 1, 33)  # where a leg is drawn
+_SHARES = np.linspace(0, 1, 33)  # the drawn points of a leg, as fractions of it
 _LOOKS = (PALE, 2), ("0.35", 2), (COLOURS["optimum"], 3)
 """Colour and width of the legs between the points of each level."""
 _NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v", "B₂v", "R₁v"]}
@@ -20,7 +20,7 @@ _NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v"
 def casteljau_table(
     t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
 ) -> dict[str, Array]:
-    """Return the points of `moving_casteljau` as a table: level 0 the given ones, 3 the curve."""
+    """Return the points of `moving_casteljau`: level 0 has the given points, level 3 the curve."""
     constructed = {
         f"{name} level {k} point {j}": level[:, j]
         for name, (levels, _) in _constructions(t, points, ends, v).items()
@@ -33,14 +33,16 @@ def casteljau_table(
 def moving_casteljau(
     axes: Sequence[Any], t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
 ) -> Callable[[int], list[Any]]:
-    """Draw control points and the legs between them; return what divides the legs.
+    """Draw control points and their legs, and return the function that divides the legs.
 
-    In the plane, on the first axes, the control points are four, shape (4, 2). On SO(3), on the
-    second ones, in space, they are those of `bezier_so3` for the `ends` R0, R1, w0, w1, and shown
-    by the images of v on the unit sphere; choose v such that all are in front. ``update(i)`` shows
-    the points at the share t[i] of all legs, the legs between these, and so on, to the one point
-    that draws the curve. It returns the artists that move: a text; then for each axes the legs of
-    two levels, the curve so far, and that point.
+    The first axes show the construction in the plane, with the four control `points`, shape (4, 2).
+    The second axes, in space, show the construction on SO(3). Its control points are those of
+    `bezier_so3` for the `ends` R0, R1, w0, w1. Rotations are shown by the images of v on the unit
+    sphere; choose v such that all images are in front.
+
+    ``update(i)`` divides all legs at the fraction t[i], draws the legs between the new points, and
+    continues to the single point that draws the curve. It returns the artists that move: a text,
+    and for each axes the legs of two levels, the curve so far, and its last point.
     """
     plane, sphere = axes
     plane.set(title="in the plane", aspect="equal", adjustable="datalim", xmargin=0.15)
@@ -78,7 +80,7 @@ def moving_casteljau(
 
 
 def describe_casteljau(ends: Sequence[ArrayLike]) -> str:
-    """Return in words what `moving_casteljau` shows."""
+    """Return a description of the picture of `moving_casteljau`."""
     B = _controls(ends)
     legs = ", ".join(f"{x:.0f}" for x in np.degrees(angle_between(B[:-1], B[1:])))
     return (
@@ -99,7 +101,7 @@ def _controls(ends: Sequence[ArrayLike]) -> Array:
 def _constructions(
     t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
 ) -> dict[str, tuple[list[Array], list[Array]]]:
-    """Return levels and legs, as `_construct` does, by the names of `_NAMES`."""
+    """Return the levels and legs of `_construct` in the plane and on the sphere."""
     plane = _construct(t, np.asarray(points), lambda a, b, t: a + t[:, None, None] * (b - a))
     levels, legs = _construct(t, _controls(ends), _on_geodesic)
     v = np.asarray(v)

@@ -1,4 +1,4 @@
-"""Lesson 13: a body turned by several laws, and free motions in two coordinates (beyond BK 1)."""
+"""Lesson 13: motions of a body for several costs, and free motions (beyond BK 1)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,7 +15,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "least acceleration": {"color": COLOURS["z"], "ls": "-"},
     "least torque": {"color": COLOURS["x"], "ls": "--"},
 }
-"""Three laws by which a body is turned, and the lines that stand for them."""
+"""Three motions of a body, and the styles of their lines."""
 _SPEEDS = {"least jerk": ("optimum", "-"), "projected quintic": ("projection", "--")}
 
 
@@ -26,13 +26,13 @@ def torques(curve: Curve, inertia: Array, t: Array) -> Array:
 
 
 def torque_table(t: Array, curves: Mapping[str, Curve], inertia: Array) -> dict[str, Array]:
-    """Return times and the torques of curves in body axes as columns, with their laws."""
+    """Return times and the torques of curves in body axes, by the names of the curves."""
     found = {name: torques(curve, inertia, t) for name, curve in curves.items()}
     return {"t [s]": t} | columns("{} {} [N m]", found)
 
 
 def draw_torques(axes: Sequence[Axes], data: Table) -> None:
-    """Draw for each law of a `torque_table` the three components of its torque, and its norm."""
+    """Draw the components and the norm of each torque of a `torque_table`, on its own axes."""
     t, laws = data["t [s]"], vectors("{} {} [N m]", data)
     for ax, (law, torque) in zip(axes, laws.items(), strict=True):
         ax.axhline(0, color="0.8", lw=1, zorder=0)
@@ -45,20 +45,20 @@ def draw_torques(axes: Sequence[Axes], data: Table) -> None:
 
 
 def describe_torques(data: Table) -> str:
-    """Return in words what `draw_torques` shows."""
+    """Return a description of the picture of `draw_torques`."""
     said = []
     for law, torque in vectors("{} {} [N m]", data).items():
         largest = np.linalg.norm(torque, axis=-1).max()
         each = ", ".join(f"{x:.2g}" for x in np.abs(torque).max(axis=0))
         said.append(f"{law}: {largest:.2g} N m, about x, y, z {each}")
     return (
-        "Torque on a body over time, in body axes, and its norm, for several laws by which the "
-        f"body is turned. The largest values: {'; '.join(said)}."
+        "Torque on a body over time, in body axes, and its norm, for several motions of the "
+        f"body. The largest values: {'; '.join(said)}."
     )
 
 
 def speed_table(t: Array, curves: Mapping[str, Curve]) -> dict[str, Array]:
-    """Return times and the angular speeds of curves, by name, as columns."""
+    """Return times and the angular speeds of curves, by the names of the curves."""
     speeds = {name: np.linalg.norm(curve(t, 1), axis=-1) for name, curve in curves.items()}
     return {"t [1]": t} | {f"{name} [rad]": speed for name, speed in speeds.items()}
 
@@ -72,7 +72,7 @@ def draw_speeds(ax: Axes, data: Table) -> None:
 
 
 def describe_speeds(data: Table) -> str:
-    """Return in words what `draw_speeds` shows."""
+    """Return a description of the picture of `draw_speeds`."""
     said = (f"{name} at most {np.max(data[f'{name} [rad]']):.1f}" for name in _SPEEDS)
     return f"Angular speed over time. In rad per unit time: {', '.join(said)}."
 
@@ -88,9 +88,9 @@ _COORDINATES = {
 def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
     """Return free motions in exponential and in normal coordinates, as columns (beyond BK 7).
 
-    They start at I with the angular velocities w, shape (motions, 3). The columns are components
-    x and y over the times t: of the straight lines t w, of the logarithm, and of the normal
-    coordinates to second order, those of `normal_cubic_so3`.
+    The motions start at I with the angular velocities w, shape (motions, 3). The columns have the
+    components x and y, at the times t, of the straight lines t w, of the logarithm, and of the
+    normal coordinates to second order, as in `normal_cubic_so3`.
     """
     R, _ = geodesic_flow(inertia, np.eye(3), w, t)
     rest = np.zeros(3)
@@ -102,7 +102,7 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
 
 
 def draw_normal(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the free motions of a `normal_table`, in each coordinates beside the straight lines."""
+    """Draw free motions and straight lines of a `normal_table`, each coordinates on own axes."""
     lines, *kinds = _by_kind(data).items()
     for ax, (kind, motions) in zip(axes, kinds, strict=True):
         for k, line in enumerate(lines[1]):
@@ -121,7 +121,7 @@ def draw_normal(axes: Sequence[Axes], data: Table) -> None:
 
 
 def describe_normal(data: Table) -> str:
-    """Return in words what `draw_normal` shows."""
+    """Return a description of the picture of `draw_normal`."""
     (_, lines), *kinds = _by_kind(data).items()
     said = []
     for kind, motions in kinds:

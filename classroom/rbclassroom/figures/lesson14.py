@@ -26,7 +26,7 @@ EXCESSES: dict[str, dict[str, Any]] = {
     "quaternion spline": {"color": COLOURS["x"], "ls": "--"},
     "SciPy's spline": {"color": COLOURS["reference"], "ls": ":"},
 }
-"""The curves of `excess_table`, and how they are drawn."""
+"""The curves of `excess_table`, and the styles of their lines."""
 _CURVES: dict[str, dict[str, Any]] = {
     "parabolas": {"color": COLOURS["z"], "ls": "-."},
     "projected spline": {"color": COLOURS["projection"], "ls": "--"},
@@ -42,10 +42,10 @@ _TURNS: list[dict[str, Any]] = [
 
 
 def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
-    """Return how fast a motion turns and moves over time, or how strongly it is accelerated.
+    """Return the speeds (order 1) or the accelerations (order 2) of a motion over time.
 
-    They are the norms of the two halves of ``motion(t, order)``, order 1 or 2, at even times in s.
-    It has to be a single motion on SE(3).
+    They are the norms of the two halves of ``motion(t, order)``, at evenly spaced times in s.
+    `motion` must be a single motion on SE(3).
     """
     t = np.linspace(*motion.domain, samples)
     rates = motion(t, order)
@@ -56,7 +56,7 @@ def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
 
 
 def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> None:
-    """Draw each column over time, on axes of its own, and a thin line at each of some times."""
+    """Draw each column over time, on its own axes, with a dotted line at each knot."""
     t = np.asarray(data[_TIME])
     for ax, (label, unit, values) in zip(axes, _profiles(data), strict=True):
         for knot in np.asarray(knots):
@@ -70,7 +70,7 @@ def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> None:
 
 
 def describe_profiles(data: Table, knots: ArrayLike) -> str:
-    """Say how large each column of such a drawing becomes, and when."""
+    """Return a description of the picture of `draw_profiles`, with the largest values."""
     t = np.asarray(data[_TIME])
     parts, labels = [], []
     for label, unit, values in _profiles(data):
@@ -87,7 +87,7 @@ def describe_profiles(data: Table, knots: ArrayLike) -> str:
 
 
 def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
-    """Give the label, the unit and the values of each column but the time."""
+    """Yield the label, the unit and the values of each column except for the time."""
     for name, values in data.items():
         label, unit = name.removesuffix("]").split(" [")
         if name != _TIME:
@@ -95,13 +95,13 @@ def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
 
 
 def acceleration_table(curves: Mapping[str, Curve], component: int) -> Table:
-    """Return a component of ω' of curves on SO(3) at 401 even times."""
+    """Return one component of ω' of curves on SO(3) at 401 evenly spaced times."""
     t = np.linspace(*next(iter(curves.values())).domain, 401)
     return {_TIME: t} | {f"{name} [rad/s²]": c(t, 2)[:, component] for name, c in curves.items()}
 
 
 def draw_accelerations(ax: Axes, data: Table, knots: ArrayLike) -> None:
-    """Draw an `acceleration_table`, with a dotted line at each of some times."""
+    """Draw an `acceleration_table`, with a dotted line at each knot."""
     for knot in np.asarray(knots):
         ax.axvline(knot, color=COLOURS["reference"], lw=0.8, ls=":")
     for name, _, values in _profiles(data):
@@ -112,7 +112,7 @@ def draw_accelerations(ax: Axes, data: Table, knots: ArrayLike) -> None:
 
 
 def describe_accelerations(data: Table, knots: ArrayLike) -> str:
-    """Return in words what `draw_accelerations` shows."""
+    """Return a description of the picture of `draw_accelerations`."""
     t, inner = np.asarray(data[_TIME]), np.asarray(knots)[1:-1]
     parts = []
     for name, _, values in _profiles(data):
@@ -126,9 +126,9 @@ def describe_accelerations(data: Table, knots: ArrayLike) -> str:
 
 
 def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
-    """Return natural cubic splines through three angles, with some whole turns more.
+    """Return natural cubic splines through three angles, with additional whole turns.
 
-    The bend is the difference from the straight line between the ends.
+    The "bend" of a spline is its difference from the straight line between its ends.
     """
     t = np.linspace(0, _CLOCK[-1], 201)
     data = {_TIME: t}
@@ -140,7 +140,7 @@ def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
 
 
 def draw_turns(axes: Sequence[Axes], data: Table) -> None:
-    """Draw a `turns_table`; dots: all angles of the three rotations, by whole turns apart."""
+    """Draw a `turns_table`; dots mark all angles of the three rotations, with whole turns."""
     t, *columns = (np.asarray(x) for x in data.values())
     low, high = np.min(columns) - 8, np.max(columns) + 8
     for clock, angle in zip(_CLOCK, _ANGLES, strict=True):
@@ -157,7 +157,7 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
 
 
 def describe_turns(data: Table) -> str:
-    """Return in words what `draw_turns` shows."""
+    """Return a description of the picture of `draw_turns`."""
     names, values = list(data)[1::2], [np.asarray(x) for x in data.values()]
     said = (
         f"{name.removesuffix(' [rad]')} to {in_words(x[-1], 10)} rad, at most "
@@ -172,10 +172,11 @@ def describe_turns(data: Table) -> str:
 
 
 def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
-    """Return by how much curves through ten rotations exceed the optimum, medians, as a table.
+    """Return a table of the median excess of curves through ten rotations.
 
-    Each leg turns by the same angle about a random axis. The curves, and their optimum, have the
-    end velocities of Bessel's parabolas; those of SciPy's spline and its optimum are its own.
+    Each leg turns by the same angle about a random axis. The curves and their optimum have the end
+    velocities of Bessel's parabolas. SciPy's spline is compared with the optimum for the end
+    velocities of this spline.
     """
     draw, times = np.random.default_rng(rng), np.arange(10.0)
     medians = []
@@ -205,7 +206,7 @@ def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
 
 
 def draw_excesses(ax: Axes, data: Table) -> None:
-    """Draw `excess_table`, both axes logarithmic."""
+    """Draw an `excess_table` on logarithmic axes."""
     legs, *columns = data.values()
     ticks = np.degrees(legs).round(9)
     for (name, look), values in zip(EXCESSES.items(), columns, strict=True):
@@ -217,7 +218,7 @@ def draw_excesses(ax: Axes, data: Table) -> None:
 
 
 def describe_excesses(data: Table) -> str:
-    """Return in words what `draw_excesses` shows."""
+    """Return a description of the picture of `draw_excesses`."""
     legs, *columns = (np.asarray(x) for x in data.values())
     legs = np.degrees(legs)
     said = (

@@ -1,4 +1,4 @@
-"""Lesson 15: the phase plane of a path, two passes by hand, and the shares of limits in use."""
+"""Lesson 15: the phase plane of a path, two passes by hand, and the used fractions of limits."""
 
 from itertools import combinations
 from typing import Any
@@ -17,7 +17,7 @@ LIMITS = {
     "angular_acceleration": (2, 0, "angular acceleration [rad/s²]"),
     "acceleration": (2, 1, "acceleration [m/s²]"),
 }
-"""The order of the derivative, which half of the twist, and the name in `profile_table`."""
+"""The order of the derivative, the half of the twist (0 or 1), and the name in `profile_table`."""
 _LOOKS: dict[str, dict[str, Any]] = {
     "accelerations": {"color": COLOURS["x"], "label": "limit of accelerations"},
     "speeds": {"color": COLOURS["z"], "ls": "-.", "label": "limit of speeds"},
@@ -33,9 +33,10 @@ _SHARES: dict[str, dict[str, Any]] = {
 
 
 def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, Array]:
-    """Return the largest rate s' at which some s'' keeps the accelerations, and the speeds.
+    """Return the largest rates s' that the limits on accelerations and on speeds allow.
 
-    `limits` are norms, named as in `LIMITS`; the rate is infinite where nothing limits it.
+    A rate satisfies the limits on accelerations if some s'' satisfies them. `limits` are norms,
+    with the names of `LIMITS`. The rate is infinite if no limit applies.
     """
     velocity, bend = (path(s, order).reshape(len(s), -1, 3) for order in (1, 2))
     squares, a, b = [np.zeros(len(s))], list[Array](), list[Array]()
@@ -52,14 +53,14 @@ def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, 
 
 
 def _least(a: list[Array], b: list[Array]) -> Array:
-    """Return the least max ‖a r + b‖² over r, at each place; a and b have a row for each limit."""
+    """Return the least max ‖a r + b‖² over r, at each s; a and b have a row for each limit."""
     if not a:
         return np.zeros(1)
     A, B = np.array(a), np.array(b)
     aa, ab, bb = (np.sum(x * y, axis=-1) for x, y in ((A, A), (A, B), (B, B)))
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = list(-ab / aa)
-        for i, j in combinations(range(len(aa)), 2):  # where two limits are equal
+        for i, j in combinations(range(len(aa)), 2):  # two limits are equal
             p, q, r = (x[i] - x[j] for x in (aa, ab, bb))
             root = np.sqrt(q * q - p * r)
             trials += [(-q + root) / p, (-q - root) / p]
@@ -69,9 +70,9 @@ def _least(a: list[Array], b: list[Array]) -> Array:
 
 
 def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
-    """Return over s the limit curves, the rate of a timing in `even` seconds, and the fastest.
+    """Return the limit curves over s, the constant rate for `even` seconds, and the fastest rate.
 
-    Rates above twice the largest of the fastest timing are left out.
+    Rates above twice the largest rate of the fastest timing are replaced by NaN.
     """
     s = np.linspace(*timed.curve.domain, 601)
     rates = highest_rates(timed.curve, s, limits)
@@ -95,7 +96,7 @@ def draw_phase_plane(ax: Axes, data: Table, knots: ArrayLike) -> None:
 
 
 def describe_phase_plane(data: Table) -> str:
-    """Return in words what `draw_phase_plane` shows."""
+    """Return a description of the picture of `draw_phase_plane`."""
     _, accelerations, speeds, even, best = (np.asarray(x) for x in data.values())
     at_speeds, at_bends = (np.mean(best > 0.995 * x) for x in (speeds, accelerations))
     return (
@@ -108,7 +109,7 @@ def describe_phase_plane(data: Table) -> str:
 
 
 def share_table(motion: Curve, limits: dict[str, float]) -> Table:
-    """Return which share of each limit a motion uses, over time, to four decimals."""
+    """Return the fraction of each limit that a motion uses, over time, to four decimals."""
     rates = {order: profile_table(motion, order, 1201) for order in (1, 2)}
     shares = {name: np.asarray(rates[LIMITS[name][0]][LIMITS[name][2]]) for name in limits}
     return {
@@ -132,7 +133,7 @@ def draw_shares(ax: Axes, data: Table) -> None:
 
 
 def describe_shares(data: Table) -> str:
-    """Return in words what `draw_shares` shows."""
+    """Return a description of the picture of `draw_shares`."""
     shares = {name.removesuffix(" [1]"): np.asarray(x) for name, x in list(data.items())[1:]}
     said = (f"{name} {100 * np.mean(x > 0.99):.0f} %" for name, x in shares.items())
     some = np.mean(np.max(list(shares.values()), axis=0) > 0.99)
@@ -143,9 +144,9 @@ def describe_shares(data: Table) -> str:
 
 
 def two_passes(highest: ArrayLike, step: float) -> tuple[Array, Array]:
-    """Return the largest x at nodes after the pass from the end, and after that from the start.
+    """Return the largest x at the nodes after the pass from the end, and after both passes.
 
-    No x is above `highest`, nor above that of a neighbour by more than `step`; at both ends x = 0.
+    No x exceeds `highest`, or the x of a neighbour by more than `step`; at both ends x = 0.
     """
     back = np.array(highest, float)
     back[[0, -1]] = 0
@@ -158,7 +159,7 @@ def two_passes(highest: ArrayLike, step: float) -> tuple[Array, Array]:
 
 
 def draw_passes(ax: Axes, data: Table) -> None:
-    """Draw the three columns of x over the place: the limits, and both passes."""
+    """Draw three columns of x over the position: the limits, and x after each of the passes."""
     s, highest, back, both = (np.asarray(x) for x in data.values())
     ax.plot(s, highest, color=COLOURS["z"], ls="", marker="_", ms=22, mew=3, label="speed limit")
     ax.plot(s, back, color=COLOURS["reference"], ls="--", marker="o", label="from the end")
@@ -171,7 +172,7 @@ def draw_passes(ax: Axes, data: Table) -> None:
 
 
 def describe_passes(data: Table) -> str:
-    """Return in words what `draw_passes` shows."""
+    """Return a description of the picture of `draw_passes`."""
     columns = [np.asarray(x).tolist() for x in data.values()]
     _, highest, back, both = ([f"{x:g}" for x in column] for column in columns)
     return (

@@ -192,7 +192,8 @@ def test_descriptions_of_free_and_carried_bodies():
     """Circles about axes 1 and 3, and one about axis 1 that passes close to axis 2."""
     spins = vectors("{} w{} [rad]", numbers("lesson08_spins"), "123")
     flips = np.count_nonzero(np.diff(np.sign(spins["axis 2"][:, 1])))
-    words = f"axis 1: it stays; axis 2: it changes its sign {flips} times; axis 3: it stays"
+    kept = "it keeps its sign"
+    words = f"axis 1: {kept}; axis 2: it changes its sign {flips} times; axis 3: {kept}"
     check_said(lesson08.describe_spins(spins), words)
     a = np.linspace(0, 2 * np.pi, 41)
     near, far = ([np.sqrt(1 - r * r) + 0 * a, r * np.cos(a), r * np.sin(a)] for r in (0.3, 0.995))
