@@ -89,7 +89,7 @@ def main():
 def run(*words):
     """Run a module in .venv, in the folder of the course; exit if it fails.
 
-    Ctrl-C also reaches the module, which decides whether it ends; JupyterLab asks first.
+    Ctrl-C also reaches the module, which decides how it ends.
     """
     job = subprocess.Popen([python(), "-m"] + list(words), cwd=ROOT)
     while True:
