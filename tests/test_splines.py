@@ -325,15 +325,32 @@ def test_the_certificate_needs_a_definite_system_and_legs_that_are_minima():
     assert fast.certified
 
 
+@pytest.mark.parametrize("degrees", [120, 150])
+@pytest.mark.parametrize(("name", "power"), [("of a body", 1), ("torque", 2)])
+def test_a_body_leaves_the_axis_of_its_poses_where_that_costs_less(name, power, degrees):
+    """There and back about axis 3, from rest to rest; the cubics about the axis are stationary."""
+    rest, angle = np.zeros(3), np.radians(degrees)
+    R = rb.exp_so3([[0, 0, 0], [0, 0, angle], [0, 0, 0]])
+    c = NATURAL[name]([0, 1, 2], R, (rest, rest))
+    assert c.definite
+    assert rb.is_local_minimum(c)
+    assert c.cost < 0.9999 * 2 * 12 * angle**2 * BOOK[2, 2] ** power
+
+
+def test_a_family_of_curves_of_one_cost_is_not_called_definite():
+    """For a plate, each curve that leaves its axis can be turned about this axis."""
+    rest, plate = np.zeros(3), np.diag([1, 1, 1.9])
+    R = rb.exp_so3([[0, 0, 0], [0, 0, 2.0], [0, 0, 0]])
+    c = rb.minimum_torque_spline_so3([0, 1, 2], R, (rest, rest), inertia=plate)
+    assert c.cost < 0.99 * 2 * 12 * 4 * 1.9**2
+    assert not c.definite
+
+
 def test_a_saddle_is_not_returned_as_a_minimum():
-    """Upright turns of a book there and back are stationary, and tilting lowers their torque."""
-    rest, B = np.zeros(3), rb.exp_so3([0, 0, np.radians(100)])
-    poses, ends = np.stack([np.eye(3), B, np.eye(3)]), (rest, rest)
-    tilted = rb.minimum_torque_so3(np.eye(3), B, rest, [1, 0.3, 0], BOOK).cost
-    tilted += rb.minimum_torque_so3(B, np.eye(3), [1, 0.3, 0], rest, BOOK).cost
-    assert tilted < 2 * rb.minimum_torque_so3(np.eye(3), B, rest, rest, BOOK).cost
+    """The long way there and the long way back: a curve about one axis, and a ball."""
+    R = rb.exp_so3([[0, 0, 0], [0, 0, 1.0], [0, 0, 0]])
     with pytest.raises(rb.ConvergenceError, match=r"only a saddle was found$"):
-        rb.minimum_torque_spline_so3([0, 1, 2], poses, ends, inertia=BOOK)
+        rb.minimum_acceleration_spline_so3([0, 1, 2], R, long=True)
 
 
 BAD_ENDS = [

@@ -49,6 +49,7 @@ from rbcourse.optimum.guesses import by_eta, cost_at_nodes, rates_of
 from rbcourse.optimum.second_variation import is_positive
 from rbcourse.paths import Chain
 from rbcourse.projection import nearest
+from rbcourse.so3 import exp_so3, log_so3
 from rbcourse.velocities import (
     KnotSystem,
     PathEnds,
@@ -64,6 +65,8 @@ LOWERED = 33  # nodes that carry a curve that is lowered
 STEPS = 20
 BUMPS, DESCENT_STEPS = 8, 150
 DESCENTS = 1e-2, 1e-4, 1e-6
+FLAT = 1e-9  # as a share of the diagonal: an eigenvalue that is smaller may be 0
+ASIDE = np.array([0.4, 0.6, 0.8])  # how far in the middle of a leg, in rad
 """Where Newton's method finds no minimum, its start is lowered until a step takes less than this
 share of the cost away; one after the other."""
 
@@ -276,6 +279,8 @@ class OptimalChain(Chain):
         The `acceleration_cost`, `torque_cost` or `jerk_cost`.
     definite : bool
         Whether the second derivative of the cost by the values at the poses is positive definite.
+        It is not if a family of curves has the same cost, as for a body that is symmetric about
+        the axis of all rotations.
     certified : bool
         `is_local_minimum` of the chain.
     """
@@ -416,19 +421,28 @@ class _Problem(NamedTuple):
         R[:, 0], R[:, -1] = self.R[:-1], self.R[1:]
         return R
 
-    def solve(self, system: KnotSystem) -> tuple[Array, bool]:
-        """Return changes of the values at the rotations, and whether the system is definite.
+    def solve(self, system: KnotSystem) -> Array:
+        """Return changes of the values at the rotations.
 
-        One that is not positive definite is shifted until it is.
+        A system that is not positive definite is shifted until it is.
         """
         sizes = np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0)
         for shift in (0.0, *(4.0**k for k in range(-3, 10))):
             more = shift * np.diag(sizes)
             shifted = system._replace(A=system.A + more, D=system.D + more)
             with suppress(np.linalg.LinAlgError):
-                change = shifted.solve(self.fixed, np.zeros_like(self.given), self.periodic)
-                return change, shift == 0
+                return shifted.solve(self.fixed, np.zeros_like(self.given), self.periodic)
         raise np.linalg.LinAlgError("the system of a step is singular")
+
+    def least_sign(self, system: KnotSystem) -> int:
+        """Return the sign of the least eigenvalue of a system; 0 where it may be 0."""
+        sizes = np.diag(np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0))
+        for sign, shift in (1, -FLAT), (0, FLAT):
+            moved = system._replace(A=system.A + shift * sizes, D=system.D + shift * sizes)
+            with suppress(np.linalg.LinAlgError):
+                moved.solve(self.fixed, np.zeros_like(self.given), self.periodic)
+                return sign
+        return -1
 
 
 class _Curve(NamedTuple):
@@ -439,12 +453,12 @@ class _Curve(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """What Newton's method found: solutions of the legs, and whether they are a minimum."""
+    """What Newton's method found: solutions of the legs, and the sign of the least eigenvalue."""
 
     curve: _Curve
     legs: list[Solution]
     cost: float
-    definite: bool
+    sign: int
 
 
 def _spline(
@@ -481,7 +495,7 @@ def _spline(
         legs=legs,
         velocities=found.curve.knots[:, :3] / unit,
         cost=float(np.sum(legs.cost)),
-        definite=found.definite,
+        definite=found.sign > 0,
     )
 
 
@@ -496,13 +510,41 @@ def _quaternion_spline(problem: _Problem, long: NDArray[np.bool_]) -> _Curve:
 def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
     """Return a minimum: by Newton's method, and where that fails from lower curves.
 
+    No step leaves the axis of a curve that turns about one axis only. For a body, curves that leave
+    it can cost less, so another search begins away from it.
+    """
+    found = _searched(problem, start, lower=False)
+    if isinstance(problem.functional, Effort) and (
+        isinstance(found, Failure) or _is_about_one_axis(found.curve.R)
+    ):
+        t = grid(start.R.shape[1]).t[:, None]
+        sides = ASIDE * (-1.0) ** np.arange(len(start.R))[:, None, None]  # to one, to the other
+        aside = start._replace(R=start.R @ exp_so3(16 * t**2 * (1 - t) ** 2 * sides))
+        other = _searched(problem, aside, lower=True)
+        if isinstance(other, _Found) and (
+            isinstance(found, Failure) or other.cost < found.cost * (1 - 1e-9)
+        ):
+            return other
+    return found
+
+
+def _is_about_one_axis(R: Array) -> bool:
+    """Tell whether all rotations of a curve, after the first one, are about one axis."""
+    v = log_so3(R[0, 0].T @ R).reshape(-1, 3)
+    return bool(np.linalg.svd(v, compute_uv=False)[1] < 1e-6 * np.linalg.norm(v))
+
+
+def _searched(problem: _Problem, start: _Curve, *, lower: bool) -> _Found | Failure:
+    """Return a minimum by Newton's method from a curve, or from lower curves.
+
     It costs no more than its start; the start of a jerk does not have all values at its ends.
     """
-    found, bound = _newton(problem, start, NODES[0]), problem.cost(start.R)
-    if problem.functional.ends > 2:
-        bound = np.inf
+    found: _Found | Failure = Failure(np.inf, 0)
+    bound = problem.cost(start.R) if problem.functional.ends == 2 else np.inf
+    if not lower:
+        found = _newton(problem, start, NODES[0])
     for worthwhile in (*DESCENTS, None):
-        if isinstance(found, _Found) and found.definite and found.cost < bound * (1 + 1e-4):
+        if isinstance(found, _Found) and found.sign >= 0 and found.cost < bound * (1 + 1e-4):
             return found
         if worthwhile is None or bound == np.inf:
             break
@@ -522,7 +564,7 @@ def _newton(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
 
 
 def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
-    knots, R, last, definite = start.knots, problem.on_nodes(start.R, n), np.inf, True
+    knots, R, last = start.knots, problem.on_nodes(start.R, n), np.inf
     legs = problem.equations(problem.ends_of_legs(knots), n)
     unknowns: Arrays = R, *legs.first(R)
     for step in range(STEPS):
@@ -540,14 +582,14 @@ def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
             unknowns = problem.on_nodes(R, n), *more
         exact = max(left.max(), tail) < EXACT and last < 1e-5
         if exact and _balanced(problem, legs, unknowns):
-            definite = problem.solve(_linearised(problem, legs, unknowns, parts)[0])[1]
+            sign = problem.least_sign(_linearised(problem, legs, unknowns, parts)[0])
             k, c, costs = legs.solution(unknowns)
             each = zip(unknowns[0], k, c, costs.tolist(), left.tolist(), strict=True)
             solutions = [Solution(*one, iterations=step) for one in each]
             curve = _Curve(unknowns[0], knots)
-            return _Found(curve, solutions, float(np.sum(costs * problem.weight)), definite)
+            return _Found(curve, solutions, float(np.sum(costs * problem.weight)), sign)
         system, responses = _linearised(problem, legs, unknowns, parts)
-        change, definite = problem.solve(system)
+        change = problem.solve(system)
         own = problem.ends_of_legs(change).reshape(len(change) - 1, -1)
         x = np.append(np.ones((len(own), 1)), own, axis=1)
         turn, *changes = (np.einsum("i...j,ij->i...", y, x) for y in responses)
@@ -629,7 +671,7 @@ def _lowered(problem: _Problem, start: _Curve, worthwhile: float) -> tuple[_Curv
         E = outer[:, :6] - M[:, :6, 6:-1] @ inner
         H, b = h[..., None] ** 2 * E[..., :6], -h * E[..., 6]
         system = KnotSystem(H[:, :3, :3], H[:, :3, 3:], H[:, 3:, 3:], b[:, :3], b[:, 3:])
-        change, _ = problem.solve(system)
+        change = problem.solve(system)
         x = np.append(h * change[:-1], h * change[1:], axis=1)
         z = -matvec(inner[..., :6], x) - inner[..., 6]
         eta = shapes[0] @ np.append(x, z, axis=1).reshape(count, -1, 3)
