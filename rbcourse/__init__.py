@@ -1,9 +1,15 @@
-"""Rigid-body motion, taught by code that runs: rotations, poses, projections and curves.
+"""Rigid-body motion: rotations, poses, projections, and curves through them.
 
-The names below are the everyday ones. The modules have more: `rbcourse.metrics` inner products,
-`rbcourse.connection` the connection, `rbcourse.planar` and `rbcourse.arm` the plane,
-`rbcourse.sampling` the naive samplers and tests of uniformity, `rbcourse.projected_line` the
-timings θ and f, `rbcourse.textbook` the main algorithms as on the board.
+The package exports the names for everyday use. Its modules have more: inner products are in
+`rbcourse.metrics`, the connection in `rbcourse.connection`, the plane in `rbcourse.planar` and
+`rbcourse.arm`, the naive samplers and the tests of uniformity in `rbcourse.sampling`, the timings
+θ and f in `rbcourse.projected_line`, and the main algorithms as on the board in
+`rbcourse.textbook`.
+
+The constants are `BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), the standard bases
+of the Lie algebras; `METRIC_SO3` and `METRIC_SE3`, the matrices of the metrics that the trace
+induces (BK (12), (14)); and `CLOSED_FORMS`, a dict of the functions that approximate the optimum in
+closed form, by name.
 
 Every function raises ValueError, and names the argument, if an argument is not what its description
 says: not finite, of another shape, outside the stated range, not symmetric or not positive definite

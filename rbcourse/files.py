@@ -128,6 +128,16 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     ValueError
         If the file has other content or no pose, if times do not increase, or if the norm of a
         quaternion differs from 1 by more than 1e-3. The message names the line and the reason.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = tempfile.mkdtemp() + "/poses.tum"  # lines of time, position and quaternion x y z w
+    >>> with open(path, "w") as file:
+    ...     print("0 0 0 0 0 0 0 1", "2 1 0 0 0 0 0.6 0.8", sep="\\n", file=file)
+    >>> times, poses, velocities = read_path(path)
+    >>> times, poses.shape, velocities
+    (array([0., 2.]), (2, 4, 4), None)
     """
     moves, rows = _tum_rows(file) if _is_tum(file) else _csv_rows(file)
     at, table, last = (4 if moves else 1), [], -math.inf
@@ -162,6 +172,14 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     kind : {"world", "body", "joints"}
         The kind of velocities: planar in the world or the body frame, or of joints. It determines
         the names of the columns.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = tempfile.mkdtemp() + "/plan.csv"
+    >>> save_plan(path, [([0.5, 0, 0.1], 2.0), ([0, 0.5, 0], 1.0)], "body")
+    >>> [(velocity.tolist(), duration) for velocity, duration in load_plan(path, "body")]
+    [([0.5, 0.0, 0.1], 2.0), ([0.0, 0.5, 0.0], 1.0)]
     """
     commands = as_plan(plan, "n")  # the first command tells the number of joints
     names = _velocities(kind, commands[0][0].size if commands else 0)
@@ -186,7 +204,7 @@ def load_plan(file: File, kind: str) -> Commands:
     Returns
     -------
     list of (ndarray, float)
-        Commands (velocity, duration).
+        Commands (velocity, duration). The example of `save_plan` reads them.
     """
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
