@@ -134,7 +134,8 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     >>> import tempfile
     >>> path = tempfile.mkdtemp() + "/poses.tum"  # lines of time, position and quaternion x y z w
     >>> with open(path, "w") as file:
-    ...     print("0 0 0 0 0 0 0 1", "2 1 0 0 0 0 0.6 0.8", sep="\\n", file=file)
+    ...     print("0 0 0 0 0 0 0 1", file=file)
+    ...     print("2 1 0 0 0 0 0.6 0.8", file=file)
     >>> times, poses, velocities = read_path(path)
     >>> times, poses.shape, velocities
     (array([0., 2.]), (2, 4, 4), None)
