@@ -4,7 +4,8 @@ from rbclassroom.course.ledger import MISPRINTS, WHAT
 
 
 def pytest_collection_modifyitems(items):
-    """A mistyped key would be lost in silence: ``source("BK (16)")``, ``source("errata 9")``."""
+    """Refuse a mistyped key of ``source("BK (16)")`` or ``source("errata 9")``, which would be
+    lost."""
     for item in items:
         for mark in item.iter_markers("source"):
             for key in mark.args:
