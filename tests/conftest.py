@@ -4,8 +4,7 @@ from rbclassroom.course.ledger import MISPRINTS, WHAT
 
 
 def pytest_collection_modifyitems(items):
-    """Refuse a mistyped key of ``source("BK (16)")`` or ``source("errata 9")``, which would be
-    lost."""
+    """Refuse unknown keys in marks such as ``source("BK (16)")`` and ``source("errata 9")``."""
     for item in items:
         for mark in item.iter_markers("source"):
             for key in mark.args:

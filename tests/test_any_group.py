@@ -57,7 +57,7 @@ def log(R):
 @pytest.mark.source("beyond BK 15")
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_the_two_forms_of_the_second_variation_are_equal(n):
-    """Integers give the same ‖x'‖² − w' · [η, x]', x = η' + [w, η], and the same sum of squares."""
+    """On integers, ‖x'‖² − w' · [η, x]' with x = η' + [w, η] equals the sum of squares exactly."""
     rng, d = np.random.default_rng(n), n * (n - 1) // 2
     for _ in range(20):
         w, a, eta, rate, bend = (
@@ -170,7 +170,7 @@ def test_the_excess_of_the_closed_forms_in_higher_dimensions(n):
 
 
 def test_the_eight_brackets_are_independent_on_so3():
-    """All eight brackets of degree three are used, so the derivation on SO(3) holds on every group."""
+    """They are all the brackets of degree three, so the derivation on SO(3) holds on every group."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)
