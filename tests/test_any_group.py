@@ -170,7 +170,7 @@ def test_the_excess_of_the_closed_forms_in_higher_dimensions(n):
 
 
 def test_the_eight_brackets_are_independent_on_so3():
-    """They are all the brackets of degree three, so the derivation on SO(3) holds on every group."""
+    """These are all brackets of degree three, so the derivation on SO(3) holds on every group."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)
