@@ -9,4 +9,4 @@ def pytest_collection_modifyitems(items):
         for mark in item.iter_markers("source"):
             for key in mark.args:
                 if key not in WHAT and key not in MISPRINTS:
-                    raise pytest.UsageError(f"{item.nodeid}: {key!r} is no key of a text")
+                    raise pytest.UsageError(f"{item.nodeid}: {key!r} is not a key of a text")

@@ -154,7 +154,7 @@ def excess(R, n):
 
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("n", [4, 5])
-def test_the_excess_of_the_closed_forms_in_higher_dimensions(n):
+def test_the_excess_of_closed_forms_agrees_with_the_note_in_higher_dimensions(n):
     """Bézier's curve has E; the excess of the corrected curve has the eighth power of the data's
     size."""
     d = n * (n - 1) // 2

@@ -136,6 +136,6 @@ ANGLES_AND_LENGTHS = [
         ("arm_inverse_kinematics", ([1, 0], [1, 1, 1]), "lengths"),
     ],
 )
-def test_bad_arguments_and_places_out_of_reach_are_named(function, arguments, message):
+def test_bad_arguments_and_places_out_of_reach_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         getattr(arm, function)(*arguments)

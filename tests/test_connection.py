@@ -276,6 +276,6 @@ NEARLY_SO3 = [L1 + 1e-7 * ONE, L2, L3 + 1e-10]
         ("geodesic_flow", (ONE, ONE, [1, 2, 3], [0, np.nan]), "t[1] is nan"),
     ],
 )
-def test_bad_arguments_and_bases_of_no_lie_algebra_are_named(function, arguments, message):
+def test_bad_arguments_and_bases_without_a_lie_algebra_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         getattr(rb.connection, function)(*arguments)

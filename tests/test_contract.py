@@ -165,7 +165,7 @@ def is_the_stack_of_its_members(make):
 
 
 def has_values_at_times_of_any_shape(make):
-    """Include no times, more times than are evaluated together, and an empty stack."""
+    """Check also no times, more times than are evaluated together, and an empty stack."""
     for batch in ((), (2,), (0,), (2, 0)):
         curve = made(make, *batch)
         assert jet(curve, times(curve, 0)).size == 0

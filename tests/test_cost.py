@@ -315,7 +315,7 @@ def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
         assert (off > 1e-9) == (rtol == 1e-2)  # fewer times are enough for the loose tolerance
 
 
-def test_bad_arguments_are_named():
+def test_bad_arguments_are_refused():
     line, motion = rb.geodesic_so3(I3, I3), rb.geodesic_se3(I4, I4)
     acceleration, jerk, torque = rb.acceleration_cost, rb.jerk_cost, rb.torque_cost
     for cost, given, message in (

@@ -68,7 +68,7 @@ def test_the_stored_table_is_the_derived_one(tmp_path):
     assert (tmp_path / "table.csv").read_bytes() == stored.read_bytes()
 
 
-def test_the_constants_of_the_excess_near_a_geodesic():
+def test_the_constants_of_the_excess_near_a_geodesic_are_right():
     """The terms have second order in e and d, for the cumulative form first order in both."""
     ss, ee, dd, se, sd = exact.ss, exact.ee, exact.dd, exact.se, exact.sd
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |σ × e|², |σ × d|²
@@ -100,7 +100,7 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
 
 
 @pytest.mark.source("beyond BK 14")
-def test_the_constants_of_splines_through_a_turn_there_and_back():
+def test_the_constants_of_splines_there_and_back_are_right():
     found = Q(309247, 1441440), Q(20711, 180180), Q(20711, 16 * 180180)
     assert tuple(exact.of_splines()) == found
 
@@ -169,7 +169,7 @@ OVER = {"projected_cubic_so3": 6300, "quaternion_cubic_so3": 256 * 6300, "cayley
 
 
 @pytest.mark.parametrize(("name", "over"), OVER.items())
-def test_the_cost_along_geodesics_of_curves_that_leave_them(name, over):
+def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
     """With e = d = 0 they deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
@@ -220,7 +220,7 @@ def test_the_correction_turns_in_the_direction_of_bezier():
     assert np.all(corrected - best < 0.5 * (plain - best) + 1e-9 * best)
 
 
-def test_estimates_of_stacks_and_with_durations():
+def test_estimates_have_the_shape_of_the_stack_and_do_not_depend_on_the_duration():
     ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in random_problems(6, 0.5, rng=1)))
     curves = rb.bezier_so3(*ends)
     estimate = rb.excess_estimate(curves)

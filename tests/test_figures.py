@@ -151,7 +151,7 @@ def test_columns_are_formulas_of_the_fraction_of_the_time(place):
 
 
 @pytest.mark.source("BK Fig. 1")
-def test_the_numbers_of_paper_fig1():
+def test_the_numbers_of_paper_fig1_are_right():
     frame, *values = numbers("paper_fig1").values()
     places, R = np.split(np.transpose(values), [3], axis=1)
     assert list(numbers("paper_fig1"))[1:4] == list(METRES)
@@ -165,7 +165,7 @@ def test_the_numbers_of_paper_fig1():
     ("name", "column", "order"),
     [("2a", "theta", 0), ("2b", "theta_dot", 1), ("3a", "f", 0), ("3b", "f_dot", 1)],
 )
-def test_the_numbers_of_paper_fig2_and_fig3(name, column, order):
+def test_the_numbers_of_paper_fig2_and_fig3_are_right(name, column, order):
     data = numbers(f"paper_fig{name}")
     angle, t, value = (data[key] for key in ("angle [rad]", "t [1]", f"{column} [1]"))
     assert np.allclose(np.unique(angle), np.arange(1, 23) * np.pi / 24, rtol=1e-11)
@@ -180,7 +180,7 @@ SIGMA = np.pi / 6 * np.array([1, 2, 3])
 
 @pytest.mark.source("BK Fig. 4", "BK (21)")
 @pytest.mark.parametrize(("name", "extra"), [("4a", 0), ("4b", 1), ("4c", 5)])
-def test_the_numbers_of_paper_fig4(name, extra):
+def test_the_numbers_of_paper_fig4_are_right(name, extra):
     """The optimum is SciPy's; the projection is tested by the definition of the nearest
     rotation."""
     data = numbers(f"paper_fig{name}")
@@ -200,7 +200,7 @@ def test_the_numbers_of_paper_fig4(name, extra):
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
-def test_the_numbers_of_paper_fig5():
+def test_the_numbers_of_paper_fig5_are_right():
     w0, w1 = np.array([1, 2, 3]), np.array([2, 1, 1])
     turn = np.pi / 6 * np.array([1, 4, 3])
     solution = oracles.minimum_acceleration(turn, w0, w1)
@@ -257,7 +257,7 @@ def test_the_excess_is_a_power_of_the_excursion_and_mostly_the_fourth(name, coun
 
 @pytest.mark.source("RR 2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize(("sample", "kind"), [("three angles", "_naive"), ("uniform", "")])
-def test_the_numbers_of_random_rotations(sample, kind):
+def test_the_numbers_of_random_rotations_are_those_of_the_samplers(sample, kind):
     draw = getattr(rb.sampling, f"sample_rotation{kind}")
     quaternions = getattr(rb.sampling, f"sample_quaternion{kind}")(100, rng=6)
     for name, R in (

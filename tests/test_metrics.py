@@ -62,7 +62,7 @@ def test_the_trace_induces_metrics_of_so3_and_se3_that_are_twice_the_energy_of_a
 
 @pytest.mark.source("BK (1)", "BK (4)", "BK (5)", "BK (6)", "BK (7)", "BK 2.2", "BK 2.3")
 @pytest.mark.parametrize(("group", "left", "x", "y", "basis"), [ON_SO3, ON_SE3])
-def test_left_invariant_fields_and_metrics(group, left, x, y, basis):
+def test_left_invariant_fields_and_metrics_agree_with_their_definitions(group, left, x, y, basis):
     """A field is its components times the moved basis. A change of frame does not change a
     metric."""
     X, Y = metrics.tangent_from_components(group, x), metrics.tangent_from_components(group, y)
@@ -135,7 +135,7 @@ def test_a_weight_exists_if_each_moment_is_at_most_the_sum_of_the_others():
         assert_close(W / size, np.diag([2.5, 1.5, 0.5]), 8)
 
 
-def test_bad_arguments_are_named_and_the_metrics_are_read_only():
+def test_bad_arguments_are_refused_and_the_metrics_are_read_only():
     one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
     inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
     for name, arguments, message in (

@@ -208,7 +208,7 @@ def test_a_problem_without_convergence_is_named_and_does_not_affect_the_others(w
 
 
 @pytest.mark.source("BK 6.3")
-def test_problems_without_convergence_alone_in_stacks_and_in_motions():
+def test_problems_without_convergence_raise_alone_and_give_nan_in_stacks_and_motions():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
@@ -321,6 +321,6 @@ ENDS = I3, I3, REST, REST
         (1e-310 * BOOK, ": eigenvalues from 1e-150 to 1e150 are wanted"),
     ],
 )
-def test_bad_inertias_are_named(make, G, message):
+def test_bad_inertias_are_refused(make, G, message):
     with pytest.raises(ValueError, match=f"^inertia ?{re.escape(message)}"):
         make(*ENDS, G)

@@ -335,8 +335,8 @@ def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
 
 
 def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
-    """The parabola x(t) passes through the logarithms of the neighbours, as R_i exp(x(t)), and
-    another one through their d. Moved poses have moved velocities."""
+    """For R_i exp(x(t)), one parabola x(t) passes through the logarithms of the neighbours; another
+    passes through d. Moved poses have moved velocities."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)

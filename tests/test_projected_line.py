@@ -24,7 +24,7 @@ def test_theta_and_f_and_their_derivatives_are_the_printed_ones(name, order):
 
 
 @pytest.mark.source("BK Cor. 2")
-def test_theta_undoes_f():
+def test_theta_is_the_inverse_of_f():
     t, angle = GRID
     error = np.abs(line.theta(line.f(t, angle), angle) - t)
     assert np.all(error <= 4 * EPS * np.maximum(1, 2 * np.tan(angle / 2) / angle))
@@ -50,7 +50,7 @@ def test_the_printed_formulas_for_theta_its_derivative_and_f_do_not_hold():
 
 
 @pytest.mark.source("BK (17)")
-def test_the_singular_values_of_the_line():
+def test_the_singular_values_of_the_line_agree_with_the_printed_formula():
     want = np.vectorize(oracles.line_singular_value)(*GRID)
     assert np.all(np.abs(line.line_singular_value(*GRID) - want) <= 4 * EPS * want)
     for angle in (1e-6, 1.0, 3.0):
@@ -121,7 +121,7 @@ def test_theta_and_f_have_their_limits_at_angle_0_and_a_step_at_angle_pi():
         assert function(0.25, np.nextafter(np.pi, 4)) == function(0.25, np.pi)
 
 
-def test_bad_angles_orders_and_times_are_named():
+def test_bad_angles_orders_and_times_are_refused():
     for one in (line.theta, line.f):
         with pytest.raises(ValueError, match=r"^angle is 3\.2, an angle in"):
             one(0.5, 3.2)

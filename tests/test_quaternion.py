@@ -88,7 +88,7 @@ def test_slerps_agree_with_the_arcs_of_mpmath_and_the_formula_of_the_paper():
                 slerp(q0, bad, 0)
 
 
-def test_slerps_near_their_singular_sets():
+def test_slerps_are_accurate_near_their_singular_sets():
     """They are equal rotations and half-turns. For half-turns q1 decides, and only rounding is
     tolerated."""
     near = rb.slerp(ONE, [1, 1e-12, 0, 0], 0.25)

@@ -54,7 +54,7 @@ def test_names_and_signatures_are_those_of_the_report():
 
 @pytest.mark.source("RR 1.4", "RR (4)", "RR (5)", "RR Fig. 1", "errata 21")
 @pytest.mark.source("RR 1.5", "RR (6)", "RR Fig. 2", "RR 1.6", "RR Fig. 3")
-def test_the_examples_of_figures_1_to_3():
+def test_the_examples_of_the_reports_figures_1_to_3():
     """Valid arguments, of integers, are returned unchanged. The first invalid one is singular."""
     quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     valid = (rr.correct_SOn, np.eye(3)), (rr.correct_quaternion, [1, 0, 0, 0])

@@ -192,7 +192,7 @@ def test_clients_use_exported_names_only():
         ("import rbcourse as rb\nrb.files.csv_lines", ["files.csv_lines"]),
     ],
 )
-def test_a_name_that_is_not_exported_is_found(text, found):
+def test_names_that_are_not_exported_are_reported(text, found):
     assert sorted(set(not_exported(text))) == found
 
 

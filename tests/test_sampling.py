@@ -130,7 +130,7 @@ def by_shoemake(x):
 
 @pytest.mark.source("errata 18")
 def test_uniform_rotations_pass_and_their_traces_have_the_stated_moments():
-    """Other uniform samples have a negated column, half of the quaternions, or come from SciPy."""
+    """Other uniform samples come from SciPy, negated columns, or half of the quaternions."""
     count, rng = 50_000, np.random.default_rng(3)
     ours = rb.sample_rotation(4 * count, rng=1)
     for R in (

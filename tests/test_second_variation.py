@@ -79,7 +79,7 @@ def test_the_second_differences_are_right_for_a_curve_at_rest():
     assert hessian(rest) == pytest.approx(1, abs=1e-5)
 
 
-def test_the_constants_of_the_lemma():
+def test_the_constants_of_the_lemma_are_right():
     """They bound η, clamped at both ends, by ∫ ‖η''‖², as Rayleigh quotients of polynomials."""
     nodes = grid(129)
     weights = nodes.integral[-1]
@@ -171,7 +171,7 @@ def test_saddles_are_recognised_among_many_stationary_curves():
     assert 2 < np.sum(told) < len(told) - 2
 
 
-def test_minima_in_stacks_of_motions_and_of_curves_that_were_not_found():
+def test_minima_are_recognised_in_stacks_and_motions_and_missing_curves_are_not_minima():
     ends = I3, rb.exp_so3([[0, 0, 1.0], [0, 0, 2.0]]), [[0, 1, 0], [0, 1e160, 0]], REST
     with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
         curves = rb.minimum_acceleration_so3(*ends)

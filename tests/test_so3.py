@@ -12,7 +12,7 @@ RANDOM = np.random.default_rng(3).normal(size=(100, 3))
 
 
 @pytest.mark.source("BK 2.1", "BK (2)", "errata 12")
-def test_hat_is_the_cross_product_and_the_basis_is_the_hats_of_the_axes():
+def test_hat_is_the_cross_product_and_the_basis_consists_of_the_hats_of_the_axes():
     """The printed L_i⁰ = e_i are vectors. The ω̂ that is printed as in se(3) is not a 4 × 4
     matrix."""
     w, x = RANDOM[:50], RANDOM[50:]

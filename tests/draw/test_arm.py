@@ -29,7 +29,7 @@ def off(found, wanted):
     return np.abs((pairs if np.iscomplexobj(pairs) else pairs @ [1, 1j]) - wanted).max()
 
 
-def test_a_table_holds_angles_and_ends():
+def test_the_table_of_a_path_has_joint_angles_and_the_ends_of_links():
     path, lengths = np.random.default_rng(1).uniform(-3, 3, (4, 3)), (1, 2, 3)
     table = arm.path_table(path, lengths)
     places = [f"{axis}{k} [m]" for k in (1, 2, 3) for axis in "xy"]
@@ -105,7 +105,7 @@ def test_arms_move_and_their_paths_are_drawn_in_the_room_and_in_the_plane_of_the
         assert off(line, ends(PATH[i])) < 1e-14  # the pale arms
 
 
-def test_descriptions_give_numbers():
+def test_descriptions_state_numbers():
     tips, steps = np.array([ends(q)[-1] for q in PATH]), np.diff(PATH, axis=0)
     covered, (first, second) = np.abs(np.diff(tips)).sum(), np.degrees(np.abs(steps).sum(axis=0))
     said = arm.describe_arm(PATH) + arm.describe_arm(np.zeros((1, 2)), [1e-3, 1000])

@@ -104,7 +104,7 @@ def test_letters_of_a_frame_are_beyond_its_arrows(axes):
         assert beyond @ direction > 1.1
 
 
-def test_descriptions_give_numbers():
+def test_descriptions_state_numbers():
     # the maximum is at 1/3; of the six times, the largest value is at 0.4
     bump = 4 * TIMES * (1 - TIMES) ** 2
     turns = rb.exp_so3(np.radians(50) * np.outer(bump, [0, 0.6, 0.8]))

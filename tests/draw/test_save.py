@@ -50,7 +50,7 @@ EYES = {
 
 
 @pytest.mark.parametrize("eye", EYES)
-def test_colours_can_be_told_apart_by_all_eyes(eye):
+def test_colours_can_be_distinguished_by_all_eyes(eye):
     """The full deficiencies are those of Machado, Oliveira and Fernandes 2009; the difference is
     CIE76."""
     matrix = np.array(EYES[eye].split(), dtype=float).reshape(3, 3)

@@ -34,7 +34,7 @@ def drawn(ax):
 
 
 @pytest.mark.parametrize("fitted", [True, False])
-def test_the_view_is_matplotlibs_with_equal_units_about_a_fixed_middle(fitted):
+def test_the_view_agrees_with_matplotlib_and_has_equal_units_and_a_fixed_centre(fitted):
     fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "space"})
     ax.plot([0, 1], [0, 5], [0, 20])
     if fitted:

@@ -128,7 +128,7 @@ def rows(course):
     [(student, *wanted) for student, _, _, *wanted in CLASS]
     + [(student, " ", [why]) for student, _, _, why in FILES],
 )
-def test_points_and_remarks_of_each_submission(course, rows, student, points, remarks):
+def test_each_submission_has_its_points_and_remarks(course, rows, student, points, remarks):
     row = rows[student]
     assert f"{row['square-test']} {row['half-test']}" == points, row
     assert all(remark in row["remarks"] for remark in remarks), row
@@ -253,7 +253,7 @@ def test_alembic_is_found_if_the_environment_is_not_activated(monkeypatch):
     assert Path(shutil.which("alembic")).parent == Path(sys.executable).parent
 
 
-def test_sets_without_submissions_and_unknown_sets_are_named(tmp_path):
+def test_sets_without_submissions_and_unknown_sets_are_refused(tmp_path):
     write_tiny_set(tmp_path)
     with pytest.raises(ValueError, match="There is no submission of ps0"):
         grade(["ps0"], tmp_path)

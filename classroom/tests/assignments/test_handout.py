@@ -115,7 +115,7 @@ def test_a_file_with_a_solution_and_a_second_notebook_are_refused(tmp_path):
         release("ps0", tmp_path)
 
 
-def test_unknown_sets_and_folders_without_sets_are_named(course, tmp_path, monkeypatch):
+def test_unknown_sets_and_folders_without_sets_are_refused(course, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="no problem set ps9; there are: ps0"):
         release("ps9", course)
     monkeypatch.chdir(tmp_path)

@@ -80,7 +80,7 @@ def told(problem, source, rng=1):
         ("rng.random() / 2", "These draws are not uniform. What gives it away: the number"),
     ],
 )
-def test_wrong_samplers_get_the_reason(body, said):
+def test_wrong_samplers_are_refused_with_the_reason(body, said):
     assert told(COIN, f"def answer(rng): return {body}").startswith(said)
 
 

@@ -25,7 +25,7 @@ def test_every_public_module_has_a_page_except_those_for_maintainers():
     assert not any(name.startswith("classroom/tests/assignments") for name in shown)
 
 
-def test_the_tests_of_a_function_are_those_that_name_it():
+def test_the_tests_listed_for_a_function_are_those_that_use_it():
     named = reference.naming(ROOT)
     for name, home in {"so3.hat_so3": "test_so3.py", "draw.save.save_figure": "draw/test_"}.items():
         found = reference.tests_of(name, named)
@@ -37,7 +37,7 @@ def test_the_tests_of_a_function_are_those_that_name_it():
     assert reference.tests_of("so3.hat", named) == ["test_so3.py::b"]
 
 
-def test_a_test_names_what_it_imports(tmp_path):
+def test_a_test_is_listed_for_the_functions_that_it_uses(tmp_path):
     """Any import name counts. `str.split` is not a function of the package."""
     (tmp_path / "rbcourse/draw").mkdir(parents=True)
     (tmp_path / "tests").mkdir()

@@ -60,7 +60,7 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
         keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
         after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
         # one on its way, one being drawn, and one for the last position of the slider
-        assert len(after) <= 3, f"{name}: keys held down left a backlog"
+        assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
         rate = 1000 * len(pictures) / (max(*pictures, keys[-1]) - keys[0])
         kind = "3-D" if explorer.display.rooms else "2-D"
         row = f"{name:22}{kind:4}{statistics.median(waits):7.0f} ms{max(waits):7.0f} ms"

@@ -72,7 +72,9 @@ def assert_seen(ax, places, *limits):
         ("random", {"number": 80.0}, "p-values", "from 100 rotations on"),
     ],
 )
-def test_examples_of_the_lessons_and_singular_settings(name, values, key, text):
+def test_texts_are_right_in_examples_of_the_lessons_and_at_singular_settings(
+    name, values, key, text
+):
     made(name).restart()
     made(name).put(**values)
     assert read_off(made(name)).get(key) == text
@@ -117,7 +119,7 @@ def turned_books(about, turn, thickness):
 
 
 @pytest.mark.source("beyond BK 3", "beyond BK 4")
-def test_the_three_books_their_torques_and_their_costs():
+def test_the_three_books_their_torques_and_their_costs_agree_with_the_package():
     artists = made("body").artists
     for v, said in sweep("body", thickness=30.0, t=0.4):
         curves, G, costs = turned_books(v["about"], v["turn"], v["thickness"])
@@ -136,7 +138,7 @@ def test_the_three_books_their_torques_and_their_costs():
 
 
 @pytest.mark.source("BK Prop. 6", "BK Cor. 1")
-def test_the_projected_line_its_dots_and_its_chord():
+def test_the_projected_line_its_dots_and_its_chord_agree_with_the_package():
     t, f = np.linspace(0, 1, 101), rb.projected_line
     for v, said in sweep("theta", angle=100.0, t=0.3):
         a, now = np.radians(v["angle"]), v["t"]
@@ -159,7 +161,7 @@ def test_the_projected_line_its_dots_and_its_chord():
 
 
 @pytest.mark.source("BK (10)", "BK (14)")
-def test_the_screw_the_geodesic_and_the_axis():
+def test_the_screw_the_geodesic_and_the_axis_agree_with_the_package():
     artists = made("screw").artists
     for v, said in sweep("screw", tilt=35.0, t=0.6):
         tilt, angle, d = np.radians(v["tilt"]), abs(v["angle"]), np.array([v["x"], 0, v["z"]])
@@ -207,7 +209,7 @@ def spun(axis, tilt):
 
 
 @pytest.mark.source("BK (8)")
-def test_the_book_and_its_spin():
+def test_the_book_and_its_angular_velocity_agree_with_the_package():
     artists = made("flip").artists
     for v, said in sweep("flip", axis="axis 2", t=6.0):
         times, R, w = spun(v["axis"], v["off"])
@@ -273,7 +275,7 @@ def assert_compared(said, curves, costs, t, rival="projection"):
 
 
 @pytest.mark.source("BK (19)", "BK (21)", "BK Fig. 4")
-def test_the_optimum_its_rivals_and_their_costs():
+def test_the_optimum_its_rivals_and_their_costs_agree_with_the_package():
     artists = made("minimum_acceleration").artists
     for v, said in sweep("minimum_acceleration", k=3.0):
         sigma = v["size"] * np.pi / 6 * np.array([1, 2, 3])
@@ -295,7 +297,7 @@ def test_the_optimum_its_rivals_and_their_costs():
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
-def test_both_cubes_their_paths_and_their_costs():
+def test_both_cubes_their_paths_and_their_costs_agree_with_the_package():
     artists = made("cube").artists
     for v, said in sweep("cube", spin=2.0, t=0.4):
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
@@ -460,7 +462,7 @@ def hand(q):
 
 
 @pytest.mark.source("RR (20)", "RR (21)")
-def test_the_arm_and_the_path_of_its_hand():
+def test_the_arm_and_the_path_of_its_hand_agree_with_the_package():
     artists = made("arm").artists
     for v, said in sweep("arm", theta0=77.0, theta1=-40.0):
         goal = np.radians([v["theta0"], v["theta1"]])
@@ -533,7 +535,7 @@ def test_box_axes_turns_and_gimbal_lock_agree_with_the_angles():
 
 
 @pytest.mark.source("BK Prop. 2")
-def test_matrices_and_their_projections():
+def test_matrices_and_their_projections_agree_with_the_package():
     letter = made("projection").artists["nearest x letter"]
     for v, said in sweep("projection", pull=1.0, e23=-0.3):
         M = np.eye(3) + v["pull"] * np.array([[0, v["e12"], 0], [0, 0, v["e23"]], [0, 0, v["e33"]]])

@@ -61,7 +61,7 @@ def check_said(said, *words):
 
 
 @pytest.mark.source("RR (8)", "RR 2.1", "BK Fig. 1")
-def test_descriptions_of_turns_and_frames():
+def test_descriptions_of_turns_and_frames_state_their_numbers():
     t, R = np.linspace(0, 1, 11), rb.exp_so3([[0, 0, np.pi / 2]])
     angles = {"t [1]": t, "slow α [rad]": -t, "slow β [rad]": -t, "slow γ [rad]": 2 * t}
     words = "slow: β goes to -57 degrees, and the middle half of α's change takes 50.0 %"
@@ -74,7 +74,7 @@ def test_descriptions_of_turns_and_frames():
 
 
 @pytest.mark.source("BK Prop. 2", "RR 1.4")
-def test_descriptions_of_projected_matrices():
+def test_descriptions_of_projected_matrices_state_their_numbers():
     drift = numbers("lesson04_drift")
     words = f"After 100000 products it is, rounded step: {drift['rounded step [1]'][-1]:.0e}"
     check_said(lesson04.describe_drift(drift), words)
@@ -162,7 +162,7 @@ def test_lines_that_are_not_in_a_table_have_their_labels(axes):
     assert [text.get_text() for text in legend.get_texts()][:3] == ["optimum", "projection", "σ₁"]
 
 
-def test_descriptions_of_curves():
+def test_descriptions_of_curves_state_their_numbers():
     data = numbers("paper_fig4c")
     best, near = vectors("{} sigma{} [rad]", data, "123").values()
     far = np.linalg.norm(near - best, axis=-1)
@@ -189,7 +189,7 @@ def test_descriptions_of_curves():
 
 
 @pytest.mark.source("BK (8)", "BK (9)")
-def test_descriptions_of_free_and_carried_bodies():
+def test_descriptions_of_free_and_carried_bodies_state_their_numbers():
     """The paths are circles about axes 1 and 3; one about axis 1 passes close to axis 2."""
     spins = vectors("{} w{} [rad]", numbers("lesson08_spins"), "123")
     flips = np.count_nonzero(np.diff(np.sign(spins["axis 2"][:, 1])))
@@ -203,7 +203,7 @@ def test_descriptions_of_free_and_carried_bodies():
     check_said(lesson08.describe_carried(np.radians([0, 90, 180])), "After 0, 90, 180 degrees")
 
 
-def test_descriptions_of_the_atlas(axes):
+def test_descriptions_of_the_atlas_state_its_numbers(axes):
     size, table = np.array([0.25, 1, 3]), {}
     for k, way in enumerate(("projection", "Bézier", "normal"), 1):
         table |= {f"{way} median excess [1]": k * 1e-3 * size**4}
@@ -341,7 +341,7 @@ def test_limit_curves_are_the_largest_rates_for_any_change_of_the_rate():
         assert rate == pytest.approx(norms.max(axis=1).min() ** -0.5, rel=1e-5)
 
 
-def test_two_passes_are_the_largest_squares_below_all_cones():
+def test_two_passes_give_the_largest_squared_rates_below_all_limits():
     """x_i is the minimum of highest_j + step |i − j|, with 0 at both ends."""
     highest = np.random.default_rng(3).uniform(0.5, 6, 12)
     highest[[0, -1]] = 0

@@ -70,7 +70,7 @@ def level():
     return points
 
 
-def test_casteljaus_points_are_bernsteins_cubic_and_beziers_curve_with_their_controls(level):
+def test_casteljaus_construction_gives_bernsteins_cubic_and_beziers_curve(level):
     s = 1 - T
     bernstein = np.array([s**3, 3 * s**2 * T, 3 * s * T**2, T**3])
     assert np.abs(level("plane", 3)[0] - POINTS.T @ bernstein).max() < 1e-12

@@ -33,7 +33,7 @@ def test_each_cell_has_its_displacements_and_end_velocities_in_the_directions_of
     assert np.mean(np.abs(across) < np.cos(np.pi / 4)) == pytest.approx(0.5, abs=0.1)
 
 
-def test_random_problems_fill_balls():
+def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
         share = (norms(x) / radius) ** 3  # the share of the volume, which is uniform

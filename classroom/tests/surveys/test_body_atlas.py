@@ -39,7 +39,7 @@ def test_a_domain_has_the_limits_that_its_description_states(name, turn, speed, 
 
 
 @pytest.mark.parametrize("body", ["ball", "book"])
-def test_the_chosen_curves_are_the_cheapest_of_two_and_three(body):
+def test_the_chosen_curves_are_the_cheapest_of_two_and_of_three(body):
     ends, inertia = body_atlas.body_problems(1, 3).take(slice(0, None, 5)), body_atlas.BODIES[body]
     costs = survey.survey(ends, inertia=inertia, ways=body_atlas.curves_for(body))
     excess = body_atlas.with_choices(atlas.excesses(ends, costs, inertia))
