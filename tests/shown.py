@@ -192,7 +192,7 @@ def held(pool, value):
 
 
 def start_recording(folder, ipython):
-    """Let kernels with this IPython folder record into another folder; return the former."""
+    """Let kernels with the IPython folder record into `folder`; return the IPython folder."""
     startup = Path(ipython) / "profile_default" / "startup"
     startup.mkdir(parents=True)
     text = STARTUP.format(tests=os.path.dirname(__file__), folder=folder)

@@ -124,8 +124,7 @@ def as_so3(x):
 
 
 def excess(R, n):
-    """Return by how much the cost of a curve exceeds the lowest one found by descent, and the
-    latter."""
+    """Return the cost of a curve above the lowest cost that descent finds, and the lowest cost."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))
@@ -170,7 +169,7 @@ def test_the_excess_of_closed_forms_agrees_with_the_note_in_higher_dimensions(n)
 
 
 def test_the_eight_brackets_are_independent_on_so3():
-    """These are all brackets of degree three, so the derivation on SO(3) holds on every group."""
+    """Degree three has only these brackets, so the derivation on SO(3) holds on every group."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)

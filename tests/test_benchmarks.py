@@ -75,7 +75,7 @@ def test_every_task_lists_our_method_first_and_all_methods_agree(ran):
     for row in ran[1]:
         methods[row["task"]].append(row["method"])
         bound, error = contest[row["task"], row["case"]].bound, row["error [1]"]
-        polar = row["call"] == "robust_polar_decomposition"  # its 20 iterations are too few
+        polar = row["call"] == "robust_polar_decomposition"  # 20 iterations are too few
         assert error is None or error <= (1e-2 if polar else bound), row
         assert (error is None) <= (bound is None or row["method"] != OURS)
     assert all(names[0] == OURS and len(set(names)) > 1 for names in methods.values()), methods

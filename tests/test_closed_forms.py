@@ -142,7 +142,8 @@ def exactly(name, given, times):
 
 
 def test_the_exponential_of_quaternions_has_exact_derivatives():
-    """The lengths are inside and outside the power series, and at the poles of the tangent."""
+    """The tested lengths are inside and outside the power series, and at the poles of the
+    tangent."""
     lengths = [0, 1e-300, 1e-170, 1e-12, 1e-8, 1e-4, 0.1, 0.49, 0.5 - 1e-9, 0.5, 0.51, 1, 1.5]
     lengths += [np.pi / 2, 3, np.pi - 1e-8, np.pi, 3 * np.pi / 2, 2 * np.pi, 7, 50, 400]
     u0, u1, u2 = np.random.default_rng(5).normal(size=(3, 3, 1))
@@ -264,7 +265,7 @@ def test_ends_outside_the_domain_are_refused_by_name():
 
 @every_curve
 def test_with_velocities_along_the_geodesic_three_of_five_forms_follow_it(name):
-    """The curve is R0 exp(σ p(t)), where p is the cubic with those ends."""
+    """The expected curve is R0 exp(σ p(t)), where p is the cubic with the same end conditions."""
     R0, R1, _, _ = ends(40)
     turn = Rotation.from_matrix(R0.mT @ R1).as_rotvec()
     rates = np.random.default_rng(5).uniform(0.1, 2, (2, 40))
@@ -281,8 +282,7 @@ def test_with_velocities_along_the_geodesic_three_of_five_forms_follow_it(name):
 
 @pytest.mark.parametrize("make", [*MAKERS.values(), rb.corrected_bezier_so3])
 def test_three_closed_forms_are_reversible_in_time_and_three_are_not(make):
-    """This includes fast ends, for which the correction takes a logarithm that is not the
-    shortest."""
+    """For some fast ends, the correction takes a logarithm that is not the shortest."""
     R0, R1, w0, w1 = ends(40, 2.5)
     curve, back = make(R0, R1, w0, w1), make(R1, R0, -w1, -w0)
     t = np.linspace(0, 1, 11)
@@ -362,7 +362,7 @@ def test_the_time_at_which_the_cubic_of_quaternions_is_zero_is_refused():
     stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
-    t = np.linspace(0, 0.4, 3000)  # for two curves, this is more than a block
+    t = np.linspace(0, 0.4, 3000)  # more than a block for two curves
     for order in (0, 1, 2):
         assert np.isfinite(stack([0, 0.25, 0.75, 1], order)).all()
         for k in (0, 2999):

@@ -93,8 +93,8 @@ def test_the_acceleration_is_the_projection_of_the_ambient_one_on_the_tangent_sp
 
 @pytest.mark.source("BK 2.4", "errata 22")
 def test_the_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
-    """A is not a tangent vector at A. It has no components there, so nothing would be
-    differentiated along it."""
+    """The point A is not a tangent vector at A. Its rotational components are zero, so no vector
+    would turn along it."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
     gamma = christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
@@ -136,8 +136,8 @@ def test_the_motion_of_a_free_body_satisfies_eulers_solution(a, c):
 
 @pytest.mark.source("BK (8)", "errata 13")
 def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
-    """It has Γ^i_ik for Γ^i_jk, and combines the frame's symbols with ä of coordinates instead of
-    ẇ."""
+    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the frame's symbols with ä of
+    coordinates instead of ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)
@@ -238,7 +238,8 @@ def test_a_start_near_the_group_is_projected_on_it():
 
 
 def test_a_fast_translation_does_not_disturb_the_rotation_and_a_body_at_rest_stays():
-    """The unit of length does not matter: the body travels 1e8 of them in a unit of time."""
+    """The body travels 1e8 units of length in a unit of time, so the unit of length does not
+    matter."""
     G = np.diag([1.0, 2, 3, 1, 1, 1])
     _, w = rb.geodesic_flow(INERTIA, ONE, [1, 2, 3], TIMES)
     A, v = rb.geodesic_flow(G, np.eye(4), [1, 2, 3, 1e8, 0, 0], TIMES)

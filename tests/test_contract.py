@@ -148,7 +148,7 @@ def has_the_derivatives_of_its_values(make):
 
 
 def is_the_stack_of_its_members(make):
-    """Check that every member of a stack is the single curve, and that ends broadcast."""
+    """Check that every member of a stack equals the single curve, and that ends broadcast."""
     ends, stack = sample(2, 3), made(make, 2, 3)
     t = times(stack, 5)
     values = jet(stack, t)
@@ -173,7 +173,7 @@ def has_values_at_times_of_any_shape(make):
             t = times(curve, *shape)
             assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
     curve = made(make, 2)
-    t = times(curve, 2600)  # for two curves, this is more than a block
+    t = times(curve, 2600)  # more than a block for two curves
     values = jet(curve, t)
     for part in (slice(1), slice(1, 40), slice(2500, 2600)):
         assert off(jet(curve, t[part]), values[part]) < 1e-12
@@ -197,7 +197,7 @@ INDICES += [([1, 0, 1], [2, 2, 0]), np.array([[True, False, True], [False, False
 
 
 def is_indexed_as_an_array_is(make):
-    """Check the attributes that describe the curves, too."""
+    """Check also the attributes that describe the curves."""
     stack = made(make, 2, 3)
     t = times(stack, 3)
     values, numbers = jet(stack, t), np.arange(6).reshape(2, 3)
@@ -267,8 +267,8 @@ def is_the_same_after_pickling(make):
 
 
 def moves_with_its_ends(make):
-    """Check L A(t) for the poses L A0 and L A1; on SO(3), L R(t) Q for ends and inertia so
-    moved."""
+    """Check that the poses L A0 and L A1 give L A(t); on SO(3), moved ends and inertia give L R(t)
+    Q."""
     ends, curve = sample(2), made(make, 2)
     L, Q = sample(seed=1), sample(seed=2)["R0"]
     t = times(curve, 3)
@@ -291,7 +291,7 @@ def lasts_as_long_as_it_is_told(make):
     """Check that a duration T for each curve equals a retimed curve from 0 to 1 with rates
     times T."""
     if "duration" not in inspect.signature(make.function).parameters:
-        return  # a curve without this parameter keeps its duration
+        return  # a curve without the parameter `duration` keeps its own duration
     ends, T = sample(3), np.array([0.5, 1, 1.5])
     curve = make(ends, duration=T)
     unit = make(ends | {name: ends[name] * T[:, None] ** power for name, power in RATES.items()})

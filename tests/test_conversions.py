@@ -39,7 +39,9 @@ def test_exact_and_rounded_half_turns_have_the_documented_sign():
     beta = RNG.uniform(-1, 1, size=200)
     R = rb.matrix_from_zyx(np.stack([np.full(200, np.pi), beta, RNG.uniform(-3, 3, 200)], axis=1))
     assert np.all(rb.zyx_from_matrix(R)[:, 0] > 0)
-    near = np.array([1e-12 - np.pi, 0.3, 0.4])  # this is not rounding, so it keeps its sign
+    near = np.array(
+        [1e-12 - np.pi, 0.3, 0.4]
+    )  # 1e-12 is more than rounding, so the angle keeps its sign
     assert np.abs(zyx_from_quaternion(quaternion_from_zyx(near)) - near).max() < 20 * EPS
 
 
@@ -65,7 +67,8 @@ def test_rotation_vectors_and_quaternions_agree_with_mpmath_and_long_turns_becom
 
 @pytest.mark.source("RR 2.1", "RR (7)", "RR (8)")
 def test_zyx_angles_agree_with_the_printed_product_and_scipy_also_in_gimbal_lock():
-    """The angles are random, multiples of π/4, and within 1e-12 … 1e-3 of gimbal lock."""
+    """The test uses random angles, multiples of π/4, and angles within 1e-12 … 1e-3 of gimbal
+    lock."""
     quarter = np.pi / 4 * np.array(np.meshgrid(*3 * [np.arange(-8, 9)])).reshape(3, -1).T
     near = RNG.uniform(-3, 3, size=(40, 3))
     near[:, 1] = RNG.choice([-1, 1], 40) * (np.pi / 2 - 10.0 ** RNG.uniform(-12, -3, 40))

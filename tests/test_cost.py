@@ -251,7 +251,7 @@ def test_costs_are_the_integrals_of_their_definitions(name):
 
 
 def test_a_chain_that_is_smooth_enough_costs_the_sum_of_its_legs():
-    """The legs are quintics with continuous acceleration. The acceleration of chained cubics
+    """Quintic legs have a continuous acceleration here. The acceleration of chained cubics
     jumps."""
     R = rb.exp_so3([[0, 0, 0], [0.3, 0.8, 0], [0, 1.0, 1.0]])
     w, a = np.array([[0, 0, 0], [0.2, 0.5, 0.5], [0, 0, 0]]), [REST, [0.3, -0.2, 0.1], REST]
@@ -283,7 +283,7 @@ def test_a_chain_that_is_smooth_enough_costs_the_sum_of_its_legs():
     "leg", [rb.exponential_cubic_so3, rb.bezier_so3, rb.minimum_acceleration_so3]
 )
 def test_a_steady_turn_in_legs_has_no_jerk_in_any_unit_of_time(leg, unit):
-    """Its accelerations, and their jumps at the joints, are rounding errors."""
+    """The accelerations of the turn, and their jumps at the joints, are rounding errors."""
     t, w = np.array([0, 1, 2.5, 3]), 0.7 * np.array([0.6, 0, 0.8])
     chain = rb.chain(unit * t, rb.exp_so3(np.outer(t, w)), [w / unit] * 4, leg=leg)
     assert rb.jerk_cost(chain) * unit**5 < 1e-20
@@ -302,7 +302,7 @@ def test_costs_scale_with_the_unit_of_inertia(size):
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-8, 1e-12])
 def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
-    """One of the two lines turns fast halfway."""
+    """One of the two tested lines turns fast halfway."""
     curve = rb.projected_line_so3(I3, rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
     for cost in (
         partial(rb.acceleration_cost, curve),

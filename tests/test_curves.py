@@ -157,7 +157,7 @@ def test_a_jump_gives_a_warning_and_its_time_is_refused(make):
     assert np.abs(stack.margin - [[2, 0], [0, 2], [2, 2]]).max() < 8 * EPS
     one = stack[0, 1]
     assert np.abs(one([0, 0.25, 0.75, 1]) - [I3, I3, half, half]).max() < 80 * EPS
-    t = np.linspace(0, 0.4, 1000)  # for six curves, this is more than a block
+    t = np.linspace(0, 0.4, 1000)  # more than a block for six curves
     own = np.full((1000, 3, 2), [[0.5, 0.25], [0.25, 0.5], [0.5, 0.5]])
     for order in (0, 1, 2):
         assert np.isfinite(stack(t, order)).all()

@@ -69,7 +69,8 @@ def test_the_stored_table_is_the_derived_one(tmp_path):
 
 
 def test_the_constants_of_the_excess_near_a_geodesic_are_right():
-    """The terms have second order in e and d, for the cumulative form first order in both."""
+    """The compared terms have second order in e and d, for the cumulative form first order in
+    both."""
     ss, ee, dd, se, sd = exact.ss, exact.ee, exact.dd, exact.se, exact.sd
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |σ × e|², |σ × d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
@@ -89,7 +90,7 @@ def test_the_constants_of_the_excess_near_a_geodesic_are_right():
 
 
 def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
-    """It is 6401/180180 a⁴ for the projection, and a sixteenth of it for quaternions."""
+    """The excess is 6401/180180 a⁴ for the projection, and a sixteenth of that for quaternions."""
     ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
     wanted = dict.fromkeys(("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"), 0)
@@ -123,7 +124,7 @@ def test_the_order_of_three_closed_forms_is_proven():
 
 
 def test_a_false_order_is_not_proven(tmp_path):
-    """One table has a larger ratio, and one has a changed entry."""
+    """The first false table has a larger ratio, and the second one has a changed entry."""
     rows = (ROOT / "docs/ordering.csv").read_text().splitlines()
     for k, old, new in ((2, "13.1", "13.2"), (4, "-170000", "-190000000")):
         changed = [*rows[:k], rows[k].replace(old, new, 1), *rows[k + 1 :]]
@@ -152,8 +153,8 @@ def test_the_deviation_in_the_package_is_the_derived_one():
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("name", TABULATED)
 def test_the_power_and_the_leading_term_of_the_excess_agree_with_the_solver(name):
-    """The relative error of the leading term falls as the square, for the cumulative form
-    linearly."""
+    """The relative error of the leading term falls as the square of the scale, for the cumulative
+    form linearly."""
     power, least = (2, 1.6) if name == "cumulative_bezier_so3" else (4, 3.4)
     found, errors = [], []
     for s in (0.4, 0.2, 0.1):
@@ -180,8 +181,8 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
 
 
 def test_the_excess_of_the_corrected_curve_has_the_eighth_power():
-    """The solver shows it in the median. The estimate resolves smaller values, and shows it for
-    each problem."""
+    """The solver shows the power in the median. The estimate resolves smaller values, and shows the
+    power for each problem."""
     (large, _), (middle, middle_one), (_, small_one) = (
         (excess, rb.excess_estimate(curves))
         for curves, excess in (
@@ -208,7 +209,7 @@ def test_the_estimate_is_right_within_a_twentieth_or_nan(name):
 
 
 def test_the_correction_turns_in_the_direction_of_bezier():
-    """The ends ask for the long way round. A correction by σ of the short way would cost far
+    """The velocities ask for the long way round. A correction by σ of the short way would cost far
     more."""
     rng = np.random.default_rng(2)
     turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))

@@ -14,7 +14,7 @@ from rbclassroom.surveys import atlas, body_atlas
 from rbclassroom.surveys.survey import costs
 from rbcourse.draw.save import UNITS
 
-TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # these have no pictures
+TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # tables without pictures
 
 
 def columns(data, form, keys="xyz"):

@@ -81,7 +81,7 @@ def test_other_programs_read_a_written_path(tmp_path):
 
 
 def test_files_of_other_programs_are_read(tmp_path):
-    """They have comments, blank lines, tabs, four digits, a byte order mark, CRLF, blanks, or
+    """The files have comments, blank lines, tabs, four digits, a byte order mark, CRLF, or
     quotes."""
     text = "# ground truth\n# timestamp tx ty tz qx qy qz qw\n\n1305031098.6659\t1 2 3 "
     (tmp_path / "a.txt").write_text(text + "0.6574 0.6126 -0.2949 -0.3248 \n\n", "utf-8")

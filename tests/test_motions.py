@@ -152,7 +152,7 @@ def test_displacements_that_turn_only_by_rounding_are_translations():
 
 @pytest.mark.parametrize("make", [rb.geodesic_se3, rb.screw_se3])
 def test_the_rate_of_the_twist_is_its_derivative(make):
-    """It differs from c(t, 2), which is the covariant acceleration."""
+    """The rate of the twist differs from c(t, 2), which is the covariant acceleration."""
     c, t, h = make(A0, A1, duration=2.0), np.linspace(0.1, 1.9, 7), 1e-4
     differences = (c(t + h, 1) - c(t - h, 1)) / (2 * h)
     assert c.twist_rate(t) == pytest.approx(differences, abs=1e-6)

@@ -105,7 +105,7 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
 @of_forces
 @pytest.mark.parametrize("size", [2.0, 0.3, 1e-6, 1e9])
 def test_the_optimum_of_a_round_body_is_that_of_a_ball(what, size):
-    """The optimum of an almost round body is near it."""
+    """The optimum of an almost round body is near the optimum of a ball."""
     ends, power = random_problems(6, 32)[:4], 2 if what == "torque" else 1
     curves, of_balls = OPTIMA[what](*ends, size * I3), rb.minimum_acceleration_so3(*ends)
     for order in range(4):
@@ -283,7 +283,7 @@ def test_ends_with_eight_digits_are_replaced_by_their_nearest_rotations(what):
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
-    """The bits are the same. The matrices that are computed with one number of threads are kept for
+    """The matrices agree bit by bit, since those made with one number of threads are kept for
     others."""
     found = []
     for threads in (1, 2):

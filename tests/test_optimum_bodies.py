@@ -143,7 +143,7 @@ def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
 @pytest.mark.parametrize("short_of", [0, 1e-9, 1e-6])
 @pytest.mark.parametrize("speeds", [(-0.72, 0.735), (-0.3, 0.31), (-1, 1.02), (-3, 3.1), (2, 2)])
 def test_optima_near_half_turns_have_no_extra_turn(short_of, speeds):
-    """Along the axis p(t) is a cubic, and σ is the shortest."""
+    """Along the axis, p(t) is a cubic, and σ is the shortest rotation vector."""
     angle, rates = np.pi - short_of, np.outer(speeds, [0, 0, 1])
     curve = rb.minimum_acceleration_so3(I3, rb.exp_so3([0, 0, angle]), *rates)
     assert rb.acceleration_cost(curve) <= cost_about_an_axis(angle, *speeds) * (1 + 1e-9)
@@ -152,7 +152,7 @@ def test_optima_near_half_turns_have_no_extra_turn(short_of, speeds):
 
 @pytest.mark.parametrize("short_of", [0, 1e-15, 1e-9, 1e-4])
 def test_the_solver_converges_near_half_turns(short_of):
-    """From rest to rest it returns the geodesic, although the projected cubic jumps."""
+    """From rest to rest the solver returns the geodesic, although the projected cubic jumps."""
     axes = np.array([[0, 0, 1], [0.6, -0.8, 0], [1, 1, 1], [-0.3, 0.2, 0.7], [0.1, -2, 1]])
     R1 = rb.exp_so3((np.pi - short_of) * axes / np.linalg.norm(axes, axis=1, keepdims=True))
     curves = rb.minimum_acceleration_so3(I3, R1, REST, REST)
@@ -217,7 +217,7 @@ def wandering(R0, R1, rng):
 
 @pytest.mark.parametrize("what", ["acceleration", "torque", "jerk"])
 def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
-    """It finds most of our optima."""
+    """The other optimiser finds most of our optima."""
     problems, rng = random_problems(6, 84), np.random.default_rng(86)
     problems[4][:] = bodies(6, 85)
     best, least = OPTIMA[what](*problems).cost, np.full(6, np.inf)
@@ -288,8 +288,8 @@ def is_the_same_however_rounded(make, R1, rng, count):
 @pytest.mark.parametrize("turn", [110, 140])
 @pytest.mark.parametrize("frame", [I3, rb.exp_so3([0.3, -0.5, 0.2])])
 def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
-    """They start from rest about the axis of the largest moment. A half-turn about it carries one
-    curve into the other."""
+    """Both curves start from rest about the axis of the largest moment. A half-turn about this axis
+    carries one curve into the other."""
     G, axis = frame @ BOOK @ frame.T, frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(

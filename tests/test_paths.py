@@ -124,7 +124,7 @@ def test_uneven_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(rati
 
 @both_groups
 def test_a_chain_without_velocities_is_the_spline_that_rests_at_its_ends(poses):
-    """Its accelerations are continuous, and equal to those of its quintics."""
+    """The accelerations of the chain are continuous, and equal to those of its quintics."""
     rest = np.zeros(3 if poses is ROTATIONS else 6)
     c, chosen = rb.chain(TIMES, poses), rb.spline_velocities(TIMES, poses, (rest, rest))
     assert np.abs(c(TIMES, 1) - chosen).max() < 400 * EPS
@@ -136,10 +136,10 @@ def test_a_chain_without_velocities_is_the_spline_that_rests_at_its_ends(poses):
 
 
 def test_user_defined_functions_make_legs():
-    """They may be partial functions, or make many paths with one rotation.
+    """A leg may be a partial function, or make many paths with one rotation.
 
-    The origin has as many end conditions as they ask for: a quintic if they take an acceleration,
-    else a cubic.
+    A function that takes an acceleration gets a quintic for the origin; other functions get a
+    cubic.
     """
     t = np.linspace(*TIMES[[0, -1]], 50)
     for same, turn in (
@@ -276,7 +276,7 @@ def test_retimed_chains_have_uniformly_scaled_times(duration):
     assert (start, end) == (first, first + duration)
     rate = (last - first) / duration
     t = np.minimum(start + np.linspace(0, 1, 7) * (end - start), end)
-    tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # its times are rounded
+    tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # the times are rounded
     for order in range(3):
         want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
         assert np.abs(again(t, order) - want).max() <= tolerance * np.abs(want).max()
@@ -288,7 +288,7 @@ def test_retimed_chains_have_uniformly_scaled_times(duration):
 
 
 def test_the_cost_of_a_chain_whose_velocity_jumps_raises_an_error():
-    """This includes a small jump of the angular velocity alone, beside fast motion."""
+    """The second chain has a small jump of the angular velocity alone, beside fast motion."""
 
     def uneven(R0, R1, w0, w1, duration):
         return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
@@ -335,8 +335,8 @@ def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
 
 
 def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
-    """For R_i exp(x(t)), one parabola x(t) passes through the logarithms of the neighbours; another
-    passes through d. Moved poses have moved velocities."""
+    """One parabola x(t) passes through the logarithms of the neighbours, for R_i exp(x(t)); another
+    one passes through d. Moved poses have moved velocities."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)

@@ -32,7 +32,7 @@ def gaps(t):
 
 @pytest.mark.source("BK 6", "BK 6.2", "BK Prop. 2")
 def test_the_cubic_is_projected_to_the_nearest_rotation():
-    """The curve is correct and smooth even where the determinant of M is negative."""
+    """The projected curve is correct and smooth even where the determinant of M is negative."""
     R, M = CUBICS(TIMES), cubic_of_matrices(TIMES)
     S = R.mT @ M
     scale = np.linalg.norm(CUBICS.ends, axis=(-2, -1)).sum(axis=-1)
@@ -75,7 +75,7 @@ def test_the_quintic_does_not_have_least_jerk():
 
 @pytest.mark.source("BK 6.1")
 def test_a_cubic_and_a_quintic_with_the_ends_of_the_projected_line_project_to_it():
-    """They are the line times a positive number ρ(t), which the projection ignores."""
+    """Both polynomials are the line times a positive number ρ(t), which the projection ignores."""
     line = rb.projected_line_so3(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
     ends = [line(t, order) for order in (0, 1, 2) for t in (0, 1)]
     for curve in (rb.projected_cubic_so3(*ends[:4]), rb.projected_quintic_so3(*ends)):
@@ -124,7 +124,8 @@ def test_a_jump_between_the_sampled_times_is_found(k, k1):
 @pytest.mark.source("BK 6.2")
 @pytest.mark.parametrize("count", [2, 4, 6])
 def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count):
-    """This holds for ends of very different sizes, and small changes have no cancellation."""
+    """The ends may have very different sizes, and small changes are computed without
+    cancellation."""
     given, t = RNG.normal(size=(6, 5))[:count], np.linspace(0, 1, 21)
     want = np.array([oracles.polynomial_through(given, x) for x in t])
     scale = np.abs(given).sum(axis=0)

@@ -305,7 +305,8 @@ def test_foam_projects_every_matrix_of_a_stack():
 
 @pytest.mark.source("BK Prop. 2")
 def test_matrices_in_a_stack_of_blocks_have_the_same_projections_as_alone():
-    """This holds near the singular set, and beside matrices that are extreme or of rank 1 or 0."""
+    """Some matrices are near the singular set, and some neighbours are extreme or of rank 1 or
+    0."""
     rng = np.random.default_rng(10)
     kinds = [*KINDS.values(), np.ones((1, 3, 3)), 1e200 * np.ones((1, 3, 3))]
     kinds += [factor * KINDS["noisy"] for factor in (-1, 2.0**900, 2.0**-900, 1e150, 1e-150)]

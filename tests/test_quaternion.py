@@ -89,8 +89,8 @@ def test_slerps_agree_with_the_arcs_of_mpmath_and_the_formula_of_the_paper():
 
 
 def test_slerps_are_accurate_near_their_singular_sets():
-    """They are equal rotations and half-turns. For half-turns q1 decides, and only rounding is
-    tolerated."""
+    """The singular sets are equal rotations and half-turns. Between half-turns, q1 decides on the
+    arc, and only rounding errors count as a half-turn."""
     near = rb.slerp(ONE, [1, 1e-12, 0, 0], 0.25)
     assert abs(near[1] / 0.25e-12 - 1) < 4 * EPS
     for goal in (ONE, -ONE, [1, 1e-17, 0, 0]):

@@ -220,7 +220,8 @@ def test_the_animation_of_a_long_path_has_forty_frames_and_a_small_file(tmp_path
 
 @pytest.mark.parametrize("place", [[1.1, 0.7], [1e14, 0]])
 def test_a_body_that_turns_on_the_spot_is_visible(place):
-    """Rounding may move it after a circle; the description then does not state the tiny length."""
+    """Rounding may move the body after a circle; the description does not state this tiny
+    length."""
     spin = rr.interpolate_rigid_body([*place, 0], [*place, 6], steps=3)
     circle = [([2 * np.pi, 0, 2 * np.pi], 1)] * 2
     driven = rr.forward_propagate_rigid_body([*place, 0], circle, frame="body")

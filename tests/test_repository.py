@@ -92,7 +92,7 @@ def test_each_list_is_complete_and_within_the_ranges_of_its_distributions(name):
 
 @pytest.mark.parametrize("document", ["README.md", "docs/conventions.md", "docs/museum.md"])
 def test_examples_in_documents_run(document, tmp_path, monkeypatch):
-    """They write their files to another folder."""
+    """The examples write their files to another folder."""
     monkeypatch.chdir(tmp_path)
     options = {"optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
     failed, tried = doctest.testfile(str(ROOT / document), module_relative=False, **options)

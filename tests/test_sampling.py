@@ -44,7 +44,7 @@ def test_draws_are_rotations_in_any_shape_and_the_global_state_is_left_alone(sam
 @pytest.mark.source("RR 2.1", "RR (9)", "RR (10)", "RR (11)", "RR 2.2", "RR (13)")
 @pytest.mark.parametrize("name", ["sample_rotation", "sample_quaternion"])
 def test_the_fast_draws_equal_those_of_the_textbook(name):
-    """This holds for one block and for several. The generator ends in the same state as the
+    """The draws fill one block or several. The generator ends in the same state as the
     textbook's."""
 
     class Given(np.random.Generator):
@@ -130,7 +130,7 @@ def by_shoemake(x):
 
 @pytest.mark.source("errata 18")
 def test_uniform_rotations_pass_and_their_traces_have_the_stated_moments():
-    """Other uniform samples come from SciPy, negated columns, or half of the quaternions."""
+    """SciPy's rotations, negated columns, and half of the quaternions give uniform samples, too."""
     count, rng = 50_000, np.random.default_rng(3)
     ours = rb.sample_rotation(4 * count, rng=1)
     for R in (
@@ -149,7 +149,8 @@ def test_uniform_rotations_pass_and_their_traces_have_the_stated_moments():
 
 @pytest.mark.source("errata 17")
 def test_naive_draws_and_deliberate_errors_are_detected():
-    """The errors are: an angle in [0, π), no root, one stream for two numbers, repeated draws."""
+    """The deliberate errors are an angle in [0, π), no root, one stream for two numbers, and
+    repeated draws."""
     naive, q = (sampler(40_000, rng=1) for sampler in NAIVE)
     for R in (naive, rb.matrix_from_quaternion(q)):
         assert failed(R, 1e-6) >= {"E tr²", "angle", "image of e₁", "image of e₃"}

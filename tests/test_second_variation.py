@@ -80,7 +80,8 @@ def test_the_second_differences_are_right_for_a_curve_at_rest():
 
 
 def test_the_constants_of_the_lemma_are_right():
-    """They bound η, clamped at both ends, by ∫ ‖η''‖², as Rayleigh quotients of polynomials."""
+    """The constants bound η, clamped at both ends, by ∫ ‖η''‖², as Rayleigh quotients of
+    polynomials."""
     nodes = grid(129)
     weights = nodes.integral[-1]
     eta, rate = polynomials(40, 2, 129)[:2]
@@ -154,7 +155,8 @@ def test_turns_that_are_minima_are_recognised(what, degrees):
 
 
 def test_saddles_are_recognised_among_many_stationary_curves():
-    """The curves are turns by more than 360° with slow ends; second differences decide."""
+    """The curves are turns by more than 360° with slow ends. Second differences of the cost show
+    which ones are saddles."""
     rng, told, least = np.random.default_rng(7), [], []
     t = grid(LIMITS.nodes).t[:, None]
     for _ in range(16):
@@ -185,7 +187,8 @@ def test_minima_are_recognised_in_stacks_and_motions_and_missing_curves_are_not_
 
 
 def test_stationary_curves_with_short_costates_are_minima():
-    """For ‖c‖ < 2π³, this follows from the isoperimetric inequality, see docs/near_optimal.md."""
+    """Stationary curves with ‖c‖ < 2π³ are minima by the isoperimetric inequality, see
+    docs/near_optimal.md."""
     curves = rb.stationary_so3(rb.exponential_cubic_long_so3(*random_problems(200, 1.5, rng=8)))
     short = np.linalg.norm(curves.c, axis=-1) < 2 * np.pi**3
     assert short.sum() > 20

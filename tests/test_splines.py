@@ -64,8 +64,8 @@ def off(x, size):
 @pytest.mark.parametrize("degrees", [10, 60, 110])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
 def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
-    """The acceleration is 0 at natural ends and equal at periodic ends. For bodies this holds for
-    the torque, and for the least jerk for j."""
+    """The acceleration is 0 at natural ends and equal at periodic ends. The same holds for the
+    torque of bodies, and for j of the least jerk."""
     t, R = path(7, degrees, 1)
     c = NATURAL[name](t, R, ends)
     assert off(c(t) - R, 1) < 100 * EPS

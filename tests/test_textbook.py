@@ -26,8 +26,8 @@ def test_the_geodesic_agrees_with_the_textbook():
 
 @pytest.mark.source("BK 6.2")
 def test_the_projected_cubic_agrees_with_the_textbook():
-    """Errors are eps over the least gap; those of derivatives are eps over its square and its
-    cube."""
+    """The bound is eps over the least gap, and for derivatives eps over the square and the cube of
+    the gap."""
     rng = np.random.default_rng(62)
     for _ in range(15):
         ends = *Rotation.random(2, rng=rng).as_matrix(), *3 * rng.normal(size=(2, 3))

@@ -208,7 +208,8 @@ def test_the_used_shares_are_those_of_torque_force_and_a_point_of_the_body():
 
 @pytest.mark.parametrize("name", SETS)
 def test_the_least_time_has_the_symmetries_of_the_problem(name):
-    """The path is moved, reversed, or has other times or units; or the limits are faster."""
+    """The path is moved, reversed, or has other times or another unit of length; then the limits
+    are faster."""
     c, limits = random_chain(7), SETS[name]
     t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
     turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # about the vertical
@@ -276,7 +277,7 @@ def test_no_uniform_timing_within_the_limits_is_faster(name):
 
 
 def test_limits_hold_in_the_cells_next_to_a_rest():
-    """In these cells, a speed and an acceleration vary as a polynomial."""
+    """In the cells next to a rest, a speed and an acceleration vary as a polynomial."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
     slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
     still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)

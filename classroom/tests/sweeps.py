@@ -38,7 +38,7 @@ def settings(explorer):
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)
-    for ends in (hadamard(8)[:, 1 : len(ranges) + 1] - 1) // 2:  # these are 0 or -1
+    for ends in (hadamard(8)[:, 1 : len(ranges) + 1] - 1) // 2:  # the indices are 0 or -1
         yield {name: ranges[name][end] for name, end in zip(ranges, ends, strict=True)}
 
 

@@ -108,5 +108,5 @@ def test_students_may_import_in_another_way_whatever_the_locked_cells_import():
 
 
 def test_the_time_for_long_code_is_not_quadratic():
-    """With quadratic time, the second that it takes would become years."""
+    """With quadratic time, the second that the test takes would become years."""
     assert found("%matplotlib" + " " * 10**6 + ";")

@@ -54,8 +54,8 @@ def square(x):
 ### BEGIN HIDDEN TESTS
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """
-# It prints more than a cell may before its limit begins, and then slowly. Without the pause, it
-# would depend on the speed of the machine whether it fills the memory within the limit.
+# This answer prints more than a cell may before its limit begins, and then slowly. Without the
+# pause, only fast machines would fill the memory within the limit.
 LOUD = f"""
 import sys, time
 from IPython.display import HTML, display

@@ -80,7 +80,7 @@ def test_the_reference_passes_even_if_it_returns_lists_and_the_stub_fails(name, 
         namespace(name, f"{start}    raise NotImplementedError()", test)
     listed = f"_inner = {function}\n\n\ndef {function}(*arguments):\n"
     listed += "    result = _inner(*arguments)\n    return np.asarray(result).tolist()\n"
-    random = "law" in TABLES[name][slug]  # its draws are converted to an array first
+    random = "law" in TABLES[name][slug]  # draws of a sampler are converted to an array first
     for wrapper in [""] if random else ["", listed]:
         namespace(name, wrapper, test)
 

@@ -138,8 +138,7 @@ def handed_out(course):
 
 @pytest.mark.parametrize("name", SETS)
 def test_no_file_of_a_handout_reveals_solutions_or_hidden_tests(course, handed_out, name):
-    """Neither does the release of the set. Its untouched answers in words need no manual
-    grading."""
+    """The release of each set is tested, too. Untouched answers in words need no manual grading."""
     own = {path: content.decode() for path, content in release(name, course).items()}
     files = {**handed_out, **own}
     assert any("whl/rbclassroom/assignments/marking.py" in path for path in files)

@@ -7,7 +7,7 @@ from pixels import shown
 from playwright.sync_api import expect
 
 IDLE = re.compile(r"\| Idle$")
-# Return the faults of the pictures and players on the page.
+# A function of the page that returns the faults of its pictures and players.
 SEEN = """() => {
   const faults = [], parts = ":is(.jp-Cell figure, .rbcourse-explorer) :is(img, canvas)";
   for (const picture of document.querySelectorAll(parts)) {
@@ -80,7 +80,7 @@ def centre(explorer):
 def move_every_control(explorer):
     """Move each slider by key and by mouse, and choose options by both; time is moved first.
 
-    The numbers change at once, and the picture and the text follow.
+    The numbers have to change at once; the picture and the text may follow later.
     """
     table, sliders = explorer.locator("table"), explorer.locator(".widget-slider").all()
     said, picture = table.inner_text(), shown(explorer.locator("canvas"))

@@ -94,7 +94,7 @@ def test_every_page_is_complete_and_every_link_has_a_target(parsed):
                 broken.append(f"{name}: {target}")
     assert broken == []
     assert len(MOVED) >= 20
-    # one for the automatic redirect, and one to click on
+    # one link for the automatic redirect, and one to click on
     assert all(len(parsed[name].links) == 2 for name in MOVED)
 
 
@@ -209,7 +209,9 @@ def test_the_picture_of_the_start_page_plays_once_unless_the_reader_reduces_moti
     if motion == "no-preference":
         expect(play).to_have_text("❚❚")
         middle = str(int(time.get_attribute("max")) // 2)
-        expect(time).to_have_value(middle)  # it passes this value and stops there at the end
+        expect(time).to_have_value(
+            middle
+        )  # the player passes this value and stops there at the end
     expect(play).to_have_text("▶")
     if motion == "no-preference":
         assert time.input_value() == middle

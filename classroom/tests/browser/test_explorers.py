@@ -16,7 +16,7 @@ from rbclassroom.course.notebooks import KERNEL
 # each picture.
 KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
-# Record when keys go down, and when the screen shows a new picture.
+# A function that records when keys go down, and when the screen shows a new picture.
 NOTE = """() => {
   window.keys = []; window.pictures = [];
   let frame = null;
@@ -59,7 +59,7 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
             waits.append(pictures[0] - keys[0])
         keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
         after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
-        # one on its way, one being drawn, and one for the last position of the slider
+        # one picture on its way, one being drawn, and one for the last position of the slider
         assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
         rate = 1000 * len(pictures) / (max(*pictures, keys[-1]) - keys[0])
         kind = "3-D" if explorer.display.rooms else "2-D"

@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 
 PANEL = "jupyterapp.shell.currentWidget"
 DIRTY = f"{PANEL}.context.model.dirty"
-# Return whether exactly the pictures with these descriptions are shown, and players have states.
+# A function that tests whether just the pictures with these descriptions are shown, with states.
 WHOLE = """(wanted) => {
   const pictures = [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")];
   const found = pictures.filter((picture) => picture.complete ?? true)
@@ -22,12 +22,12 @@ WHOLE = """(wanted) => {
     && !document.querySelector("img[data-read]")
     && [...new Set(found)].sort().join() === [...wanted].sort().join();
 }"""
-# Return the boxes of an explorer that scroll up and down: their classes and heights.
+# A function that returns the classes and heights of the boxes that scroll up and down.
 SCROLLING = """(explorer) => [explorer, ...explorer.querySelectorAll("*")]
   .filter((box) => box.scrollHeight > box.clientHeight + 0.5)
   .filter((box) => ["auto", "scroll"].includes(getComputedStyle(box).overflowY))
   .map((box) => [box.className, box.scrollHeight, box.clientHeight])"""
-# Wait in the page until an explorer plays, and stop it, so that a slow test is not too late.
+# A function that stops an explorer when it plays. It runs in the page, so a slow test is not late.
 PAUSE = """async (explorer) => {
   const number = [...explorer.querySelectorAll(".widget-readout")].at(-1);
   while (parseFloat(number.innerText) < 0.1) await new Promise(requestAnimationFrame);
@@ -86,7 +86,8 @@ def descriptions(path):
 
 
 def test_a_stored_lesson_is_complete_and_its_explorer_works_until_its_kernel_ends(opened, page):
-    """Without Python the explorer says so, and it is a still when the lesson is opened again."""
+    """Without Python the explorer reports this, and it is a still when the lesson is opened
+    again."""
     path = opened("06_geodesics", "stored")
     stored = descriptions(path)
     assert len(stored) > 3

@@ -20,7 +20,7 @@ SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
 STYLES = ["default", "rbcourse.rbcourse"]
 SIZE = {"figsize": (4, 4), "dpi": 100, "subplot_kw": {"projection": "space"}}
 
-# Return the parts of a state in the order in which they are drawn, for each of some views.
+# A function that returns the parts of a state in the order of drawing, for each of some views.
 SEEN = """({ state, styles, room, views }) => {
   const all = rbcourseDisplay.decode(Int16Array.from(state), styles);
   const pieces = all.map(({ style, runs }) =>

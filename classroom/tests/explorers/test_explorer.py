@@ -52,7 +52,7 @@ def explorer():
 
 
 def sent(explorer):
-    """Return the states that were sent last: for each, the places of the dot, and its texts."""
+    """Return the states that were sent last: the places of the dot in each state, and the texts."""
     run = explorer.picture.run
     drawn = [polygons(state, run["styles"]) for state in split(run["states"])]
     return [[place for _, _, ((*place,),) in state] for state in drawn], run["texts"]

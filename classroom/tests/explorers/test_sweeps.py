@@ -104,7 +104,7 @@ PANELS = {"as if a ball": (-15, 202), "least acceleration": (172, 389), "least t
 
 @cache
 def turned_books(about, turn, thickness):
-    """Return the three curves, the inertia, and both costs of each curve over the least ones.
+    """Return the three curves, the inertia, and both costs of each curve over the least costs.
 
     Each problem is solved once.
     """
@@ -198,7 +198,7 @@ def spun(axis, tilt):
     w0 = np.full(3, 4 * np.sin(np.radians(tilt)) / np.sqrt(2))
     w0[int(axis[-1]) - 1] = 4 * np.cos(np.radians(tilt))
     momentum = MOMENTS * w0 / np.linalg.norm(MOMENTS * w0)
-    assert momentum[2] >= 0  # it points upwards, if only a little
+    assert momentum[2] >= 0  # the momentum points upwards, if only a little
     cross = np.cross(momentum, [0, 0, 1])
     turn = np.linalg.norm(cross)
     start = rb.exp_so3(np.arcsin(turn) * cross / turn) if turn else np.eye(3)
@@ -286,7 +286,7 @@ def test_the_optimum_its_rivals_and_their_costs_agree_with_the_package():
             drawn = np.transpose([points(artists[f"{name} {axis}"])[:, 1] for axis in "xyz"])
             assert off(drawn, rb.log_so3(curve(TIMES))) < 1e-12
             assert_box(artists[f"{name} box"], curve(v["t"]), [0.65, 0.4, 0.125], turned=1e-12)
-            if v["rival"] != "Cayley" or name != "rival":  # this curve may leave the picture
+            if v["rival"] != "Cayley" or name != "rival":  # Cayley's curve may leave the picture
                 # the curve never jumps across the ball of radius π
                 assert np.abs(np.diff(drawn, axis=0)).max() < 0.5
                 assert_within(drawn, *[artists["σ₁"].axes.get_ylim()] * 3)

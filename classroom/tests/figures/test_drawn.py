@@ -273,7 +273,8 @@ def test_profiles_agree_with_the_motion():
 
 @pytest.mark.source("beyond BK 7")
 def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
-    """They leave the lines t w as the square of w in exponential coordinates, here as the cube."""
+    """Free motions leave the lines t w as w² in exponential coordinates, and as w³ in normal
+    ones."""
     book, t = rb.metrics.box_inertia([0.30, 0.20, 0.03]), np.linspace(0, 1, 5)
     w = np.array([[0.8, 0.6, 1], [-0.6, 0.8, 1]])
     kinds = "exponential coordinates", "normal coordinates"
@@ -319,7 +320,7 @@ def test_the_turns_are_natural_splines_through_the_angles_and_their_bends_end_at
 
 
 def test_limit_curves_are_the_largest_rates_for_any_change_of_the_rate():
-    """Many changes of the rate are tried at each place."""
+    """The test tries many changes of the rate at each place."""
     path = rb.minimum_acceleration_se3(
         np.eye(4),
         rb.pose_from_coordinates([1, 0, 1, 2, 1, 0]),

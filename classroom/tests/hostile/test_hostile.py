@@ -96,7 +96,7 @@ LOUD = {
     "display({'image/png': '', 'text/plain': ''}, raw=True,\n"
     "    metadata={'filenames': {'image/png': 'https://evil.example/x.png'}})",
 }
-# It tries to pass data to the next run: in a file, and in the kernel's keyring.
+# This answer tries to pass data to the next run: in a file, and in the kernel's keyring.
 TELLS = """
 import base64, linecache, platform
 import numpy
@@ -161,7 +161,7 @@ OTHERS = [
     ("returns points", "half = 1\n100.0", "2 0", ""),
     ("=cmd|' -C calc'!A0", "half = 1", "2 0", ""),
     ("loops", f"{begun()}\nwhile True: pass", "2 0", f"{CELL_5}: stopped after"),
-    # It is stopped when its time is over, or when the memory is full.
+    # The endless output is stopped when the time is over, or when the memory is full.
     ("floods", f"{begun()}\nwhile True: print('x' * 9**4)", "2 0", f"{CELL_5}: "),
     ("takes memory", "bytearray(3 * 10**9)", "2 0", f"{CELL_5}: takes too much memory"),
     ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
@@ -323,7 +323,7 @@ def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, m
     ],
 )
 def test_points_that_a_submission_writes_are_detected(tmp_path, template, who, said, monkeypatch):
-    """Its own points are above the maximum, or those of another student have changed."""
+    """A submission gives itself points above the maximum, or changes those of another student."""
     course = Class(tmp_path, template)
     course.submit("ann")
     grade(["ps0"], course.folder)

@@ -125,7 +125,7 @@ async def run_cells(address, token, sources):
             raw = await socket_.read_message()
             if isinstance(
                 raw, bytes
-            ):  # of an explorer, with buffers: first their number, then where they begin
+            ):  # a message with buffers begins with their number and their places
                 begins = [int.from_bytes(raw[k : k + 4], "big") for k in (4, 8)]
                 raw = raw[slice(*begins)]
             message = json.loads(raw)

@@ -223,7 +223,7 @@ def test_a_question_of_the_run_sheet_is_asked_after_the_vote(tmp_path):
     assert asked == {"title": [], "poll": [], "plain": [], "verdict": ["**Ask:** Why B?"]}
     assert "**Ask:** And so?" in deck.shown[4].notes
     cells = poll()
-    cells[3].id = "proof"  # its row begins before the verdict, and after the vote
+    cells[3].id = "proof"  # the row of this cell begins before the verdict, and after the vote
     deck = tiny(tmp_path, *cells, sheet="| 0 | poll 1 | Why B? | |\n| 5 | proof | | |\n")
     assert "**Ask:** Why B?" in deck.shown[2].notes
 

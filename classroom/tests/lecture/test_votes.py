@@ -53,7 +53,7 @@ def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
             ballot.vote(b, letter)
     assert [ballot.vote_of(phone) for phone in (a, silent)] == ["C", ""]
     assert ballot.state() == {"poll": "Poll 1", "open": True, "voters": 3, "counts": []}
-    for _ in range(2):  # closing it again changes nothing
+    for _ in range(2):  # closing the vote again changes nothing
         ballot.close()
         counted = {"poll": "Poll 1", "open": False, "voters": 3, "counts": [0, 0, 2, 1]}
         assert ballot.state() == counted
@@ -159,7 +159,7 @@ def test_thirty_phones_vote_and_the_count_is_hidden_until_the_vote_is_closed(tmp
         assert "Poll 1: the result" in result
         values = re.findall(r'<meter max="(\d+)" value="(\d+)">', result)
         assert values == [(str(len(letters)), str(counts[letter])) for letter in "ABCD"]
-        assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # it is too late
+        assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # the vote is closed
         assert state() == closed
         state(begin)
         assert "Tap your answer" in ask(url, Cookie=cookies[0])[1]  # this is another vote

@@ -164,7 +164,7 @@ if __name__ == "__main__":
 
 
 def test_processes_end_when_their_parent_is_killed(tmp_path):
-    """They hold the pipe of its output open until they end."""
+    """The worker processes hold the pipe of the parent's output open until they end."""
     script = tmp_path / "parent.py"
     script.write_text(KILLED)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
