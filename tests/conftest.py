@@ -4,9 +4,9 @@ from rbclassroom.course.ledger import MISPRINTS, WHAT
 
 
 def pytest_collection_modifyitems(items):
-    """A mistyped key would be lost in silence: ``source("BK (16)")``, ``source("errata 9")``."""
+    """Refuse unknown keys in marks such as ``source("BK (16)")`` and ``source("errata 9")``."""
     for item in items:
         for mark in item.iter_markers("source"):
             for key in mark.args:
                 if key not in WHAT and key not in MISPRINTS:
-                    raise pytest.UsageError(f"{item.nodeid}: {key!r} is no key of a text")
+                    raise pytest.UsageError(f"{item.nodeid}: {key!r} is not a key of a text")

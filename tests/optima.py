@@ -1,4 +1,4 @@
-"""Problems of optima, and their functionals."""
+"""Problems for the optima, and their functionals."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -7,7 +7,7 @@ import rbcourse as rb
 
 I3, REST = np.eye(3), np.zeros(3)
 ALONG = np.pi / 6 * np.array([1, 2, 3])
-PAPER = {  # the rotation vector and the velocities of its figures
+PAPER = {  # the rotation vector and the velocities of the paper's figures
     "4b": (ALONG, ALONG, ALONG + I3[0]),
     "4c": (ALONG, ALONG, ALONG + 5 * I3[0]),
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
@@ -36,7 +36,10 @@ def with_inertias(moments, rng):
 
 
 def random_problems(count, seed, turn=3.0, speed=9.0):
-    """R0, R1, w0, w1, inertias with moments up to (1, 2, 2.9) about random axes, a0, a1."""
+    """Return R0, R1, w0, w1, inertias, a0 and a1 of random problems.
+
+    The inertias have moments up to (1, 2, 2.9) about random axes.
+    """
     rng = np.random.default_rng(seed)
     vectors = rng.normal(size=(5, count, 3))
     vectors *= rng.random((5, count, 1)) / np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -47,7 +50,7 @@ def random_problems(count, seed, turn=3.0, speed=9.0):
 
 
 def bodies(count, seed):
-    """Inertias of bodies whose largest moment is up to ten times the least one."""
+    """Return inertias of bodies whose largest moment is up to ten times the smallest one."""
     rng = np.random.default_rng(seed)
     moments = np.sort(np.exp(rng.uniform(0, np.log(10), (20 * count, 3))), axis=1)
     return with_inertias(moments[moments @ [1, 1, -1] > 0][:count], rng)
@@ -62,7 +65,7 @@ def times(A, x):
 
 
 def deviation(what, G, w, a, b=0):
-    """u, written down again: the cost is the integral of its square."""
+    """Return u, written independently: the cost is the integral of its square."""
     if what in ("ball", "shooting", "jerk"):
         return np.sqrt(2) * (b + np.cross(w, a) / 2 if what == "jerk" else a)
     torque = times(G, a) + np.cross(w, times(G, w))

@@ -20,12 +20,12 @@ def exact_norm(w):
 
 
 def exact_polynomial(coefficients, t):
-    """The sum of c_k t^k; the caller sets the precision."""
+    """Return the sum of c_k t^k; the caller sets the precision."""
     return mp.fsum(c * t**k for k, c in enumerate(coefficients))
 
 
 def polynomial_through(ends, t):
-    """The polynomial with the values, then the derivatives, ... at 0 and 1, solved for; at t."""
+    """Return at t the polynomial whose values, then derivatives and so on, at 0 and 1 are given."""
     count, ends = len(ends), np.asarray(ends, float)
     with mp.workdps(DIGITS):
         rows = [
@@ -40,7 +40,7 @@ def polynomial_through(ends, t):
 
 
 def exact_exp(w):
-    """Rodrigues' formula, as an mpmath matrix; the caller sets the precision."""
+    """Return Rodrigues' formula as an mpmath matrix; the caller sets the precision."""
     angle, W = exact_norm(w), exact_hat([mp.mpf(x) for x in w])
     if angle == 0:
         return mp.eye(3)
@@ -53,13 +53,13 @@ def exp_so3(w):
 
 
 def expm(A):
-    """The exponential of any matrix, by its power series."""
+    """Return the exponential of any matrix, by its power series."""
     with mp.workdps(DIGITS):
         return _array(mp.expm(mp.matrix(np.asarray(A, dtype=float).tolist()), method="taylor"))
 
 
 def log_so3(R):
-    """The rotation vector of the rotation nearest to R, by the polar iteration of Newton."""
+    """Return the rotation vector of the rotation nearest to R, by Newton's polar iteration."""
     with mp.workdps(DIGITS):
         X = mp.matrix(np.asarray(R, dtype=float).tolist())
         for _ in range(8):
@@ -80,7 +80,7 @@ def log_so3(R):
 
 
 def nearest_rotation(M):
-    """The rotation nearest to M: U diag(1, …, 1, ±1) Vᵀ, by mpmath's singular values."""
+    """Return the rotation nearest to M: U diag(1, …, 1, ±1) Vᵀ, by mpmath's singular values."""
     with mp.workdps(DIGITS):
         U, _, Vt = mp.svd_r(mp.matrix(np.asarray(M, dtype=float).tolist()))
         if mp.det(U * Vt) < 0:
@@ -90,14 +90,14 @@ def nearest_rotation(M):
 
 
 def right_jacobian_so3(w):
-    """∫₀¹ exp(−s ŵ) ds, the definition behind the closed form, by Gauss's rule with 24 nodes."""
+    """Return ∫₀¹ exp(−s ŵ) ds, which defines the closed form, by Gauss's rule with 24 nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(24)
     turns = [exp_so3(-(1 + node) / 2 * np.asarray(w)) for node in nodes]
     return np.einsum("n,nij->ij", weights / 2, turns)
 
 
 def theta(t, angle, order=0):
-    """BK (16) for f(t) = t, as printed, by its own derivatives."""
+    """Return BK (16) for f(t) = t, as printed, or its derivative by differences."""
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
         return float(
@@ -110,7 +110,7 @@ def theta(t, angle, order=0):
 
 
 def f(t, angle, order=0):
-    """BK Corollary 2, as printed, by its own derivatives."""
+    """Return BK Corollary 2, as printed, or its derivative by differences."""
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
         return float(
@@ -123,19 +123,19 @@ def f(t, angle, order=0):
 
 
 def line_singular_value(t, angle):
-    """BK (17) as printed."""
+    """Return BK (17) as printed."""
     with mp.workdps(DIGITS):
         u, c = mp.mpf(float(t)), 2 * (1 - mp.cos(mp.mpf(float(angle))))
         return float(mp.sqrt(c * u**2 - c * u + 1))
 
 
 def two_smallest_eigenvalues(S):
-    """The sum of the two smallest eigenvalues of the symmetric part of S (…, n, n)."""
+    """Return the sum of the two smallest eigenvalues of the symmetric part of S (…, n, n)."""
     return np.linalg.eigvalsh((S + np.swapaxes(S, -1, -2)) / 2)[..., :2].sum(axis=-1)
 
 
 def derivative_by_differences(curve, t, size=2.0**-10):
-    """R'(t) of a matrix curve by a central difference of order 8: error about 1e-13."""
+    """Return R'(t) of a matrix curve by a central difference of order 8, to about 1e-13."""
     steps = np.array([1, 2, 3, 4])
     weights = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
     return sum(
@@ -145,7 +145,7 @@ def derivative_by_differences(curve, t, size=2.0**-10):
 
 
 def quaternion_product(p, q):
-    """Hamilton's product, component by component: (w, x, y, z) along the first axis."""
+    """Return Hamilton's product by components; the first axis holds (w, x, y, z)."""
     a, b, c, d = p
     w, x, y, z = q
     return np.array(
@@ -159,12 +159,12 @@ def quaternion_product(p, q):
 
 
 def between_rotations(p, q):
-    """The distance of unit quaternions p to the nearer of q and −q."""
+    """Return the distance of unit quaternions p to the nearer of q and −q."""
     return np.minimum(np.linalg.norm(p - q, axis=-1), np.linalg.norm(p + q, axis=-1))
 
 
 def quaternion(w):
-    """The unit quaternion of a rotation vector: cosine and sine of half its length."""
+    """Return the unit quaternion of a rotation vector, by cosine and sine of half its length."""
     with mp.workdps(DIGITS):
         x = [mp.mpf(float(c)) for c in w]
         angle = exact_norm(x)
@@ -173,7 +173,7 @@ def quaternion(w):
 
 
 def arc(q0, q1, t):
-    """The point at the share t of the great circle from q0 to q1, not the long way."""
+    """Return the point at the share t of the shorter great-circle arc from q0 to q1."""
     with mp.workdps(DIGITS):
         p, q = ([mp.mpf(float(c)) for c in x] for x in (q0, q1))
         p, q = ([c / mp.sqrt(mp.fdot(x, x)) for c in x] for x in (p, q))
@@ -185,7 +185,7 @@ def arc(q0, q1, t):
 
 
 def rotation_of_quaternions(q):
-    """The matrices (N, 3, 3) of quaternions (4, N), of any length but 0."""
+    """Return the matrices (N, 3, 3) of quaternions (4, N) of any nonzero length."""
     w, x, y, z = q / np.linalg.norm(q, axis=0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -196,7 +196,7 @@ def rotation_of_quaternions(q):
 
 
 def _times(q, side):
-    """The matrices (4, 4, ...) of p ↦ q p (side 0) and of p ↦ p q (side 1)."""
+    """Return the matrices (4, 4, ...) of p ↦ q p (side 0) or of p ↦ p q (side 1)."""
     columns = [
         quaternion_product(*((q, e) if side == 0 else (e, q)))
         for e in np.eye(4).reshape(4, 4, *(1 for _ in q.shape[1:]))
@@ -205,16 +205,16 @@ def _times(q, side):
 
 
 def _crosses(v):
-    """The matrices (3, 3, N) of x ↦ v × x."""
+    """Return the matrices (3, 3, N) of x ↦ v × x."""
     x, y, z = v
     nothing = np.zeros_like(x)
     return np.array([[nothing, -z, y], [z, nothing, -x], [-y, x, nothing]])
 
 
 def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
-    """BK (19) from I to exp(turn) by SciPy's `solve_bvp`: 13 equations for q, w, w', w''.
+    """Solve BK (19) from I to exp(turn) by SciPy's `solve_bvp`: 13 equations for q, w, w', w''.
 
-    Returns its solution, whose `sol(t)` has the quaternion in rows 0 – 3, w in rows 4 – 6.
+    Returns its solution; `sol(t)` has the quaternion in rows 0 – 3, and w in rows 4 – 6.
     """
     from scipy.integrate import solve_bvp
 
@@ -263,9 +263,10 @@ def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
 
 
 def free_body(moments, a, c, t):
-    """Euler's free body by Jacobi's functions: (a cn, b sn, c dn)(λ t), from (a, 0, c) at t = 0.
+    """Return the velocity of Euler's free body by Jacobi's functions: (a cn, b sn, c dn)(λ t).
 
-    For principal moments J1 < J2 < J3 and a, c > 0 with a²J1 (J2 − J1) < c²J3 (J3 − J2).
+    It is (a, 0, c) at t = 0. The principal moments are J1 < J2 < J3, and a, c > 0 with a²J1 (J2 −
+    J1) < c²J3 (J3 − J2).
     """
     with mp.workdps(DIGITS):
         J1, J2, J3, a, c, t = (mp.mpf(float(x)) for x in (*moments, a, c, t))
@@ -278,10 +279,10 @@ def free_body(moments, a, c, t):
 
 
 def stationary(functional, ends, curve, tol=1e-9):
-    """R p = c by SciPy's `solve_bvp`, with quaternions, from a curve nearby; w and ∫ ‖u‖² dt.
+    """Solve R p = c by SciPy's `solve_bvp` with quaternions, from a curve nearby.
 
     `functional` is ("effort", G, M), for ∫ τᵀ M τ dt, or ("jerk",). `ends` are R0, R1, w0, w1, and
-    for the jerk a0, a1. Returns the solution, w is in rows 4 – 6, and the cost.
+    for the jerk a0, a1. Returns the solution, which has w in rows 4 – 6, and the cost ∫ ‖u‖² dt.
     """
     from scipy.integrate import solve_bvp
     from scipy.spatial.transform import Rotation
@@ -292,7 +293,7 @@ def stationary(functional, ends, curve, tol=1e-9):
     def in_body(q, c):
         w, v = q[0], q[1:]
         c = c[:, None] + 0 * v
-        turned = c + 2 * cross(v, cross(v, c) - w * c)  # by the conjugate of q / ‖q‖
+        turned = c + 2 * cross(v, cross(v, c) - w * c)  # turned by the conjugate of q / ‖q‖
         return turned + (1 / np.sum(q * q, axis=0) - 1) * (turned - c)
 
     def spin(q, w):
@@ -342,11 +343,11 @@ def stationary(functional, ends, curve, tol=1e-9):
 
 
 def least_directly(deviation, ends, curve, terms=16, nodes=80):
-    """The least ∫ ‖u‖² dt over normalised polynomials of quaternions, from a curve nearby.
+    """Minimise ∫ ‖u‖² dt over normalised polynomials of quaternions, from a curve nearby.
 
-    No Euler–Lagrange equation is used. `deviation` takes w, w', … and returns u, all of shape
-    (..., 3); as many end rates are kept as `ends` has pairs after R0, R1. Returns a function of t
-    that is w, and the cost.
+    No Euler–Lagrange equation is used. `deviation` takes w, w', … and returns u, all of shape (...,
+    3). The number of rates that are fixed at each end is the number of pairs in `ends` after R0,
+    R1. Returns w as a function of t, and the cost.
     """
     from math import comb
 
@@ -385,7 +386,7 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
         return base, [sum(comb(k, i) * B[i] * T[k - i] for i in range(k + 1)) for k in order]
 
     def rates(x, table):
-        """From n w = 2 im(q̄ q'), n = ‖q‖², and its derivatives."""
+        """Return w and its rates from n w = 2 im(q̄ q'), n = ‖q‖², and its derivatives."""
         base, shapes = table
         Q = [b + s @ x.reshape(*x.shape[:-1], terms, 4) for b, s in zip(base, shapes, strict=True)]
 
@@ -411,7 +412,8 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
     def residuals(x):
         Q, w = rates(x, table)
         u = root * deviation(*w)
-        norm = 30 * root[:, 0] * (np.sum(Q * Q, axis=-1) - 1)  # which is free otherwise
+        # the norm is not determined otherwise
+        norm = 30 * root[:, 0] * (np.sum(Q * Q, axis=-1) - 1)
         return np.concatenate([u.reshape(*u.shape[:-2], -1), norm], axis=-1)
 
     def jacobian(x):

@@ -1,9 +1,9 @@
-"""The data of the artists of a figure, recorded when a lesson saves it, beside its numbers.
+"""The numbers that the artists of a figure hold, compared with the CSV of the figure.
 
-A kernel that runs `record` (see conftest.py) writes for each figure all numbers that its artists
-hold, an animation's in all frames, and stops at a figure that is clipped or has no labels.
-`not_shown` looks for the columns of the CSV among the numbers: if a title or a label names a
-column, among those of the artists that have this title or label.
+A kernel that runs `record` (see conftest.py) writes for each saved figure all numbers that its
+artists hold, for an animation in all frames. It stops at a figure that is clipped or has no labels.
+`not_shown` looks for the columns of the CSV among these numbers. If a title or a label names a
+column, it looks only among the numbers of the artists with this title or label.
 """
 
 import csv
@@ -19,34 +19,37 @@ STARTUP = """
 __import__("sys").path.insert(0, {tests!r})
 __import__("shown").record({folder!r})
 """
-# What of a CSV need not be in the picture as a number: a pattern of "figure, column", and the share
-# that is there all the same.
+# Columns of a CSV that need not be in the picture as numbers: a pattern of "figure, column", and
+# the share of the values that must be in the picture all the same.
 SHARES = {
-    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # beside the drawn data
-    r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,  # order, or colour
-    r".*, (.* )?theta\d? \[rad\]": 0,  # where links and corners are
-    r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface of fewer points
-    r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, drawn three times
-    r"lesson01_straight, .* by the corner .*": 0,  # the corner's way is drawn, not the centre's
-    r"lesson08_half, turn \[rad\]": 0,  # of the body
-    r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames at the ends only
-    r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,  # the cell
+    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # values beside the drawn data
+    # the order of rows, or colours
+    r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,
+    r".*, (.* )?theta\d? \[rad\]": 0,  # shown by the places of links and corners
+    r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface with fewer points
+    r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, which is drawn three times
+    # the path of the corner is drawn, not that of the centre
+    r"lesson01_straight, .* by the corner .*": 0,
+    r"lesson08_half, turn \[rad\]": 0,  # the angle of the body
+    r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames are drawn at the ends only
+    # the place of the cell
+    r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,
 }
 FIGURES = Path(__file__).parents[1] / "figures"
-LETTERS = str.maketrans("ω₁₂₃", "w123")  # of labels, as columns have them
+LETTERS = str.maketrans("ω₁₂₃", "w123")  # the letters of labels, as columns spell them
 BAR = "<colorbar>"
 GETTERS = "get_data", "get_data_3d", "get_segments", "get_xy", "get_offsets", "get_array"
 
 
 def columns(file):
-    """The columns of a CSV by their names, as words."""
+    """Return the columns of a CSV by their names, as words."""
     with file.open(encoding="utf-8", newline="") as lines:
         header, *rows = csv.reader(lines)
     return dict(zip(header, np.array(rows).T, strict=True))
 
 
 def numbers(name):
-    """The columns of a committed figure by their names; those that have no unit are words."""
+    """Return the columns of a committed figure by their names; columns without a unit are words."""
     table = columns(FIGURES / f"{name}.csv")
     return {key: x.astype(float) if key.endswith("]") else x for key, x in table.items()}
 
@@ -75,7 +78,7 @@ def record(folder):
 
 
 def pooled(pairs):
-    """The different numbers under each name."""
+    """Return the distinct numbers under each name."""
     pools = defaultdict(list)
     for key, values in pairs:
         pools[key].append(values)
@@ -83,7 +86,7 @@ def pooled(pairs):
 
 
 def by_names(artists):
-    """The numbers that artists hold, under "" and under the titles and labels of the artists."""
+    """Yield the numbers that artists hold, under "" and under their titles and labels."""
     for artist in artists:
         title = title_of(getattr(artist, "axes", None))
         label = str(artist.get_label()).removeprefix("about ").translate(LETTERS)
@@ -93,7 +96,7 @@ def by_names(artists):
 
 
 def title_of(ax):
-    """The first line of the title of axes; "" where some axes of a figure have none."""
+    """Return the first line of the title of axes, or "" if some axes of its figure lack one."""
     if not hasattr(ax, "get_title"):
         return ""
     others = [other for other in ax.figure.axes if other.axison and other.get_label() != BAR]
@@ -101,7 +104,7 @@ def title_of(ax):
 
 
 def numbers_of(artists):
-    """The numbers that artists hold, as flat arrays: coordinates, heights, values of a map."""
+    """Yield the numbers that artists hold as flat arrays: coordinates, heights, values of a map."""
     for artist in artists:
         held = [getattr(artist, name)() for name in GETTERS if hasattr(artist, name)]
         held += [getattr(artist, name) for name in ("U", "V") if hasattr(artist, name)]
@@ -110,7 +113,7 @@ def numbers_of(artists):
             faces = np.asarray([face[:4] for face in artist._faces])
         if faces is not None:
             held.append(faces)
-            if len(faces) == 7:  # a box: where it is, and its axes
+            if len(faces) == 7:  # a box: its centre and its axes
                 centres = faces[:6].mean(axis=1)
                 axes = centres[:3] - centres[3:]
                 held += [centres.mean(axis=0), axes / np.linalg.norm(axes, axis=1)[:, None]]
@@ -121,7 +124,7 @@ def numbers_of(artists):
 
 
 def check_looks(fig):
-    """Fail where a figure is clipped, has axes without labels, or has curves that look the same."""
+    """Fail if a figure is clipped, has axes without labels, or has curves that look the same."""
     flat = [ax for ax in fig.axes if ax.name == "rectilinear"]
     box = fig.get_tightbbox().transformed(fig.dpi_scale_trans)
     assert (box.min > -1).all(), box
@@ -131,7 +134,7 @@ def check_looks(fig):
         named = [line for line in ax.lines if not line.get_label().startswith("_")]
         looks = {(str(line.get_color()), line.get_marker()) for line in named}
         assert len(looks) == len(named), ax
-        for line in named:  # a label that is on two axes has one colour
+        for line in named:  # a label on two axes has one colour
             place = title_of(ax), line.get_label()
             assert colours.setdefault(place, line.get_color()) == line.get_color(), place
     for ax in flat:
@@ -141,23 +144,23 @@ def check_looks(fig):
         for artist in [*ax.lines, *ax.patches]:
             if artist.get_transform().contains_branch(ax.transData):
                 places = artist.get_path().transformed(artist.get_transform()).vertices
-                if ax.get_aspect() == 1:  # a picture: marks are not cut either
+                if ax.get_aspect() == 1:  # a picture, whose marks must not be cut either
                     places = artist.get_window_extent().corners()
                 assert not (places < ax.bbox.min - 1e-6).any(), artist
                 assert not (places > ax.bbox.max + 1e-6).any(), artist
 
 
 def not_shown(figures, shown):
-    """The columns of the CSV files of figures whose numbers the artists do not hold."""
+    """Yield the columns of the CSV files of figures whose numbers the artists do not hold."""
     for file in sorted(figures.glob("*.csv")):
         if not file.with_suffix(".png").exists():
-            continue  # a table beside figures
+            continue  # a table without a picture
         pools = pickle.loads((shown / f"{file.stem}.pickle").read_bytes())
         yield from lost_columns(file, pools)
 
 
 def lost_columns(file, pools):
-    """The columns of a CSV file that are not among the numbers of a figure."""
+    """Yield the columns of a CSV file that are not among the numbers of a figure."""
     table = columns(file)
     rows = table.get("drawn [1]", np.array("1")) == "1"
     for column, cells in table.items():
@@ -166,14 +169,14 @@ def lost_columns(file, pools):
         if share:
             pool = pools[name_for(column, pools)]
             values = np.unique(cells[rows].astype(float))
-            values = values[np.isfinite(values)]  # nan is not drawn
+            values = values[np.isfinite(values)]  # NaN is not drawn
             lost = [v for v in values if not (held(pool, v) or held(pool, np.degrees(v)))]
             if len(lost) > (1 - share) * len(values):
                 yield f"{place}: {len(lost)} of {len(values)} are not in the picture"
 
 
 def name_for(column, pools):
-    """The label, or else the title, that names a column; "" if none does."""
+    """Return the label, or else the title, that names a column, or "" if neither does."""
     plain = column.split(" [")[0]
     for name in (plain, plain.rpartition(" ")[0], plain.removesuffix(" median excess")):
         if name and f"label {name}" in pools:
@@ -183,13 +186,13 @@ def name_for(column, pools):
 
 
 def held(pool, value):
-    """Whether a number is in the sorted pool, to the twelve digits of the CSV."""
+    """Return whether a number is in the sorted pool, to the twelve digits of the CSV."""
     near = pool[np.clip(np.searchsorted(pool, value) + np.array([-1, 0]), 0, len(pool) - 1)]
     return bool((np.abs(near - value) <= 1e-11 * max(1, abs(value))).any())
 
 
 def start_recording(folder, ipython):
-    """Let kernels with this IPython folder record into another one; return the IPython folder."""
+    """Let kernels with the IPython folder record into `folder`; return the IPython folder."""
     startup = Path(ipython) / "profile_default" / "startup"
     startup.mkdir(parents=True)
     text = STARTUP.format(tests=os.path.dirname(__file__), folder=folder)

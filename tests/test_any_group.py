@@ -1,4 +1,4 @@
-"""The formulas of docs/near_optimal.md on SO(3), SO(4) and SO(5), with brackets."""
+"""The formulas of docs/near_optimal.md on SO(3), SO(4) and SO(5), written with brackets."""
 
 import itertools
 from fractions import Fraction
@@ -16,7 +16,7 @@ NODES = 33
 
 @cache
 def basis(n):
-    """The basis of so(n), orthonormal for half the trace of XᵀY, shape (n (n − 1)/2, n, n)."""
+    """Return the basis of so(n), orthonormal for tr(XᵀY)/2, shape (n (n − 1)/2, n, n)."""
     found = []
     for i, j in itertools.combinations(range(n), 2):
         X = np.zeros((n, n), int)
@@ -40,13 +40,13 @@ def bracket(x, y, n):
 
 
 def exp(X):
-    """The exponential of skew matrices, by their eigenvectors."""
+    """Return the exponential of skew matrices, by their eigenvectors."""
     values, V = np.linalg.eigh(1j * X)
     return np.real((V * np.exp(-1j * values)[..., None, :]) @ V.conj().mT)
 
 
 def log(R):
-    """The logarithm of rotations by less than about 2 rad, by Newton's method."""
+    """Return the logarithm of rotations by less than about 2 rad, by Newton's method."""
     X = (R - R.mT) / 2
     for _ in range(9):
         E = exp(-X) @ R
@@ -57,7 +57,7 @@ def log(R):
 @pytest.mark.source("beyond BK 15")
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_the_two_forms_of_the_second_variation_are_equal(n):
-    """Exactly, of integers: ‖x'‖² − w' · [η, x]' with x = η' + [w, η], and the sum of squares."""
+    """On integers, ‖x'‖² − w' · [η, x]' with x = η' + [w, η] equals the sum of squares exactly."""
     rng, d = np.random.default_rng(n), n * (n - 1) // 2
     for _ in range(20):
         w, a, eta, rate, bend = (
@@ -74,7 +74,7 @@ def test_the_two_forms_of_the_second_variation_are_equal(n):
 
 
 def closed_forms(sigma, w0, w1, n):
-    """Bézier's curve from I, and the same less its deviation; E, by (9)."""
+    """Return Bézier's curve from I, the same curve minus its deviation, and E by (9)."""
     nodes = grid(NODES)
     t = nodes.t
     S, W0, W1 = (to_matrix(x, n) for x in (sigma, w0, w1))
@@ -94,7 +94,7 @@ def closed_forms(sigma, w0, w1, n):
 
 
 def deviation(s, e, d, n):
-    """(9) of docs/near_optimal.md, by powers of u."""
+    """Return (9) of docs/near_optimal.md by powers of u."""
 
     def triple(x, y, z):
         return bracket(x, bracket(y, z, n), n)
@@ -110,7 +110,7 @@ def deviation(s, e, d, n):
     ]
 
 
-def test_the_deviation_of_the_package_is_that_of_so3():
+def test_the_deviation_in_the_package_equals_the_one_on_so3():
     sigma, w0, w1 = np.random.default_rng(1).normal(size=(3, 3))
     e, d = seen_from_the_middle(sigma, w0, w1)
     ours = bezier_deviation(sigma, e, d)
@@ -119,12 +119,12 @@ def test_the_deviation_of_the_package_is_that_of_so3():
 
 
 def as_so3(x):
-    """A vector of ℝ³ in the basis of so(3) used here."""
+    """Return a vector of ℝ³ in the basis of so(3) used here."""
     return to_vector(np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]]))
 
 
 def excess(R, n):
-    """The cost of a curve above the best one that descent finds, and the cost of that one."""
+    """Return the cost of a curve above the lowest cost that descent finds, and the lowest cost."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))
@@ -138,7 +138,7 @@ def excess(R, n):
         slope = np.einsum("t,ta,jta->j", weights, a, by)
         step = np.linalg.solve(np.einsum("t,ita,jta->ij", weights, by, by), -slope)
         x, x_rate, x_bend = (np.tensordot(step, z, axes=1) for z in (eta, rate, bend))
-        # w of R exp(x) less that of R: series of brackets, and its derivative
+        # w of R exp(x) minus w of R, as series of brackets, and its derivative
         dw, da, term, its_rate, k = x_rate.copy(), x_bend.copy(), x_rate, x_bend, 1
         other, other_rate = w, a
         while np.abs(term).max() + np.abs(other).max() > 1e-20 and k < 12:
@@ -153,8 +153,9 @@ def excess(R, n):
 
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("n", [4, 5])
-def test_excess_of_the_closed_forms_in_higher_dimensions(n):
-    """E for Bézier's curve; for the corrected one the eighth power of the size of the data."""
+def test_the_excess_of_closed_forms_agrees_with_the_note_in_higher_dimensions(n):
+    """Bézier's curve has E; the excess of the corrected curve has the eighth power of the data's
+    size."""
     d = n * (n - 1) // 2
     for data in np.random.default_rng(n).normal(size=(20, 3, d)):
         data *= [[0.6], [0.8], [1.0]] / np.linalg.norm(data, axis=1, keepdims=True)
@@ -168,7 +169,7 @@ def test_excess_of_the_closed_forms_in_higher_dimensions(n):
 
 
 def test_the_eight_brackets_are_independent_on_so3():
-    """So the derivation for SO(3) holds for every group: there are eight of degree three."""
+    """Degree three has only these brackets, so the derivation on SO(3) holds on every group."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)

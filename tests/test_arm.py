@@ -19,8 +19,9 @@ def tips(q, *lengths):
 
 @pytest.mark.source("RR 4")
 @pytest.mark.parametrize("lengths", [(), LENGTHS[:1], LENGTHS[:3], LENGTHS])
-def test_arms_of_any_number_of_links_by_complex_numbers(lengths):
-    """The arm of the report, of 2 and 1.5 m, if none are given; and its Jacobian by differences."""
+def test_arms_with_any_number_of_links_agree_with_complex_numbers(lengths):
+    """Without lengths, the arm is the report's of 2 and 1.5 m. Its Jacobian is tested by
+    differences."""
     n = len(lengths) or 2
     q, given = RNG.uniform(-7, 7, (5, 6, n)), [lengths] * bool(lengths)
     joints, frames = arm.arm_forward_kinematics(q, *given)
@@ -43,10 +44,11 @@ def test_arms_of_any_number_of_links_by_complex_numbers(lengths):
     assert np.abs(by_each_angle - J.mT).max() < 1e-9
 
 
-def test_the_jacobian_of_two_links_is_singular_where_they_are_in_line():
+def test_the_jacobian_of_two_links_is_singular_if_they_are_in_line():
     q = RNG.uniform(-7, 7, (100, 2))
     assert np.abs(np.linalg.det(arm.arm_tip_jacobian(q)) - 3 * np.sin(q[:, 1])).max() < 32 * EPS
-    for bent, reach in ((0, 3.5), (np.pi, 0.5)):  # of joint 0; of joint 1 it is 1.5 always
+    # the lever arm of joint 0; that of joint 1 is always 1.5
+    for bent, reach in ((0, 3.5), (np.pi, 0.5)):
         singular = np.linalg.svd(arm.arm_tip_jacobian([0.4, bent]), compute_uv=False)
         assert singular == pytest.approx([np.hypot(reach, 1.5), 0], abs=8 * EPS)
 
@@ -54,8 +56,8 @@ def test_the_jacobian_of_two_links_is_singular_where_they_are_in_line():
 @pytest.mark.source("RR (20)", "RR (21)", "RR 4.1", "errata 19")
 @pytest.mark.parametrize("steps", [1, 10, 37])
 def test_each_joint_goes_from_its_own_start_to_its_own_goal(steps):
-    """As printed, link 1's start would be blended with link 2's: the first index counts the links
-    in the formula, start and goal in the sentence below it."""
+    """The printed formula would blend link 1's start with link 2's. Its first index counts the
+    links; in the sentence below it, the first index distinguishes start and goal."""
     theta = np.array([[0.1, 0.2], [1.0, 2.0]])
     path, t = arm.interpolate_joints(*theta, steps), np.linspace(0, 1, steps + 1)[:, None]
     assert np.array_equal(path[[0, -1]], theta)
@@ -77,8 +79,8 @@ def test_each_command_adds_velocity_times_duration():
 
 
 @pytest.mark.source("RR 4.2", "errata 20")
-def test_a_configuration_of_the_arm_is_no_planar_pose():
-    """Two configurations take the tip to one place, and most planar poses are out of reach."""
+def test_a_configuration_of_the_arm_is_not_a_planar_pose():
+    """Two configurations take the tip to the same place, and most planar poses are out of reach."""
     q = np.array([0.3, 0.8])
     tip = tips(q)
     mirrored = [2 * np.arctan2(tip[1], tip[0]) - 0.3, -0.8]
@@ -94,9 +96,9 @@ def test_a_configuration_of_the_arm_is_no_planar_pose():
 @pytest.mark.parametrize(
     "lengths", [(2, 1.5), (1.5, 2), (1, 1), (1e-3, 4), (1e-200, 2e-200), (3e200, 1e200)]
 )
-def test_both_solutions_bring_the_tip_there_and_one_is_where_it_came_from(lengths):
+def test_both_inverse_solutions_reach_the_tip_and_one_equals_the_original_angles(lengths):
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, size=(4, 250, 2))
-    q[0, :3, 1] = [0, np.pi, -np.pi]  # stretched and folded, as they come out of rounding
+    q[0, :3, 1] = [0, np.pi, -np.pi]  # stretched and folded arms, whose tips are rounded
     tip = tips(q, lengths)
     found = arm.arm_inverse_kinematics(tip, lengths)
     assert np.abs(tips(found, lengths) - tip[..., None, :]).max() < 16 * EPS * sum(lengths)
@@ -107,7 +109,7 @@ def test_both_solutions_bring_the_tip_there_and_one_is_where_it_came_from(length
         for k, elbow in enumerate((q[..., 1], -q[..., 1])):
             bent = (elbow > 0.1) & (elbow < 3)
             assert np.abs(found[bent, k] - q[bent]).max() < 1e-13
-    if lengths == (1, 1):  # the tip at the base
+    if lengths == (1, 1):  # the tip is at the base
         assert np.abs(tips(arm.arm_inverse_kinematics([0, 0], lengths), lengths)).max() < 1e-15
 
 
@@ -134,6 +136,6 @@ ANGLES_AND_LENGTHS = [
         ("arm_inverse_kinematics", ([1, 0], [1, 1, 1]), "lengths"),
     ],
 )
-def test_bad_arguments_and_places_out_of_reach_are_named(function, arguments, message):
+def test_bad_arguments_and_places_out_of_reach_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         getattr(arm, function)(*arguments)

@@ -15,7 +15,7 @@ STORED = report.README.with_name("benchmarks.csv")
 
 
 class Clock:
-    """A clock that goes on when a call takes its time, on a machine whose load may grow."""
+    """A clock that advances by the duration of each call, on a machine whose load may grow."""
 
     now, load = 0.0, 1.0
 
@@ -27,8 +27,8 @@ class Clock:
         self.load *= grows
 
 
-def test_times_are_of_one_item_and_ratios_of_turns_under_the_same_load():
-    """When the machine gets twice as slow from turn to turn, all methods of a round do."""
+def test_times_are_per_item_and_ratios_compare_methods_under_the_same_load():
+    """The machine gets twice as slow from round to round, for all methods of a round."""
     clock, rounds = Clock(), {"loop": 0, "total": 0, "fewest": 3, "most": 3}
     ours, other = partial(clock.take, 6), partial(clock.take, 4, grows=2)
     methods = {OURS: contests.Method("", ours, items=3), "other": contests.Method("", other)}
@@ -40,7 +40,7 @@ def test_times_are_of_one_item_and_ratios_of_turns_under_the_same_load():
 
 
 def once(contest):
-    """The contest at its smallest sizes, where each method is called once."""
+    """Return the contest at its smallest sizes, with each method called once."""
 
     def make(n, rng, *options):
         methods, error = contest.make(n, rng, *options)
@@ -52,7 +52,7 @@ def once(contest):
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    """The folder and the rows of a run of every task, with one case and gentle problems."""
+    """Run every task with one case and gentle problems; return the folder and the rows."""
     folder = tmp_path_factory.mktemp("run")
     text = "before\n<!-- benchmarks -->\nold\n<!-- end of benchmarks -->\nafter\n"
     (folder / "README.md").write_text(text)
@@ -69,13 +69,13 @@ def ran(tmp_path_factory):
     plt.close("all")
 
 
-def test_every_task_has_ours_first_and_others_that_agree(ran):
+def test_every_task_lists_our_method_first_and_all_methods_agree(ran):
     contest = {(contest.task, contest.case): contest for contest in CONTESTS}
     methods = {contest.task: [] for contest in CONTESTS}
     for row in ran[1]:
         methods[row["task"]].append(row["method"])
         bound, error = contest[row["task"], row["case"]].bound, row["error [1]"]
-        polar = row["call"] == "robust_polar_decomposition"  # 20 iterations, which is too few
+        polar = row["call"] == "robust_polar_decomposition"  # 20 iterations are too few
         assert error is None or error <= (1e-2 if polar else bound), row
         assert (error is None) <= (bound is None or row["method"] != OURS)
     assert all(names[0] == OURS and len(set(names)) > 1 for names in methods.values()), methods
@@ -100,7 +100,7 @@ def test_a_run_writes_the_table_and_the_figure(ran):
         assert len(ax.lines) == len({row["method"] for row in rows if row["task"] == task})
 
 
-def test_the_stored_csv_and_readme_are_what_the_report_writes(ran, tmp_path):
+def test_the_report_reproduces_the_stored_csv_and_readme(ran, tmp_path):
     stored = report.read_csv(STORED)
     report.write_csv(stored, tmp_path / "table.csv")
     assert (tmp_path / "table.csv").read_bytes() == STORED.read_bytes()

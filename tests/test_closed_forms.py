@@ -1,4 +1,4 @@
-"""The other closed forms: of BK 1 against their definitions in 60 digits, and of real bodies."""
+"""The closed forms of BK 1 against their definitions in 60 digits, and those for real bodies."""
 
 from itertools import pairwise
 
@@ -34,7 +34,7 @@ def directions(count, rng):
 
 
 def ends(count, angle=None, size=None):
-    """R0, R1, w0, w1: turns by an angle, or any; velocities of a size, or up to 9."""
+    """Return R0, R1, w0, w1: turns by one angle, or any; velocities of one size, or up to 9."""
     rng = np.random.default_rng(count)
     R0, R1 = (Rotation.random(count, rng=rng).as_matrix() for _ in range(2))
     if angle is not None:
@@ -44,7 +44,7 @@ def ends(count, angle=None, size=None):
 
 
 def quaternion_of(R):
-    """Of any norm."""
+    """Return the quaternion of a rotation, not normalised."""
     sine = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
     return [1 + R[0, 0] + R[1, 1] + R[2, 2], *sine]
 
@@ -55,14 +55,14 @@ def unit_quaternion_of(R):
 
 
 def exact_log(R):
-    """The rotation vector, of no half-turn."""
+    """Return the rotation vector of a rotation that is not a half-turn."""
     q, *sine = quaternion_of(R)
     length = oracles.exact_norm(sine)
     return [mp.atan2(length, q - 2) / (length or 1) * x for x in sine]
 
 
 def turned_by(q):
-    """The matrix of p ↦ q p q⁻¹."""
+    """Return the matrix of p ↦ q p q⁻¹."""
     w, W = q[0], oracles.exact_hat(q[1:])
     return mp.eye(3) + 2 * (w * W + W * W) / mp.fsum(x * x for x in q)
 
@@ -72,7 +72,7 @@ def along(w, share):
 
 
 def in_coordinates(coordinates, point):
-    """The cubic in coordinates, whose rates at the ends are those of the turning body."""
+    """Return the cubic in coordinates whose rates at the ends are those of the turning body."""
 
     def curve(turn, w0, w1):
         values, rates = [], []
@@ -123,13 +123,13 @@ DEFINITIONS = {
 
 
 def by_differences(f, t):
-    """f(t), f'(t), f''(t), all mpmath."""
+    """Return f(t), f'(t), f''(t) as mpmath numbers."""
     before, now, after = (f(mp.mpf(float(t)) + k * STEP) for k in (-1, 0, 1))
     return now, (after - before) / (2 * STEP), (after - 2 * now + before) / STEP**2
 
 
 def exactly(name, given, times):
-    """R, w and w' from I on: Rᵀ R'' = ŵ' + ŵ², of which the second is symmetric."""
+    """Return R, w and w' of a curve from I, by Rᵀ R'' = ŵ' + ŵ², in which ŵ² is symmetric."""
     jets = []
     with mp.workdps(oracles.DIGITS):
         turn, w0, w1 = ([mp.mpf(float(x)) for x in v] for v in given)
@@ -142,7 +142,8 @@ def exactly(name, given, times):
 
 
 def test_the_exponential_of_quaternions_has_exact_derivatives():
-    """With and without the power series, side by side, and where the tangent has its poles."""
+    """The tested lengths are inside and outside the power series, and at the poles of the
+    tangent."""
     lengths = [0, 1e-300, 1e-170, 1e-12, 1e-8, 1e-4, 0.1, 0.49, 0.5 - 1e-9, 0.5, 0.51, 1, 1.5]
     lengths += [np.pi / 2, 3, np.pi - 1e-8, np.pi, 3 * np.pi / 2, 2 * np.pi, 7, 50, 400]
     u0, u1, u2 = np.random.default_rng(5).normal(size=(3, 3, 1))
@@ -162,7 +163,7 @@ def test_the_exponential_of_quaternions_has_exact_derivatives():
             assert np.abs(x[:, k] - y).max() < (20 + 4 * length) * EPS * np.abs(y).max(initial=1)
 
 
-def test_a_quaternion_of_any_norm_has_one_rotation():
+def test_quaternions_of_any_norm_give_the_same_rotation():
     q = np.random.default_rng(10).normal(size=(4, 50))
     for scale in (1, -1, 1e-100, 3, 1e100):
         off = jets.rotation(scale * q) - oracles.rotation_of_quaternions(q)
@@ -171,7 +172,7 @@ def test_a_quaternion_of_any_norm_has_one_rotation():
 
 
 def cases():
-    """Turn, w0 and w1, from R0 on."""
+    """Return turns, w0 and w1 of curves by name."""
     rng = np.random.default_rng(11)
     n, m = directions(2, rng)
     w0, w1, turn = np.array([2.0, -1, 3]), np.array([1.0, 4, -2]), np.array([0.3, -0.4, 1.2])
@@ -200,8 +201,9 @@ CASES = cases()
 @pytest.mark.source("BK 1")
 @every_curve
 @pytest.mark.parametrize("case", CASES)
-def test_curve_and_derivatives_are_those_of_the_definition(name, case):
-    """Cayley's parameters lose the secant of half the angle: all digits near a half-turn."""
+def test_curves_and_derivatives_are_those_of_the_definition(name, case):
+    """Errors of Cayley's parameters grow with the secant of half the angle: near a half-turn, all
+    digits are lost."""
     (turn, w0, w1), start, times = CASES[case], Rotation.random(rng=1).as_matrix(), (0.13, 0.6, 1)
     curve = MAKERS[name](start, start @ oracles.exp_so3(turn), w0, w1)
     R, *rates = exactly(name, CASES[case], times)
@@ -214,7 +216,7 @@ def test_curve_and_derivatives_are_those_of_the_definition(name, case):
 
 @every_curve
 @pytest.mark.parametrize("size", [None, 0, 9, 100], ids=str)
-def test_all_four_ends_are_met_wherever_the_curve_is_defined(name, size):
+def test_the_ends_and_end_velocities_are_met_wherever_the_curve_is_defined(name, size):
     size = min(size, 9.42) if size and name == "bezier" else size
     angles = [None, 0, 1e-9, 1e-3, 3, np.pi - 1e-3, np.pi - 1e-6, np.pi]
     for angle in angles[:-1] if name == "cayley" else angles:
@@ -228,8 +230,8 @@ def test_all_four_ends_are_met_wherever_the_curve_is_defined(name, size):
 
 
 @pytest.mark.parametrize("make", [rb.exponential_cubic_long_so3, rb.bezier_long_so3])
-def test_the_long_way_round_is_the_rest_of_a_full_turn(make):
-    """About one axis, from rest to rest or at the constant speed 1 − 2π."""
+def test_the_long_way_round_completes_a_full_turn(make):
+    """Turns about one axis, from rest to rest or at the constant speed 1 − 2π."""
     e, t = I3[1], np.linspace(0, 1, 201)
     for w in [0 * e, (1 - 2 * np.pi) * e][: 2 if make is rb.exponential_cubic_long_so3 else 1]:
         speed = make(I3, rb.exp_so3(e), w, w)(t, 1)[:, 1]
@@ -239,7 +241,8 @@ def test_the_long_way_round_is_the_rest_of_a_full_turn(make):
 
 
 def test_ends_outside_the_domain_are_refused_by_name():
-    """Bézier's velocities from 3π on, half-turns for Cayley's cubic, and inertias of no body."""
+    """Bézier's velocities from 3π on, half-turns for Cayley's cubic, and inertias of impossible
+    bodies raise errors."""
     w, half = np.zeros((2, 3, 3)), np.diag([-1.0, 1, -1])
     w[1, 2] = 3 * np.pi * np.array([2, 1, 2]) / 3
     for name, given in (("w0", (w, REST)), ("w1", (REST, w))):
@@ -261,8 +264,8 @@ def test_ends_outside_the_domain_are_refused_by_name():
 
 
 @every_curve
-def test_velocities_along_the_geodesic_give_a_cubic_along_it_in_three_of_five(name):
-    """R0 exp(σ p(t)), p the cubic with those ends."""
+def test_with_velocities_along_the_geodesic_three_of_five_forms_follow_it(name):
+    """The expected curve is R0 exp(σ p(t)), where p is the cubic with the same end conditions."""
     R0, R1, _, _ = ends(40)
     turn = Rotation.from_matrix(R0.mT @ R1).as_rotvec()
     rates = np.random.default_rng(5).uniform(0.1, 2, (2, 40))
@@ -278,8 +281,8 @@ def test_velocities_along_the_geodesic_give_a_cubic_along_it_in_three_of_five(na
 
 
 @pytest.mark.parametrize("make", [*MAKERS.values(), rb.corrected_bezier_so3])
-def test_backwards_in_time_three_are_the_same_and_three_are_not(make):
-    """Also where the correction of fast ends takes a logarithm that is not the shortest."""
+def test_three_closed_forms_are_reversible_in_time_and_three_are_not(make):
+    """For some fast ends, the correction takes a logarithm that is not the shortest."""
     R0, R1, w0, w1 = ends(40, 2.5)
     curve, back = make(R0, R1, w0, w1), make(R1, R0, -w1, -w0)
     t = np.linspace(0, 1, 11)
@@ -294,8 +297,8 @@ def test_backwards_in_time_three_are_the_same_and_three_are_not(make):
         assert np.all(off < 400 * EPS * np.abs(want).max(axis=others, initial=1) * worse)
 
 
-def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_before():
-    """Also of velocities just below 3π, whose legs are all but half-turns."""
+def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_leg_before():
+    """Some velocities are just below 3π, so that their legs are almost half-turns."""
     R0, R1, w0, w1 = ends(100)
     for w in (w0[::2], w1[::4]):
         w *= 9.4247 / np.linalg.norm(w, axis=1, keepdims=True)
@@ -311,7 +314,7 @@ def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_before(
 
 
 def cubic_of_quaternions(R0, R1, w0, w1, t):
-    """Q(t) as the definition says, shape (N, 4, times), q1 nearer to q0 than −q1."""
+    """Return Q(t) by its definition, shape (N, 4, times), with q1 nearer to q0 than −q1."""
     q = Rotation.from_matrix(R0.mT @ R1).as_quat(canonical=True, scalar_first=True).T
     one, (v0, v1) = np.eye(4)[:1].T, (np.insert(w, 0, 0, axis=1).T for w in (w0, w1))
     values = one + 0 * q, q, v0 / 2, oracles.quaternion_product(q, v1) / 2
@@ -332,9 +335,9 @@ def test_the_margin_is_the_least_norm_of_the_cubic():
 
 
 def in_a_plane(margin):
-    """A turn by 2 and both velocities about one axis.
+    """Return a turn by 2 and both velocities about one axis.
 
-    Seen from half way Q is a complex number, at t = 1/2 cos(1/2) + k/8 sin(1/2), the least.
+    Seen from halfway, Q is a complex number. Its minimum, at t = 1/2, is cos(1/2) + k/8 sin(1/2).
     """
     [n] = directions(1, np.random.default_rng(13))
     k = 8 * (margin - np.cos(0.5)) / np.sin(0.5)
@@ -342,7 +345,7 @@ def in_a_plane(margin):
 
 
 @pytest.mark.parametrize("margin", [0.3, 1e-2, 1e-4, 1e-6])
-def test_where_the_margin_is_small_its_powers_are_lost(margin):
+def test_errors_grow_with_powers_of_the_inverse_norm_of_the_cubic(margin):
     turn, w0, w1 = in_a_plane(margin)
     given = I3, oracles.exp_so3(turn), w0, w1
     curve, t = rb.quaternion_cubic_so3(*given), 0.5 + np.array([-0.25, -margin / 8, 0, margin / 32])
@@ -354,12 +357,12 @@ def test_where_the_margin_is_small_its_powers_are_lost(margin):
         assert np.all(off < 40 * EPS * 8**order / np.linalg.norm(Q, axis=0) ** (1 + order))
 
 
-def test_where_the_cubic_of_quaternions_is_zero_it_is_refused_at_that_time():
+def test_the_time_at_which_the_cubic_of_quaternions_is_zero_is_refused():
     turn, w0, w1 = in_a_plane(0)
     stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
-    t = np.linspace(0, 0.4, 3000)  # of two curves more than a block
+    t = np.linspace(0, 0.4, 3000)  # more than a block for two curves
     for order in (0, 1, 2):
         assert np.isfinite(stack([0, 0.25, 0.75, 1], order)).all()
         for k in (0, 2999):
@@ -392,8 +395,8 @@ def test_the_weighted_cubic_is_the_nearest_rotation_in_the_metric():
 
 
 @pytest.mark.source("beyond BK 7")
-def test_the_normal_cubic_is_that_of_its_formula():
-    """x(t) is solved for again, by SciPy, and is a cubic."""
+def test_the_normal_cubic_satisfies_its_formula():
+    """SciPy solves for x(t) again, and x(t) is a cubic."""
     curve = rb.normal_cubic_so3(R0[0], R1[0], W0[0], W1[0], BOOK)
     t, inverse = np.linspace(0, 1, 9), np.linalg.inv(BOOK)
 
@@ -407,8 +410,8 @@ def test_the_normal_cubic_is_that_of_its_formula():
     assert np.abs(round_one(TIMES) - same(TIMES)).max() < 1e-13
 
 
-def test_the_normal_cubic_of_thin_bodies_exists_but_at_the_singular_angle():
-    """About the middle axis of a plate the map from x to y is singular at about 2.02."""
+def test_the_normal_cubic_of_thin_bodies_exists_except_at_the_singular_angle():
+    """About the middle axis of a plate, the map from x to y is singular at about 2.02 rad."""
     for moments in ((1e-6, 1, 1), (1, 1, 1e-6), (1e-3, 1, 1)):
         R1 = rb.exp_so3([0.4, 0.1, 0.3])
         curve = rb.normal_cubic_so3(I3, R1, REST, REST, np.diag(moments))
@@ -426,7 +429,7 @@ def test_the_normal_cubic_of_thin_bodies_exists_but_at_the_singular_angle():
 
 
 @pytest.mark.source("beyond BK 8")
-def test_the_excess_of_the_quintic_falls_with_the_fourth_power_and_from_rest_it_is_0():
+def test_the_excess_of_the_quintic_has_the_fourth_power_and_is_zero_from_rest_to_rest():
     found = []
     for s in (0.2, 0.1, 1):
         ends = I3, rb.exp_so3(s * TURN), *(s * x for x in (W0, W1, A0, A1))

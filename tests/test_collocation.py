@@ -1,4 +1,4 @@
-"""R p = c, solved: a problem of a stack that fails harms no other."""
+"""Newton's method for R p = c: a problem of a stack that fails does not affect the others."""
 
 import numpy as np
 import pytest
@@ -10,9 +10,9 @@ from rbcourse.optimum.functionals import Effort
 
 
 @pytest.mark.parametrize("of_torque", [False, True])
-@pytest.mark.parametrize("start", [np.nan, 1.0])  # with the second the matrix is singular
+@pytest.mark.parametrize("start", [np.nan, 1.0])  # the second start makes the matrix singular
 @pytest.mark.parametrize("broken", range(4))
-def test_relax_finds_the_others_where_one_problem_of_a_stack_is_singular(of_torque, start, broken):
+def test_relax_solves_the_other_problems_of_a_stack_if_one_is_singular(of_torque, start, broken):
     rng = np.random.default_rng(47)
     R0, R1 = rb.sample_rotation((2, 4), rng=rng)
     rates = rng.normal(size=(4, 2, 3))

@@ -22,14 +22,14 @@ def metrics(m, count=100, definite=True):
 
 
 def momentum(G, A, v):
-    """In the fixed frame, where it is conserved (Noether)."""
+    """Return the momentum in the fixed frame, where it is conserved (Noether)."""
     adjoint = rb.adjoint_se3(A) if A.shape[-1] == 4 else A
     return np.linalg.solve(adjoint.mT, (v @ G)[..., None])[..., 0]
 
 
 @pytest.mark.source("BK (2)", "BK (3)", "BK 2.4")
 @pytest.mark.parametrize("condition", [1, 1e3, 1e5])
-def test_structure_constants_give_the_commutators_in_any_basis_of_any_size(condition):
+def test_structure_constants_give_the_commutators_in_bases_of_any_scale(condition):
     for m, basis in BASES.items():
         C = structure_constants(basis)
         for i, j in np.ndindex(m, m):
@@ -50,13 +50,14 @@ def test_structure_constants_give_the_commutators_in_any_basis_of_any_size(condi
 @both_groups
 @pytest.mark.parametrize("definite", [True, False])
 def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(m, definite):
-    """Also d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩."""
+    """The product rule d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩ holds, too."""
     G, C = metrics(m, definite=definite), structure_constants(BASES[m])
     gamma, condition = christoffel(G, BASES[m]), np.linalg.cond(G)
     bound = 1e-14 * condition[:, None, None, None]
     assert np.all(np.abs(gamma - gamma.mT - C) < bound)
     lowered = np.einsum("bil,bljk->bijk", G, gamma)
-    change = lowered + lowered.transpose(0, 3, 2, 1)  # of ⟨L_i, L_k⟩ along L_j, must be 0
+    # the derivative of ⟨L_i, L_k⟩ along L_j, which must be 0
+    change = lowered + lowered.transpose(0, 3, 2, 1)
     assert np.all(np.abs(change) < bound * np.abs(G).max(axis=(-2, -1))[:, None, None, None])
     v, x, y, dx, dy = np.random.default_rng(4).normal(size=(5, 100, m))
 
@@ -69,7 +70,7 @@ def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(m, defi
 
 
 @pytest.mark.source("BK (9)", "BK 2.4")
-def test_a_bi_invariant_metric_has_half_the_commutator():
+def test_the_connection_of_a_bi_invariant_metric_is_half_the_commutator():
     C = structure_constants(rb.BASIS_SO3)
     for size in (2, 1e-320, 1e-310, 1e-200, 1e200, 1e308):
         assert np.array_equal(christoffel(size * np.eye(3), rb.BASIS_SO3), C / 2)
@@ -80,8 +81,8 @@ def test_a_bi_invariant_metric_has_half_the_commutator():
 
 @pytest.mark.source("BK (9)", "BK (14)", "BK 2.4")
 @pytest.mark.parametrize(("G", "exp"), [(rb.METRIC_SO3, rb.exp_so3), (rb.METRIC_SE3, rb.exp_se3)])
-def test_the_acceleration_is_the_ambient_one_projected_on_the_tangent_space(G, exp):
-    """Of (12) and (14), which are induced by a flat metric; A'' by differences, not by Γ."""
+def test_the_acceleration_is_the_projection_of_the_ambient_one_on_the_tangent_space(G, exp):
+    """A flat metric induces (12) and (14). A'' is computed by differences, not from Γ."""
     start, v, a = np.random.default_rng(2).normal(size=(3, len(G)))
     h, A0 = 1e-4, exp(start)
     before, at, after = (A0 @ exp(v * t + a * t**2 / 2) for t in (-h, 0, h))
@@ -92,22 +93,25 @@ def test_the_acceleration_is_the_ambient_one_projected_on_the_tangent_space(G, e
 
 @pytest.mark.source("BK 2.4", "errata 22")
 def test_the_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
-    """A is no tangent vector at A: it has no components there, so nothing would turn along."""
+    """The point A is not a tangent vector at A. Its rotational components are zero, so no vector
+    would turn along it."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
     gamma = christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
     corrected = rb.metrics.components_from_tangent(A, rb.metrics.tangent_from_components(A, S))
     assert np.abs(printed[:3]).max() < 8 * EPS
     at = (covariant_derivative(gamma, x, S, 0 * S) for x in (corrected, printed))
-    off = [np.abs(x - [0, 0, 0, 0, 6, 0]).max() for x in at]  # the origin on a circle: ω × v
+    # the acceleration of the origin on a circle: ω × v
+    off = [np.abs(x - [0, 0, 0, 0, 6, 0]).max() for x in at]
     assert off[0] < 1e-13
     assert off[1] > 1
 
 
 @pytest.mark.source("BK (8)")
 @both_groups
-def test_the_velocity_is_the_slope_and_energy_and_momentum_stay(m):
-    """The energy for ten units of time and condition numbers up to 1e4, relatively."""
+def test_the_velocity_is_the_derivative_and_energy_and_momentum_are_conserved(m):
+    """The relative error of the energy is small over ten units of time, at condition numbers up to
+    1e4."""
     rng, h = np.random.default_rng(5), 1e-4
     G, v0 = metrics(m, 40), rng.normal(size=(2, m))
     G = G[np.linalg.cond(G) < 1e4][:2]
@@ -124,7 +128,7 @@ def test_the_velocity_is_the_slope_and_energy_and_momentum_stay(m):
 
 @pytest.mark.source("BK (8)", "BK 2.4")
 @pytest.mark.parametrize(("a", "c"), [(1, 1), (0.01, 2), (1.5, 1)])
-def test_the_free_body_is_eulers(a, c):
+def test_the_motion_of_a_free_body_satisfies_eulers_solution(a, c):
     _, w = rb.geodesic_flow(INERTIA, ONE, [a, 0, c], TIMES)
     exact = [oracles.free_body([1, 2, 3], a, c, t) for t in TIMES]
     assert np.abs(w - exact).max() < 1e-9
@@ -132,20 +136,23 @@ def test_the_free_body_is_eulers(a, c):
 
 @pytest.mark.source("BK (8)", "errata 13")
 def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
-    """It has Γ^i_ik for Γ^i_jk, and with the frame's symbols ä of coordinates for ẇ."""
+    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the frame's symbols with ä of
+    coordinates instead of ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)
     euler = np.linalg.solve(inertia, np.cross(inertia @ w, w))
     assert np.abs(-np.einsum("ijk,j,k->i", gamma, w, w) - euler).max() < 40 * EPS
-    for reading in ("iik,j,k->i", "iik,i,k->i"):  # j is summed over, or stands for i
+    # two readings: j is summed over, or j stands for i
+    for reading in ("iik,j,k->i", "iik,i,k->i"):
         printed = -np.einsum(reading, gamma, w, w)
         assert np.abs(printed).max() > 0.1
         assert np.abs(printed - euler).max() > 1
     _, after = rb.geodesic_flow(inertia, ONE, w, h)
     assert np.abs((after - w) / h - euler).max() < 1e-2
     ways, _ = rb.geodesic_flow(rb.METRIC_SO3, turn, w, [-h, 0, h])
-    before, at, ahead = rb.log_so3(ways)  # coordinates along the geodesic, and their ä
+    # coordinates along the geodesic, for their second derivative
+    before, at, ahead = rb.log_so3(ways)
     velocity, acceleration = (ahead - before) / (2 * h), (before - 2 * at + ahead) / h**2
     frame = christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
     assert np.abs(acceleration + np.einsum("ijk,j,k->i", frame, velocity, velocity)).max() > 0.1
@@ -164,7 +171,7 @@ def steady_and_straight(S):
         (rb.METRIC_SE3, steady_and_straight, 3, 1e-10),
     ],
 )
-def test_geodesics_of_bi_invariant_metrics_are_subgroups_and_those_of_14_straight(
+def test_geodesics_of_bi_invariant_metrics_are_subgroups_and_those_of_14_are_straight(
     G, exp, constant, tolerance
 ):
     v0 = np.random.default_rng(8).normal(size=(5, len(G)))
@@ -173,7 +180,7 @@ def test_geodesics_of_bi_invariant_metrics_are_subgroups_and_those_of_14_straigh
     assert np.abs(A - exp(TIMES[:, None, None] * v0)).max() < tolerance
 
 
-def test_times_in_any_order_forwards_and_back_and_large_batches():
+def test_geodesics_are_followed_at_times_in_any_order_and_in_large_batches():
     start, spin = rb.exp_so3([1, 2, 3]), [0.3, 2, -1]
     t = np.array([[2.0, -1, 0], [2, 0.5, -3]])
     R, w = rb.geodesic_flow(INERTIA, start, spin, t)
@@ -185,14 +192,14 @@ def test_times_in_any_order_forwards_and_back_and_large_batches():
     back, _ = rb.geodesic_flow(INERTIA, R[0, 0], w[0, 0], -2)
     assert np.abs(back - start).max() < 1e-11
     crowd, _ = rb.geodesic_flow(INERTIA, start, [spin] + [[0.01, 0, 0]] * 399, 10)
-    alone, _ = rb.geodesic_flow(INERTIA, start, spin, 10)  # it loses the root of 400, at most
+    alone, _ = rb.geodesic_flow(INERTIA, start, spin, 10)  # the batch loses at most a factor √400
     assert np.abs(crowd[0] - alone).max() < 20 * 1e-12
     assert rb.geodesic_flow(INERTIA, start, spin, [])[0].shape == (0, 3, 3)
     assert rb.geodesic_flow(np.ones((0, 3, 3)), start, spin, 1)[0].shape == (0, 3, 3)
 
 
-def test_the_size_of_velocities_and_metrics_does_not_matter():
-    """γ_sv(t) = γ_v(st), alone and in one batch; also at extreme sizes."""
+def test_the_scale_of_velocities_and_metrics_does_not_matter():
+    """γ_sv(t) = γ_v(st), alone and in one batch, and also at extreme scales."""
     w0 = np.array([0.3, 2, -1])
     R, w = rb.geodesic_flow(INERTIA, ONE, w0, 3)
     for s in (1e-8, 1e8):
@@ -210,7 +217,7 @@ def test_the_size_of_velocities_and_metrics_does_not_matter():
         assert np.abs(v - w).max() < (1e-11 if size > 1e-300 else 1e-2)
 
 
-def test_of_an_indefinite_metric_velocities_may_grow_and_the_momentum_stays():
+def test_velocities_may_grow_in_an_indefinite_metric_but_the_momentum_is_conserved():
     G = np.linalg.inv(np.kron([[0, 1], [1, 0]], np.diag([2, 0.5, 1])))
     v0 = np.linalg.solve(G, [1, 1, 0, 0, 0, 1])
     A, v = rb.geodesic_flow(G, np.eye(4), v0, [0, 10, 20])
@@ -220,18 +227,19 @@ def test_of_an_indefinite_metric_velocities_may_grow_and_the_momentum_stays():
     assert np.all(off < 1e-10 * speeds * np.linalg.norm(rb.adjoint_se3(A), axis=(-2, -1)))
 
 
-def test_a_start_beside_the_group_is_put_on_it():
+def test_a_start_near_the_group_is_projected_on_it():
     start = rb.exp_so3([1, 2, 3]) + 1e-3
     R, _ = rb.geodesic_flow(INERTIA, start, [0.3, 2, -1], TIMES)
     assert np.abs(R[0] - rb.project_so(start)).max() < 4 * EPS
     assert np.abs(R.mT @ R - ONE).max() < 10 * EPS
-    pose = np.diag([2, 2, 2, 1])  # it does not run at twice the speed
+    pose = np.diag([2, 2, 2, 1])  # the projected pose does not move at twice the speed
     A, _ = rb.geodesic_flow(np.eye(6), pose, [0, 0, 0, 1, 0, 0], 3)
     assert np.abs(A[:3, 3] - [3, 0, 0]).max() < 1e-12
 
 
-def test_a_fast_flight_does_not_disturb_the_turning_and_a_body_at_rest_stays():
-    """Whatever the unit of length: 1e8 of them go by while the body turns."""
+def test_a_fast_translation_does_not_disturb_the_rotation_and_a_body_at_rest_stays():
+    """The body travels 1e8 units of length in a unit of time, so the unit of length does not
+    matter."""
     G = np.diag([1.0, 2, 3, 1, 1, 1])
     _, w = rb.geodesic_flow(INERTIA, ONE, [1, 2, 3], TIMES)
     A, v = rb.geodesic_flow(G, np.eye(4), [1, 2, 3, 1e8, 0, 0], TIMES)
@@ -242,7 +250,7 @@ def test_a_fast_flight_does_not_disturb_the_turning_and_a_body_at_rest_stays():
     assert not v.any()
 
 
-def test_an_integration_that_fails_is_an_error(monkeypatch):
+def test_a_failed_integration_raises_an_error(monkeypatch):
     failed = SimpleNamespace(success=False, message="the step is too small")
     monkeypatch.setattr(scipy.integrate, "solve_ivp", lambda *_, **__: failed)
     with pytest.raises(FloatingPointError, match="followed to its end: the step is too small"):
@@ -269,6 +277,6 @@ NEARLY_SO3 = [L1 + 1e-7 * ONE, L2, L3 + 1e-10]
         ("geodesic_flow", (ONE, ONE, [1, 2, 3], [0, np.nan]), "t[1] is nan"),
     ],
 )
-def test_bad_arguments_and_bases_of_no_lie_algebra_are_named(function, arguments, message):
+def test_bad_arguments_and_bases_without_a_lie_algebra_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         getattr(rb.connection, function)(*arguments)

@@ -15,7 +15,7 @@ import rbcourse as rb
 
 
 def of(function, *more):
-    """The maker with the required arguments of a function, and `more`, of the named ends."""
+    """Return a maker with the required arguments of a function, and with the named ends `more`."""
     parameters = inspect.signature(function).parameters.values()
 
     def make(ends, **given):
@@ -27,7 +27,7 @@ def of(function, *more):
 
 
 def uneven(c, t, order):
-    """A reparameterisation for each curve; with c > 1 it leaves [0, 1]."""
+    """Return a reparameterisation for each curve; with c > 1 it leaves [0, 1]."""
     return (t + c * t * (1 - t), 1 + c * (1 - 2 * t), -2 * c + 0 * t, 0 * c * t)[order]
 
 
@@ -46,7 +46,7 @@ FUNCTIONS = rb.CLOSED_FORMS | {
     for name in rb.__all__
     if inspect.isfunction(function := getattr(rb, name)) and returns_a_curve(function)
 }
-NO_STACKS = {  # see test_paths.py, test_splines.py and test_timing.py
+NO_STACKS = {  # tested in test_paths.py, test_splines.py and test_timing.py
     name
     for name, function in FUNCTIONS.items()
     if issubclass(typing.get_type_hints(function)["return"], rb.Chain | rb.Timed)
@@ -61,12 +61,12 @@ MAKERS = {
     "projected_line_so3 with f": of(timed),
     "retime of a projection": of(lambda R0, R1, w0, w1: rb.retime(cubic(R0, R1, w0, w1), 0.5)),
 }
-CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # for each order
+CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # for each order of the derivative
 RATES = {"w0": 1, "w1": 1, "d0_dot": 1, "d1_dot": 1, "a0": 2, "a1": 2}
 
 
 def sample(*batch, seed=0, size=1):
-    """Ends of all kinds: turns of up to 2 rad, moderate rates; both times a size."""
+    """Return ends of all kinds: turns of up to 2 rad and moderate rates, both scaled by `size`."""
     rng = np.random.default_rng([104, seed])
     R0, Q = rb.sample_rotation((2, *batch), rng=rng)
     R1 = R0 @ rb.exp_so3(size * rng.uniform(-1.15, 1.15, (*batch, 3)))
@@ -80,18 +80,19 @@ def sample(*batch, seed=0, size=1):
 
 @cache
 def made(make, *batch):
-    """The curve with the ends of `sample`, made once."""
+    """Return the curve with the ends of `sample`; each curve is made once."""
     return make(sample(*batch))
 
 
 def times(curve, *shape):
     start, end = curve.domain
-    end = min(end, start + 3)  # an empty stack has all times
+    end = min(end, start + 3)  # the domain of an empty stack is unbounded
     return start + (end - start) * np.random.default_rng(93).random(shape)
 
 
 def jet(curve, t, own=False):
-    """The curve and its derivatives, which have the stated shapes, with all components last."""
+    """Return the curve and its derivatives, after a check of their shapes, with all components
+    last."""
     call, shape = (curve.at_own_times, t.shape) if own else (curve, t.shape + curve.batch_shape)
     cores = CORES[curve.size]
     values = [call(t, order) for order in range(len(cores))]
@@ -101,14 +102,14 @@ def jet(curve, t, own=False):
 
 
 def off(a, b):
-    """The largest difference, over the largest entry of that component or 1."""
+    """Return the largest difference over the largest entry of its component or 1."""
     others = tuple(range(np.ndim(b) - 1))
     scale = np.abs(b).max(axis=others, initial=1)
     return (np.abs(np.subtract(a, b, dtype=float)).max(axis=others, initial=0) / scale).max()
 
 
 def meets_its_ends(make):
-    """The rotations or poses, the velocities and the accelerations are those asked for."""
+    """Check that the curve has the given rotations or poses, velocities and accelerations."""
     ends, curve = sample(2, 3), made(make, 2, 3)
     for k, t in enumerate(curve.domain):
         value = ends[f"{'RA'[curve.size - 3]}{k}"]
@@ -122,7 +123,8 @@ def meets_its_ends(make):
 
 
 def has_the_derivatives_of_its_values(make):
-    """As `Curve` says: R' = R ŵ, w', w''; on SE(3) Rᵀ d' and Rᵀ d''. Also of small motions."""
+    """Check R' = R ŵ, w', w'', and on SE(3) Rᵀ d' and Rᵀ d'', as `Curve` says, also for small
+    motions."""
     long = make.function in (rb.exponential_cubic_long_so3, rb.bezier_long_so3)
     sizes = np.array([1, 1, 1] if long else [1, 1e-3, 1e-7])
     curve = make(sample(3, size=sizes[:, None]))
@@ -146,7 +148,7 @@ def has_the_derivatives_of_its_values(make):
 
 
 def is_the_stack_of_its_members(make):
-    """Every member is the single curve; ends broadcast."""
+    """Check that every member of a stack equals the single curve, and that ends broadcast."""
     ends, stack = sample(2, 3), made(make, 2, 3)
     t = times(stack, 5)
     values = jet(stack, t)
@@ -163,7 +165,7 @@ def is_the_stack_of_its_members(make):
 
 
 def has_values_at_times_of_any_shape(make):
-    """Also at none, at more than are evaluated together, and for an empty stack."""
+    """Check also no times, more times than are evaluated together, and an empty stack."""
     for batch in ((), (2,), (0,), (2, 0)):
         curve = made(make, *batch)
         assert jet(curve, times(curve, 0)).size == 0
@@ -171,7 +173,7 @@ def has_values_at_times_of_any_shape(make):
             t = times(curve, *shape)
             assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
     curve = made(make, 2)
-    t = times(curve, 2600)  # of two curves more than a block
+    t = times(curve, 2600)  # more than a block for two curves
     values = jet(curve, t)
     for part in (slice(1), slice(1, 40), slice(2500, 2600)):
         assert off(jet(curve, t[part]), values[part]) < 1e-12
@@ -195,7 +197,7 @@ INDICES += [([1, 0, 1], [2, 2, 0]), np.array([[True, False, True], [False, False
 
 
 def is_indexed_as_an_array_is(make):
-    """With the attributes that describe its curves."""
+    """Check also the attributes that describe the curves."""
     stack = made(make, 2, 3)
     t = times(stack, 3)
     values, numbers = jet(stack, t), np.arange(6).reshape(2, 3)
@@ -215,7 +217,7 @@ def is_indexed_as_an_array_is(make):
 
 
 def keeps_and_changes_no_arguments(make):
-    """Ends, times and returned arrays are independent of the curve."""
+    """Check that ends, times and returned arrays are independent of the curve."""
     ends, before = sample(2), sample(2)
     curve = make(ends)
     t, asked = times(curve, 3), times(curve, 3)
@@ -265,7 +267,8 @@ def is_the_same_after_pickling(make):
 
 
 def moves_with_its_ends(make):
-    """L A(t) for the poses L A0 and L A1; on SO(3) L R(t) Q for the ends and the inertia moved."""
+    """Check that the poses L A0 and L A1 give L A(t); on SO(3), moved ends and inertia give L R(t)
+    Q."""
     ends, curve = sample(2), made(make, 2)
     L, Q = sample(seed=1), sample(seed=2)["R0"]
     t = times(curve, 3)
@@ -285,9 +288,10 @@ def moves_with_its_ends(make):
 
 
 def lasts_as_long_as_it_is_told(make):
-    """One duration for each: the curve from 0 to 1 whose rates at the ends are as many times."""
+    """Check that a duration T for each curve equals a retimed curve from 0 to 1 with rates
+    times T."""
     if "duration" not in inspect.signature(make.function).parameters:
-        return  # it has the duration of its curve
+        return  # a curve without the parameter `duration` keeps its own duration
     ends, T = sample(3), np.array([0.5, 1, 1.5])
     curve = make(ends, duration=T)
     unit = make(ends | {name: ends[name] * T[:, None] ** power for name, power in RATES.items()})
@@ -306,7 +310,7 @@ def lasts_as_long_as_it_is_told(make):
 
 
 def altered(name, change):
-    """The maker of projected cubics with another method: a function of the right one."""
+    """Return a maker of projected cubics in which a function of the original replaces a method."""
 
     def make(R0, R1, w0, w1):
         curve = copy(cubic(R0, R1, w0, w1))
@@ -323,7 +327,7 @@ def scaled(order, by):
     return altered("__call__", lambda call, c, t, k=0: call(c, t, k) * (by if k == order else 1))
 
 
-CONTRACT = {  # the clauses, and makers with a fault that each of them finds
+CONTRACT = {  # the clauses, and for each clause makers with a fault that it must find
     meets_its_ends: {
         "end": lambda R0, R1, w0, w1: bezier(R0, R1 @ rb.exp_so3([0, 0, 1e-9]), w0, w1),
         "end velocity": lambda R0, R1, w0, w1: bezier(R0, R1, w0, 1.0000001 * w1),
@@ -376,7 +380,7 @@ CONTRACT = {  # the clauses, and makers with a fault that each of them finds
 
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 @pytest.mark.parametrize("clause", CONTRACT)
-def test_a_curve(make, clause):
+def test_a_curve_keeps_the_contract(make, clause):
     if clause is not refuses_bad_arguments_by_name or make.function in FUNCTIONS.values():
         clause(make)
 
@@ -387,7 +391,7 @@ def test_every_function_that_returns_a_curve_has_a_maker():
 
 
 @pytest.mark.parametrize("clause", CONTRACT)
-def test_faults_are_found_by(clause):
+def test_faults_are_found_by_their_clause(clause):
     for fault in CONTRACT[clause].values():
         with pytest.raises((AssertionError, ValueError, pytest.fail.Exception)):
             clause(of(fault))

@@ -11,7 +11,7 @@ EPS = np.finfo(float).eps
 RNG = np.random.default_rng(2026)
 
 
-def test_matrices_agree_with_scipy_and_give_the_quaternion_back():
+def test_rotation_matrices_agree_with_scipy_and_are_converted_back_to_the_quaternion():
     q = np.concatenate([rb.project_quaternion(RNG.normal(size=(200, 4))), awkward.quaternions()])
     R = rb.matrix_from_quaternion(q)
     assert np.abs(R - Rotation.from_quat(q, scalar_first=True).as_matrix()).max() < 4 * EPS
@@ -21,7 +21,7 @@ def test_matrices_agree_with_scipy_and_give_the_quaternion_back():
     assert np.all(back[..., 0] >= 0)
 
 
-def test_half_turns_exact_or_rounded_have_the_named_sign():
+def test_exact_and_rounded_half_turns_have_the_documented_sign():
     R0, R1, n = awkward.rounded_half_turns(np.random.default_rng(7))
     matrices, axes = awkward.half_turns()
     exact, rounded = rb.quaternion_from_matrix(matrices), rb.quaternion_from_matrix(R0.mT @ R1)
@@ -39,12 +39,14 @@ def test_half_turns_exact_or_rounded_have_the_named_sign():
     beta = RNG.uniform(-1, 1, size=200)
     R = rb.matrix_from_zyx(np.stack([np.full(200, np.pi), beta, RNG.uniform(-3, 3, 200)], axis=1))
     assert np.all(rb.zyx_from_matrix(R)[:, 0] > 0)
-    near = np.array([1e-12 - np.pi, 0.3, 0.4])  # no rounding: it keeps its sign
+    near = np.array(
+        [1e-12 - np.pi, 0.3, 0.4]
+    )  # 1e-12 is more than rounding, so the angle keeps its sign
     assert np.abs(zyx_from_quaternion(quaternion_from_zyx(near)) - near).max() < 20 * EPS
 
 
 @pytest.mark.source("BK 2.5", "RR 2.2")
-def test_rotation_vectors_and_quaternions_agree_with_mpmath_and_long_turns_come_back_short():
+def test_rotation_vectors_and_quaternions_agree_with_mpmath_and_long_turns_become_short():
     vectors, axis = awkward.ROTATION_VECTORS, awkward.UNIT_AXES
     q = rb.quaternion_from_rotation_vector(vectors)
     exact = np.array([oracles.quaternion(w) for w in vectors])
@@ -64,8 +66,9 @@ def test_rotation_vectors_and_quaternions_agree_with_mpmath_and_long_turns_come_
 
 
 @pytest.mark.source("RR 2.1", "RR (7)", "RR (8)")
-def test_zyx_is_the_printed_product_and_scipys_and_comes_back_gimbal_lock_included():
-    """Of any angles, the multiples of π/4, and those within 1e-12 … 1e-3 of gimbal lock."""
+def test_zyx_angles_agree_with_the_printed_product_and_scipy_also_in_gimbal_lock():
+    """The test uses random angles, multiples of π/4, and angles within 1e-12 … 1e-3 of gimbal
+    lock."""
     quarter = np.pi / 4 * np.array(np.meshgrid(*3 * [np.arange(-8, 9)])).reshape(3, -1).T
     near = RNG.uniform(-3, 3, size=(40, 3))
     near[:, 1] = RNG.choice([-1, 1], 40) * (np.pi / 2 - 10.0 ** RNG.uniform(-12, -3, 40))
@@ -82,33 +85,35 @@ def test_zyx_is_the_printed_product_and_scipys_and_comes_back_gimbal_lock_includ
     for back in (rb.zyx_from_matrix(R), zyx_from_quaternion(q), zyx_from_quaternion(-q)):
         assert np.all(np.abs(back[:, 1]) <= np.pi / 2 * (1 + EPS))
         assert np.all((back[:, ::2] > -np.pi) & (back[:, ::2] <= np.pi))
-        assert np.abs(rb.matrix_from_zyx(back) - R).max() < 40 * EPS  # twice what q loses
+        # twice the loss of the quaternion
+        assert np.abs(rb.matrix_from_zyx(back) - R).max() < 40 * EPS
         plain = back[:200]  # the rest is near gimbal lock
         off = np.abs(plain - want[:200].as_euler("ZYX")).max(axis=1)
         assert np.all(off < 20 * EPS / np.cos(plain[:, 1]))
 
 
-def test_in_gimbal_lock_to_16_eps_the_last_angle_is_zero_and_close_to_it_both_come_back():
+def test_within_16_eps_of_gimbal_lock_the_last_angle_is_zero_and_outside_both_are_found():
     a, c = np.pi / 4 * np.array(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))).reshape(2, -1)
     for lock in (np.pi / 2, -np.pi / 2):
         R = rb.matrix_from_zyx(np.stack([a, np.full_like(a, lock), c], axis=1))
         back = rb.zyx_from_matrix(R)
         assert np.all(back[:, 2] == 0)
         assert np.abs(back[:, 1] - lock).max() < 16 * EPS
-        alone = a - c if lock > 0 else a + c  # the only combination that is determined
+        alone = a - c if lock > 0 else a + c  # only this combination of the angles is determined
         assert np.abs(np.exp(1j * back[:, 0]) - np.exp(1j * alone)).max() < 16 * EPS
     for off in (1e-3, 1e-6, 1e-9):
         given = np.array([0.3, np.pi / 2 - off, -0.4])
         back = rb.zyx_from_matrix(rb.matrix_from_zyx(given))
         assert np.abs(back - given).max() < 10 * EPS / off
         assert abs((back - given) @ [1, 0, -1]) < 10 * EPS
-    for steps, locked in ((17, True), (19, False)):  # of 2⁻⁵³: 15 or 17 eps before the lock
+    # in units of 2⁻⁵³: 15 or 17 eps before gimbal lock
+    for steps, locked in ((17, True), (19, False)):
         for sign in (1, -1):
             q = [0.5 + steps * 2.0**-53, -0.25 * sign, 0.5 * sign, 0.25]
             assert (zyx_from_quaternion(q)[2] == 0) is np.bool_(locked)
 
 
-def test_scipy_names_half_turns_otherwise_and_its_zyx_is_about_fixed_axes():
+def test_scipy_has_another_sign_of_half_turns_and_its_zyx_is_about_fixed_axes():
     q, a = np.array([0, -0.6, 0.8, 0]), [0.3, -0.4, 0.5]
     assert np.allclose(rb.quaternion_from_matrix(rb.matrix_from_quaternion(q)), q)
     theirs = Rotation.from_quat(q, scalar_first=True).as_quat(scalar_first=True, canonical=True)

@@ -21,7 +21,7 @@ def about_z(angle):
 
 
 def gauss(density, near=(), end=1.0):
-    """The integral from 0 on, on panels that are halved towards both ends and other shares."""
+    """Return the integral from 0 to `end` on panels that are halved towards the ends and `near`."""
     apart = 2.0 ** -np.arange(1, 42)
     cuts = np.unique([x for t in (0, 1, *near) for x in (*(t - apart), t, *(t + apart))])
     cuts = end * cuts[(cuts >= 0) & (cuts <= 1)]
@@ -35,8 +35,9 @@ def squared(x):
 
 
 @pytest.mark.source("BK (18)", "BK (12)", "errata 1")
-def test_one_axis_has_a_closed_form():
-    """A cubic from rest to rest over the angle a costs 2 · 12 a²; a projected line 2 ∫ (a θ'')²."""
+def test_costs_of_turns_about_one_axis_have_a_closed_form():
+    """A cubic from rest to rest over the angle a costs 2 · 12 a². A projected line costs 2 ∫ (a
+    θ'')²."""
     turn = rb.exp_so3([0, 0.9, 0])
     optimum = rb.minimum_acceleration_so3(I3, turn, REST, REST)
     assert rb.acceleration_cost(optimum) == pytest.approx(24 * 0.81, rel=1e-10)
@@ -45,8 +46,8 @@ def test_one_axis_has_a_closed_form():
 
 
 @pytest.mark.source("BK (18)", "BK (14)", "beyond BK 9")
-def test_the_parts_on_se3_are_the_integrals_and_the_centre_of_mass_counts():
-    """∫ m ‖d_c''‖² by differences of where the centre is."""
+def test_the_parts_of_the_cost_on_se3_are_integrals_and_depend_on_the_centre_of_mass():
+    """∫ m ‖d_c''‖² is computed from the positions of the centre, by a Chebyshev series."""
     A1 = rb.pose_from_coordinates([0.5, 0.4, 0.3, 1, 2, 3])
     curve = rb.projected_cubic_se3(I4, A1, [1, 2, 0], [0, -1, 1], [1, 1, 1], [1, 0, 3])
     parts = rb.acceleration_cost_parts(curve)
@@ -66,7 +67,7 @@ def test_the_parts_on_se3_are_the_integrals_and_the_centre_of_mass_counts():
 
 
 @pytest.mark.source("BK 2.6")
-def test_geodesics_cost_nothing_and_screws_do():
+def test_geodesics_cost_nothing_and_screw_motions_have_a_cost():
     A1 = rb.pose_from_coordinates([0, 0, 1, 2, 0, 0])
     assert rb.acceleration_cost(rb.geodesic_se3(I4, A1)) == 0
     screw = rb.screw_se3(I4, A1)
@@ -77,10 +78,11 @@ def test_geodesics_cost_nothing_and_screws_do():
 
 
 @pytest.mark.parametrize("margin", [2e-3, 1e-3, 1e-4, 1e-5, 3e-6])
-def test_sharp_turns_are_not_missed(margin):
-    """Nearly all of the cost arises within a share of the time that is half the margin.
+def test_the_cost_of_sharp_turns_is_integrated(margin):
+    """Nearly all of the cost arises within a fraction of the time that is half the margin.
 
-    Alone, and as a leg of a chain: the breakpoints are close where it is.
+    The line is tested alone and as a leg of a chain. The breakpoints are close together where the
+    cost arises.
     """
     turn = about_z(np.pi - margin)
     k = np.tan((np.pi - margin) / 2)  # aθ = a/2 + atan u, u = (2t − 1) k; ∫ u²/(1 + u²)⁴ du = π/16
@@ -91,12 +93,12 @@ def test_sharp_turns_are_not_missed(margin):
         assert rb.acceleration_cost(line) == pytest.approx(4 * np.pi * k**3 / 27, rel=1e-9)
         least = np.abs(np.setdiff1d(line.breakpoints, 0.5) - 0.5).min()
         assert margin / 20 < least < margin / 4
-    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)  # 3/2 as fast there
+    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)  # the cubic is 3/2 as fast there
     assert rb.acceleration_cost(cubic) == pytest.approx(27 / 8 * 4 * np.pi * k**3, rel=20 * margin)
 
 
 def late_line(when, angle):
-    """All of its acceleration is within a thousandth of the time."""
+    """Return a line whose acceleration is confined to a thousandth of the time."""
 
     def late(t, order):
         x = np.tanh(2000 * (t - when))
@@ -106,7 +108,8 @@ def late_line(when, angle):
 
 
 def cubic(when, off):
-    """About one axis M is a complex cubic: here of the order `off` at a time, all but a jump."""
+    """Return a cubic about one axis that almost jumps: the complex cubic M is of order `off` at a
+    time."""
     h00, h01, h10, h11 = (hermite(one, np.array(when)) for one in np.eye(4))
     turn = np.exp(2.5j)
     columns = np.array([1j * h10, 1j * turn * h11, -h00 - turn * h01])
@@ -118,7 +121,7 @@ def cubic(when, off):
 
 
 def cubic_of_quaternions(margin):
-    """About one axis by 2 rad; half-way Q, a complex cubic, is cos(1/2) + k/8 sin(1/2)."""
+    """Return a turn by 2 rad about one axis; halfway, Q is the complex cos(1/2) + k/8 sin(1/2)."""
     k = 8 * (margin - np.cos(0.5)) / np.sin(0.5)
     curve = rb.quaternion_cubic_so3(I3, about_z(2.0), [0, 0, k], [0, 0, k])
     assert curve.margin == pytest.approx(margin)
@@ -126,7 +129,7 @@ def cubic_of_quaternions(margin):
 
 
 def cayleys_cubic(short_of):
-    """It turns once more in a time of about the square of π minus its angle."""
+    """Return a cubic that makes a fast extra turn, in a time of about the square of `short_of`."""
     w0, w1, n = np.array([1.0, 0, 0]), np.array([0, 2.0, 0]), np.array([1.0, 2, 2]) / 3
     goal = n / np.tan(short_of / 2)
     rate = (w1 + np.cross(goal, w1) + goal * (goal @ w1)) / 2
@@ -145,28 +148,28 @@ def cayleys_cubic(short_of):
         *((cayleys_cubic, [short_of]) for short_of in (0.3, 1e-2, 1e-3, 1e-4)),
     ],
 )
-def test_a_sudden_turn_is_not_missed(make, given):
+def test_the_cost_of_a_sudden_turn_is_integrated(make, given):
     curve, near = make(*given)
     want = gauss(lambda t: 2 * squared(curve(t, 2)), near)
     assert rb.acceleration_cost(curve) == pytest.approx(want, rel=1e-8)
 
 
 @pytest.mark.parametrize("speed", [1e3, 1e12, 1e26])
-def test_fast_motion_in_the_first_instant_is_not_missed(speed):
-    """M(t) = I + t M'(0) + … turns at once: the cost is of the order of the speed cubed."""
+def test_the_cost_of_fast_motion_in_the_first_instant_is_integrated(speed):
+    """M(t) = I + t M'(0) + … turns at once, so the cost is of the order of the speed cubed."""
     cubic = rb.projected_cubic_so3(I3, I3, [speed] * 3, REST)
-    a = np.sqrt(3) * speed  # along one axis θ = atan(a t)
+    a = np.sqrt(3) * speed  # along one axis, θ = atan(a t)
     want = 2 * a**3 * quad(lambda u: (2 * u / (1 + u * u) ** 2) ** 2, 0, np.inf)[0]
     assert rb.acceleration_cost(cubic) == pytest.approx(want, rel=5 / speed + 1e-9)
 
 
-def test_panels_are_as_fine_about_each_axis():
+def test_panels_are_equally_fine_for_motions_about_each_axis():
     one, *others = (rb.exponential_cubic_so3(I3, I3, 1e3 * x, 1e3 * x).breakpoints for x in I3)
     assert len(one) > 17
     assert all(other == pytest.approx(one, rel=1e-9) for other in others)
 
 
-def test_a_jump_and_a_curve_that_was_not_found_have_no_cost():
+def test_the_cost_of_a_jump_or_of_a_curve_that_was_not_found_raises_an_error():
     for turn in (np.diag([-1.0, -1, 1]), np.diag([1.0, -1, -1]), about_z(np.pi - 5e-7)):
         with pytest.warns(RuntimeWarning, match="margin < 1e-6"):
             jump = rb.projected_cubic_so3(I3, turn, [0, 1e-9, 0], REST)
@@ -180,7 +183,7 @@ def test_a_jump_and_a_curve_that_was_not_found_have_no_cost():
         rb.acceleration_cost(stack)
 
 
-def test_an_integral_that_does_not_settle_or_overflows_is_refused():
+def test_an_integral_that_does_not_converge_or_overflows_raises_an_error():
     noise, turn = np.random.default_rng(0), (np.pi - 1e-6) * np.array([1, 2, 2]) / 3
 
     def line(bend):
@@ -189,14 +192,15 @@ def test_an_integral_that_does_not_settle_or_overflows_is_refused():
     for curve in (
         line(lambda t: noise.normal(size=t.shape)),
         line(lambda t: np.where(abs(t - 0.5) < 0.4, 1e160, 0)),
-        rb.cayley_cubic_so3(I3, rb.exp_so3(turn), [1, 0, 0], [0, 2, 0]),  # beyond rounding
+        # accuracy is limited by rounding
+        rb.cayley_cubic_so3(I3, rb.exp_so3(turn), [1, 0, 0], [0, 2, 0]),
     ):
         with np.errstate(over="ignore"), pytest.raises(RuntimeError, match="leave an uncertainty"):
             rb.acceleration_cost(curve)
 
 
 @pytest.mark.parametrize("make", [rb.projected_cubic_so3, rb.quaternion_cubic_so3])
-def test_a_stack_has_a_cost_for_each_with_an_inertia_for_all_or_one_for_each(make):
+def test_a_stack_has_one_cost_for_each_curve_with_one_inertia_or_one_for_each_curve(make):
     turns = rb.exp_so3(np.linspace(0.5, 2.9, 6).reshape(2, 3, 1) * [0.6, 0, 0.8])
     stack = make(I3, turns, REST, [0, 2, 0])
     each = BOOK * np.linspace(1, 2, 6).reshape(2, 3, 1, 1)
@@ -231,7 +235,7 @@ CURVES = rb.CLOSED_FORMS | {
 
 @pytest.mark.source("beyond BK 1", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize("name", CURVES)
-def test_costs_are_the_integrals(name):
+def test_costs_are_the_integrals_of_their_definitions(name):
     curve = CURVES[name](I3, rb.exp_so3([0.5, 1.2, -0.4]), [1, 2, 0], [0, -1, 1])
 
     def densities(t):
@@ -246,8 +250,9 @@ def test_costs_are_the_integrals(name):
     assert found == pytest.approx(want, rel=1e-10, abs=1e-20)
 
 
-def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
-    """Quintics that meet with one acceleration; of cubics the acceleration jumps."""
+def test_a_chain_that_is_smooth_enough_costs_the_sum_of_its_legs():
+    """Quintic legs have a continuous acceleration here. The acceleration of chained cubics
+    jumps."""
     R = rb.exp_so3([[0, 0, 0], [0.3, 0.8, 0], [0, 1.0, 1.0]])
     w, a = np.array([[0, 0, 0], [0.2, 0.5, 0.5], [0, 0, 0]]), [REST, [0.3, -0.2, 0.1], REST]
 
@@ -278,14 +283,14 @@ def test_a_chain_that_is_smooth_enough_has_the_costs_of_its_legs():
     "leg", [rb.exponential_cubic_so3, rb.bezier_so3, rb.minimum_acceleration_so3]
 )
 def test_a_steady_turn_in_legs_has_no_jerk_in_any_unit_of_time(leg, unit):
-    """Its accelerations are rounding, and so are their jumps at the joints."""
+    """The accelerations of the turn, and their jumps at the joints, are rounding errors."""
     t, w = np.array([0, 1, 2.5, 3]), 0.7 * np.array([0.6, 0, 0.8])
     chain = rb.chain(unit * t, rb.exp_so3(np.outer(t, w)), [w / unit] * 4, leg=leg)
     assert rb.jerk_cost(chain) * unit**5 < 1e-20
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-8, 1.0, 1e8])
-def test_the_unit_of_inertia_does_not_matter(size):
+def test_costs_scale_with_the_unit_of_inertia(size):
     G, w0 = size * np.diag([1.0, 2, 2.9]), np.array([0.8, 0.1, 1.2])
     A, w = rb.geodesic_flow(G / size, I3, w0, [0.0, 1.0])
     ends = I3, A[1], w0, w[1]
@@ -296,8 +301,8 @@ def test_the_unit_of_inertia_does_not_matter(size):
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-8, 1e-12])
-def test_a_cost_is_as_exact_as_rtol_asks(rtol):
-    """On lines of which one turns fast half-way."""
+def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
+    """One of the two tested lines turns fast halfway."""
     curve = rb.projected_line_so3(I3, rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
     for cost in (
         partial(rb.acceleration_cost, curve),
@@ -307,10 +312,10 @@ def test_a_cost_is_as_exact_as_rtol_asks(rtol):
     ):
         off = np.abs(cost(rtol=rtol) / cost() - 1).max()
         assert off < max(rtol, 1e-10)
-        assert (off > 1e-9) == (rtol == 1e-2)  # fewer times are enough for that
+        assert (off > 1e-9) == (rtol == 1e-2)  # fewer times are enough for the loose tolerance
 
 
-def test_bad_arguments_are_named():
+def test_bad_arguments_are_refused():
     line, motion = rb.geodesic_so3(I3, I3), rb.geodesic_se3(I4, I4)
     acceleration, jerk, torque = rb.acceleration_cost, rb.jerk_cost, rb.torque_cost
     for cost, given, message in (

@@ -27,7 +27,7 @@ I3, REST = np.eye(3), np.zeros(3)
 
 
 def quick(t, order):
-    """A reparameterisation that leaves [0, 1]: 4 t² − 3 t."""
+    """Return a reparameterisation that leaves [0, 1], 4 t² − 3 t, and its derivatives."""
     return (4 * t**2 - 3 * t, 8 * t - 3, 8 + 0 * t, 0 * t)[order]
 
 
@@ -55,8 +55,8 @@ def test_the_geodesic_turns_uniformly_about_one_axis_as_slerp_does():
 
 @pytest.mark.source("BK Prop. 6", "BK (15)", "BK (17)", "BK Cor. 1")
 @pytest.mark.parametrize("timing", [None, quick])
-def test_the_projected_line_is_the_projection_of_the_line_and_on_the_path_of_the_geodesic(timing):
-    """The rotation between a point of one and the start is about the axis of the other."""
+def test_the_projected_line_is_the_projection_of_the_line_and_follows_the_geodesic(timing):
+    """The rotation from the start to any point of the curve is about the axis of the geodesic."""
     curves, t = rb.projected_line_so3(STARTS, GOALS, timing), np.linspace(0, 1, 1001)[::50]
     x = (t if timing is None else quick(t, 0))[:, None, None, None]
     M = STARTS + (GOALS - STARTS) * x
@@ -71,7 +71,7 @@ def test_the_projected_line_is_the_projection_of_the_line_and_on_the_path_of_the
 
 
 @pytest.mark.source("BK Cor. 2")
-def test_the_line_run_through_as_f_projects_to_the_geodesic():
+def test_the_line_with_the_timing_f_projects_to_the_geodesic():
     angle = np.linalg.norm(GEODESICS.rotation_vector, axis=-1)
     lines = rb.projected_line_so3(STARTS, GOALS, lambda t, order: f(t, angle, order))
     growth = 1 + 2 * np.tan(angle / 2) / np.maximum(angle, 1)
@@ -90,7 +90,7 @@ def quintic_at_rest(R0, R1):
 
 
 def half_turns():
-    """Starts, goals and axes, exact and rounded."""
+    """Return starts, goals and axes, exact and rounded."""
     exact, axes = awkward.half_turns()
     R0, R1, n = awkward.rounded_half_turns(np.random.default_rng(180), 80)
     start = np.broadcast_to(I3, exact.shape)
@@ -98,9 +98,9 @@ def half_turns():
 
 
 def test_the_geodesic_over_a_half_turn_is_rodrigues_formula_about_the_axis_of_positive_sign():
-    """To the end of the interval, where the tangent is infinite."""
+    """The formula holds up to the end of the interval, where the tangent is infinite."""
     R0, R1, n = half_turns()
-    # of ±n the one whose component of largest magnitude, the first of equals, is positive
+    # the sign of the axis makes its largest component positive, the first one of equal ones
     first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
     n *= np.sign(np.take_along_axis(n, first[:, None], axis=1))
     curves, cross = rb.geodesic_so3(R0, R1), rb.hat_so3(n)
@@ -112,7 +112,7 @@ def test_the_geodesic_over_a_half_turn_is_rodrigues_formula_about_the_axis_of_po
         assert np.abs(curves(t) - want).max() < 20 * EPS
 
 
-def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused():
+def test_the_middle_of_the_line_between_rotations_a_half_turn_apart_is_refused():
     for R0, R1, _ in zip(*half_turns(), strict=True):
         with pytest.warns(RuntimeWarning, match="^margin < 1e-6: .* jumps there"):
             curve = rb.projected_line_so3(R0, R1)
@@ -132,8 +132,11 @@ def test_between_rotations_a_half_turn_apart_the_middle_of_the_line_is_refused()
         (at_rest, "t", lambda t: 3 * t**2 - 2 * t**3),
     ],
 )
-def test_near_the_singular_set_a_curve_is_right_or_warned_of(make, where, share, short_of):
-    """Just short of a half-turn the margin is 2 cos(a/2), the curve right to eps over the gap."""
+def test_a_curve_near_the_singular_set_is_accurate_or_a_warning_is_given(
+    make, where, share, short_of
+):
+    """Just short of a half-turn the margin is 2 cos(a/2), and errors are of the order of eps over
+    the gap."""
     turn, margin = np.array([0, 0, np.pi - short_of]), f"{short_of:.1e}"
     message = rf"^margin < 1e-6: {margin} at {where} = 0\.5; "
     with pytest.warns(RuntimeWarning, match=message) if short_of < 1e-6 else nullcontext():
@@ -146,15 +149,15 @@ def test_near_the_singular_set_a_curve_is_right_or_warned_of(make, where, share,
 
 
 @pytest.mark.parametrize("make", [rb.projected_line_so3, at_rest, quintic_at_rest])
-def test_a_jump_is_warned_of_and_its_time_is_refused(make):
-    """From rest to rest over a half-turn: the matrix runs through one of rank 1."""
+def test_a_jump_gives_a_warning_and_its_time_is_refused(make):
+    """From rest to rest over a half-turn, the matrix passes through one of rank 1."""
     half = np.diag([1.0, -1, -1])
     with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6 of curve \[0, 1\]: .* t = 0\.5; .* j"):
         stack = make(I3, np.array([[I3, half], [half, I3], [I3, I3]]))
     assert np.abs(stack.margin - [[2, 0], [0, 2], [2, 2]]).max() < 8 * EPS
     one = stack[0, 1]
     assert np.abs(one([0, 0.25, 0.75, 1]) - [I3, I3, half, half]).max() < 80 * EPS
-    t = np.linspace(0, 0.4, 1000)  # of six curves more than a block
+    t = np.linspace(0, 0.4, 1000)  # more than a block for six curves
     own = np.full((1000, 3, 2), [[0.5, 0.25], [0.25, 0.5], [0.5, 0.5]])
     for order in (0, 1, 2):
         assert np.isfinite(stack(t, order)).all()
@@ -171,7 +174,7 @@ def test_a_jump_is_warned_of_and_its_time_is_refused(make):
                     call(given, order)
 
 
-def test_f_may_return_numbers_work_in_place_and_end_at_rounding():
+def test_f_may_return_numbers_change_its_argument_and_miss_the_end_by_rounding():
     def in_place(t, order):
         t *= t
         return (t * (1 + 1e-14), 2 * np.sqrt(t), 2)[order]
@@ -193,12 +196,12 @@ def test_f_may_return_numbers_work_in_place_and_end_at_rounding():
         *((one, r"f: a callable f\(t, order\) is wanted") for one in (0, 1, [], "f")),
     ],
 )
-def test_f_that_is_no_timing_is_refused(timing, message):
+def test_f_that_is_not_a_timing_is_refused(timing, message):
     with pytest.raises(ValueError, match=message):
         rb.projected_line_so3(STARTS[0], GOALS[0], timing)
 
 
-def test_a_time_at_which_f_fails_is_named_with_its_curve():
+def test_the_error_names_the_time_and_the_curve_at_which_f_fails():
     def rates(t, order):
         rates = [t + np.array([0, 0.1, 0]) * (t * (1 - t)), np.array([1, np.nan, 1]) + 0 * t]
         return rates[order]
@@ -218,7 +221,7 @@ def test_a_time_at_which_f_fails_is_named_with_its_curve():
             line(t, order)
 
 
-def test_errors_survive_a_pickle():
+def test_errors_can_be_pickled():
     error = SingularTime(0.5, 3, "no rotation", (2, 2))
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "t = 0.5 of curve [1, 1]: no rotation"

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def supplement(name):
-    """A module of docs/."""
+    """Return a module of docs/."""
     spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -28,7 +28,8 @@ FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
 
 
 def bent(*ends, bend):
-    """Quintics with random accelerations at their ends; some cost much more than the optimum."""
+    """Return quintics with random accelerations at their ends; some cost much more than the
+    optimum."""
     return rb.exponential_quintic_so3(
         *ends, *bend * np.random.default_rng(4).normal(size=(2, *ends[2].shape))
     )
@@ -40,7 +41,8 @@ CURVES = rb.CLOSED_FORMS | {f"bent by {x}": partial(bent, bend=x) for x in (0.3,
 
 @cache
 def problems(count, size, seed, scale=1.0):
-    """Random problems, σ, w0 and w1 times a scale, and twice the costs of their optima."""
+    """Return ends of random problems, with σ, w0 and w1 times a scale, and twice the optimal
+    costs."""
     R0, R1, w0, w1 = random_problems(count, size, rng=seed)
     turn = scale * rb.log_so3(R0.mT @ R1)
     ends = Ends(R0, R0 @ rb.exp_so3(turn), scale * w0, scale * w1)
@@ -48,28 +50,29 @@ def problems(count, size, seed, scale=1.0):
 
 
 def cost(curve):
-    """Twice ∫ ‖w'‖² dt by Gauss's rule: smooth curves only."""
+    """Return twice ∫ ‖w'‖² dt by Gauss's rule, for smooth curves."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
     return weights @ np.sum(curve((nodes + 1) / 2, 2) ** 2, axis=-1)
 
 
 def solved(name, *given):
-    """Closed forms for `problems`, and their excess over the optima."""
+    """Return closed forms for `problems`, and their excess over the optima."""
     ends, best = problems(*given)
     curves = CURVES[name](*ends)
     return curves, cost(curves) / best - 1
 
 
-def test_the_table_is_the_derived_one(tmp_path):
+def test_the_stored_table_is_the_derived_one(tmp_path):
     exact.write(tmp_path / "table.csv")
     stored = ROOT / "rbcourse/leading_excess.csv"
     assert (tmp_path / "table.csv").read_bytes() == stored.read_bytes()
 
 
-def test_the_constants_near_a_geodesic():
-    """Terms of second order in e and d; of first order in both for the cumulative."""
+def test_the_constants_of_the_excess_near_a_geodesic_are_right():
+    """The compared terms have second order in e and d, for the cumulative form first order in
+    both."""
     ss, ee, dd, se, sd = exact.ss, exact.ee, exact.dd, exact.se, exact.sd
-    across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |sigma x e|², |sigma x d|²
+    across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |σ × e|², |σ × d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
     wanted = {
         "projected_cubic_so3": projection,
@@ -79,7 +82,7 @@ def test_the_constants_near_a_geodesic():
         "cumulative_bezier_so3": across_e * Q(1, 7) + across_d * Q(47, 11340),
     }
     for c, bezier, along, mean in ((180, 14580, 9, 445.5), (175, 14175, 25, 1093.5)):
-        assert (bezier / c, (2 + along) / 2 * bezier / c) == (81, mean)  # the note's ratios
+        assert (bezier / c, (2 + along) / 2 * bezier / c) == (81, mean)  # the ratios in the note
     orders = np.array([0, 0, 2, 2, 1, 1, 2])
     for name, form in wanted.items():
         few = {power: x for power, x in FORMS[name].terms() if orders @ power == 2}
@@ -87,7 +90,7 @@ def test_the_constants_near_a_geodesic():
 
 
 def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
-    """6401/180180 a⁴ for the projection, and a sixteenth for quaternions; others are exact."""
+    """The excess is 6401/180180 a⁴ for the projection, and a sixteenth of that for quaternions."""
     ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
     wanted = dict.fromkeys(("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"), 0)
@@ -98,13 +101,13 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
 
 
 @pytest.mark.source("beyond BK 14")
-def test_constants_of_splines_there_and_back():
+def test_the_constants_of_splines_there_and_back_are_right():
     found = Q(309247, 1441440), Q(20711, 180180), Q(20711, 16 * 180180)
     assert tuple(exact.of_splines()) == found
 
 
 def test_the_order_of_four_closed_forms_is_proven():
-    """With these constants; for these inner products they could not be 2 % larger."""
+    """The proven ratios are nearly sharp: for these inner products they could not be 2 % larger."""
     projection, quaternion, cayley, bezier = (
         f"{x}_so3" for x in ("projected_cubic", "quaternion_cubic", "cayley_cubic", "bezier")
     )
@@ -144,7 +147,7 @@ def test_no_other_pair_of_closed_forms_has_an_order():
 
 
 def test_a_false_order_is_not_proven(tmp_path):
-    """With a larger ratio, and with one entry changed."""
+    """The first false table has a larger ratio, and the second one has a changed entry."""
     rows = (ROOT / "docs/ordering.csv").read_text().splitlines()
     for k, old, new in ((2, "13.1", "13.2"), (4, "-0.017", "-19")):
         changed = [*rows[:k], rows[k].replace(old, new, 1), *rows[k + 1 :]]
@@ -157,7 +160,7 @@ def test_a_false_order_is_not_proven(tmp_path):
 
 @pytest.mark.source("beyond BK 10")
 def test_the_deviation_in_the_package_is_the_derived_one():
-    """Exactly, with fractions, as polynomials in t."""
+    """The two polynomials in t agree exactly, in fractions."""
     numbers = np.random.default_rng(5).integers(-9, 9, (3, 3))
     vectors = np.array([[Q(int(n), 3) for n in row] for row in numbers])
     u, bump = exact.RING(2) * exact.t - 1, exact.t**2 * (1 - exact.t) ** 2
@@ -172,8 +175,9 @@ def test_the_deviation_in_the_package_is_the_derived_one():
 
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("name", TABULATED)
-def test_power_and_leading_term_against_the_solver(name):
-    """Its relative error falls with the next power: the second, for the cumulative the first."""
+def test_the_power_and_the_leading_term_of_the_excess_agree_with_the_solver(name):
+    """The relative error of the leading term falls as the square of the scale, for the cumulative
+    form linearly."""
     power, least = (2, 1.6) if name == "cumulative_bezier_so3" else (4, 3.4)
     found, errors = [], []
     for s in (0.4, 0.2, 0.1):
@@ -189,18 +193,19 @@ OVER = {"projected_cubic_so3": 6300, "quaternion_cubic_so3": 256 * 6300, "cayley
 
 
 @pytest.mark.parametrize(("name", "over"), OVER.items())
-def test_the_cost_along_geodesics_of_curves_that_leave_them(name, over):
+def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
     """With e = d = 0 they deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
     curves = rb.CLOSED_FORMS[name](I3, rb.exp_so3(sigma), sigma, sigma)
     found = rb.acceleration_cost(curves) / 2 * over / sizes**10
     assert found == pytest.approx(1, abs=0.1)
-    assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # a relative error of second order
+    assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # the relative error is of second order
 
 
-def test_the_corrected_curve_has_the_eighth_power():
-    """By the solver in the median; by the estimate, which sees smaller ones, for each problem."""
+def test_the_excess_of_the_corrected_curve_has_the_eighth_power():
+    """The solver shows the power in the median. The estimate resolves smaller values, and shows the
+    power for each problem."""
     (large, _), (middle, middle_one), (_, small_one) = (
         (excess, rb.excess_estimate(curves))
         for curves, excess in (
@@ -214,7 +219,7 @@ def test_the_corrected_curve_has_the_eighth_power():
 
 @pytest.mark.parametrize("name", CURVES)
 @pytest.mark.source("beyond BK 11")
-def test_the_estimate_within_a_twentieth_or_none(name):
+def test_the_estimate_is_right_within_a_twentieth_or_nan(name):
     for size in (0.5, 1, 2):
         curves, true = solved(name, 80, size, 8)
         estimate = rb.excess_estimate(curves)
@@ -226,8 +231,9 @@ def test_the_estimate_within_a_twentieth_or_none(name):
         assert np.all(np.abs(estimate - true)[holds] < 0.05 * true[holds] + 1e-11)
 
 
-def test_the_correction_turns_the_way_that_bezier_turns():
-    """Ends that want the other way round: by σ of the short way it would cost far more."""
+def test_the_correction_turns_in_the_direction_of_bezier():
+    """The velocities ask for the long way round. A correction by σ of the short way would cost far
+    more."""
     rng = np.random.default_rng(2)
     turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))
     ends = I3, rb.exp_so3(turn), *([0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3)))
@@ -238,7 +244,7 @@ def test_the_correction_turns_the_way_that_bezier_turns():
     assert np.all(corrected - best < 0.5 * (plain - best) + 1e-9 * best)
 
 
-def test_stacks_and_durations():
+def test_estimates_have_the_shape_of_the_stack_and_do_not_depend_on_the_duration():
     ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in random_problems(6, 0.5, rng=1)))
     curves = rb.bezier_so3(*ends)
     estimate = rb.excess_estimate(curves)
@@ -248,7 +254,7 @@ def test_stacks_and_durations():
         assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
 
 
-def test_the_estimate_of_the_optimum_is_zero_and_nan_where_it_costs_nothing_or_is_not_found():
+def test_the_estimate_is_zero_for_an_optimum_and_nan_for_zero_cost_or_no_optimum():
     best = rb.minimum_acceleration_so3(*random_problems(50, 0.6, rng=9))
     assert np.all(np.abs(rb.excess_estimate(best)) < 1e-22)
     ends = I3, rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
@@ -270,10 +276,10 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
 
     line = rb.projected_line_so3(I3, rb.exp_so3([0, 0, 0.5]), jolt)
     assert np.isnan(rb.excess_estimate(line))
-    assert rb.acceleration_cost(line) < 1.5 * 24 * 0.5**2  # neither costly nor fast
+    assert rb.acceleration_cost(line) < 1.5 * 24 * 0.5**2  # the line is neither costly nor fast
 
 
-def test_other_names_and_curves_are_refused():
+def test_unknown_names_and_curves_on_se3_are_refused():
     assert set(FORMS) == set(TABULATED)
     for name in (["bezier_so3"], "corrected_bezier_so3"):
         message = re.escape(f"name: one of {', '.join(FORMS)} is wanted, got {name!r}")
@@ -288,7 +294,7 @@ def test_other_names_and_curves_are_refused():
 
 
 def test_the_latex_source_has_the_formulas_of_the_note():
-    """Made from it by the command in CONTRIBUTING.md."""
+    """The source is made from the note by the command in CONTRIBUTING.md."""
     note, latex = ((ROOT / f"docs/near_optimal.{x}").read_text("utf-8") for x in ("md", "tex"))
     here = re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", note, re.DOTALL)
     body = latex[latex.index(r"\begin{document}") :]

@@ -1,4 +1,4 @@
-"""The committed figures: complete, and their numbers against the definitions."""
+"""The committed figures: all files are present, and their numbers agree with the definitions."""
 
 import re
 
@@ -14,11 +14,11 @@ from rbclassroom.surveys import atlas, body_atlas
 from rbclassroom.surveys.survey import costs
 from rbcourse.draw.save import UNITS
 
-TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # without pictures
+TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # tables without pictures
 
 
 def columns(data, form, keys="xyz"):
-    """The columns of a table with these keys in their names, side by side."""
+    """Return the columns of a table with these keys in their names, side by side."""
     return np.stack([data[form.format(key)] for key in keys], axis=-1)
 
 
@@ -29,7 +29,7 @@ def matrices(data, form="R{} [1]"):
 @pytest.mark.parametrize(
     "name", sorted({file.stem for file in FIGURES.iterdir() if file.is_file()})
 )
-def test_every_figure_has_files_that_journals_take_units_and_letters_that_can_be_read(name):
+def test_every_figure_has_complete_files_units_and_legible_letters(name):
     plain = "figure", "curve", "frame", "family", "body", "domain"
     for column in numbers(name):
         assert column.endswith(tuple(f" [{unit}]" for unit in UNITS)) or column in plain, column
@@ -42,7 +42,7 @@ def test_every_figure_has_files_that_journals_take_units_and_letters_that_can_be
     assert b"/Type3" not in content.replace(b" ", b"")
     assert b"/FontFile2" in content
     assert b"CreationDate" not in content
-    # numbers of 13.5 points on a slide of 1080 pixels: 2.5 %, when white margins are cut off
+    # Numbers of 13.5 points are 2.5 % of a slide of 1080 pixels, once white margins are cut off.
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", content)
     width, height = map(float, box.groups())  # in points
     aspect = width / height
@@ -60,7 +60,7 @@ def circle(angle, radius):
 
 
 def half_turned(t):
-    """From 30° on, by half a turn over twice the time."""
+    """Return points from 30° on, over half a turn in twice the time."""
     return np.cos((30 + 90 * t) * D), np.sin((30 + 90 * t) * D)
 
 
@@ -71,13 +71,15 @@ def on_chord(t):
 
 
 def report_fig7(t):
-    """Right for 3 s, turn for 1 s, along the diagonal for 2 s, right while turning for 3 s."""
+    """Go right for 3 s, turn for 1 s, follow the diagonal for 2 s, go right while turning for 3
+    s."""
     ways = [0, 3, 3, 5, 8], [0, 0, 0, 2, 2], [0, 0, 45 * D, 45 * D, -90 * D]
     return [np.interp(t, SECONDS, way) for way in ways]
 
 
 def report_fig9(t):
-    """45 degrees a second: the shoulder, the elbow, both opposite ways."""
+    """Turn at 45 degrees a second: the shoulder, then the elbow, then both in opposite
+    directions."""
     ways, far = ([0, 1, 1, 0], [0, 0, 1, 2]), 135 * D
     return [far * np.interp(3 * t, range(4), way) for way in ways]
 
@@ -86,14 +88,14 @@ GOAL, TURNED, CORNER = 5 + 1j, np.exp(150j * D), -1 - 0.5j
 
 
 def straight(t):
-    """Of the centre when the corner of the body runs straight."""
+    """Return the poses of the centre when the corner of the body moves on a straight line."""
     turn = np.exp(150j * D * t)
     centre = CORNER + t * (GOAL + TURNED * CORNER - CORNER) - turn * CORNER
     return centre.real, centre.imag, 150 * D * t
 
 
 def screwed(t):
-    """On a circle about the one point that stays where it is."""
+    """Return poses on a circle about the one point that stays in place."""
     centre = GOAL / (1 - TURNED) * (1 - np.exp(150j * D * t))
     return centre.real, centre.imag, 150 * D * t
 
@@ -140,7 +142,7 @@ FORMULAS = {
 @pytest.mark.source("RR (21)", "RR (22)", "RR (23)", "RR Fig. 6", "RR Fig. 7", "RR Fig. 8")
 @pytest.mark.source("RR Fig. 9", "BK (9)")
 @pytest.mark.parametrize("place", FORMULAS)
-def test_columns_are_formulas_of_the_share_of_the_time(place):
+def test_columns_are_formulas_of_the_fraction_of_the_time(place):
     name, _, prefix = place.partition(",")
     keys, formula = FORMULAS[place]
     data = columns(numbers(name), prefix + "{}", keys)
@@ -149,7 +151,7 @@ def test_columns_are_formulas_of_the_share_of_the_time(place):
 
 
 @pytest.mark.source("BK Fig. 1")
-def test_the_data_of_paper_fig1():
+def test_the_numbers_of_paper_fig1_are_right():
     frame, *values = numbers("paper_fig1").values()
     places, R = np.split(np.transpose(values), [3], axis=1)
     assert list(numbers("paper_fig1"))[1:4] == list(METRES)
@@ -163,7 +165,7 @@ def test_the_data_of_paper_fig1():
     ("name", "column", "order"),
     [("2a", "theta", 0), ("2b", "theta_dot", 1), ("3a", "f", 0), ("3b", "f_dot", 1)],
 )
-def test_the_data_of_paper_fig2_and_fig3(name, column, order):
+def test_the_numbers_of_paper_fig2_and_fig3_are_right(name, column, order):
     data = numbers(f"paper_fig{name}")
     angle, t, value = (data[key] for key in ("angle [rad]", "t [1]", f"{column} [1]"))
     assert np.allclose(np.unique(angle), np.arange(1, 23) * np.pi / 24, rtol=1e-11)
@@ -178,8 +180,9 @@ SIGMA = np.pi / 6 * np.array([1, 2, 3])
 
 @pytest.mark.source("BK Fig. 4", "BK (21)")
 @pytest.mark.parametrize(("name", "extra"), [("4a", 0), ("4b", 1), ("4c", 5)])
-def test_the_data_of_paper_fig4(name, extra):
-    """The optimum by SciPy; the projection by the definition of the nearest rotation."""
+def test_the_numbers_of_paper_fig4_are_right(name, extra):
+    """The optimum is SciPy's; the projection is tested by the definition of the nearest
+    rotation."""
     data = numbers(f"paper_fig{name}")
     t, w1 = data["t [1]"], SIGMA + np.array([extra, 0, 0])
     best, near = (columns(data, f"{x} sigma{{}} [rad]", "123") for x in ("optimum", "projection"))
@@ -197,7 +200,7 @@ def test_the_data_of_paper_fig4(name, extra):
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
-def test_the_data_of_paper_fig5():
+def test_the_numbers_of_paper_fig5_are_right():
     w0, w1 = np.array([1, 2, 3]), np.array([2, 1, 1])
     turn = np.pi / 6 * np.array([1, 4, 3])
     solution = oracles.minimum_acceleration(turn, w0, w1)
@@ -217,7 +220,7 @@ def test_the_data_of_paper_fig5():
         for values, order in (("v", 1), ("a", 2)):
             body = (np.swapaxes(drawn, 1, 2) @ p(t, order)[..., None])[..., 0]
             assert np.abs(columns(data, values + "{} [m]", "123") - body).max() < 1e-8
-        # The velocity of R, and its derivative, by splines through the numbers of the file.
+        # The velocity of R and its derivative come from splines through the numbers of the file.
         entries = make_interp_spline(t, drawn.reshape(-1, 9), 7)
         rate = np.swapaxes(drawn, 1, 2) @ entries(t, 1).reshape(-1, 3, 3)
         assert np.abs(rb.vee_so3(rate) - w)[5:-5].max() < 1e-4
@@ -242,7 +245,7 @@ def test_the_data_of_paper_fig5():
         ("lesson13_growth", 3, 0.5, {"projection": 2, "Bézier": 2}),
     ],
 )
-def test_the_excess_falls_with_a_power_of_the_excursion_mostly_the_fourth(name, count, off, others):
+def test_the_excess_is_a_power_of_the_excursion_and_mostly_the_fourth(name, count, off, others):
     size, *_ = (data := numbers(name)).values()
     curves = {key.partition(" median")[0]: x for key, x in data.items() if "90 %" not in key}
     del curves[next(iter(data))]
@@ -254,7 +257,7 @@ def test_the_excess_falls_with_a_power_of_the_excursion_mostly_the_fourth(name, 
 
 @pytest.mark.source("RR 2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize(("sample", "kind"), [("three angles", "_naive"), ("uniform", "")])
-def test_the_data_of_random_rotations(sample, kind):
+def test_the_numbers_of_random_rotations_are_those_of_the_samplers(sample, kind):
     draw = getattr(rb.sampling, f"sample_rotation{kind}")
     quaternions = getattr(rb.sampling, f"sample_quaternion{kind}")(100, rng=6)
     for name, R in (
@@ -267,8 +270,8 @@ def test_the_data_of_random_rotations(sample, kind):
 
 
 @pytest.mark.source("RR 4", "RR 4.1", "RR Fig. 8", "RR Fig. 9")
-def test_arms_end_where_their_angles_say():
-    """And go along a line or along three arcs, or touch the circle."""
+def test_the_tips_of_arms_agree_with_their_joint_angles():
+    """The tips move along a line or along three arcs, or touch the circle."""
     tips = {}
     for name, prefix in (
         ("lesson02_posture", ""),
@@ -296,8 +299,8 @@ def test_arms_end_where_their_angles_say():
 
 
 @pytest.mark.source("BK 1", "BK 7")
-def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost():
-    cell = 100 + 4 * 10 + 5  # after those along the axis: 81°, 4.95 rad
+def test_the_excess_in_a_cell_of_the_atlas_is_that_of_its_hundred_problems():
+    cell = 100 + 4 * 10 + 5  # after the problems along the axis: 81°, 4.95 rad
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for name, place in (("median", 49), ("ninety", 89)):
@@ -312,7 +315,7 @@ def test_a_cell_of_the_atlas_is_what_its_hundred_problems_cost():
 
 @pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize("body", body_atlas.BODIES)
-def test_a_cell_of_the_atlas_of_bodies_is_what_its_problems_cost(body):
+def test_the_excess_in_a_cell_of_the_atlas_of_bodies_is_that_of_its_problems(body):
     table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # 63°, 3.15 rad
     data = {name: column[table["body"] == body][cell] for name, column in table.items()}
     assert [data[x] for x in list(data)[1:4]] == pytest.approx([np.radians(63), 3.15, 200])
@@ -331,7 +334,7 @@ def test_a_cell_of_the_atlas_of_bodies_is_what_its_problems_cost(body):
         assert stored == pytest.approx(excess[[99, 179]], rel=2e-3, abs=1e-6)
 
 
-def test_the_intervals_are_of_all_problems_of_three_seeds():
+def test_the_intervals_cover_all_problems_of_three_seeds():
     table = body_atlas.stored("intervals")
     assert sorted(set(table["seed [1]"])) == [31, 32, 33]
     everything = table["problems [1]"][table["domain"] == "all"]
@@ -339,8 +342,8 @@ def test_the_intervals_are_of_all_problems_of_three_seeds():
 
 
 @pytest.mark.source("beyond BK 1", "beyond BK 3", "beyond BK 4")
-def test_the_book_of_lesson_13_is_turned_by_its_torques():
-    """Euler's equation with the stored torques, from rest, leads to the stored goal, at rest."""
+def test_the_torques_of_lesson_13_turn_its_book_to_the_goal():
+    """Euler's equation with the stored torques leads from rest to the stored goal, at rest."""
     torques, poses = numbers("lesson13_torques"), numbers("lesson13_book")
     G, t = rb.metrics.box_inertia([0.3, 0.2, 0.03]), torques["t [s]"]
     diagonal = rb.exp_so3(np.radians(150) * np.ones(3) / np.sqrt(3))
@@ -359,7 +362,7 @@ def test_the_book_of_lesson_13_is_turned_by_its_torques():
             assert np.abs(end - [*R.ravel(), *rest]).max() < 1e-6, law
 
 
-def test_the_readme_says_what_the_projection_costs():
+def test_the_readme_states_the_cost_of_the_projection():
     best, near = numbers("paper_fig5_costs")["rotation [rad²]"]
     readme = (FIGURES.parent / "README.md").read_text("utf-8")
     assert f"costs {100 * (near / best - 1):.0f} % more" in readme

@@ -22,7 +22,7 @@ FULL = f"{PLAIN}{RATES},vx body [m/s],vy body [m/s],vz body [m/s]"
 PLAN = "vx world [m/s],vy world [m/s],vtheta [rad/s],duration [s]\n"
 
 
-def test_a_path_comes_back(tmp_path):
+def test_a_written_path_is_read_back(tmp_path):
     for poses, velocities, endings in (
         (POSES, TWISTS, ["csv"]),
         (POSES, None, ["csv", "tum", "txt", "TUM"]),
@@ -39,7 +39,7 @@ def test_a_path_comes_back(tmp_path):
 
 
 @pytest.mark.source("RR 3.2", "RR 4.2")
-def test_a_plan_comes_back_to_the_last_digit(tmp_path):
+def test_a_saved_plan_is_loaded_to_the_last_digit(tmp_path):
     for kind, plan in {
         "world": [(RNG.normal(size=3) * 10.0**k, 10.0**-k) for k in range(-9, 9)],
         "body": [([1, 0, -0.5], 2), ([0.1, 1 / 3, np.pi], 0)],
@@ -57,8 +57,8 @@ def test_a_plan_comes_back_to_the_last_digit(tmp_path):
     assert (tmp_path / "plan.csv").read_bytes() == text.encode()
 
 
-def test_other_programs_read_a_path(tmp_path):
-    """SciPy's quaternions end with the scalar, as those of TUM do; their signs do not jump."""
+def test_other_programs_read_a_written_path(tmp_path):
+    """The scalar is the last component for SciPy and TUM. The signs of quaternions do not jump."""
     tum, csv = tmp_path / "path.tum", tmp_path / "path.csv"
     rb.write_path(tum, TIMES, POSES)
     rb.write_path(csv, TIMES, POSES, TWISTS)
@@ -81,7 +81,8 @@ def test_other_programs_read_a_path(tmp_path):
 
 
 def test_files_of_other_programs_are_read(tmp_path):
-    """Comments, blank lines, tabs, four digits; a mark of the byte order, CRLF, blanks, quotes."""
+    """The files have comments, blank lines, tabs, four digits, a byte order mark, CRLF, or
+    quotes."""
     text = "# ground truth\n# timestamp tx ty tz qx qy qz qw\n\n1305031098.6659\t1 2 3 "
     (tmp_path / "a.txt").write_text(text + "0.6574 0.6126 -0.2949 -0.3248 \n\n", "utf-8")
     times, poses, _ = rb.read_path(tmp_path / "a.txt")
@@ -141,7 +142,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("kind", BAD_FILES)
-def test_a_bad_file_gives_the_line_and_the_reason(tmp_path, kind):
+def test_the_error_of_a_bad_file_states_the_line_and_the_reason(tmp_path, kind):
     file = tmp_path / (kind if "." in kind else "plan.csv")
     for text, reason in BAD_FILES[kind]:
         file.write_bytes(text.encode(errors="surrogateescape"))

@@ -17,14 +17,14 @@ every_functional = pytest.mark.parametrize(
 @pytest.mark.source("beyond BK 2")
 @every_functional
 def test_the_costate_is_the_derivative_of_the_integral(functional):
-    """½ d/ds of ∫ ‖u‖² along w + s δw is ±∫ p · δw, for a δw that vanishes at both ends."""
+    """½ d/ds ∫ ‖u‖² along w + s δw is ±∫ p · δw, if δw vanishes at both ends."""
     rng, order = np.random.default_rng(1), functional.ends // 2
     x, weights = np.polynomial.legendre.leggauss(40)
     w = [Polynomial(rng.normal(size=5)) for _ in range(3)]
     dw = [Polynomial(rng.normal(size=4)) * Polynomial([0, 1, -1]) ** order for _ in range(3)]
 
     def jets(s, count):
-        """w + s δw and its derivatives at the nodes, each of shape (1, n, 3)."""
+        """Return w + s δw and its derivatives at the nodes, each of shape (1, n, 3)."""
         moved = [p + s * q for p, q in zip(w, dw, strict=True)]
         return [
             np.stack([p.deriv(k)((x + 1) / 2) for p in moved], axis=-1)[None] for k in range(count)
@@ -41,7 +41,7 @@ def test_the_costate_is_the_derivative_of_the_integral(functional):
 
 @every_functional
 @pytest.mark.parametrize("what", ["deviation", "p"])
-def test_the_derivatives_are_derivatives(functional, what):
+def test_the_jacobians_are_the_derivatives_of_their_functions(functional, what):
     count = functional.ends + 1 if what == "p" else functional.ends // 2 + 1
     rates = np.random.default_rng(2).normal(size=(count, 1, 4, 3))
     by = getattr(functional, f"{what}_by")(*rates)
@@ -57,10 +57,10 @@ def test_the_derivatives_are_derivatives(functional, what):
 
 @pytest.mark.source("beyond BK 5")
 @pytest.mark.parametrize(("kappa", "same"), [(0, False), (0.5, True), (1, False)])
-def test_the_covariant_jerk_is_the_same_seen_from_the_body(kappa, same):
-    """Rᵀ(t) has the body velocity −R w; only with κ = ½ has its jerk the same size."""
+def test_the_covariant_jerk_has_the_same_norm_for_the_inverse_motion(kappa, same):
+    """Rᵀ(t) has the body velocity −R w. Only with κ = ½ has its jerk the same norm."""
     w, a, b = np.random.default_rng(4).normal(size=(3, 3))
     here = b + kappa * np.cross(w, a)
-    # by the derivatives of −R w, turned back by R: −w, −a and −(b + w × a)
+    # the derivatives of −R w, rotated back by R, are −w, −a and −(b + w × a)
     there = -(b + np.cross(w, a)) + kappa * np.cross(-w, -a)
     assert (abs(here @ here - there @ there) < 1e-12) == same

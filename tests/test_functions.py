@@ -1,4 +1,4 @@
-"""The contract of all functions of arrays: shapes as documented, stacks, and refused arguments."""
+"""The contract of all functions of arrays: documented shapes, stacks, and refused arguments."""
 
 import importlib
 import inspect
@@ -18,7 +18,7 @@ TURNS = {"R", "R0", "R1", "S"}
 
 
 def exported():
-    """All functions in the lists of the package and its modules, by name."""
+    """Return all functions in the lists of the package and its modules, by name."""
     others = {"draw", "report", "textbook"}
     names = {part.name for part in pkgutil.iter_modules(rb.__path__)} - others
     modules = [rb, *(importlib.import_module(f"rbcourse.{name}") for name in sorted(names))]
@@ -27,7 +27,7 @@ def exported():
 
 
 def arrays_of(function):
-    """The core shapes of the required arrays, as the docstring has them."""
+    """Return the core shapes of the required arrays, as the docstring states them."""
     found = {}
     for names, shape, optional in ENTRY.findall(inspect.getdoc(function)):
         if shape.startswith("...") and not optional:
@@ -47,7 +47,7 @@ every_function = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUN
 
 
 def sample(function, *batch):
-    """Valid arguments: rotations and poses, unit quaternions, inertias, or any numbers."""
+    """Return valid arguments: rotations and poses, unit quaternions, inertias, or any numbers."""
     rng, found = np.random.default_rng([96, *batch]), {}
     for name, core in arrays_of(function).items():
         sizes = tuple(int(SIZES.get(n, n)) for n in core)
@@ -67,11 +67,11 @@ def sample(function, *batch):
 
 
 @every_function
-def test_results_have_the_documented_shape_and_are_stacks_of_single_results(function):
+def test_results_have_the_documented_shape_and_a_stack_gives_the_single_results(function):
     (shape,) = RESULT.search(inspect.getdoc(function)).groups()
     before, _, core = shape.rpartition("...")
     leading = tuple(SIZES[n] for n in before.split(", ") if n)
-    for batch in ((), (2,), (5, 7), (0,), (2, 0)):  # 5 and 7 are the lengths of no other axes
+    for batch in ((), (2,), (5, 7), (0,), (2, 0)):  # no other axes have the lengths 5 and 7
         given = sample(function, *batch)
         values = function(**given)
         sizes = tuple(int(SIZES.get(n, n)) for n in core.split(", ") if n)
@@ -136,8 +136,9 @@ def test_parameters_and_results_are_documented(name):
     wanted = set(inspect.signature(function).parameters)
     assert wanted == {one for names in documented for one in names.split(", ")}
     assert "Returns" in text or inspect.signature(function).return_annotation == "None"
-    assert "Examples" in text or function.__module__ == "rbcourse.files"  # one for all four
+    # one example serves all four
+    assert "Examples" in text or function.__module__ == "rbcourse.files"
 
 
-def test_most_exported_functions_are_tried_here():
+def test_most_exported_functions_are_tested_here():
     assert len(FUNCTIONS) >= 55

@@ -20,7 +20,7 @@ def assert_close(value, wanted, units=400):
 
 
 @pytest.mark.source("BK (11)", "BK (13)", "BK Prop. 1", "BK 3.1", "BK 3.2")
-def test_the_trace_is_the_sum_of_products_and_invariant_under_rotations_but_not_a_shear():
+def test_the_trace_metric_is_a_sum_of_products_and_invariant_under_rotations_but_not_a_shear():
     for inner, n in ((metrics.inner_gl, 4), (metrics.inner_ga, 4), (metrics.inner_gl, 1)):
         X, Y = RNG.normal(size=(2, 5, n, n))
         by_definition = [np.trace(x.T @ y) for x, y in zip(X, Y, strict=True)]
@@ -33,10 +33,10 @@ def test_the_trace_is_the_sum_of_products_and_invariant_under_rotations_but_not_
 
 @pytest.mark.source("BK (12)", "BK Remark 1", "BK Remark 2", "BK 3.1", "errata 1")
 @pytest.mark.source("BK (14)", "BK Remark 3", "BK Remark 4", "BK Remark 5", "BK 3.2")
-def test_the_trace_induces_the_metrics_of_so3_and_se3_twice_the_energy_of_a_ball():
-    """On SO(3) it is twice the identity, not once; on SE(3) a shift on the right changes it.
+def test_the_trace_induces_metrics_of_so3_and_se3_that_are_twice_the_energy_of_a_ball():
+    """On SO(3) the metric is twice the identity. On SE(3) a translation on the right changes it.
 
-    Six equal masses on the axes have the moments of a ball, 2 in all directions, and mass 1.
+    Six equal masses on the axes have the moments of a ball, 2 about all axes, and mass 1.
     """
     points = np.sqrt(3) * np.concatenate([np.eye(3), -np.eye(3)])
     X, Y = metrics.tangent_from_components(R, w), metrics.tangent_from_components(R, z)
@@ -62,8 +62,9 @@ def test_the_trace_induces_the_metrics_of_so3_and_se3_twice_the_energy_of_a_ball
 
 @pytest.mark.source("BK (1)", "BK (4)", "BK (5)", "BK (6)", "BK (7)", "BK 2.2", "BK 2.3")
 @pytest.mark.parametrize(("group", "left", "x", "y", "basis"), [ON_SO3, ON_SE3])
-def test_left_invariant_fields_and_metrics(group, left, x, y, basis):
-    """A field is its components times the moved basis; a move does not change a metric."""
+def test_left_invariant_fields_and_metrics_agree_with_their_definitions(group, left, x, y, basis):
+    """A field is its components times the moved basis. A change of frame does not change a
+    metric."""
     X, Y = metrics.tangent_from_components(group, x), metrics.tangent_from_components(group, y)
     assert_close(X, np.einsum("bi,bjk,ikl->bjl", x, group, basis))
     assert_close(metrics.components_from_tangent(group, X), x)
@@ -77,7 +78,8 @@ def test_left_invariant_fields_and_metrics(group, left, x, y, basis):
     small, large = X * 1e-200, np.eye(x.shape[-1]) * 1e308
     value = metrics.inner_left_invariant(large, group, small, 1e-100 * Y)
     assert_close(value / 1e8, np.vecdot(x, y))
-    X[:, :3, :3] += group[:, :3, :3] @ [[1, 4, 5], [4, 2, 6], [5, 6, 3]]  # is dropped
+    # the symmetric part is ignored
+    X[:, :3, :3] += group[:, :3, :3] @ [[1, 4, 5], [4, 2, 6], [5, 6, 3]]
     X[:, 3:] = 7
     assert_close(metrics.components_from_tangent(group, X), x)
 
@@ -106,24 +108,24 @@ def test_the_weighted_trace_induces_the_inertia_of_the_points_of_a_body():
     assert_close(metrics.weight_from_inertia(G), W, 1000)
     by_points = sum(p @ p * np.eye(3) - np.outer(p, p) for p in P[0].T)
     assert_close(G[0], by_points, 1000)
-    # of a box by the rule of Gauss with two points an axis, exact for squares
+    # the points of Gauss's rule, two for each axis, are exact for the squares in a box's inertia
     sides = np.array([[0.3, 0.2, 0.03], [1.0, 2, 3], [2.0, 0, 0]])
     p = sides[:, None] * (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / np.sqrt(3)
     exact, box = metrics.inertia_from_weight(5 / 8 * p.mT @ p), metrics.box_inertia(sides, 5)
     assert_close(box, exact, 16 * exact.max())
-    metrics.weight_from_inertia(metrics.box_inertia(sides))  # of a body
-    assert metrics.box_inertia([1e9, 1, 1], 12)[0, 0] == 2  # nothing cancels
+    metrics.weight_from_inertia(metrics.box_inertia(sides))  # the inertia of a body is accepted
+    assert metrics.box_inertia([1e9, 1, 1], 12)[0, 0] == 2  # no digits cancel
 
 
 @pytest.mark.source("BK 3")
-def test_weights_are_for_moments_of_which_each_is_at_most_the_sum_of_the_others():
+def test_a_weight_exists_if_each_moment_is_at_most_the_sum_of_the_others():
     for moments in ([2, 3, 4.9], [2, 3, 5 - 1e-12], [1, 2, 3], [1, 1, 2], [0, 1, 1], [0, 0, 0]):
         G = R @ np.diag(moments) @ R.mT
         W = metrics.weight_from_inertia(G)
         least = np.linalg.eigvalsh(W)[:, 0]
         assert_close(least, (moments[0] + moments[1] - moments[2]) / 2, 40)
         assert_close(metrics.inertia_from_weight(W), G, 40)
-        rb.project_so_weighted(np.eye(3), W)  # is taken
+        rb.project_so_weighted(np.eye(3), W)  # the weight is accepted
     assert np.array_equal(metrics.weight_from_inertia(np.diag([1, 2, 3])), np.diag([2, 1, 0]))
     for moments in ([1, 2, 3 + 1e-13], [1, 2, 4], [-1, 5, 5], [-1e-13, 1, 1], [-2, -2, -2]):
         with pytest.raises(ValueError, match=r"moments .*; each must be at most the sum"):
@@ -133,7 +135,7 @@ def test_weights_are_for_moments_of_which_each_is_at_most_the_sum_of_the_others(
         assert_close(W / size, np.diag([2.5, 1.5, 0.5]), 8)
 
 
-def test_bad_arguments_are_named_and_the_metrics_are_read_only():
+def test_bad_arguments_are_refused_and_the_metrics_are_read_only():
     one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
     inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
     for name, arguments, message in (

@@ -1,4 +1,4 @@
-"""Motions on SE(3): rotations with paths of their own, bodies off their centre, and screws."""
+"""Motions on SE(3): separate rotation and path, bodies with an offset centre, and screws."""
 
 import numpy as np
 import oracles
@@ -36,8 +36,8 @@ def turned(A, v):
 
 @pytest.mark.source("BK 6.3", "BK (1)", "BK (9)", "BK 2.6", "BK (14)")
 @pytest.mark.parametrize("name", ["geodesic", "projected_cubic", "minimum_acceleration"])
-def test_rotation_and_origin_each_go_their_own_way(name):
-    """The origin on a cubic; along a geodesic straight on, at constant speed."""
+def test_rotation_and_origin_follow_separate_curves(name):
+    """The origin moves on a cubic, and for a geodesic on a line at constant speed."""
     rates, slopes = (RATES, RATES[2:]) if name != "geodesic" else ((), [(A1 - A0)[:, :3, 3]] * 2)
     motion = getattr(rb, f"{name}_se3")(A0, A1, *rates)
     rotation = on_so3(getattr(rb, f"{name}_so3"), *rates[:2])
@@ -54,8 +54,8 @@ def test_rotation_and_origin_each_go_their_own_way(name):
 
 
 @pytest.mark.source("beyond BK 9")
-def test_the_centre_of_mass_of_a_body_runs_along_a_cubic():
-    """Twist and acceleration are those of the frame of the body, off the centre."""
+def test_the_centre_of_mass_of_a_body_follows_a_cubic():
+    """Twist and acceleration are those of the body frame, whose origin is not the centre."""
     t, (w0, w1, *v) = np.linspace(0, 1, 21), RATES
     A, r = OFF_CENTRE(t), BODY["centre"]
     centre = (A[..., :3, :3] @ r + A[..., :3, 3]).reshape(21, -1)
@@ -79,9 +79,9 @@ def test_the_centre_of_mass_of_a_body_runs_along_a_cubic():
 
 
 @pytest.mark.source("BK 2.6", "errata 15")
-def test_each_definition_holds_of_screws_and_not_of_geodesics():
-    """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, A' a left-invariant field. As
-    printed, without the dot, the definitions hold of every curve."""
+def test_each_definition_holds_for_screws_and_not_for_geodesics():
+    """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, and A' is a left-invariant field.
+    The definitions that are printed without the dot hold for every curve."""
     found, inside = [], TIMES[1:-1]
     for curve in (SCREWS, GEODESICS):
         A, rate = curve(inside), oracles.derivative_by_differences(curve, inside)
@@ -98,7 +98,7 @@ def test_each_definition_holds_of_screws_and_not_of_geodesics():
     assert np.abs(rb.vee_se3(rb.inverse_se3(A) @ rate) - SCREWS.twist).max() < 1e-11
     assert np.array_equal(SCREWS(0, 1), SCREWS.twist)
     a, b, ab = SCREWS([0.2, 0.5, 0.7])
-    assert np.abs(a @ b - ab).max() > 0.1  # A itself is no subgroup, unless A0 = I
+    assert np.abs(a @ b - ab).max() > 0.1  # A itself is not a subgroup, unless A0 = I
 
 
 @pytest.mark.source("errata 15")
@@ -113,7 +113,7 @@ def test_the_subgroup_through_a_pose_is_not_unique():
 
 
 @pytest.mark.source("BK 2.6")
-def test_chasles_every_displacement_turns_about_an_axis_and_slides_along_it():
+def test_every_displacement_is_a_turn_about_an_axis_and_a_translation_along_it():
     screw = rb.screw_from_pose(A1)
     on_axis = screw.point + 3 * screw.axis
     moved = turned(A1, on_axis) + A1[:, :3, 3]
@@ -133,7 +133,7 @@ def test_chasles_every_displacement_turns_about_an_axis_and_slides_along_it():
     assert np.array_equal(rb.screw_se3(wrong, A1)(0.3), rb.screw_se3(np.eye(4), A1)(0.3))
 
 
-def test_displacements_that_do_not_turn_or_by_rounding_only_slide():
+def test_displacements_that_turn_only_by_rounding_are_translations():
     still = rb.screw_from_pose(np.eye(4))
     assert not np.any([*still.axis, *still.point, still.angle, still.slide])
     assert np.isnan(still.pitch)
@@ -152,7 +152,7 @@ def test_displacements_that_do_not_turn_or_by_rounding_only_slide():
 
 @pytest.mark.parametrize("make", [rb.geodesic_se3, rb.screw_se3])
 def test_the_rate_of_the_twist_is_its_derivative(make):
-    """Unlike c(t, 2), which is the covariant acceleration."""
+    """The rate of the twist differs from c(t, 2), which is the covariant acceleration."""
     c, t, h = make(A0, A1, duration=2.0), np.linspace(0.1, 1.9, 7), 1e-4
     differences = (c(t + h, 1) - c(t - h, 1)) / (2 * h)
     assert c.twist_rate(t) == pytest.approx(differences, abs=1e-6)

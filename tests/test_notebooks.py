@@ -29,7 +29,7 @@ every_lesson = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.st
 
 
 def faults(notebook):
-    """The faults of a notebook as it is stored."""
+    """Yield the faults of a stored notebook."""
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     if notebook.metadata.get("kernelspec", {}).get("name") != "python3":
         yield "the kernel is not python3"
@@ -66,7 +66,7 @@ def test_stored_lessons_are_complete(path):
 
 
 @pytest.mark.parametrize("path", TAUGHT, ids=lambda path: path.stem)
-def test_every_lesson_is_announced_with_its_minutes_and_has_two_questions_for_each_objective(path):
+def test_every_lesson_is_listed_with_its_minutes_and_has_two_questions_for_each_objective(path):
     head = LESSONS[path].cells[0].source
     (time,) = re.findall(r"^\| Time \| (.*) \|$", head, re.MULTILINE)
     minutes = re.escape(" + ".join(re.findall(r"(\d+) (?:minutes|more)", time)))
@@ -81,7 +81,8 @@ def test_every_lesson_is_announced_with_its_minutes_and_has_two_questions_for_ea
 
 @every_lesson
 def test_the_figures_in_a_lesson_are_the_stored_ones(path):
-    """All figures whose captions name files; pictures in exercises may have no files."""
+    """The test compares all figures whose captions name files. Pictures in exercises may have no
+    files."""
     text = path.read_text("utf-8")
     shown = re.findall(BASE64 + r".{0,30}<figcaption>[^<]* <small>(\w+)\.", text)
     assert len(shown) == len(re.findall(r"<small>\w+\.(?:png|gif), ", text))
@@ -96,7 +97,7 @@ def test_the_figures_in_a_lesson_are_the_stored_ones(path):
 
 
 def cited_and_listed(path):
-    """The keys in the text of a lesson, and the lines below its heading "References"."""
+    """Return the keys in the text of a lesson, and the lines below its heading "References"."""
     texts = [cell.source for cell in LESSONS[path].cells if cell.cell_type == "markdown"]
     lists = [text for text in texts if text.startswith("## References")]
     groups = CITED.findall("\n".join(text for text in texts if text not in lists))
@@ -105,7 +106,7 @@ def cited_and_listed(path):
 
 @every_lesson
 def test_the_works_that_a_lesson_cites_are_listed_at_its_end_as_in_the_references(path):
-    def plain(words):  # without the commands and braces of BibTeX
+    def plain(words):  # the words without the commands and braces of BibTeX
         return re.sub(r"\\['v]|[{}]", "", words.replace(r"\'e", "é"))
 
     keys, lines = cited_and_listed(path)

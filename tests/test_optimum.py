@@ -1,4 +1,4 @@
-"""The optima: two solvers of ours, SciPy's, direct minimisation, and the equations themselves."""
+"""The optima of two solvers against SciPy's, direct minimisation, and their own equations."""
 
 import functools
 import re
@@ -36,7 +36,7 @@ FEW = random_problems(2, 5, 2.0, 4.0)
 
 
 def of_paper(case):
-    """A problem, without an inertia and accelerations."""
+    """Return a problem of the paper, without an inertia and accelerations."""
     turn, w0, w1 = PAPER[case]
     return I3, rb.exp_so3(turn), w0, w1, None, REST, REST
 
@@ -73,7 +73,7 @@ def test_solve_bvp_and_direct_minimisation_find_the_same_curve(what, problem):
 
 
 @every_optimum
-def test_the_cost_is_the_integral(what):
+def test_the_cost_is_the_integral_of_the_squared_deviation(what):
     problems = random_problems(5, 33)
     curves = OPTIMA[what](*problems)
     x, weights = np.polynomial.legendre.leggauss(120)
@@ -104,8 +104,8 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
 
 @of_forces
 @pytest.mark.parametrize("size", [2.0, 0.3, 1e-6, 1e9])
-def test_of_a_round_body_it_is_the_balls_optimum(what, size):
-    """And near it for a body that is almost round."""
+def test_the_optimum_of_a_round_body_is_that_of_a_ball(what, size):
+    """The optimum of an almost round body is near the optimum of a ball."""
     ends, power = random_problems(6, 32)[:4], 2 if what == "torque" else 1
     curves, of_balls = OPTIMA[what](*ends, size * I3), rb.minimum_acceleration_so3(*ends)
     for order in range(4):
@@ -121,8 +121,8 @@ def test_of_a_round_body_it_is_the_balls_optimum(what, size):
 @pytest.mark.source("BK 6.2")
 @pytest.mark.parametrize("what", ["ball", "shooting", "acceleration", "torque"])
 @pytest.mark.parametrize("shares", [(1, 1), (0, 0), (2, 0.5), (0, 3), (-0.3, 1.5)])
-def test_about_a_principal_axis_it_is_a_cubic(what, shares):
-    """Of a ball all axes are principal."""
+def test_the_optimum_of_turns_about_a_principal_axis_is_a_cubic(what, shares):
+    """All axes of a ball are principal axes."""
     frame, R0 = Rotation.random(2, rng=4).as_matrix()
     moments, angle = np.array([1.0, 2.2, 2.9]), 1.3 if what in ("acceleration", "torque") else 1.96
     G = (frame * moments) @ frame.T
@@ -141,7 +141,7 @@ def test_about_a_principal_axis_it_is_a_cubic(what, shares):
 
 @pytest.mark.source("beyond BK 5")
 @pytest.mark.parametrize("angle", [0.1, 1.0, 2.67, np.pi - 1e-9])
-def test_least_jerk_from_rest_to_rest_is_the_geodesic(angle):
+def test_the_least_jerk_from_rest_to_rest_follows_the_geodesic(angle):
     axis = np.array([0.6, 0, 0.8])
     curve = rb.minimum_jerk_so3(I3, rb.exp_so3(angle * axis), REST, REST, REST, REST)
     share = TIMES**3 * (10 - 15 * TIMES + 6 * TIMES**2)
@@ -150,7 +150,7 @@ def test_least_jerk_from_rest_to_rest_is_the_geodesic(angle):
 
 
 @every_optimum
-def test_reversed_ends_and_another_unit_change_nothing_else(what):
+def test_reversed_ends_reverse_the_optimum_and_the_unit_of_inertia_only_scales_the_cost(what):
     size = (100, 36, np.pi, 12.0) if what == "ball" else (12, 36, 2.5, 5.0)
     R0, R1, w0, w1, G, a0, a1 = problems = random_problems(*size)
     curves, back = OPTIMA[what](*problems), OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
@@ -166,7 +166,7 @@ def test_reversed_ends_and_another_unit_change_nothing_else(what):
 
 @pytest.mark.source("BK 6.2")
 @every_optimum
-def test_a_stack_of_which_one_body_is_round_is_what_each_is_alone(what):
+def test_a_stack_with_a_round_body_gives_the_same_optima_as_single_problems(what):
     problems = random_problems(6, 39, 2.0, 5.0)
     problems[4][2] = 0.7 * I3
     stack = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
@@ -183,7 +183,7 @@ def test_a_stack_of_which_one_body_is_round_is_what_each_is_alone(what):
 
 
 @pytest.mark.parametrize(("what", "speed"), [*((what, 1e160) for what in OPTIMA), ("ball", 1e3)])
-def test_a_hopeless_problem_is_named_and_harms_no_other(what, speed):
+def test_a_problem_without_convergence_is_named_and_does_not_affect_the_others(what, speed):
     problems = random_problems(6, 41, 2.0, 4.0)
     problems[0][4], problems[1][4] = I3, rb.exp_so3([1, 2, 0])
     good, others = OPTIMA[what](*problems), np.arange(6) != 4
@@ -208,7 +208,7 @@ def test_a_hopeless_problem_is_named_and_harms_no_other(what, speed):
 
 
 @pytest.mark.source("BK 6.3")
-def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
+def test_problems_without_convergence_raise_alone_and_give_nan_in_stacks_and_motions():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
@@ -234,9 +234,9 @@ def test_hopeless_problems_alone_and_in_stacks_of_their_own_and_of_motions():
         assert np.abs(broken(TIMES, order)[:, 0] - motion(TIMES, order)).max() < 1e-10
 
 
-def test_the_search_tells_where_newtons_method_fails_from_the_cheapest_start(monkeypatch):
-    """Of the first of three problems it is made to fail on all curves but those that turn the
-    other way round."""
+def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkeypatch):
+    """For the first of three problems, Newton's method is made to fail on all curves except those
+    that turn the other way round."""
     real, turns = search._follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
     ends = I3, turns, [0, 0, 1], [1, 0, 0]
     good = rb.minimum_acceleration_so3(*ends)
@@ -265,7 +265,7 @@ def test_the_search_starts_with_the_shortest_way_and_then_tries_the_other_one(an
 
 
 @every_solver
-def test_no_motion_at_all(what):
+def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
     curve = SOLVERS[what](I3, I3, REST, REST, BOOK, REST, REST)
     name = {"torque": "MinimumTorque", "jerk": "MinimumJerk"}.get(what, "MinimumAcceleration")
     assert f"{name} on SO(3)" in repr(curve)
@@ -275,7 +275,7 @@ def test_no_motion_at_all(what):
 
 
 @pytest.mark.parametrize("what", ["ball", "shooting"])
-def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(what):
+def test_ends_with_eight_digits_are_replaced_by_their_nearest_rotations(what):
     _, R1, *rates = of_paper("4b")[:4]
     rounded, exact = (SOLVERS[what](I3, R, *rates) for R in (R1.round(8), R1))
     assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
@@ -283,7 +283,8 @@ def test_ends_written_with_eight_digits_are_taken_as_their_nearest_rotations(wha
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
-    """To the bit: matrices computed with one number of threads are kept for others."""
+    """The matrices agree bit by bit, since those made with one number of threads are kept for
+    others."""
     found = []
     for threads in (1, 2):
         for kept in (grid, interpolation):
@@ -293,7 +294,7 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
     assert found[0] == found[1]
 
 
-def test_a_guess_is_followed_and_one_that_is_not_a_curve_on_so3_is_refused():
+def test_a_guess_is_followed_and_a_guess_that_is_not_a_curve_on_so3_is_refused():
     ends = random_problems(6, 42, 2.0, 4.0)[:4]
     found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
@@ -320,6 +321,6 @@ ENDS = I3, I3, REST, REST
         (1e-310 * BOOK, ": eigenvalues from 1e-150 to 1e150 are wanted"),
     ],
 )
-def test_bad_inertias_are_named(make, G, message):
+def test_bad_inertias_are_refused(make, G, message):
     with pytest.raises(ValueError, match=f"^inertia ?{re.escape(message)}"):
         make(*ENDS, G)

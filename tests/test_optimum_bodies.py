@@ -17,28 +17,29 @@ from rbcourse.optimum.collocation import cost_of, relax_ball
 from rbcourse.optimum.search import ball
 
 MANY = random_problems(800, 50)
-# the short way costs 3504, Bézier's curves 603 and 553
+# The short way costs 3504, and Bézier's curves cost 603 and 553.
 ASTRAY = "-.46787982 1.84514378 2.04665512  -1.84205908 -6.79718364 -1.48113244 "
 ASTRAY += "2.12409307 -7.32863165 -2.12777328"
 KNOWN = {  # the rotation vector, velocities, and moments or accelerations; or a number in `MANY`
     f"ball {ASTRAY}": "502.348",
     f"shooting {ASTRAY}": "502.348",
-    "acceleration 79": "256.965743",  # from a curve that is lowered in torque first;
+    "acceleration 79": "256.965743",  # found from a curve whose torque was lowered first
     "acceleration 654": "359.307210",
-    "torque 565": "615.812105",  # from one that is lowered in acceleration first;
-    "torque 177": "314.084507",  # only after many steps down a valley;
-    # other programs, from random starts, found these costs
+    "torque 565": "615.812105",  # found from a curve whose acceleration was lowered first
+    "torque 177": "314.084507",  # found only after many steps along a valley
+    # Other programs found these costs from random starts.
     "torque 2.751 .431 1.014  5.098 -.082 4.558  -5.168 5.805 -4.112  .399 1.031 1.219": "134.51",
     "torque 1.532 1.491 .224  -3.494 7.652 2.381  2.509 5.826 -5.963  .21 .544 .654": "20.98",
     "jerk 0 0 -1.6796  .0478 -1.2536 7.2756  .7923 .2244 6.3072  "
-    ".0926 -1.1733 13.5431  3.2645 -1.6836 -16.3042": "6350.394",  # with a turn less 34,447
+    # with one turn less, the cost is 34,447
+    ".0926 -1.1733 13.5431  3.2645 -1.6836 -16.3042": "6350.394",
 }
-SELDOM_FOUND = {  # least costs that are known of some of the fast problems of `best`
+SELDOM_FOUND = {  # the least known costs of some of the fast problems of `best`
     "acceleration": {60 + 9: 1251.1935149, 60 + 18: 842.5309036},
     "torque": {60 + 16: 2919.2413078, 60 + 27: 2059.4960175},
 }
 TIMES = np.linspace(0, 1, 101)
-OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # ‖w‖ < 3π
+OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # for ‖w‖ < 3π
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
 of_forces = pytest.mark.parametrize("what", ["acceleration", "torque"])
 
@@ -48,7 +49,7 @@ def vectors(numbers):
 
 
 def random_ends(rng, angle, speed, count):
-    """Turns and two velocities, uniform in balls, shape (3, count, 3)."""
+    """Return turns and two velocities, uniform in balls, shape (3, count, 3)."""
     directions = rng.normal(size=(3, count, 3))
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     lengths = np.reshape([angle, speed, speed], (3, 1, 1)) * np.cbrt(rng.random((3, count, 1)))
@@ -57,10 +58,10 @@ def random_ends(rng, angle, speed, count):
 
 @pytest.fixture(scope="module")
 def best():
-    """Many problems of each kind and their optima, in one stack."""
+    """Return many problems of each kind and their optima, in one stack."""
     slow, fast = random_problems(60, 37), some(random_problems(40, 38, np.pi, 20.0), slice(28))
     of_bodies = [np.concatenate(pair) for pair in zip(slow, fast, strict=True)]
-    # Newton's method does not converge from the projected cubics of these two
+    # Newton's method does not converge from the projected cubics of these two problems.
     hard = vectors("-.1 2.5 -1.7  -7.1 7 4.1  -7.2 .4 8   .6 .4 -2.9  6 -2.5 8.6  -.2 7.1 -8.1")
     many = random_ends(np.random.default_rng(12), np.pi, 12, 150)
     turn, *w = np.hstack([many, hard.reshape(2, 3, 3).swapaxes(0, 1)])
@@ -101,12 +102,12 @@ def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
         u = deviation(what, None if G is None else G[those][:, None], *rates)
         assert np.all(
             np.trapezoid(np.sum(u**2, axis=-1), t) > curves.cost[those] * (1 - 1e-3)
-        )  # roughly
+        )  # the trapezoidal rule is rough
 
 
 @pytest.mark.source("BK 6.2")
-def test_neither_way_round_costs_less(best):
-    """Newton's method from Bézier's curves in cumulative form, written out, all four ways."""
+def test_turns_in_either_direction_do_not_cost_less(best):
+    """Newton's method starts from cumulative Bézier curves with four numbers of turns."""
     (R0, R1, w0, w1, *_), curves = best["ball"]
     first, last = rb.exp_so3(-w0 / 3), rb.exp_so3(-w1 / 3)
     middle = rb.log_so3(first @ R1 @ last)
@@ -122,14 +123,14 @@ def test_neither_way_round_costs_less(best):
 
 
 def cost_about_an_axis(angle, k0, k1):
-    """2 ∫ p''² of the cubic p from 0 to the angle with these rates."""
+    """Return 2 ∫ p''² of the cubic p from 0 to the angle with these rates."""
     square, cube = 3 * angle - 2 * k0 - k1, k0 + k1 - 2 * angle
     return 8 * (square**2 + 3 * square * cube + 3 * cube**2)
 
 
 @pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
-def test_fast_spins_about_one_axis_make_as_many_turns_as_cost_least(speed):
-    """There p(t) is a cubic, to σ and any number of turns; the optimum costs no more."""
+def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
+    """A cubic p(t) to σ plus any number of turns is admissible; the optimum costs no more."""
     rng, count = np.random.default_rng(speed), 30 if speed < 30 else 8
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
@@ -141,8 +142,8 @@ def test_fast_spins_about_one_axis_make_as_many_turns_as_cost_least(speed):
 
 @pytest.mark.parametrize("short_of", [0, 1e-9, 1e-6])
 @pytest.mark.parametrize("speeds", [(-0.72, 0.735), (-0.3, 0.31), (-1, 1.02), (-3, 3.1), (2, 2)])
-def test_no_turn_too_many_near_half_turns(short_of, speeds):
-    """Along the axis p(t) is a cubic; σ is the shortest."""
+def test_optima_near_half_turns_have_no_extra_turn(short_of, speeds):
+    """Along the axis, p(t) is a cubic, and σ is the shortest rotation vector."""
     angle, rates = np.pi - short_of, np.outer(speeds, [0, 0, 1])
     curve = rb.minimum_acceleration_so3(I3, rb.exp_so3([0, 0, angle]), *rates)
     assert rb.acceleration_cost(curve) <= cost_about_an_axis(angle, *speeds) * (1 + 1e-9)
@@ -150,8 +151,8 @@ def test_no_turn_too_many_near_half_turns(short_of, speeds):
 
 
 @pytest.mark.parametrize("short_of", [0, 1e-15, 1e-9, 1e-4])
-def test_near_half_turns_converge(short_of):
-    """From rest to rest the geodesic; it is returned though the projected cubic jumps."""
+def test_the_solver_converges_near_half_turns(short_of):
+    """From rest to rest the solver returns the geodesic, although the projected cubic jumps."""
     axes = np.array([[0, 0, 1], [0.6, -0.8, 0], [1, 1, 1], [-0.3, 0.2, 0.7], [0.1, -2, 1]])
     R1 = rb.exp_so3((np.pi - short_of) * axes / np.linalg.norm(axes, axis=1, keepdims=True))
     curves = rb.minimum_acceleration_so3(I3, R1, REST, REST)
@@ -164,8 +165,9 @@ def test_near_half_turns_converge(short_of):
 
 
 @pytest.mark.parametrize("seed", [None, 1])
-def test_along_a_path_of_goals_the_cost_has_no_jump(seed):
-    """Where two families cross it bends; a step then is no larger than its neighbours."""
+def test_the_cost_is_continuous_along_a_path_of_goals(seed):
+    """The cost has a kink where two families cross. No step may be much larger than its
+    neighbours."""
     ends = random_ends(np.random.default_rng(seed), np.pi, 12, 1)[:, 0]
     axis, w0, w1 = ends if seed else vectors(ASTRAY)
     turns = np.linspace(0, 2 * np.pi, 500)[:, None] * axis / np.linalg.norm(axis)
@@ -175,8 +177,9 @@ def test_along_a_path_of_goals_the_cost_has_no_jump(seed):
 
 
 @pytest.mark.parametrize("power", [-320, -162, -161, -160, -156, -150, -100, -20])
-def test_tiny_motions_cost_what_their_cubic_costs(power):
-    """Squares of such velocities are 0 in floating point; the solver must not add a full turn."""
+def test_tiny_motions_cost_as_much_as_their_cubic(power):
+    """The squares of these velocities are 0 in floating point. The solver must not add a full
+    turn."""
     speed = 10.0**power
     curve = rb.minimum_acceleration_so3(I3, I3, [0, 0, speed], REST)
     assert curve.cost == pytest.approx(8 * speed**2, rel=1e-4, abs=1e-40)
@@ -186,7 +189,8 @@ def test_tiny_motions_cost_what_their_cubic_costs(power):
 @pytest.mark.source("beyond BK 1", "beyond BK 4")
 @of_forces
 def test_free_motions_cost_nothing(what):
-    """Euler's equations, by SciPy; the ends of the motion lead back to it, at speeds up to 16."""
+    """SciPy integrates Euler's equations. The optimum for the ends is the same motion, at speeds up
+    to 16."""
     rng, few = np.random.default_rng(16), [np.diag([1.0, 2, 2.9]), BOOK]
     w = rng.normal(size=(12, 3))
     w *= rng.uniform(3, 16, (12, 1)) / np.linalg.norm(w, axis=1, keepdims=True)
@@ -202,7 +206,7 @@ def test_free_motions_cost_nothing(what):
 
 
 def wandering(R0, R1, rng):
-    """A random curve, which turns either way round."""
+    """Return a random curve that turns in either direction."""
     turn = rb.log_so3(R0.T @ R1)
     turn *= 1 - 2 * np.pi * rng.integers(2) / np.linalg.norm(turn)
     bends = np.exp(rng.uniform(np.log(0.1), np.log(2))) * rng.normal(size=(2, 3))
@@ -213,7 +217,7 @@ def wandering(R0, R1, rng):
 
 @pytest.mark.parametrize("what", ["acceleration", "torque", "jerk"])
 def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
-    """It finds most of ours."""
+    """The other optimiser finds most of our optima."""
     problems, rng = random_problems(6, 84), np.random.default_rng(86)
     problems[4][:] = bodies(6, 85)
     best, least = OPTIMA[what](*problems).cost, np.full(6, np.inf)
@@ -228,7 +232,7 @@ def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
 
 
 @pytest.mark.parametrize("case", KNOWN)
-def test_the_cheapest_curve_that_is_known_is_found(case):
+def test_the_cheapest_known_curve_is_found(case):
     (what, numbers), cost = case.split(" ", 1), KNOWN[case]
     if numbers.isdecimal():
         problem = some(MANY, int(numbers))
@@ -240,8 +244,8 @@ def test_the_cheapest_curve_that_is_known_is_found(case):
 
 
 @pytest.mark.source("beyond BK 5")
-def test_least_jerk_about_one_axis_is_the_best_quintic_of_all_turns():
-    """Of half of them both accelerations add turns."""
+def test_least_jerk_about_one_axis_is_the_best_quintic_of_all_numbers_of_turns():
+    """In half of the problems both accelerations add turns."""
     rng, e = np.random.default_rng(55), np.array([0.6, 0, 0.8])
     angle = np.append(rng.uniform(-np.pi, np.pi, 200), [0.8, -0.6])
     w, a = rng.uniform(-9, 9, (2, 202)), rng.uniform(-20, 20, (2, 202))
@@ -259,8 +263,8 @@ def test_least_jerk_about_one_axis_is_the_best_quintic_of_all_turns():
 
 
 @pytest.mark.parametrize("moments", [(1, 2.22, 3.18), (0.3, 1, 1.28)])
-def test_a_turn_about_the_largest_moment_may_leave_its_axis(moments):
-    """From rest to rest the turn about the axis is a saddle of the torque, if it is large."""
+def test_the_least_torque_of_a_turn_about_the_largest_moment_may_leave_the_axis(moments):
+    """From rest to rest, a large turn about the axis is a saddle of the torque."""
     exact, near, small = (
         rb.minimum_torque_so3(I3, rb.exp_so3(turn), REST, REST, np.diag(moments)).cost
         for turn in ([0, 0, 3.1], [1e-4, 2e-4, 3.1], [0, 0, 1.0])
@@ -271,7 +275,7 @@ def test_a_turn_about_the_largest_moment_may_leave_its_axis(moments):
 
 
 def is_the_same_however_rounded(make, R1, rng, count):
-    """Return the velocities of the curve to R1, if ends nearby have the same."""
+    """Check that curves to ends near R1 have the same velocities; return the velocities."""
     t = np.linspace(0, 1, 5)
     first, *others = (
         make(R1 @ rb.exp_so3(nudge))(t, 1)
@@ -283,21 +287,21 @@ def is_the_same_however_rounded(make, R1, rng, count):
 
 @pytest.mark.parametrize("turn", [110, 140])
 @pytest.mark.parametrize("frame", [I3, rb.exp_so3([0.3, -0.5, 0.2])])
-def test_of_two_best_curves_rounding_does_not_choose(turn, frame):
-    """From rest about the axis of the largest moment: a half-turn about it carries one into the
-    other."""
+def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
+    """Both curves start from rest about the axis of the largest moment. A half-turn about this axis
+    carries one curve into the other."""
     G, axis = frame @ BOOK @ frame.T, frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(
         lambda R1: rb.minimum_torque_so3(I3, R1, REST, REST, G), goal, turn, 4
     )
-    assert np.abs(np.cross(w, axis)).max() > 0.1  # it leaves the axis
+    assert np.abs(np.cross(w, axis)).max() > 0.1  # the curve leaves the axis
 
 
 @every_optimum
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, -0.8, 0), (-1, 1, 0), (-0.48, -0.6, 0.64)])
-def test_of_two_half_turns_rounding_does_not_choose(what, axis):
-    """From rest to rest both ways round cost the same."""
+def test_rounding_does_not_choose_between_two_half_turns(what, axis):
+    """From rest to rest, both directions cost the same."""
     half = rb.exp_so3(np.pi * np.array(axis) / np.linalg.norm(axis))
     is_the_same_however_rounded(
         lambda R1: OPTIMA[what](I3, R1, REST, REST, 2 * I3, REST, REST), half, 180, 6

@@ -1,4 +1,4 @@
-"""Any duration, and many poses: checked leg by leg against the two-point curves themselves."""
+"""Any duration, and many poses: each leg is compared with the two-point curve itself."""
 
 import re
 from functools import partial
@@ -42,9 +42,9 @@ def own_poses(leg):
 
 @every_leg
 @both_groups
-def test_a_chain_is_at_its_poses_with_joints_as_smooth_as_stated(leg, poses):
-    """The curve just before a joint, against the curve there; and the two-point curves, at times of
-    any shape. It neither changes nor reads later the arrays that it is given."""
+def test_a_chain_meets_its_poses_and_its_joints_are_as_smooth_as_stated(leg, poses):
+    """The curve just before a joint is compared with the curve at it, and legs with the two-point
+    curves at times of any shape. The chain neither changes its arguments nor reads them later."""
     poses = POSES if own_poses(leg) is POSES else poses
     given = [TIMES.copy(), poses.copy(), TWISTS[:, : 3 if poses is ROTATIONS else 6].copy()]
     if leg in WITHOUT_VELOCITIES:
@@ -63,7 +63,7 @@ def test_a_chain_is_at_its_poses_with_joints_as_smooth_as_stated(leg, poses):
     assert np.abs(c(np.nextafter(TIMES[1:], -9)) - poses[1:]).max() < 200 * EPS
     assert np.abs(c.jumps(0)).max() < 200 * EPS
     assert c([], 1).shape == (0, 3 * c.size - 6)
-    many = RNG.uniform(*c.domain, size=5000)  # in several blocks
+    many = RNG.uniform(*c.domain, size=5000)  # more than a block of times
     smooth = {rb.projected_quintic_so3: 2}.get(leg, int(velocities is not None))
     inner = TIMES[1:-1]
     for order in range(3):
@@ -87,7 +87,7 @@ def test_a_chain_is_at_its_poses_with_joints_as_smooth_as_stated(leg, poses):
 
 
 @every_leg
-def test_equal_neighbours_are_a_rest(leg):
+def test_a_chain_rests_between_equal_neighbours(leg):
     poses = own_poses(leg)[[0, 1, 2, 2, 3]]
     poses[3, :3, :3] @= rb.exp_so3([1e-15, 0, 0])
     c = rb.chain(range(5), poses, leg=leg)
@@ -96,10 +96,11 @@ def test_equal_neighbours_are_a_rest(leg):
 
 
 @pytest.mark.parametrize("ratio", [1, 100, 1e4])
-def test_uneven_steps_cost_no_digits_and_their_quintics_are_the_nearest_rotations(ratio):
-    """At the poses, just before them, and in the joints; a rate to eps of ‖w‖ and ‖w‖² + ‖w'‖.
+def test_uneven_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(ratio):
+    """Test rates to eps of ‖w‖ and ‖w‖² + ‖w'‖ at the poses, just before them, and in the joints.
 
-    Against 60 digits: the rounding of M, however large, over its two least eigenvalues.
+    The bound, against 60 digits, is the rounding of M, however large, over the sum of its two
+    smallest eigenvalues.
     """
     steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
     times = np.append(0, np.cumsum(steps))
@@ -122,8 +123,8 @@ def test_uneven_steps_cost_no_digits_and_their_quintics_are_the_nearest_rotation
 
 
 @both_groups
-def test_without_velocities_it_is_the_spline_that_rests_at_its_ends(poses):
-    """Its accelerations are continuous, and those of its quintics."""
+def test_a_chain_without_velocities_is_the_spline_that_rests_at_its_ends(poses):
+    """The accelerations of the chain are continuous, and equal to those of its quintics."""
     rest = np.zeros(3 if poses is ROTATIONS else 6)
     c, chosen = rb.chain(TIMES, poses), rb.spline_velocities(TIMES, poses, (rest, rest))
     assert np.abs(c(TIMES, 1) - chosen).max() < 400 * EPS
@@ -134,10 +135,11 @@ def test_without_velocities_it_is_the_spline_that_rests_at_its_ends(poses):
     assert np.abs(quintic(TIMES[[0, -1]], 2)).max() < 1e-12
 
 
-def test_own_functions_make_legs():
-    """Also partial ones, and those whose curves are many paths and one rotation.
+def test_user_defined_functions_make_legs():
+    """A leg may be a partial function, or make many paths with one rotation.
 
-    The origin has as many ends as they ask for: with an acceleration a quintic, else a cubic.
+    A function that takes an acceleration gets a quintic for the origin; other functions get a
+    cubic.
     """
     t = np.linspace(*TIMES[[0, -1]], 50)
     for same, turn in (
@@ -156,7 +158,7 @@ def test_own_functions_make_legs():
         return rigid_motion(RigidMotion, turn, A0[:, :3, 3], A1[:, :3, 3])
 
     c = rb.chain(TIMES, POSES, leg=slow)
-    assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # its turn rests at each pose
+    assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # the rotation rests at each pose
     assert np.abs(c(TIMES[2] + 0.3 * H[2])[:3, :3] - slow(*ROTATIONS[2:4])(0.3)).max() < 40 * EPS
     frozen = partial(rb.projected_line_so3, f=lambda t, k: [t, 1 + 0 * t][k])
     assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
@@ -200,7 +202,7 @@ def turned_by(w):
         (ROTATIONS, lambda w0, **T: rb.bezier_so3(*HALF_TURN, w0 + 9, w0, **T), "w0[0]: a norm"),
     ],
 )
-def test_no_leg_is_refused(poses, leg, message):
+def test_functions_that_do_not_make_legs_are_refused(poses, leg, message):
     with pytest.raises(ValueError, match=f"^leg: {re.escape(message)}"):
         rb.chain([0, 1, 2], poses[:3], leg=leg)
 
@@ -249,8 +251,8 @@ def test_bad_paths_velocities_times_and_durations_are_refused(function, argument
         function(*arguments)
 
 
-def test_a_leg_that_is_lost_is_named():
-    """Velocities for which the cubic through a turn of 2 rad is of rank 1 in its middle."""
+def test_the_error_names_the_leg_that_is_singular_or_not_found():
+    """With the velocities, the cubic through a turn of 2 rad has rank 1 in its middle."""
     turn = np.array([0, 0, 2.0])
     R = rb.exp_so3([[0, 0, 0], -turn / 2, turn / 2])
     w = -4 / np.tan(1) * np.array([[0, 0, 0], [0, 0, 1], [0, 0, 1]])
@@ -267,14 +269,14 @@ def test_a_leg_that_is_lost_is_named():
 
 
 @pytest.mark.parametrize("duration", [1e-9, 0.25, 3, 1e12])
-def test_retimed_chains_are_run_through_evenly(duration):
+def test_retimed_chains_have_uniformly_scaled_times(duration):
     c = rb.chain(TIMES, POSES)
     again, (first, last) = rb.retime(c, duration), c.domain
     start, end = again.domain
     assert (start, end) == (first, first + duration)
     rate = (last - first) / duration
     t = np.minimum(start + np.linspace(0, 1, 7) * (end - start), end)
-    tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # its times are rounded
+    tolerance = 1e-9 + 20 * np.spacing(abs(start)) / duration  # the times are rounded
     for order in range(3):
         want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
         assert np.abs(again(t, order) - want).max() <= tolerance * np.abs(want).max()
@@ -285,8 +287,8 @@ def test_retimed_chains_are_run_through_evenly(duration):
     assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
 
 
-def test_a_chain_whose_velocity_jumps_has_no_cost():
-    """Also by little, in the turning alone, beside fast motion."""
+def test_the_cost_of_a_chain_whose_velocity_jumps_raises_an_error():
+    """The second chain has a small jump of the angular velocity alone, beside fast motion."""
 
     def uneven(R0, R1, w0, w1, duration):
         return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
@@ -300,8 +302,9 @@ def test_a_chain_whose_velocity_jumps_has_no_cost():
     assert 0 < rb.acceleration_cost(stops) < np.inf
 
 
-def test_far_from_the_origin_it_is_the_same_motion():
-    """Eastings and northings at 1 kHz, slow: no rests, no jumps, and a cost."""
+def test_a_chain_far_from_the_origin_is_the_same_motion():
+    """A slow motion in eastings and northings, sampled at 1 kHz, has no rests and no jumps, and has
+    a cost."""
     t = np.arange(60) / 1000
     here = rb.pose_from_coordinates(t[:, None] * [0, 0, 4e-3, 4e-3, 0, 0])
     far = here.copy()
@@ -317,8 +320,8 @@ def test_far_from_the_origin_it_is_the_same_motion():
     assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
 
 
-def test_a_dwell_is_a_rest_wherever_it_is_seen_from_and_near_neighbours_are_none():
-    """Poses that differ only by the rounding of their products, also at the origin of the frame."""
+def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
+    """Equal poses may differ by the rounding of their products, also at the origin of the frame."""
     stay = POSES[[0, 1, 1, 2]]
     for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
         seen = frame @ stay
@@ -331,9 +334,9 @@ def test_a_dwell_is_a_rest_wherever_it_is_seen_from_and_near_neighbours_are_none
     assert np.abs(rb.log_so3(rb.chain([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
 
 
-def test_bessels_velocities_are_those_of_the_parabola_through_three():
-    """Of R_i exp(x(t)), x through the logarithms of the neighbours; and of d. Moved poses have
-    moved velocities."""
+def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
+    """One parabola x(t) passes through the logarithms of the neighbours, for R_i exp(x(t)); another
+    one passes through d. Moved poses have moved velocities."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)
@@ -346,5 +349,5 @@ def test_bessels_velocities_are_those_of_the_parabola_through_three():
         assert np.abs(chosen[i, 3:] - ROTATIONS[i].T @ slope[3:]).max() < 200 * EPS
     A = rb.pose_from_coordinates([0.4, -1, 2, 3, 1, 5])
     assert np.abs(rb.bessel_velocities(TIMES, A @ POSES) - chosen).max() < 200 * EPS
-    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # of two poses the constant one
+    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # for two poses, the constant velocity
     assert np.abs(w - oracles.log_so3(ROTATIONS[0].T @ ROTATIONS[1]) / 2).max() < 10 * EPS

@@ -26,7 +26,7 @@ def hat(S):
 
 
 @pytest.mark.source("RR 3.1", "RR 3.2")
-def test_matrices_carry_points_into_the_world_and_have_products_inverses_and_poses():
+def test_matrices_carry_points_into_the_world_and_agree_with_products_and_inverses():
     A, (x, y, theta) = planar.matrix_from_planar(POSES), POSES.T
     for point in (1, 1j, 2 - 3j):
         moved = x + 1j * y + np.exp(1j * theta) * point
@@ -45,10 +45,10 @@ def test_matrices_carry_points_into_the_world_and_have_products_inverses_and_pos
     for pose, want in ((product, A @ A[::-1]), (inverse, np.linalg.inv(A))):
         assert np.abs(planar.matrix_from_planar(pose) - want).max() < 32 * EPS
     assert np.abs(planar.compose_planar(POSES, inverse)).max() < 32 * EPS
-    assert np.array_equal(product[:, 2], theta + theta[::-1])  # full turns count
+    assert np.array_equal(product[:, 2], theta + theta[::-1])  # full turns are kept
 
 
-def test_of_a_matrix_that_is_no_pose_the_nearest_rotation_counts():
+def test_the_nearest_rotation_replaces_a_matrix_that_is_not_a_rotation():
     blocks = RNG.normal(size=(50, 2, 2))
     poses = planar.planar_from_matrix(np.pad(blocks, ((0, 0), (0, 1), (0, 1))))
     nearest = planar.matrix_from_planar(poses)[:, :2, :2]
@@ -60,8 +60,9 @@ def test_of_a_matrix_that_is_no_pose_the_nearest_rotation_counts():
 
 
 @pytest.mark.source("RR 3.2")
-def test_the_exponential_is_that_of_the_matrix_and_of_space():
-    """Of small twists SciPy's too; its error grows with the twist, to 5e-14 here."""
+def test_the_exponential_agrees_with_that_of_the_matrix_and_with_exp_se3():
+    """For small twists it also agrees with SciPy, whose error grows with the twist, to 5e-14
+    here."""
     ours = planar.exp_planar(TWISTS)
     assert np.array_equal(ours[:, 2], TWISTS[:, 2])
     in_space = np.insert(TWISTS[:, [2, 0, 1]], [0, 0, 3], 0, axis=1)
@@ -73,11 +74,11 @@ def test_the_exponential_is_that_of_the_matrix_and_of_space():
         assert np.abs(planar.matrix_from_planar(pose) - exact).max() < tolerance, twists
 
 
-def test_the_logarithm_undoes_the_exponential_but_for_full_turns():
+def test_the_logarithm_undoes_the_exponential_except_for_full_turns():
     short = TWISTS[np.abs(TWISTS[:, 2]) <= np.pi]
     assert np.abs(planar.log_planar(planar.exp_planar(short)) - short).max() < 32 * EPS
     assert np.array_equal(planar.log_planar([1, 2, 0]), [1, 2, 0])
-    assert np.array_equal(planar.log_planar(short)[:, 2], short[:, 2])  # ±π are among them
+    assert np.array_equal(planar.log_planar(short)[:, 2], short[:, 2])  # these include ±π
     many = np.array([[1, 2, w] for w in (*(np.arange(-41, 42) * np.pi), 1e6, -2.3e6, 1e15)])
     twists = planar.log_planar(many)
     assert np.abs(twists[:, 2]).max() <= np.pi
@@ -95,11 +96,11 @@ def test_poses_are_blended_evenly_with_exact_ends(steps):
     for ends in ((start, goal), (goal, start)):
         assert np.array_equal(planar.interpolate_planar(*ends, steps)[[0, -1]], ends)
     turned = planar.interpolate_planar(POSES, np.add(POSES, [0, 0, 5]), steps)
-    assert (turned[..., :2] == POSES[:, :2]).all()  # exactly equal places stay so
+    assert (turned[..., :2] == POSES[:, :2]).all()  # exactly equal places stay equal
 
 
 @pytest.mark.source("RR (16)")
-def test_the_short_way_turns_by_half_a_turn_at_most():
+def test_the_short_way_turns_by_at_most_half_a_turn():
     def short(start, goal, steps=1):
         return planar.interpolate_planar(start, goal, steps, shortest=True)
 
@@ -110,14 +111,14 @@ def test_the_short_way_turns_by_half_a_turn_at_most():
         ends = [[5, 6, 1 + delta + 2 * np.pi * turns] for turns in (-3, 0, 2)]
         path = short([0, 0, 1], ends)
         assert np.abs(path - [[[0, 0, 1]], [[5, 6, 1 + delta]]]).max() < 32 * EPS
-    start, goal = POSES[:, None] * [1, 1, 0.3], POSES * [1, 1, 0.3]  # the way is short already
+    start, goal = POSES[:, None] * [1, 1, 0.3], POSES * [1, 1, 0.3]  # the path is short already
     assert np.array_equal(short(start, goal)[1], np.broadcast_to(goal, (200, 200, 3)))
     for angle in (1, -1, np.pi, -np.pi):
         assert short([0, 0, 0], [1, 2, angle])[-1, 2] == angle
 
 
 @pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
-def test_a_command_adds_in_the_world_and_is_a_constant_twist_in_the_body():
+def test_a_command_adds_in_the_world_frame_and_is_a_constant_twist_in_the_body_frame():
     added, A = [POSES[0]], [planar.matrix_from_planar(POSES[0])]
     for velocity, duration in PLAN:
         added.append(added[-1] + np.array(velocity) * duration)
@@ -131,7 +132,7 @@ def test_a_command_adds_in_the_world_and_is_a_constant_twist_in_the_body():
 
 @pytest.mark.source("RR 3.2")
 @both_frames
-def test_stacks_follow_a_plan_and_the_plan_undone_leads_back(frame):
+def test_stacks_follow_a_plan_and_the_reversed_plan_leads_back(frame):
     plan = [(np.array(v, float), d) for v, d in PLAN]
     there = planar.propagate_planar(POSES.reshape(4, 50, 3), plan, frame=frame)
     one = planar.propagate_planar(POSES[57], PLAN, frame=frame)
@@ -156,12 +157,12 @@ def test_stacks_follow_a_plan_and_the_plan_undone_leads_back(frame):
         (ORIGIN, [("abc", 1)], "plan[0] velocity: real numbers are wanted"),
     ],
 )
-def test_bad_starts_and_malformed_plans_are_named(frame, start, plan, message):
+def test_bad_starts_and_malformed_plans_are_refused(frame, start, plan, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         planar.propagate_planar(start, plan, frame=frame)
 
 
-def test_other_frames_and_bad_steps_are_refused():
+def test_unknown_frames_and_bad_steps_are_refused():
     with pytest.raises(ValueError, match=r"^frame: 'world' or 'body' is wanted, got 'World'"):
         planar.propagate_planar([0, 0, 0], PLAN, frame="World")
     for steps in (0, -3, 2.5, True, "10"):

@@ -1,4 +1,4 @@
-"""Projected cubics and quintics, and the polynomials that they are projections of."""
+"""Projected cubics and quintics, and the polynomials of which they are projections."""
 
 import numpy as np
 import oracles
@@ -22,7 +22,7 @@ PRINTED = [R0, V0, -3 * R0 + 3 * R1 - 2 * V0 - V1, 2 * R0 - 2 * R1 + V0 + V1]
 
 
 def cubic_of_matrices(t):
-    """M(t), with the coefficients that BK 6.2 prints."""
+    """Return M(t), with the coefficients that BK 6.2 prints."""
     return sum(M * t[:, None, None, None] ** k for k, M in enumerate(PRINTED))
 
 
@@ -32,7 +32,7 @@ def gaps(t):
 
 @pytest.mark.source("BK 6", "BK 6.2", "BK Prop. 2")
 def test_the_cubic_is_projected_to_the_nearest_rotation():
-    """The curve is right and smooth also where the determinant of M is negative."""
+    """The projected curve is correct and smooth even where the determinant of M is negative."""
     R, M = CUBICS(TIMES), cubic_of_matrices(TIMES)
     S = R.mT @ M
     scale = np.linalg.norm(CUBICS.ends, axis=(-2, -1)).sum(axis=-1)
@@ -50,8 +50,8 @@ def test_the_cubic_is_projected_to_the_nearest_rotation():
 
 
 @pytest.mark.source("BK 6.2", "errata 11")
-def test_the_ends_are_met_to_their_rounding_and_the_printed_ones_are_not():
-    """The second derivative at the end is not the one that is prescribed; and R0 ŵ0 is singular."""
+def test_the_end_conditions_hold_to_rounding_and_the_printed_ones_do_not():
+    """The printed second derivative at the end is not the prescribed one, and R0 ŵ0 is singular."""
     for curve in (CUBICS, QUINTICS):
         scale = np.linalg.norm(curve.ends, axis=(-2, -1)).sum(axis=-1)[:, None]
         for t, R, w, a in ((0, R0, W0, B0), (1, R1, W1, B1)):
@@ -63,8 +63,8 @@ def test_the_ends_are_met_to_their_rounding_and_the_printed_ones_are_not():
     assert np.abs(np.linalg.det(V0)).max() < 1e-13 * 64
 
 
-def test_the_quintic_is_not_of_least_jerk():
-    """About one axis least jerk is a quintic in the angle: 720 angle² from rest to rest."""
+def test_the_quintic_does_not_have_least_jerk():
+    """About one axis the least jerk is a quintic in the angle, 720 angle² from rest to rest."""
     t = np.linspace(0, 1, 4001)
     for degrees, times in ((20, 1.002), (60, 1.17), (90, 2.31), (120, 11.56)):
         angle = np.radians(degrees)
@@ -74,8 +74,8 @@ def test_the_quintic_is_not_of_least_jerk():
 
 
 @pytest.mark.source("BK 6.1")
-def test_the_projected_line_has_the_ends_of_a_cubic_and_a_quintic_that_project_to_it():
-    """They are the line times a positive number ρ(t), which the projection does not see."""
+def test_a_cubic_and_a_quintic_with_the_ends_of_the_projected_line_project_to_it():
+    """Both polynomials are the line times a positive number ρ(t), which the projection ignores."""
     line = rb.projected_line_so3(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
     ends = [line(t, order) for order in (0, 1, 2) for t in (0, 1)]
     for curve in (rb.projected_cubic_so3(*ends[:4]), rb.projected_quintic_so3(*ends)):
@@ -85,7 +85,7 @@ def test_the_projected_line_has_the_ends_of_a_cubic_and_a_quintic_that_project_t
 
 @pytest.mark.source("BK Prop. 3", "BK Prop. 5")
 def test_moved_and_reversed_ends_give_the_moved_and_reversed_curve():
-    """Moved from both sides. The bound is the claim, 1e-12 over the margin."""
+    """Ends are moved from both sides. The bound is the documented one, 1e-12 over the margin."""
     L, Q = Rotation.random(2, rng=5).as_matrix()
     ends, rates = (L @ R0 @ Q, L @ R1 @ Q), np.array([W0, W1, B0, B1]) @ Q
     for moved, curve, want in (
@@ -107,11 +107,11 @@ def test_the_margin_is_the_least_gap():
 @pytest.mark.parametrize("k", [40, 45, 50, 50.05, 55])
 @pytest.mark.parametrize("k1", [5, 40])
 def test_a_jump_between_the_sampled_times_is_found(k, k1):
-    """Half way between two of 65 times, and of 129 too, and elsewhere; about one axis.
+    """Jumps about one axis are at and off the midpoints between 65 sampled times, and between 129.
 
-    The cubic is there a complex number z with z(0) = 1, z'(0) = i k0, z(1) = exp(ia) and
-    z'(1) = i k1 exp(ia). With Hermite's basis, z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0
-    fixes k0 and a.
+    The cubic is then a complex number z with z(0) = 1, z'(0) = i k0, z(1) = exp(ia) and z'(1) = i
+    k1 exp(ia). With Hermite's basis, z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0
+    determines k0 and a.
     """
     h00, h01, h10, h11 = (hermite(one, np.array((k + 0.25) / 64)) for one in np.eye(4))
     k0 = np.sqrt(h01**2 + (k1 * h11) ** 2 - h00**2) / h10
@@ -124,7 +124,8 @@ def test_a_jump_between_the_sampled_times_is_found(k, k1):
 @pytest.mark.source("BK 6.2")
 @pytest.mark.parametrize("count", [2, 4, 6])
 def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count):
-    """However its ends differ in size; where little changes without cancellation."""
+    """The ends may have very different sizes, and small changes are computed without
+    cancellation."""
     given, t = RNG.normal(size=(6, 5))[:count], np.linspace(0, 1, 21)
     want = np.array([oracles.polynomial_through(given, x) for x in t])
     scale = np.abs(given).sum(axis=0)
@@ -147,8 +148,8 @@ def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count)
 
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.source("BK 6")
-def test_the_polynomial_is_optimal(count):
-    """The derivative that counts is orthogonal to that of any change which keeps the ends."""
+def test_the_polynomial_minimises_its_cost(count):
+    """The derivative in the cost is orthogonal to that of any change that keeps the ends."""
     ends, order = RNG.normal(size=count), count // 2
     t = (1 + np.cos(np.pi * np.arange(9) / 8)) / 2
     best = Polynomial.fit(t, hermite(ends, t), count - 1).convert().deriv(order)

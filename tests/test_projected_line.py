@@ -18,13 +18,13 @@ def test_theta_and_f_and_their_derivatives_are_the_printed_ones(name, order):
     want = np.vectorize(getattr(oracles, name))(*grid, order)
     off = np.abs(getattr(line, name)(*grid, order) - want)
     scale = np.abs(want)
-    if (name, order) == ("theta", 3):  # a difference: relative to its terms
+    if (name, order) == ("theta", 3):  # a difference, whose error is relative to its terms
         scale += 4 * line.theta(*grid, 2) ** 2 / line.theta(*grid, 1)
     assert np.all(off <= (2 * EPS if (name, order) == ("theta", 0) else 8 * EPS * scale + 1e-60))
 
 
 @pytest.mark.source("BK Cor. 2")
-def test_theta_undoes_f():
+def test_theta_is_the_inverse_of_f():
     t, angle = GRID
     error = np.abs(line.theta(line.f(t, angle), angle) - t)
     assert np.all(error <= 4 * EPS * np.maximum(1, 2 * np.tan(angle / 2) / angle))
@@ -33,7 +33,8 @@ def test_theta_undoes_f():
 
 @pytest.mark.source("BK (16)", "BK Cor. 1", "BK Cor. 2", "errata 8", "errata 9", "errata 10")
 def test_the_printed_formulas_for_theta_its_derivative_and_f_do_not_hold():
-    """atan2 has its arguments exchanged, θ' lacks a square, and f an angle on the right."""
+    """The arguments of atan2 are exchanged, θ' lacks a square, and f lacks an angle on the
+    right."""
     angle, t = 2.0, 0.15
     cosine, sine = 1 - t + t * np.cos(angle), t * np.sin(angle)
     assert abs(np.arctan2(sine, cosine) / angle - line.theta(t, angle)) < 2 * EPS
@@ -49,7 +50,7 @@ def test_the_printed_formulas_for_theta_its_derivative_and_f_do_not_hold():
 
 
 @pytest.mark.source("BK (17)")
-def test_the_singular_values_of_the_line():
+def test_the_singular_values_of_the_line_agree_with_the_printed_formula():
     want = np.vectorize(oracles.line_singular_value)(*GRID)
     assert np.all(np.abs(line.line_singular_value(*GRID) - want) <= 4 * EPS * want)
     for angle in (1e-6, 1.0, 3.0):
@@ -59,7 +60,7 @@ def test_the_singular_values_of_the_line():
 
 
 def printed_eigenvectors(w):
-    """The second and the third; the first is along w."""
+    """Return the second and the third printed eigenvector; the first is along w."""
     x, y, z = w
     second, third = np.array([-z, 0, x]), np.array([-y * x, z**2 + x**2, -z * y])
     size = np.sqrt(y**2 * x**2 + (z**2 + x**2) ** 2 + z**2 * y**2)
@@ -71,7 +72,7 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
     w, x = np.array([0.3, -1.2, 0.8]), 0.3
     a, W, R2, I3 = np.linalg.norm(w), rb.hat_so3(w), oracles.exp_so3(w), np.eye(3)
     N = 2 * I3 - R2 - R2.T
-    printed = (1 - np.cos(a)) / a**2 * (W @ W + (W @ W).T)  # the sign of N
+    printed = (1 - np.cos(a)) / a**2 * (W @ W + (W @ W).T)  # the printed sign of N
     assert np.abs(N + printed).max() < 8 * EPS
     assert np.abs(N - printed).max() > 1
     s = oracles.line_singular_value(x, a)
@@ -79,12 +80,12 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
     projected = oracles.exp_so3(w * oracles.theta(x, a))
     holds = I3 + W / a * g2 + (1 - g1) * W @ W / a**2
     assert np.abs(holds - projected).max() < 8 * EPS
-    for unit in (I3, np.ones((3, 3))):  # either reading of a number plus a matrix
+    for unit in (I3, np.ones((3, 3))):  # two readings of a number plus a matrix
         printed = I3 + W / a * g2 + (1 - g1) * unit + W @ W / a**2
         assert np.abs(printed - projected).max() > 0.1
     pairs = [(w, printed_eigenvectors(w))]
     along_y, turn = np.array([0, 1.2, 0]), oracles.exp_so3([0, 0.7, 0])
-    with np.errstate(invalid="ignore"):  # undefined, where any pair serves
+    with np.errstate(invalid="ignore"):  # not defined along y, where any pair is valid
         assert np.isnan(printed_eigenvectors(along_y)).any(axis=1).all()
     pairs += [(along_y, I3[[0, 2]]), (along_y, I3[[0, 2]] @ turn.T)]
     for w, across in pairs:
@@ -94,7 +95,7 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
 
 
 @pytest.mark.source("BK Prop. 6", "errata 7")
-def test_theta_leaves_the_unit_interval_where_f_does_and_far_from_the_line():
+def test_theta_leaves_the_unit_interval_outside_it_and_is_accurate_far_from_the_line():
     outside = [(-0.5, 1.0), (1.5, 1.0), (1e6, 9.99e-10), (1e10, 9.99e-10), (-1e3, 1e-6), (1e12, 3)]
     want = np.array([oracles.theta(*one) for one in outside])
     off = np.abs(line.theta(*np.transpose(outside)) - want)
@@ -102,8 +103,8 @@ def test_theta_leaves_the_unit_interval_where_f_does_and_far_from_the_line():
     assert want[0] < 0 < 1 < want[1]
 
 
-def test_angle_0_is_the_limit_and_angle_pi_the_step():
-    """Also an angle that is larger than π by rounding."""
+def test_theta_and_f_have_their_limits_at_angle_0_and_a_step_at_angle_pi():
+    """An angle may be larger than π by rounding."""
     t = awkward.LINE_TIMES
     for function in (line.theta, line.f):
         for angle in (0, 1e-310):
@@ -120,7 +121,7 @@ def test_angle_0_is_the_limit_and_angle_pi_the_step():
         assert function(0.25, np.nextafter(np.pi, 4)) == function(0.25, np.pi)
 
 
-def test_bad_angles_orders_and_times_are_named():
+def test_bad_angles_orders_and_times_are_refused():
     for one in (line.theta, line.f):
         with pytest.raises(ValueError, match=r"^angle is 3\.2, an angle in"):
             one(0.5, 3.2)

@@ -16,7 +16,7 @@ BLOCK = 5128
 
 
 def members(n, rng, count=40):
-    """Random rotations of Rⁿ, by Householder's QR."""
+    """Return random rotations of Rⁿ, by Householder's QR."""
     Q = np.linalg.qr(rng.normal(size=(count, n, n)))[0]
     Q[..., 0] *= np.linalg.det(Q)[:, None]
     return Q
@@ -29,24 +29,26 @@ def assert_members(R):
 
 
 def assert_nearest(R, M, W=None):
-    """RᵀM, or RᵀMW, symmetric, its two smallest eigenvalues sum to 0 or more: nearest."""
+    """Check that R is nearest: RᵀM, or RᵀMW, is symmetric, and its two smallest eigenvalues sum to
+    0 or more."""
     S, n = R.mT @ M, M.shape[-1]
     bound = 8 * n * EPS * np.linalg.norm(M, axis=(-2, -1))
     if W is not None:
-        S, bound = S @ W, 2 * bound * np.linalg.norm(W, axis=(-2, -1))  # M W is rounded already
+        # the product M W is already rounded
+        S, bound = S @ W, 2 * bound * np.linalg.norm(W, axis=(-2, -1))
     assert np.all(np.linalg.norm(S - S.mT, axis=(-2, -1)) <= bound)
     if n > 1:
         assert np.all(oracles.two_smallest_eigenvalues(S) >= -bound)
 
 
 def condition(M, R):
-    """‖M‖ over the sum of the two smallest eigenvalues of RᵀM: what rounding grows by."""
+    """Return ‖M‖ over the sum of the two smallest eigenvalues of RᵀM, which amplifies rounding."""
     return np.linalg.norm(M, axis=(-2, -1)) / oracles.two_smallest_eigenvalues(R.mT @ M)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
 @pytest.mark.source("BK Prop. 2", "BK Remark 6", "RR 1.4", "RR (4)", "RR (5)")
-def test_the_projection_is_a_member_and_the_nearest_at_its_distance_as_in_the_textbook(n):
+def test_the_projection_is_a_rotation_and_the_nearest_one_as_in_the_textbook(n):
     rng = np.random.default_rng(n)
     M, others = awkward.matrices(n, rng), members(n, rng)
     R = rb.project_so(M)
@@ -65,7 +67,7 @@ def test_the_projection_is_a_member_and_the_nearest_at_its_distance_as_in_the_te
 
 
 @pytest.mark.source("BK Prop. 2", "BK Remark 6", "errata 2", "errata 3")
-def test_the_printed_projection_and_distance_forget_the_sign_and_the_distance_is_its_square():
+def test_the_printed_projection_lacks_the_sign_and_the_printed_distance_is_squared():
     for M, distance in ((np.diag([3.0, 1, 1]), 2), (np.diag([3.0, 2, -1]), 3)):
         U, d, Vt = np.linalg.svd(M)
         assert np.linalg.det(U @ Vt) * np.linalg.det(M) > 0
@@ -77,7 +79,8 @@ def test_the_printed_projection_and_distance_forget_the_sign_and_the_distance_is
 
 @pytest.mark.source("BK Prop. 3", "BK 4")
 def test_projections_are_invariant_on_both_sides_or_on_the_left_only():
-    """The weighted one is invariant on both if the weight turns, Gram's and Schmidt's is not."""
+    """The weighted projection is invariant on both sides if the weight turns. Gram–Schmidt is
+    not."""
     rng = np.random.default_rng(3)
     M, L, W = rng.normal(size=(40, 3, 3)), members(3, rng), np.diag([1, 2, 5])
     R, Q = rb.project_so(M), rb.orthonormalize_gram_schmidt(M)
@@ -95,7 +98,7 @@ def test_projections_are_invariant_on_both_sides_or_on_the_left_only():
 @pytest.mark.parametrize("n", [2, 3, 4])
 @pytest.mark.source("BK 4")
 def test_the_weighted_projection_is_the_nearest_in_its_own_metric(n):
-    """For condition numbers up to 1e6, and ranks 1 and n − 1, those of a rod and of a flat body.
+    """Condition numbers are up to 1e6, and ranks include 1 (a rod) and n − 1 (a flat body).
 
     Points of a flat body that a rotation has moved determine the rotation.
     """
@@ -121,7 +124,7 @@ def test_the_weighted_projection_is_the_nearest_in_its_own_metric(n):
 
 @pytest.mark.parametrize("n", DIMENSIONS)
 @pytest.mark.source("BK 4")
-def test_gram_schmidt_leaves_a_triangle(n):
+def test_gram_schmidt_leaves_an_upper_triangular_matrix(n):
     rng = np.random.default_rng(n)
     M = np.concatenate([rng.normal(size=(40, n, n)), members(n, rng)])
     nearly_flat = members(n, rng) * ([1.0] * (n - 1) + [1e-12]) @ members(n, rng)
@@ -157,15 +160,16 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
     assert np.abs(R[np.triu_indices(3)] - printed).max() < 1e-8
     assert_nearest(R, M)
     assert np.linalg.matrix_rank(M) == 2
-    assert oracles.two_smallest_eigenvalues((R.T @ M)[None]) > 1  # so there is no other
+    # the nearest rotation is thus unique
+    assert oracles.two_smallest_eigenvalues((R.T @ M)[None]) > 1
 
 
 @pytest.mark.source("BK 5", "BK Prop. 4", "BK Prop. 5", "RR 1.6", "errata 16")
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_the_nearest_pose_is_the_nearest_and_keeps_the_translation(n):
-    """It is invariant under poses on the left, on the right under rotations only.
+    """The projection is invariant under poses on the left, but only under rotations on the right.
 
-    tr(AᵀA) is n + 1 + dᵀd, where the paper prints 4 + dᵀd.
+    tr(AᵀA) is n + 1 + dᵀd. The paper prints 4 + dᵀd.
     """
     rng = np.random.default_rng(n)
     B = np.eye(n + 1) + 0.3 * rng.normal(size=(40, n + 1, n + 1))
@@ -207,7 +211,8 @@ def test_membership_allows_defects_up_to_1e_9_or_atol():
     assert np.array_equal(is_unit(np.outer([1.009, 1.011], np.eye(4)[0]), 0.01), [True, False])
     for share, passes in ((0.98, True), (1.02, False)):
         longer = 1 + share * 1e-9
-        stretched = np.diag([longer**0.5, 1 / longer**0.5, 1])  # det 1, defect of MᵀM as wanted
+        # the determinant is 1, and MᵀM has the wanted defect
+        stretched = np.diag([longer**0.5, 1 / longer**0.5, 1])
         assert is_so(stretched) == passes
         assert is_se(rb.pose_from_components(stretched, [1, 2, 3])) == passes
         assert is_unit([longer, 0, 0, 0]) == passes
@@ -222,7 +227,7 @@ def test_membership_allows_defects_up_to_1e_9_or_atol():
                 is_member(one, atol)
 
 
-def test_of_many_matrices_the_first_that_is_not_finite_is_named():
+def test_the_error_names_the_first_matrix_that_is_not_finite():
     M = np.random.default_rng(9).normal(size=(3 * BLOCK, 3, 3))
     for value in (np.nan, np.inf, -np.inf):
         M[777, 1, 2] = M[778, 0, 0] = M[-1, 2, 2] = value
@@ -232,7 +237,7 @@ def test_of_many_matrices_the_first_that_is_not_finite_is_named():
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_arrays_of_any_kind_and_layout_are_read(n):
+def test_arrays_of_any_type_and_memory_layout_are_accepted(n):
     M = np.random.default_rng(n).integers(-9, 10, size=(6, 5, n, n)).astype(float)
     R, wide = rb.project_so(M), np.zeros((12, 5, n + 1, 2 * n))
     wide[::-2, ::-1, 1:, ::2] = M
@@ -277,7 +282,7 @@ def by_foam(M):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.source("BK Prop. 2")
-def test_foam_is_right_far_from_the_singular_set_and_not_worse_than_the_svd(kind):
+def test_foam_is_accurate_far_from_the_singular_set_and_no_worse_than_the_svd(kind):
     M = KINDS[kind]
     want = np.array([oracles.nearest_rotation(m) for m in M])
     off, svd_off = (np.abs(R - want).max() for R in (rb.project_so(M), textbook.project_so(M)))
@@ -299,8 +304,9 @@ def test_foam_projects_every_matrix_of_a_stack():
 
 
 @pytest.mark.source("BK Prop. 2")
-def test_in_a_stack_of_blocks_each_matrix_gets_the_projection_that_it_gets_alone():
-    """Also near the singular set, and beside matrices that are extreme or of rank 1 or 0."""
+def test_matrices_in_a_stack_of_blocks_have_the_same_projections_as_alone():
+    """Some matrices are near the singular set, and some neighbours are extreme or of rank 1 or
+    0."""
     rng = np.random.default_rng(10)
     kinds = [*KINDS.values(), np.ones((1, 3, 3)), 1e200 * np.ones((1, 3, 3))]
     kinds += [factor * KINDS["noisy"] for factor in (-1, 2.0**900, 2.0**-900, 1e150, 1e-150)]
@@ -317,7 +323,7 @@ def test_in_a_stack_of_blocks_each_matrix_gets_the_projection_that_it_gets_alone
 
 @pytest.mark.source("BK 4")
 @pytest.mark.parametrize("power", [-1000, -300, -40, -1, 1, 40, 300, 1020])
-def test_powers_of_two_change_no_bit(power):
+def test_scaling_by_powers_of_two_does_not_change_any_bit(power):
     M = np.concatenate([M[:10] for M in KINDS.values()])
     for some in (M, *M[:20]):
         assert np.array_equal(rb.project_so(some), rb.project_so(np.ldexp(some, power)))

@@ -14,7 +14,7 @@ ONE = np.array([1.0, 0, 0, 0])
 
 
 @pytest.mark.source("RR 2.2")
-def test_multiplication_has_hamiltons_rules_and_turns_points_as_scipy_does():
+def test_multiplication_follows_hamiltons_rules_and_rotates_points_as_scipy_does():
     one, i, j, k = np.eye(4)
     assert np.array_equal(rb.quaternion_multiply([i, j, k], [i, j, k]), [-one] * 3)
     for a, b, c in [(i, j, k), (j, k, i), (k, i, j)]:
@@ -43,7 +43,7 @@ def test_the_nearest_unit_quaternion_has_the_same_direction():
             rb.project_quaternion(zero)
 
 
-def test_one_of_q_and_minus_q_is_canonical_and_only_rounding_counts_as_a_half_turn():
+def test_q_and_minus_q_have_one_canonical_form_and_half_turns_are_recognised_up_to_rounding():
     for q in (RANDOM, awkward.quaternions(), np.insert(awkward.half_turns()[1], 0, 0, axis=1)):
         one = canonical_quaternion(q)
         assert np.array_equal(canonical_quaternion(-q), one)
@@ -51,7 +51,8 @@ def test_one_of_q_and_minus_q_is_canonical_and_only_rounding_counts_as_a_half_tu
         assert np.abs(np.abs(one) - np.abs(q)).max() < 4 * EPS
         assert np.all(one[:, 0] >= 0)
     for off, first in [(0, True), (1e-9, True), (-1e-9, True), (1e-7, False)]:
-        q = rb.project_quaternion([0, -1, 1 + off, 0.3])  # of two largest the first decides
+        # of two largest components, the first decides
+        q = rb.project_quaternion([0, -1, 1 + off, 0.3])
         assert (canonical_quaternion(q)[1] > 0) is np.bool_(first)
     for off in (1e-9, 1e-12, 1e-14):
         q = np.array([-off, 0.8, 0.6, 0])
@@ -60,7 +61,7 @@ def test_one_of_q_and_minus_q_is_canonical_and_only_rounding_counts_as_a_half_tu
 
 
 @pytest.mark.source("BK Remark 7")
-def test_slerps_are_the_two_arcs_of_mpmath_and_the_formula_of_the_paper():
+def test_slerps_agree_with_the_arcs_of_mpmath_and_the_formula_of_the_paper():
     """The long way ends at −q1: its arc in R⁴ is longer than a quarter circle."""
     for start in (RANDOM[0], ONE):
         for turn in awkward.quaternions()[::7]:
@@ -87,8 +88,9 @@ def test_slerps_are_the_two_arcs_of_mpmath_and_the_formula_of_the_paper():
                 slerp(q0, bad, 0)
 
 
-def test_slerps_near_their_singular_sets():
-    """Equal rotations, and half-turns: there q1 decides, and only rounding counts as one."""
+def test_slerps_are_accurate_near_their_singular_sets():
+    """The singular sets are equal rotations and half-turns. Between half-turns, q1 decides on the
+    arc, and only rounding errors count as a half-turn."""
     near = rb.slerp(ONE, [1, 1e-12, 0, 0], 0.25)
     assert abs(near[1] / 0.25e-12 - 1) < 4 * EPS
     for goal in (ONE, -ONE, [1, 1e-17, 0, 0]):
@@ -96,7 +98,7 @@ def test_slerps_near_their_singular_sets():
             slerp_long(ONE, [[0, 1, 0, 0], goal], 0.5)
     for angle in (1e-3, 1e-6, 1e-9):
         near = np.array([np.cos(angle), 0, np.sin(angle), 0])
-        quarter = slerp_long(ONE, near, np.pi / 2 / (np.pi - angle))  # of the circle
+        quarter = slerp_long(ONE, near, np.pi / 2 / (np.pi - angle))  # a quarter of the circle
         assert np.abs(quarter - [0, 0, -1, 0]).max() < 4 * EPS / angle
     near = [np.cos(1e-14), np.sin(1e-14), 0, 0]
     assert np.abs(slerp_long(ONE, near, 0.5) - [0, -1, 0, 0]).max() < 0.1
@@ -104,15 +106,17 @@ def test_slerps_near_their_singular_sets():
         half_turn, goal = np.array([[0, 0, sign, 0], [sign * 1e-14, 1, 0, 0]])
         assert np.abs(rb.slerp(ONE, half_turn, 0.5) - (ONE + half_turn) / 2**0.5).max() < 2 * EPS
         assert np.abs(slerp_long(ONE, half_turn, 1) + half_turn).max() < 4 * EPS
-        assert np.abs(rb.slerp(ONE, goal, 1) - sign * goal).max() < 4 * EPS  # nearly as far
+        # the arc is nearly a half-turn
+        assert np.abs(rb.slerp(ONE, goal, 1) - sign * goal).max() < 4 * EPS
         assert np.abs(slerp_long(ONE, goal, 1) + sign * goal).max() < 4 * EPS
     rounded = [-2e-16, 1, 0, 0]
     assert rb.slerp(ONE, rounded, 1)[1] > 0 > slerp_long(ONE, rounded, 1)[1]
 
 
-def test_continuous_quaternions_are_the_same_rotations_without_jumps_for_each_of_a_stack():
+def test_continuous_quaternions_are_the_same_rotations_without_jumps_in_each_member_of_a_stack():
     t, w = np.linspace(0, 4, 401), np.array([[0.3, -1, 2], [-1, 0.3, 2]])
-    q = rb.quaternion_from_matrix(rb.exp_so3(np.multiply.outer(t, w)))  # w is 0 three times
+    # w, the real part, is 0 three times
+    q = rb.quaternion_from_matrix(rb.exp_so3(np.multiply.outer(t, w)))
     before, smooth = q.copy(), rb.continuous_quaternions(q)
     assert np.array_equal(q, before)
     assert np.abs(np.diff(q, axis=0)).max() > 1

@@ -40,7 +40,7 @@ def figures_are_closed():
 
 
 def test_names_and_signatures_are_those_of_the_report():
-    """Parameters that the report does not have are keyword-only and optional."""
+    """Parameters that are not in the report are keyword-only and optional."""
     wanted = {name: words.split(", ") for words, names in SIGNATURES.items() for name in names}
     assert set(rr.__all__) == set(wanted)
     for name, words in wanted.items():
@@ -54,8 +54,8 @@ def test_names_and_signatures_are_those_of_the_report():
 
 @pytest.mark.source("RR 1.4", "RR (4)", "RR (5)", "RR Fig. 1", "errata 21")
 @pytest.mark.source("RR 1.5", "RR (6)", "RR Fig. 2", "RR 1.6", "RR Fig. 3")
-def test_the_examples_of_figures_1_to_3():
-    """Valid ones are returned as they are, as integers; the first invalid one is singular."""
+def test_the_examples_of_the_reports_figures_1_to_3():
+    """Valid arguments, of integers, are returned unchanged. The first invalid one is singular."""
     quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     valid = (rr.correct_SOn, np.eye(3)), (rr.correct_quaternion, [1, 0, 0, 0])
     for correct, given in (*valid, (rr.correct_SEn, quarter)):
@@ -88,14 +88,14 @@ def test_checks_take_epsilon_as_the_largest_defect():
         pose[0, 3], pose[3, 1] = 1e6, off
         assert rr.check_SEn(pose) is within
     assert rr.check_SOn([[1, 1e-5], [0, 1]], epsilon=1e-6) is False
-    assert rr.check_SOn([[0, 1], [1, 0]], 0.5) is False  # det −1
+    assert rr.check_SOn([[0, 1], [1, 0]], 0.5) is False  # the determinant is −1
     assert rr.check_SOn(NINE, np.inf) is True
-    assert rr.check_SOn([[1]]) is rr.check_SEn([[1, 7], [0, 1]]) is True  # of one dimension
+    assert rr.check_SOn([[1]]) is rr.check_SEn([[1, 7], [0, 1]]) is True  # in one dimension
     assert rr.check_SOn([[-1]]) is rr.check_SEn([[1]]) is False
 
 
 @pytest.mark.parametrize(("check", "correct", "good"), TRIPLES)
-def test_checks_never_raise_and_corrections_copy_or_mend(check, correct, good):
+def test_checks_never_raise_and_corrections_copy_or_project(check, correct, good):
     """Malformed and infinite arguments fail the check; valid ones are copied."""
     for thing in (
         *([], [[]], 5, None, "abc", [1, 0, 0], [[1, 0, 0], [0, 1, 0]], [[1, 0], [0]]),
@@ -123,7 +123,7 @@ def strokes_of(figure):
 
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize("quaternion", [True, False])
-def test_random_rotations_are_those_of_the_samplers_and_are_shown(quaternion):
+def test_random_rotations_are_those_of_the_samplers_and_are_drawn(quaternion):
     one = rr.random_quaternion if quaternion else rr.random_rotation_matrix
     for choice, steps in (({}, 5 if quaternion else 100), ({"naive": True}, 3)):
         naive = bool(choice)
@@ -144,7 +144,7 @@ def test_random_rotations_are_those_of_the_samplers_and_are_shown(quaternion):
 
 @pytest.mark.parametrize("function", [rb.exp_so3, rb.quaternion_from_rotation_vector])
 def test_one_rotation_is_shown_step_by_step(function):
-    """Within the tolerance the nearest one."""
+    """An argument within the tolerance is replaced by the nearest rotation."""
     turn = np.array([0.5, 1, -2])
     given = function(turn)
     off = 0.002 * np.diag([1, -1, 2]) @ given if given.ndim == 2 else 0.009 * given
@@ -160,7 +160,7 @@ def test_one_rotation_is_shown_step_by_step(function):
 @pytest.mark.source("RR 3.1", "RR (14)", "RR (15)", "RR (16)")
 @pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
 @pytest.mark.source("RR 4.1", "RR (20)", "RR (21)", "RR 4.2", "RR (22)", "RR (23)")
-def test_paths_have_ten_steps_and_plans_are_in_the_world_by_default():
+def test_paths_have_ten_steps_and_plans_are_in_the_world_frame_by_default():
     for interpolate, path in ((rr.interpolate_rigid_body, PATH), (rr.interpolate_arm, ARM_PATH)):
         for steps, options in ((10, {}), (3, {"steps": 3})):
             want = np.linspace(*path[:2], steps + 1)
@@ -181,8 +181,8 @@ def edges_of(figure):
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7", "RR 4.3", "RR Fig. 8", "RR Fig. 9")
 @pytest.mark.parametrize(("states", "pale"), [(1, [0]), (12, [0, 2, 4, 7, 9, 11])])
-def test_paths_are_shown(states, pale):
-    """Six states at most are pale; the last one is drawn over them."""
+def test_paths_of_bodies_and_arms_are_drawn(states, pale):
+    """At most six states are pale; the last state is drawn over them."""
     path, arm_path = PATH[:states], ARM_PATH[:states]
     figure, animation = rr.visualize_path(path)
     arm, arm_animation = rr.visualize_arm_path(arm_path)
@@ -206,8 +206,8 @@ def test_paths_are_shown(states, pale):
     assert np.abs(np.array(others) - joints[pale]).max() < 1e-14
 
 
-def test_of_a_long_path_forty_states_are_frames_and_the_file_is_small(tmp_path):
-    """Though the way covers the plane. So is that of a hundred random rotations."""
+def test_the_animation_of_a_long_path_has_forty_frames_and_a_small_file(tmp_path):
+    """The path covers the plane. The file of a hundred random rotations is small, too."""
     t = np.linspace(0, 1, 10_000)
     path = np.transpose([1.3 * np.cos(716.9 * t), np.sin(245.86 * t), 50 * t])
     figure, animation = rr.visualize_path(path)
@@ -219,8 +219,9 @@ def test_of_a_long_path_forty_states_are_frames_and_the_file_is_small(tmp_path):
 
 
 @pytest.mark.parametrize("place", [[1.1, 0.7], [1e14, 0]])
-def test_a_body_that_turns_on_the_spot_is_seen(place):
-    """Also if rounding moves it, after a circle; the description has no length of rounding."""
+def test_a_body_that_turns_on_the_spot_is_visible(place):
+    """Rounding may move the body after a circle; the description does not state this tiny
+    length."""
     spin = rr.interpolate_rigid_body([*place, 0], [*place, 6], steps=3)
     circle = [([2 * np.pi, 0, 2 * np.pi], 1)] * 2
     driven = rr.forward_propagate_rigid_body([*place, 0], circle, frame="body")
@@ -233,7 +234,7 @@ def test_a_body_that_turns_on_the_spot_is_seen(place):
 
 
 @pytest.mark.parametrize(("size", "far"), [(1e-6, 1000), (0.25, 1e9), (1e6, 0)])
-def test_the_rectangle_is_a_fifth_of_the_extent_and_the_words_have_the_scale(size, far):
+def test_the_rectangle_is_a_fifth_of_the_extent_and_the_description_has_its_scale(size, far):
     path = np.array([[far, 0, 0], [far + 2 * size, size, 0]])
     figure, animation = rr.visualize_path(path)
     extent = path[1, 0] - far
@@ -275,7 +276,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("function", "arguments", "message"), BAD)
-def test_bad_arguments_are_named_and_no_figure_stays_open(function, arguments, message):
+def test_bad_arguments_are_refused_and_no_figure_stays_open(function, arguments, message):
     options = arguments[-1] if isinstance(arguments[-1], dict) else {}
     with pytest.raises(ValueError, match=f"^{message}"):
         function(*(one for one in arguments if one is not options), **options)

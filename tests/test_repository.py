@@ -1,4 +1,4 @@
-"""The files round the package agree with each other, and the package works without them."""
+"""The files around the package agree with each other, and the package works without them."""
 
 import doctest
 import importlib.metadata
@@ -36,7 +36,7 @@ PINS = {
     name: [Requirement(line.partition("#")[0]) for line in lines if line[0] not in "#-"]
     for name, lines in LISTS.items()
 }
-EXTRAS = {  # of rbcourse and of rbcourse-classroom, and the list that contains them
+EXTRAS = {  # extras of rbcourse and of rbcourse-classroom, by the list that contains them
     "environment.txt": (["draw"], ["lessons"]),
     "classroom/environment-teach.txt": ([], ["grading"]),
     "classroom/environment-book.txt": ([], ["book"]),
@@ -45,7 +45,7 @@ EXTRAS = {  # of rbcourse and of rbcourse-classroom, and the list that contains 
 
 
 def ranges_of(name):
-    """The contents of a list: dependencies, and extras."""
+    """Return the requirements behind a list: dependencies, and extras."""
     wanted = []
     for project, extras in zip((PROJECT, CLASSROOM), EXTRAS[name], strict=True):
         wanted += project["dependencies"] if name == "environment.txt" else []
@@ -61,7 +61,7 @@ def read(name):
     return (ROOT / name).read_text("utf-8")
 
 
-def test_all_lists_are_exact_agree_and_the_first_one_installs_the_course_without_other_tools():
+def test_all_lists_pin_the_same_versions_and_the_first_one_has_no_tools_of_maintainers():
     versions = {}
     for name, lines in LISTS.items():
         editable = [line.split("#")[0].strip() for line in lines if line.startswith("-")]
@@ -77,8 +77,8 @@ def test_all_lists_are_exact_agree_and_the_first_one_installs_the_course_without
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_list_is_complete_and_in_the_ranges_of_its_distributions(name):
-    """Complete: what its distributions require in turn is in it, or in the lists before it."""
+def test_each_list_is_complete_and_within_the_ranges_of_its_distributions(name):
+    """A list is complete if it, or a list before it, has all direct and indirect requirements."""
     pins = {canonical(pin.name): pin for other in NAMES for pin in PINS[other]}
     there = {canonical(pin.name) for other in NAMES[: NAMES.index(name) + 1] for pin in PINS[other]}
     ranges = ranges_of(name)
@@ -91,8 +91,8 @@ def test_each_list_is_complete_and_in_the_ranges_of_its_distributions(name):
 
 
 @pytest.mark.parametrize("document", ["README.md", "docs/conventions.md", "docs/museum.md"])
-def test_examples_of_documents_run(document, tmp_path, monkeypatch):
-    """Their files are written to another folder."""
+def test_examples_in_documents_run(document, tmp_path, monkeypatch):
+    """The examples write their files to another folder."""
     monkeypatch.chdir(tmp_path)
     options = {"optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
     failed, tried = doctest.testfile(str(ROOT / document), module_relative=False, **options)
@@ -116,7 +116,7 @@ def test_binder_the_citation_and_the_licences_agree_with_the_package():
     assert "CC BY 4.0" in read("README.md")
 
 
-def test_every_file_that_the_readme_points_to_is_there():
+def test_every_file_that_the_readme_links_to_exists():
     text = re.sub("`[^`\n]+`", "", read("README.md") + read("CONTRIBUTING.md"))
     targets = re.findall(r"\]\(([^)#]+?)\)", text)
     assert targets
@@ -131,7 +131,9 @@ def test_every_file_that_the_readme_points_to_is_there():
         (["figure"], None, r"(?s).*There is no task 'figure'\. Choose from: lab, check.*"),
     ],
 )
-def test_an_old_python_and_a_wrong_task_are_named(words, version, message, monkeypatch, capsys):
+def test_an_old_python_and_an_unknown_task_are_reported(
+    words, version, message, monkeypatch, capsys
+):
     monkeypatch.setattr(sys, "argv", ["course.py", *words])
     monkeypatch.setattr(sys, "version_info", version or sys.version_info)
     with pytest.raises(SystemExit) as left:
@@ -170,7 +172,7 @@ def course_module():
 
 @pytest.fixture
 def setting_up(tmp_path, monkeypatch):
-    """course.py in a folder of its own, where set-up only records its commands."""
+    """Return course.py with a folder of its own, where set-up only records its commands."""
     module, done = course_module(), []
 
     def pretend(*command, **_):
@@ -195,7 +197,7 @@ def installed(done):
     return [command[command.index("-r") + 1 :: 2] for command in done if "-r" in command]
 
 
-def test_environments_grow_and_a_list_is_installed_once_and_again_in_place_when_it_changes(
+def test_environments_grow_and_a_list_is_installed_once_and_again_if_it_changes(
     setting_up,
 ):
     module, done = setting_up
@@ -219,7 +221,7 @@ def test_environments_grow_and_a_list_is_installed_once_and_again_in_place_when_
     ],
     ids=["the environment has changed", "its Python is gone", "it was interrupted", "it is old"],
 )
-def test_the_environment_is_made_anew_when_needed(setting_up, disturb):
+def test_the_environment_is_made_again_if_needed(setting_up, disturb):
     module, done = setting_up
     module.set_up("lessons")
     (module.VENV / "old").touch()
@@ -239,7 +241,7 @@ def test_an_environment_of_another_tool_is_left_alone(setting_up):
     assert done == []
 
 
-def test_the_environment_in_use_is_not_made_anew(setting_up, monkeypatch):
+def test_the_environment_in_use_is_not_made_again(setting_up, monkeypatch):
     module, _ = setting_up
     module.set_up("lessons")
     Path(module.python()).unlink()
@@ -249,9 +251,7 @@ def test_the_environment_in_use_is_not_made_anew(setting_up, monkeypatch):
     assert module.VENV.exists()
 
 
-def test_uv_is_fetched_by_pip_with_its_indexes_and_pip_installs_where_uv_fails(
-    setting_up, monkeypatch
-):
+def test_pip_fetches_uv_with_its_own_indexes_and_installs_if_uv_fails(setting_up, monkeypatch):
     module, done = setting_up
     monkeypatch.setattr(module, "UV", None)
     listed = "global.index-url='https://a/simple'\nglobal.extra-index-url='b\\nc'\n:env:.no='x'\n"
@@ -280,8 +280,8 @@ def test_uv_is_fetched_by_pip_with_its_indexes_and_pip_installs_where_uv_fails(
 
 
 @pytest.mark.parametrize("task", course_module().TASKS)
-def test_each_task_runs_modules_that_take_its_words(task, setting_up, tmp_path, monkeypatch):
-    """Files are those of the folder in which the command is typed."""
+def test_each_task_passes_its_arguments_to_its_modules(task, setting_up, tmp_path, monkeypatch):
+    """Relative paths start at the folder in which the command is typed."""
     module, _ = setting_up
     ran = []
     (tmp_path / "ps1.ipynb").touch()
@@ -308,7 +308,7 @@ def test_each_task_runs_modules_that_take_its_words(task, setting_up, tmp_path, 
 
 
 @pytest.mark.parametrize("which", ["oldest", "newest"])
-def test_other_releases_are_tested_in_an_environment_of_their_own(which, monkeypatch):
+def test_other_releases_are_tested_in_a_separate_environment(which, monkeypatch):
     ran = []
     monkeypatch.setattr(sys, "argv", ["releases", which, "-k", "so3"])
     monkeypatch.setattr(sys, "version_info", (3, 12))
@@ -332,7 +332,7 @@ def test_other_releases_are_tested_in_an_environment_of_their_own(which, monkeyp
 
 
 @pytest.mark.parametrize(("edit", "folder"), [(False, "work"), (True, "notebooks")])
-def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
+def test_lab_opens_the_first_lesson_without_the_extensions_for_teachers(
     edit, folder, tmp_path, monkeypatch
 ):
     copied, opened = [], []
@@ -341,7 +341,7 @@ def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
     monkeypatch.setattr(lab, "copy_lessons", lambda *paths: copied.append(paths))
     monkeypatch.setattr("jupyterlab.labapp.LabApp.launch_instance", opened.extend)
     monkeypatch.setenv("JUPYTER_CONFIG_PATH", "")
-    monkeypatch.setenv("RBCOURSE_EDIT", "")  # so that it is removed again
+    monkeypatch.setenv("RBCOURSE_EDIT", "")  # registered here, so that it is removed again
     with warnings.catch_warnings():
         lab.main()
     assert bool(copied) is not edit
@@ -362,7 +362,7 @@ def test_lab_opens_the_first_lesson_without_the_extensions_of_teachers(
     assert "invert" in Path(styles, "custom.css").read_text()
 
 
-def test_the_last_lesson_cites_what_the_citation_file_has():
+def test_the_last_lesson_agrees_with_the_citation_file():
     shown = re.sub(r"[{}]", "", read("notebooks/16_take_it_away.ipynb"))
     both, _ = read("CITATION.cff").split("- type: report")
     said = dict(re.findall(r"^\W*([a-z-]+): (.*)$", both, re.MULTILINE))
@@ -372,7 +372,7 @@ def test_the_last_lesson_cites_what_the_citation_file_has():
     assert said["title"] in shown
 
 
-def test_every_task_has_a_row_for_users_in_the_readme_or_for_maintainers_in_contributing():
+def test_every_task_is_listed_in_the_readme_or_in_contributing():
     rows = r"^\| `(?:python3 )?course\.py (\w+)"
     users, maintainers = (
         re.findall(rows, read(name), re.MULTILINE) for name in ("README.md", "CONTRIBUTING.md")
@@ -384,7 +384,7 @@ def test_every_task_has_a_row_for_users_in_the_readme_or_for_maintainers_in_cont
 
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
-    """The wheels of rbcourse and of rbcourse-classroom."""
+    """Build the wheels of rbcourse and of rbcourse-classroom; return their paths."""
     folder = tmp_path_factory.mktemp("wheels")
     code = f"from flit_core import buildapi; print(buildapi.build_wheel({str(folder)!r}))"
     words = [sys.executable, "-c", code]
@@ -395,7 +395,7 @@ def wheels(tmp_path_factory):
 
 
 def distributions_for(requirements):
-    """The installed distributions that are required, and those that these require in turn."""
+    """Return the installed distributions that are required, directly or indirectly."""
     left, asked = [(Requirement(line), {""}) for line in requirements], {}
     while left:
         requirement, extras = left.pop()
@@ -416,7 +416,7 @@ NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "
 NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
-IMPORTED = {  # the installed list, and the modules that need more
+IMPORTED = {  # the installed requirements, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),
@@ -426,9 +426,9 @@ IMPORTED = {  # the installed list, and the modules that need more
 
 @pytest.mark.parametrize("case", IMPORTED)
 def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_path, case):
-    """In an environment that has nothing else: links to the distributions, and the wheels.
+    """The environment has nothing else: links to the distributions, and the wheels.
 
-    The lines of the README run with NumPy and SciPy alone.
+    The example in the README runs with NumPy and SciPy alone.
     """
     installed, without = IMPORTED[case]
     package = case.partition("[")[0]
@@ -463,7 +463,7 @@ def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_p
         assert rows[40].startswith("2.0,2.0")
 
 
-def test_wheels_carry_types_styles_and_pages_and_nothing_else(wheels):
+def test_wheels_contain_types_styles_and_pages_and_nothing_else(wheels):
     for path, package, files in (
         (wheels[0], "rbcourse", {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"}),
         (
@@ -480,7 +480,7 @@ def test_wheels_carry_types_styles_and_pages_and_nothing_else(wheels):
         assert all(top == package or top.endswith(".dist-info") for top in tops)
 
 
-def test_tasks_and_options_that_pages_name_exist():
+def test_tasks_and_options_in_documents_exist():
     teach = "classroom/rbclassroom/book/pages/teach/index.md"
     text = "".join(map(read, ["README.md", "notebooks/assignments/README.md", teach]))
     code = "".join(path.read_text("utf-8") for path in ROOT.glob("classroom/rbclassroom/**/*.py"))

@@ -1,4 +1,4 @@
-"""Who imports from whom: one way, no circles, exported names only, and NumPy alone at first."""
+"""Imports between the parts: one direction, no cycles, exported names only, at first only NumPy."""
 
 import ast
 import importlib
@@ -20,7 +20,7 @@ PACKAGES = {
     name: Path(package.__file__).parent
     for name, package in {"rbcourse": rbcourse, "rbclassroom": rbclassroom}.items()
 }
-MAY_IMPORT = {  # the parts, beside itself, that a part of the packages may import
+MAY_IMPORT = {  # the parts, apart from itself, that a part of the packages may import
     "rbcourse": set(),
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},
@@ -64,7 +64,7 @@ LIBRARIES = {
 
 
 def modules(packages):
-    """The modules of packages by their dotted names."""
+    """Yield the modules of packages by their dotted names."""
     for package, folder in packages.items():
         for path in folder.rglob("*.py"):
             parts = path.relative_to(folder).with_suffix("").parts
@@ -77,7 +77,8 @@ def part(module):
 
 
 def imports(module, path, known):
-    """The imports of a module, also inside functions: modules of the packages, libraries."""
+    """Return the modules of the packages and the libraries that a module imports, also in
+    functions."""
     inner, outer = set(), set()
     here = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -100,14 +101,14 @@ def imports(module, path, known):
 
 
 def faults(packages):
-    """Each import that the rules forbid, as "a imports b"; and the first circle that is found."""
+    """Yield each import that the rules forbid, as "a imports b", and the first cycle."""
     known = dict(modules(packages))
     graph = {}
     for module, path in known.items():
         inner, outer = imports(module, path, known)
         graph[module], own = inner - {module}, part(module)
         for other in sorted(inner):
-            top = other == "rbcourse" and module != other  # all of the mathematics
+            top = other == "rbcourse" and module != other  # an import of all of the mathematics
             if part(other) not in {own, *MAY_IMPORT[own]} or (own == "rbcourse" and top):
                 yield f"{module} imports {other}"
         libraries = LIBRARIES["rbcourse"] | LIBRARIES[own] | set(sys.stdlib_module_names)
@@ -118,12 +119,12 @@ def faults(packages):
         yield "a circle: " + " imports ".join(reversed(error.args[1]))
 
 
-def test_imports_keep_the_rules():
+def test_imports_follow_the_rules():
     assert list(faults(PACKAGES)) == []
 
 
 def clients():
-    """The name and the text of each file that uses the package from outside."""
+    """Yield the name and the text of each file that uses the package from outside."""
     folders = PACKAGES["rbcourse"] / "draw", PACKAGES["rbclassroom"], ROOT / "benchmarks"
     for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
         yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
@@ -134,7 +135,8 @@ def clients():
 
 
 def uses(text):
-    """Each name of `rbcourse` that a text imports or reads as an attribute, with its module."""
+    """Yield each name of `rbcourse` that a text imports or reads as an attribute, with its
+    module."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -155,7 +157,7 @@ def uses(text):
 
 
 def not_exported(text):
-    """The names among `uses` that are not exported, as "module.name"."""
+    """Yield the names among `uses` that are not exported, as "module.name"."""
     for module, name in uses(text):
         if name.startswith("__"):
             continue
@@ -190,7 +192,7 @@ def test_clients_use_exported_names_only():
         ("import rbcourse as rb\nrb.files.csv_lines", ["files.csv_lines"]),
     ],
 )
-def test_a_name_that_is_not_exported_is_found(text, found):
+def test_names_that_are_not_exported_are_reported(text, found):
     assert sorted(set(not_exported(text))) == found
 
 
@@ -201,7 +203,7 @@ def test_names_in_all_exist_and_are_documented():
         assert all(hasattr(public, name) for name in public.__all__), module
 
 
-def test_import_loads_numpy_only():
+def test_importing_the_package_loads_only_numpy():
     code = """
         import sys, numpy
         before = set(sys.modules)
@@ -224,7 +226,7 @@ def test_every_public_name_is_listed_once_and_documented():
 
 
 def test_signatures_are_short_enough_to_be_read():
-    """Shift + Tab shows ArrayLike, not the types that it stands for."""
+    """Shift + Tab shows ArrayLike, not the types for which it stands."""
     for name in rbcourse.__all__:
         if inspect.isroutine(getattr(rbcourse, name)) or inspect.isclass(getattr(rbcourse, name)):
             assert "Buffer" not in str(inspect.signature(getattr(rbcourse, name))), name

@@ -23,7 +23,7 @@ CORNERS = np.array(np.meshgrid(*3 * [SHARES])).reshape(3, -1).T
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR (7)", "RR (8)", "RR (9)", "RR (13)")
-def test_draws_are_members_in_any_number_and_the_global_state_is_left_alone(sampler):
+def test_draws_are_rotations_in_any_shape_and_the_global_state_is_left_alone(sampler):
     before, core = np.random.get_state(), sampler(rng=3).shape  # noqa: NPY002
     draws = sampler(20_000, rng=1)
     defect = draws.mT @ draws - np.eye(3) if core == (3, 3) else np.linalg.norm(draws, axis=-1) - 1
@@ -43,8 +43,9 @@ def test_draws_are_members_in_any_number_and_the_global_state_is_left_alone(samp
 
 @pytest.mark.source("RR 2.1", "RR (9)", "RR (10)", "RR (11)", "RR 2.2", "RR (13)")
 @pytest.mark.parametrize("name", ["sample_rotation", "sample_quaternion"])
-def test_the_fast_draws_are_those_of_the_textbook(name):
-    """In one block and in several; the generator is left where the textbook leaves it."""
+def test_the_fast_draws_equal_those_of_the_textbook(name):
+    """The draws fill one block or several. The generator ends in the same state as the
+    textbook's."""
 
     class Given(np.random.Generator):
         def random(self, size):
@@ -61,7 +62,7 @@ def test_the_fast_draws_are_those_of_the_textbook(name):
 
 
 @pytest.mark.source("RR (9)", "RR (10)", "RR (11)", "errata 18")
-def test_the_printed_matrix_is_a_reflection_always_and_its_negative_a_rotation():
+def test_the_printed_matrix_is_always_a_reflection_and_its_negative_is_a_rotation():
     x = np.random.default_rng(2).random((500, 3))
     theta, phi, z = x.T * [[2 * np.pi], [2 * np.pi], [1]]
     V = np.array([np.cos(phi) * np.sqrt(z), np.sin(phi) * np.sqrt(z), np.sqrt(1 - z)]).T
@@ -108,7 +109,7 @@ def test_bad_arguments_are_refused():
 
 
 def test_other_processors_draw_the_same_to_rounding():
-    """NumPy told to do without the instructions that make its tangent fast."""
+    """NumPy is told not to use the instructions that make its tangent fast."""
     code = "import rbcourse as rb; print(*map(float, rb.sample_rotation(300, rng=8).ravel()))"
     slow = os.environ | {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
     done = subprocess.run(
@@ -119,7 +120,7 @@ def test_other_processors_draw_the_same_to_rounding():
 
 
 def failed(R, level=1e-8):
-    """The names of the statistics with a p-value below the level."""
+    """Return the names of the statistics with a p-value below the level."""
     return {name for name, test in uniformity_tests(R).items() if test.p_value < level}
 
 
@@ -129,7 +130,7 @@ def by_shoemake(x):
 
 @pytest.mark.source("errata 18")
 def test_uniform_rotations_pass_and_their_traces_have_the_stated_moments():
-    """Also with a column negated, of half the quaternions, and by SciPy."""
+    """SciPy's rotations, negated columns, and half of the quaternions give uniform samples, too."""
     count, rng = 50_000, np.random.default_rng(3)
     ours = rb.sample_rotation(4 * count, rng=1)
     for R in (
@@ -137,7 +138,8 @@ def test_uniform_rotations_pass_and_their_traces_have_the_stated_moments():
         rb.matrix_from_quaternion(rb.sample_quaternion(4 * count, rng=1)),
         Rotation.random(count, rng=3).as_matrix(),
         ours[:count] @ np.diag([1, -1, -1]),
-        by_shoemake(rng.random((count, 3)) * [1, 0.5, 1]),  # q and −q are one rotation
+        # half of the quaternions, since q and −q are one rotation
+        by_shoemake(rng.random((count, 3)) * [1, 0.5, 1]),
     ):
         assert failed(R) == set()
     trace = np.einsum("nii", ours)
@@ -146,8 +148,9 @@ def test_uniform_rotations_pass_and_their_traces_have_the_stated_moments():
 
 
 @pytest.mark.source("errata 17")
-def test_naive_draws_and_deliberate_faults_are_caught():
-    """Faults: an angle in [0, π), no root, one stream for two numbers, repeated draws."""
+def test_naive_draws_and_deliberate_errors_are_detected():
+    """The deliberate errors are an angle in [0, π), no root, one stream for two numbers, and
+    repeated draws."""
     naive, q = (sampler(40_000, rng=1) for sampler in NAIVE)
     for R in (naive, rb.matrix_from_quaternion(q)):
         assert failed(R, 1e-6) >= {"E tr²", "angle", "image of e₁", "image of e₃"}
@@ -161,8 +164,8 @@ def test_naive_draws_and_deliberate_faults_are_caught():
         assert failed(R) != set(), k
 
 
-def test_the_law_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions():
-    """The integral is (a − sin a)/π; its relative accuracy is a few eps/a², or that of a³/(6π)."""
+def test_the_distribution_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions():
+    """The integral is (a − sin a)/π. Its relative accuracy is a few eps/a², or that of a³/(6π)."""
     for a in (0.1, 1.0, 2.5, np.pi):
         cap, _ = quad(lambda u: np.sin(u) ** 2, 0, a / 2)
         assert angle_law(a) == pytest.approx(cap / (np.pi / 4), rel=1e-12)
@@ -173,7 +176,7 @@ def test_the_law_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions(
     assert angle_law(1e-8) == pytest.approx(1e-24 / (6 * np.pi), rel=1e-12)
 
 
-def test_the_statistics_are_those_of_scipy_and_poles_and_the_date_line_belong_to_a_cell():
+def test_the_statistics_agree_with_scipy_and_poles_and_the_date_line_are_in_a_cell():
     R = rb.sample_rotation(1000, rng=9)
     tests, trace, back = uniformity_tests(R), np.einsum("nii", R), R.mT
     for name, values, mean, variance in (("E tr", trace, 0, 1), ("E tr²", trace**2, 1, 2)):
@@ -194,7 +197,7 @@ def test_the_statistics_are_those_of_scipy_and_poles_and_the_date_line_belong_to
     nulls = [test.null for test in tests.values()]
     assert nulls[1:3] == ["normal, mean 1, sd 0.045", "Kolmogorov, n = 1000"]
     assert nulls[4:6] == ["χ², 19 degrees of freedom", "Kolmogorov, n = 500"]
-    # 40 images of e₁ at each pole and 40 on the date line: three of the 20 cells are full
+    # 40 images of e₁ are at each pole and 40 on the date line, so three of the 20 cells are full.
     up, down = np.eye(3)[[2, 1, 0]], np.eye(3)[[2, 1, 0]] * [[1], [1], [-1]]
     for sign in (0.0, -0.0):
         date_line = [[-0.8, 0, 0.6], [sign, 1, 0], [0.6, 0, 0.8]]

@@ -51,7 +51,7 @@ def test_exp_is_the_power_series_and_log_its_inverse_and_both_agree_with_scipy()
 
 
 @pytest.mark.source("BK (1)", "BK 2.1")
-def test_the_inverse_inverts_the_adjoint_carries_twists_and_they_are_velocities_in_the_body():
+def test_the_inverse_the_adjoint_and_hat_agree_with_their_definitions():
     S = RNG.normal(size=(40, 6))
     inverse = rb.inverse_se3(POSES)
     assert np.all(np.abs(POSES @ inverse - np.eye(4)) < 20 * EPS * SIZES)
@@ -63,7 +63,7 @@ def test_the_inverse_inverts_the_adjoint_carries_twists_and_they_are_velocities_
 
 
 @pytest.mark.source("BK 2.5")
-def test_coordinates_and_components_are_rotation_and_position_and_come_back():
+def test_coordinates_and_components_are_rotation_and_position_and_convert_back():
     x = rb.coordinates_from_pose(POSES)
     assert np.array_equal(x[:, :3], rb.log_so3(POSES[:, :3, :3]))
     assert np.array_equal(x[:, 3:], POSES[:, :3, 3])

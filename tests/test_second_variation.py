@@ -20,7 +20,8 @@ with mp.workdps(50):
 
 
 def stationary(what, R, ends, G=BOOK, accelerations=(REST, REST)):
-    """What Newton's method finds from rotations at its nodes; it need not be a minimum."""
+    """Return the curve that Newton's method finds from rotations at its nodes; it may be a
+    saddle."""
     one = Ends(*(np.asarray(x, float)[None] for x in ends))
     if what == "jerk":
         task = jerk(one, *(np.asarray(a, float)[None] for a in accelerations))
@@ -33,7 +34,8 @@ def stationary(what, R, ends, G=BOOK, accelerations=(REST, REST)):
 
 
 def upright(what, angle):
-    """The turn about the third axis from rest to rest, which is stationary for all of them."""
+    """Return the turn about the third axis from rest to rest, which is stationary for all
+    functionals."""
     nodes = grid(LIMITS.nodes_for_jerk if what == "jerk" else LIMITS.nodes).t
     angles = angle * np.polynomial.Polynomial(TURN.get(what, TURN["acceleration"]))(nodes)
     axis = np.array([0, 0, 1.0])
@@ -42,9 +44,9 @@ def upright(what, angle):
 
 
 def hessian(curve, count=16, nodes=41, h=2e-2):
-    """Second differences of the cost by turns η of the nodes, over the matrix of ∫ ‖η⁽ᵏ⁾‖².
+    """Return the eigenvalues of the second variation for turns η of the nodes, over ∫ ‖η⁽ᵏ⁾‖².
 
-    The cost of R exp(η̂) is found from its values at the nodes alone.
+    The second differences use only values of R exp(η̂) at the nodes.
     """
     functional, k = curve.functional, curve.functional.ends // 2
     points, weights = grid(nodes), grid(nodes).integral[-1]
@@ -71,14 +73,15 @@ def hessian(curve, count=16, nodes=41, h=2e-2):
     return np.linalg.eigvalsh(H)
 
 
-def test_the_hessian_of_the_tests_is_right_for_a_curve_at_rest():
-    """There the cost of R exp(η̂) is ∫ ‖η''‖² to second order: the identity."""
+def test_the_second_differences_are_right_for_a_curve_at_rest():
+    """At rest, the cost of R exp(η̂) is ∫ ‖η''‖² to second order, so the matrix is the identity."""
     rest = rb.minimum_acceleration_so3(I3, I3, REST, REST)
     assert hessian(rest) == pytest.approx(1, abs=1e-5)
 
 
-def test_constants_of_the_lemma():
-    """Bounds of η, clamped at both ends, by ∫ ‖η''‖²: Rayleigh quotients of polynomials."""
+def test_the_constants_of_the_lemma_are_right():
+    """The constants bound η, clamped at both ends, by ∫ ‖η''‖², as Rayleigh quotients of
+    polynomials."""
     nodes = grid(129)
     weights = nodes.integral[-1]
     eta, rate = polynomials(40, 2, 129)[:2]
@@ -91,8 +94,8 @@ def test_constants_of_the_lemma():
     assert float(mp.sqrt(SUP) / (2 * mp.pi)) == pytest.approx(float(MIXED), rel=1e-15)
 
 
-def test_the_second_variation_is_at_least_that_of_the_lemma():
-    """For 500 optima, by its spectrum on polynomials, over ∫ ‖D²η‖²."""
+def test_the_second_variation_satisfies_the_bound_of_the_lemma():
+    """Test 500 optima by the spectrum of the second variation on polynomials, over ∫ ‖D²η‖²."""
     nodes = grid(65)
     weights = nodes.integral[-1]
     eta, rate, bend = (
@@ -113,7 +116,7 @@ def test_the_second_variation_is_at_least_that_of_the_lemma():
             np.einsum("t,...tia,...tib->...ab", weights, p, q)
             for p, q in ((x_rate, x_rate), (D2, D2), (eta, C @ x))
         )
-        Q -= (P + P.mT) / 2  # + w'' · (η × x), by parts
+        Q -= (P + P.mT) / 2  # the term w'' · (η × x), by parts
         L = np.linalg.inv(np.linalg.cholesky(M))
         least = np.linalg.eigvalsh(L @ Q @ L.mT)[:, 0]
         assert np.all(least > bound)
@@ -135,8 +138,9 @@ MINIMA = [
 
 
 @pytest.mark.parametrize(("what", "degrees"), SADDLES)
-def test_a_saddle_is_no_local_minimum(what, degrees):
-    """Turns about an axis, from rest to rest: some turns of the nodes lower their costs."""
+def test_a_saddle_is_not_a_local_minimum(what, degrees):
+    """Turns about an axis from rest to rest are saddles: some turns of the nodes lower their
+    costs."""
     curve = upright(what, np.radians(degrees))
     assert curve.converged.all()
     assert hessian(curve[0])[0] < -1e-5
@@ -144,14 +148,15 @@ def test_a_saddle_is_no_local_minimum(what, degrees):
 
 
 @pytest.mark.parametrize(("what", "degrees"), MINIMA)
-def test_turns_that_are_minima_are_shown_to_be(what, degrees):
+def test_turns_that_are_minima_are_recognised(what, degrees):
     curve = upright(what, np.radians(degrees))
     assert hessian(curve[0])[0] > 1e-5
     assert rb.is_local_minimum(curve).all()
 
 
-def test_of_many_stationary_curves_the_saddles_are_told():
-    """From turns by more than a full one, with slow ends, against second differences."""
+def test_saddles_are_recognised_among_many_stationary_curves():
+    """The curves are turns by more than 360° with slow ends. Second differences of the cost show
+    which ones are saddles."""
     rng, told, least = np.random.default_rng(7), [], []
     t = grid(LIMITS.nodes).t[:, None]
     for _ in range(16):
@@ -168,7 +173,7 @@ def test_of_many_stationary_curves_the_saddles_are_told():
     assert 2 < np.sum(told) < len(told) - 2
 
 
-def test_stacks_motions_and_curves_that_were_not_found():
+def test_minima_are_recognised_in_stacks_and_motions_and_missing_curves_are_not_minima():
     ends = I3, rb.exp_so3([[0, 0, 1.0], [0, 0, 2.0]]), [[0, 1, 0], [0, 1e160, 0]], REST
     with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
         curves = rb.minimum_acceleration_so3(*ends)
@@ -181,8 +186,9 @@ def test_stacks_motions_and_curves_that_were_not_found():
         rb.is_local_minimum(rb.geodesic_so3(I3, I3))
 
 
-def test_short_costates_are_minima():
-    """‖c‖ < 2π³: by the isoperimetric inequality, docs/near_optimal.md."""
+def test_stationary_curves_with_short_costates_are_minima():
+    """Stationary curves with ‖c‖ < 2π³ are minima by the isoperimetric inequality, see
+    docs/near_optimal.md."""
     curves = rb.stationary_so3(rb.exponential_cubic_long_so3(*random_problems(200, 1.5, rng=8)))
     short = np.linalg.norm(curves.c, axis=-1) < 2 * np.pi**3
     assert short.sum() > 20

@@ -12,8 +12,9 @@ RANDOM = np.random.default_rng(3).normal(size=(100, 3))
 
 
 @pytest.mark.source("BK 2.1", "BK (2)", "errata 12")
-def test_hat_is_the_cross_product_and_the_basis_is_the_hats_of_the_axes():
-    """L_i⁰ = e_i, as printed, are vectors; and ω̂, printed as of se(3), is no 4 × 4 matrix."""
+def test_hat_is_the_cross_product_and_the_basis_consists_of_the_hats_of_the_axes():
+    """The printed L_i⁰ = e_i are vectors. The ω̂ that is printed as in se(3) is not a 4 × 4
+    matrix."""
     w, x = RANDOM[:50], RANDOM[50:]
     assert np.array_equal(np.einsum("nij,nj->ni", rb.hat_so3(w), x), np.cross(w, x))
     assert np.array_equal(rb.vee_so3(rb.hat_so3(w)), w)
@@ -45,8 +46,8 @@ def test_exp_and_log_agree_with_mpmath_and_are_inverse():
     assert np.all((off <= 4 * EPS * size) | (size >= 1e-6))
 
 
-def test_of_huge_vectors_exp_is_a_rotation_until_their_norm_overflows():
-    """About the axis: (1 − cos a)/a and (sin a)/a vanish, and n̂² + I is n nᵀ."""
+def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
+    """About the axis, (1 − cos a)/a and (sin a)/a vanish, and n̂² + I is n nᵀ."""
     n = awkward.UNIT_AXES[3]
     for length in (1e16, 1e154, 1e160, 1.7e308):
         R, J = rb.exp_so3(length * n), rb.right_jacobian_so3(length * n)
@@ -65,7 +66,7 @@ def test_of_huge_vectors_exp_is_a_rotation_until_their_norm_overflows():
 
 
 @pytest.mark.source("BK 2.5", "errata 14")
-def test_the_printed_exponential_at_R_has_its_vector_beside_the_exponent():
+def test_the_printed_exponential_at_R_has_its_vector_outside_the_exponent():
     R, w = oracles.exp_so3([0.5, -1, 2]), np.array([0.4, 0.1, -0.3])
     V = R @ rb.hat_so3(w)
     assert np.abs(R @ oracles.expm(R.T @ V) - R @ rb.exp_so3(w)).max() < 8 * EPS
@@ -74,8 +75,8 @@ def test_the_printed_exponential_at_R_has_its_vector_beside_the_exponent():
 
 
 @pytest.mark.source("BK 2.5", "BK (1)")
-def test_the_jacobian_is_its_integral_and_turns_rates_into_velocities_and_has_an_inverse():
-    """An inverse that is huge near a full turn."""
+def test_the_jacobian_is_its_integral_maps_rates_to_velocities_and_has_an_inverse():
+    """The inverse is huge near a full turn."""
     vectors = VECTORS[np.linalg.norm(VECTORS, axis=1) > 1e-13][::23]
     for w in [*vectors, [4, -3, 2]]:
         J = rb.right_jacobian_so3(w)
@@ -96,7 +97,7 @@ def test_the_jacobian_is_its_integral_and_turns_rates_into_velocities_and_has_an
 
 
 @pytest.mark.source("BK 6.1")
-def test_the_angle_between_rotations_is_scipys_and_a_distance():
+def test_the_angle_between_rotations_agrees_with_scipy_and_is_a_distance():
     R, S, T = Rotation.random(60, rng=5).as_matrix().reshape(3, 20, 3, 3)
     want = (Rotation.from_matrix(R).inv() * Rotation.from_matrix(S)).magnitude()
     assert np.abs(rb.angle_between(R, S) - want).max() < 16 * EPS

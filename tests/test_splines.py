@@ -32,7 +32,7 @@ every_spline = pytest.mark.parametrize("name", NATURAL)
 
 
 def path(count, degrees, seed, ratio=3.0):
-    """Times and rotations: each leg about a new axis, durations within a ratio."""
+    """Return times and rotations; each leg has a new axis, and durations are within a ratio."""
     rng = np.random.default_rng([511, seed])
     axes = rng.normal(size=(count - 1, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
@@ -64,7 +64,8 @@ def off(x, size):
 @pytest.mark.parametrize("degrees", [10, 60, 110])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
 def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
-    """And 0 at natural ends, the same at periodic ones; for bodies the torque, for the jerk j."""
+    """The acceleration is 0 at natural ends and equal at periodic ends. The same holds for the
+    torque of bodies, and for j of the least jerk."""
     t, R = path(7, degrees, 1)
     c = NATURAL[name](t, R, ends)
     assert off(c(t) - R, 1) < 100 * EPS
@@ -81,7 +82,7 @@ def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
 
 
 @pytest.mark.source("beyond BK 13")
-def test_the_velocities_of_projected_splines_are_the_textbooks_and_join_poses():
+def test_the_velocities_of_projected_splines_agree_with_the_textbook_and_join_poses():
     t, R = path(9, 100, 2)
     assert off(rb.spline_velocities(t, R) - textbook.spline_velocities(t, R), 1) < 100 * EPS
     poses = poses_of(R)
@@ -103,7 +104,7 @@ def test_the_velocities_of_projected_splines_are_the_textbooks_and_join_poses():
 
 @every_spline
 def test_a_moved_or_reversed_path_has_the_moved_or_reversed_spline(name):
-    """A body is moved in the room only."""
+    """With the inertia of a body, only the fixed frame is moved."""
     t, R = path(6, 80, 3)
     c, s = NATURAL[name](t, R), np.linspace(t[0], t[-1], 30)
     L, Q = (oracles.exp_so3(x) for x in np.random.default_rng(4).normal(size=(2, 3)))
@@ -119,11 +120,11 @@ def test_a_moved_or_reversed_path_has_the_moved_or_reversed_spline(name):
 
 @pytest.mark.source("beyond BK 14")
 @pytest.mark.parametrize("name", ["projected", "quaternion"])
-def test_excess_of_a_spline_there_and_back_has_the_exact_constant(name):
-    """About one axis, (0, θ, 0) at 0, 1, 2. With σ = θ p + θ³ r + … of a leg, p the spline, the
-    excess is θ⁴ ∫ r''² / ∫ p''²; r is by how much the projected cubic is off."""
+def test_the_excess_of_a_spline_there_and_back_has_the_exact_constant(name):
+    """The angle about one axis is (0, θ, 0) at 0, 1, 2. Let σ = θ p + θ³ r + … on a leg, where p is
+    the spline and r the leading error of the projected cubic. The excess is θ⁴ ∫ r''² / ∫ p''²."""
     p, H = Polynomial([0, 1.5, 0, -0.5]), Polynomial([0, 0, 3, -2])
-    r = -p / 6 + p * H / 2 - p**3 / 3  # of tan σ = y/x of the cubics of cos and sin
+    r = -p / 6 + p * H / 2 - p**3 / 3  # from tan σ = y/x of the cubics for cos and sin
     parts = [(x.deriv(2) ** 2).integ()(1) for x in (r, p)]
     constant = Fraction(20711, 180180) / (16 if name == "quaternion" else 1)
     if name == "projected":
@@ -139,7 +140,7 @@ def test_excess_of_a_spline_there_and_back_has_the_exact_constant(name):
 
 @pytest.mark.parametrize("ends", ["natural", "periodic", "given"])
 @pytest.mark.parametrize("size", [1.0, 2.3])
-def test_about_one_axis_the_optimum_is_the_cubic_spline_of_the_angle(ends, size):
+def test_the_optimum_about_one_axis_is_the_cubic_spline_of_the_angle(ends, size):
     rng = np.random.default_rng(5)
     t, steps = np.cumsum(rng.uniform(0.5, 1.5, 9)), size * rng.uniform(-1, 1, 8)
     angle, rates, kind = np.append(0, np.cumsum(steps - steps.mean())), [1.3, -0.4], ends
@@ -155,8 +156,8 @@ def test_about_one_axis_the_optimum_is_the_cubic_spline_of_the_angle(ends, size)
     assert c.certified
 
 
-def test_the_optimum_between_two_rotations_and_through_samples_of_one():
-    """Restriction: the inner samples change nothing."""
+def test_the_optimal_spline_through_samples_of_an_optimum_is_that_optimum():
+    """The inner samples change nothing."""
     _, (R0, R1) = path(2, 100, 6)
     w0, w1 = 2 * np.random.default_rng(7).normal(size=(2, 3))
     one = rb.minimum_acceleration_so3(R0, R1, w0, w1)
@@ -177,7 +178,7 @@ def test_the_optimum_between_two_rotations_and_through_samples_of_one():
 
 
 @pytest.mark.source("beyond BK 12")
-def test_the_optimum_is_that_of_the_textbook():
+def test_the_optimum_agrees_with_the_textbook():
     t, R = path(3, 80, 8)
     for ends in (None, np.random.default_rng(3).normal(size=(2, 3))):
         w, a = textbook.minimum_acceleration_spline_so3(t, R, ends)
@@ -187,8 +188,9 @@ def test_the_optimum_is_that_of_the_textbook():
 
 
 def least_cost(t, R, bodies):
-    """The least cost of quaternions (p, v)/‖(p, v)‖, with p the cubic of the ends and v of a higher
-    degree, and of any velocities at the rotations: no equation of Euler and Lagrange is used."""
+    """Return the least cost of quaternions (p, v)/‖(p, v)‖, with p the cubic of the ends and v of a
+    higher degree. The velocities at the rotations are free, and no Euler–Lagrange equation is used.
+    """
     h, count, free = np.diff(t), len(R), 9
     x, weight = np.polynomial.legendre.leggauss(30)
     s = (x + 1) / 2
@@ -220,7 +222,7 @@ def least_cost(t, R, bodies):
 
 
 def vector(p, q):
-    """The vector part of p̄ q."""
+    """Return the vector part of p̄ q."""
     return p[..., :1] * q[..., 1:] - q[..., :1] * p[..., 1:] - np.cross(p[..., 1:], q[..., 1:])
 
 
@@ -233,7 +235,8 @@ def test_direct_minimisation_finds_no_lower_cost(bodies):
 
 @pytest.mark.parametrize(("degrees", "ratio"), [(30, 10), (60, 2), (90, 10), (120, 2)])
 def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio):
-    """With the same ends; a chain with velocities of parabolas costs a tenth more, or a third."""
+    """All splines have the same ends. A chain with velocities of parabolas costs a tenth to a third
+    more."""
     chains = []
     for seed in range(12):
         t, R = path(10, degrees, [10, seed], ratio)
@@ -258,8 +261,8 @@ def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio)
 
 @pytest.mark.parametrize("seed", [2, 3, 9])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
-def test_large_turns_in_uneven_times_are_found_from_lower_curves(ends, seed):
-    """Where plain Newton's method meets systems that are not positive definite."""
+def test_large_turns_in_uneven_times_are_found_from_cheaper_curves(ends, seed):
+    """Plain Newton's method meets systems that are not positive definite in these problems."""
     t, R = path(10, 120, [10, seed], ratio=10)
     for name, make in (("optimum", None), ("torque", torque)):
         c = NATURAL[name](t, R, ends)
@@ -270,7 +273,7 @@ def test_large_turns_in_uneven_times_are_found_from_lower_curves(ends, seed):
         assert off(rate(c, s) - before, before) < 1e-9
 
 
-def test_a_long_way_is_kept_and_costs_are_those_of_quadrature():
+def test_the_long_way_is_kept_and_costs_agree_with_quadrature():
     t, R = path(5, 70, 11)
     way = [False, True, False, False]
     c = rb.minimum_acceleration_spline_so3(t, R, long=way)
@@ -369,13 +372,13 @@ def test_bad_ends_are_refused(name, ends, message):
 
 
 @pytest.mark.parametrize("long", [[True], 1, ["yes", "no"]])
-def test_bad_ways_are_refused(long):
+def test_bad_choices_of_the_long_way_are_refused(long):
     with pytest.raises(ValueError, match=r"^long: a bool for each of 2 legs wanted, got"):
         rb.minimum_acceleration_spline_so3(*path(3, 50, 16), long=long)
 
 
 def test_very_uneven_times_give_a_minimum_or_an_error():
-    """The short legs are a thousand times shorter, and turn as far."""
+    """The short legs are a thousand times shorter, but turn by the same angle."""
     t = np.array([0, 1, 1.001, 2, 2.001, 3])
     _, R = path(6, 150, 17)
     try:

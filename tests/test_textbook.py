@@ -16,7 +16,7 @@ FIGURE_5 = np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0
 
 
 @pytest.mark.source("BK 6.1")
-def test_the_geodesic_is_the_textbooks():
+def test_the_geodesic_agrees_with_the_textbook():
     for turn in (ALONG, [0, 0, 0], [1e-9, 0, 2e-9], [0, 3.14, 0], [0, 0, np.pi]):
         R0 = Rotation.random(rng=6).as_matrix()
         R1 = R0 @ rb.exp_so3(turn)
@@ -25,8 +25,9 @@ def test_the_geodesic_is_the_textbooks():
 
 
 @pytest.mark.source("BK 6.2")
-def test_the_projected_cubic_is_the_textbooks():
-    """To eps over the least gap, its derivatives to that over its square and its cube."""
+def test_the_projected_cubic_agrees_with_the_textbook():
+    """The bound is eps over the least gap, and for derivatives eps over the square and the cube of
+    the gap."""
     rng = np.random.default_rng(62)
     for _ in range(15):
         ends = *Rotation.random(2, rng=rng).as_matrix(), *3 * rng.normal(size=(2, 3))
@@ -38,7 +39,7 @@ def test_the_projected_cubic_is_the_textbooks():
 
 @pytest.mark.parametrize(("turn", "w0", "w1"), [FIGURE_4C, FIGURE_5])
 @pytest.mark.source("BK (19)", "beyond BK 4")
-def test_the_optima_are_the_textbooks(turn, w0, w1):
+def test_the_optima_agree_with_the_textbook(turn, w0, w1):
     R0, body = Rotation.random(rng=19).as_matrix(), np.diag([1, 2.2, 2.9])
     given = R0, R0 @ rb.exp_so3(turn), w0, w1
     for name, ends, bound in (
@@ -50,7 +51,7 @@ def test_the_optima_are_the_textbooks(turn, w0, w1):
             assert np.abs(curve(TIMES, order) - want).max() < bound * max(1, np.abs(want).max())
 
 
-def test_an_optimum_that_is_not_found_is_no_result(monkeypatch):
+def test_an_optimum_that_is_not_found_raises_an_error(monkeypatch):
     failed = SimpleNamespace(success=False, message="too many nodes")
     monkeypatch.setattr(integrate, "solve_bvp", lambda *_, **__: failed)
     given, times = (np.eye(3), np.eye(3), np.zeros(3), np.zeros(3)), np.zeros(1)
@@ -59,6 +60,6 @@ def test_an_optimum_that_is_not_found_is_no_result(monkeypatch):
             getattr(textbook, name)(*given, *body, times)
 
 
-def test_a_function_without_a_docstring_is_not_shown():
+def test_show_refuses_a_function_without_a_docstring():
     with pytest.raises(ValueError, match="one with a docstring is wanted"):
         textbook.show(textbook._spin)

@@ -47,7 +47,7 @@ def trapezoid(length, v, a):
 
 
 def on_circle(angle, r, a):
-    """From rest to rest on a circle: v² = r a sin(2s/r), until v² = r a."""
+    """Return the time from rest to rest on a circle: v² = r a sin(2s/r), until v² = r a."""
     if angle > np.pi / 2:
         return LEMNISCATE * np.sqrt(r / a) + (angle - np.pi / 2) * np.sqrt(r / a)
     half = np.sqrt(r * angle / 2)
@@ -117,12 +117,12 @@ FORMULAS = {
 
 @pytest.mark.source("beyond BK 16")
 @pytest.mark.parametrize("name", FORMULAS)
-def test_the_time_is_that_of_the_formula(name):
+def test_the_least_time_agrees_with_the_formula(name):
     curve, limits, T, tolerance = FORMULAS[name]
     assert rb.fastest(curve, **limits).domain[1] == pytest.approx(T, rel=tolerance)
 
 
-def test_a_turn_with_bounded_torque_is_timed_as_on_the_board():
+def test_a_turn_with_bounded_torque_has_the_timing_of_the_textbook():
     s, times = textbook.fastest(2.5 * SIDEWAYS, G, 1.5, 1000)
     timed = rb.fastest(about(2.5 * SIDEWAYS), torque=1.5, inertia=G)
     np.testing.assert_allclose(timed.s, s, rtol=1e-14)
@@ -149,7 +149,7 @@ def test_no_timing_on_the_same_cells_is_faster(name, monkeypatch):
         assert -1e-8 < found / T - 1 < 1e-4
 
 
-def test_times_within_boxes_are_those_of_toppra():
+def test_times_within_boxes_agree_with_toppra():
     for seed, T in enumerate([2.4639600513, 2.8119294681, 1.8797166882]):
         c, rng = random_chain(seed), np.random.default_rng(seed)
         A0, A1 = c(np.array(c.domain))
@@ -160,7 +160,7 @@ def test_times_within_boxes_are_those_of_toppra():
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_limits_are_kept_and_one_is_used_at_nearly_all_times(name):
+def test_limits_hold_and_one_limit_is_reached_at_nearly_all_times(name):
     for seed in range(3):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
         t = np.linspace(*timed.domain, 100_001)
@@ -177,7 +177,7 @@ def test_limits_are_kept_and_one_is_used_at_nearly_all_times(name):
         assert max(share for share, _ in largest.values()) == pytest.approx(used.max(), abs=1e-4)
 
 
-def test_shares_are_those_of_torque_force_and_a_point_of_the_body():
+def test_the_used_shares_are_those_of_torque_force_and_a_point_of_the_body():
     c, r, g = random_chain(4), np.array([0.2, -0.1, 0.4]), np.array([1.0, 2, -9])
     t = np.linspace(0.2, 0.8, 7) * c.times[1]
     V, A, R = c(t, 1), c(t, 2), c(t)[:, :3, :3]
@@ -207,8 +207,9 @@ def test_shares_are_those_of_torque_force_and_a_point_of_the_body():
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_the_time_has_the_symmetries_of_the_problem(name):
-    """Moved path, backwards, other times and units of the path; faster limits."""
+def test_the_least_time_has_the_symmetries_of_the_problem(name):
+    """The path is moved, reversed, or has other times or another unit of length; then the limits
+    are faster."""
     c, limits = random_chain(7), SETS[name]
     t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
     turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # about the vertical
@@ -260,13 +261,13 @@ def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size)
         rb.acceleration_cost(timed)
 
 
-def test_a_share_that_lasts_is_given_with_its_first_time():
+def test_a_share_that_lasts_is_returned_with_its_first_time():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 
 
 @pytest.mark.parametrize("name", ["norms", "boxes", "accelerations"])
-def test_no_even_timing_within_the_limits_is_faster(name):
+def test_no_uniform_timing_within_the_limits_is_faster(name):
     for seed in range(4):
         c, limits = random_chain(20 + seed), SETS[name]
         shares = rb.limits_used(c, **limits)
@@ -275,8 +276,8 @@ def test_no_even_timing_within_the_limits_is_faster(name):
         assert rb.fastest(c, **limits).domain[1] < even * (1 + 1e-3)
 
 
-def test_limits_are_kept_in_the_cells_beside_a_rest():
-    """There a speed and an acceleration change as a polynomial of a cell."""
+def test_limits_hold_in_the_cells_next_to_a_rest():
+    """In the cells next to a rest, a speed and an acceleration vary as a polynomial."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
     slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
     still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)
@@ -291,7 +292,7 @@ def test_limits_are_kept_in_the_cells_beside_a_rest():
             assert sizes.max() < most * (1 + 1e-4)
 
 
-def test_a_uniform_motion_at_its_limits_stays_as_it_is():
+def test_a_uniform_motion_at_its_limits_is_not_changed():
     leg = rb.geodesic_se3(I4, rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2]))
     w, v = np.linalg.norm(leg(0, 1).reshape(2, 3), axis=1)
     timed = rb.fastest(leg, angular_speed=w, speed=v, acceleration=1, rates=(1, 1))
@@ -345,7 +346,7 @@ def test_an_unknown_limit_is_refused():
         rb.limits_used(UP, jerk=1)
 
 
-def test_a_limit_that_is_exceeded_between_the_points_is_warned_of(monkeypatch):
+def test_a_limit_that_is_exceeded_between_the_points_gives_a_warning(monkeypatch):
     monkeypatch.setattr(timing, "FINER", (1,))
     monkeypatch.setattr(timing, "TOLERANCE", 1e-9)
     monkeypatch.setattr(timing, "_REPEATS", 1)

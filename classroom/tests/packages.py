@@ -8,7 +8,7 @@ import pytest
 
 
 def find_program(package, *names):
-    """Return the path of a program; install its package where Debian's packages are available."""
+    """Return the path of a program; install its package if Debian's packages are available."""
     if found := next(filter(None, map(shutil.which, names)), None):
         return found
     if not shutil.which("apt-get"):

@@ -11,14 +11,14 @@ from rbclassroom import explorers
 
 @cache
 def made(name):
-    """An explorer; one of each is enough."""
+    """Return an explorer; each is made once."""
     return getattr(explorers, f"{name}_explorer")()
 
 
 def sweep(name, **base):
-    """Put each setting on top of these values; yield all values and texts, if there is a picture.
+    """Set each setting on top of these values; yield values and texts if there is a picture.
 
-    Everywhere an explorer shows values or says why not, and no number is "nan" or "-0".
+    At every setting an explorer shows values or states why not, and no number is "nan" or "-0".
     """
     explorer = made(name)
     explorer.restart()
@@ -33,11 +33,12 @@ def sweep(name, **base):
 
 
 def settings(explorer):
-    """Each control at five places of its range; then all at extremes, each pair in every way."""
+    """Yield each control at five places of its range, then all at extremes, each pair in all
+    ways."""
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)
-    for ends in (hadamard(8)[:, 1 : len(ranges) + 1] - 1) // 2:  # 0 or -1
+    for ends in (hadamard(8)[:, 1 : len(ranges) + 1] - 1) // 2:  # the indices are 0 or -1
         yield {name: ranges[name][end] for name, end in zip(ranges, ends, strict=True)}
 
 
@@ -50,30 +51,30 @@ def _range(control):
 
 
 def points(artist):
-    """The points of a line in the plane or in space, shape (n, 2) or (n, 3)."""
+    """Return the points of a line in the plane or in space, shape (n, 2) or (n, 3)."""
     data = artist.get_data_3d() if hasattr(artist, "get_data_3d") else artist.get_data()
     return np.stack(data, axis=-1)
 
 
 def read_off(explorer):
-    """The displayed texts, by name, with plain minus signs and spaces."""
+    """Return the displayed texts, by name, with plain minus signs and spaces."""
     ((rows, *_),) = explorer.picture.run["texts"]
     return {name: text.replace("−", "-").replace("\u2007", " ") for name, text in rows}
 
 
 def reads(text, wanted):
-    """Whether the numbers of a text are these, but for half of their last digits."""
+    """Return whether the numbers of a text are these, up to half a unit of their last digits."""
     found = re.findall(r"-?\d+(?:\.\d+)?", text)
     digits = np.array([len(each.partition(".")[2]) for each in found])
     return np.all(np.abs(np.array(found, float) - np.ravel(wanted)) <= 0.51 * 10.0**-digits)
 
 
 def notice(explorer):
-    """The notice, or ""."""
+    """Return the notice, or ""."""
     return explorer.picture.run["notice"] or explorer.picture.run["texts"][0][1]
 
 
 def tell(explorer, **message):
-    """Send a message of the browser: the ``index`` of a state, or the ``place`` of a click."""
+    """Send a message as the browser does: the ``index`` of a state, or the ``place`` of a click."""
     data = {"method": "custom", "content": message}
     explorer.picture._handle_msg({"content": {"data": data}, "buffers": []})

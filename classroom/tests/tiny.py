@@ -1,4 +1,4 @@
-"""A course of one small lesson, how Python runs a module in it, and how it is shown."""
+"""A course of one small lesson, the command that runs a module, and a server for the lesson."""
 
 import http.client
 import subprocess
@@ -23,7 +23,7 @@ def lesson_at(folder, *cells):
 
 @contextmanager
 def lecture(folder, *further):
-    """The address of a lecture, and the process."""
+    """Serve a lecture; yield its address and the process."""
     words = [*MODULE, "rbclassroom.lecture.serve", "1", "--no-browser", *further]
     with subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, text=True) as server:
         try:

@@ -43,8 +43,8 @@ c.Execute.timeout_func = limit
 def make_template(folder):
     """Write a course folder with the tiny set and its gradebook.
 
-    Only cells that say when they have `begun` have a limit, which begins then. Returned are the
-    folder and the set as it is handed out.
+    Only cells that report that they have `begun` have a limit, which begins at that time. Returns
+    the folder, and the set as it is handed out.
     """
     write_tiny_set(folder)
     (folder / "nbgrader_config.py").write_text(CONFIG)
@@ -53,7 +53,8 @@ def make_template(folder):
 
 
 def begun():
-    """Return the text that a cell writes when its endless part begins; each has its own."""
+    """Return code that a cell runs when its endless part begins; the code is unique for each
+    cell."""
     return f"open('begun-{uuid.uuid4().hex}', 'w').close()"
 
 
@@ -68,7 +69,7 @@ class Class:
         return Gradebook(f"sqlite:///{self.folder / 'gradebook.db'}")
 
     def submit(self, student, change=None, **answers):
-        """Hand in the right answers, but for those that are given, changed."""
+        """Hand in the right answers, or given ones instead, after a change of the notebook."""
         notebook = nbformat.reads(self.given.decode(), as_version=4)
         given = {name.replace("_", "-") + "-answer": text for name, text in answers.items()}
         for name, text in (ANSWERS | {"words-answer": "It is."} | given).items():
@@ -90,9 +91,9 @@ class Class:
         return self.folder / "autograded" / student / "ps0" / "ps0.ipynb"
 
     def page(self, student):
-        """The feedback."""
+        """Return the page with the feedback."""
         return (self.folder / "feedback" / student / "ps0" / "ps0.html").read_text("utf-8")
 
     def feedback(self, student):
-        """The text of the feedback."""
+        """Return the text of the feedback."""
         return html.unescape(re.sub(r"<[^>]*>", "", self.page(student).split("<body>", 1)[1]))

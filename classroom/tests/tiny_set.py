@@ -11,7 +11,7 @@ ANSWERS = {"square-answer": "def square(x):\n    return x * x", "half-answer": "
 
 
 def cell(notebook, grade_id):
-    """The cell of a name."""
+    """Return the cell with this name."""
     names = [
         marks.get("nbgrader", {}).get("grade_id") for marks in (c.metadata for c in notebook.cells)
     ]
@@ -19,7 +19,7 @@ def cell(notebook, grade_id):
 
 
 def marked(cell, grade_id, points=None, **kind):
-    """The cell with nbgrader's metadata."""
+    """Return the cell with nbgrader's metadata."""
     marks = {"schema_version": 3, "grade_id": grade_id, "locked": True, "grade": False}
     marks |= {"solution": False, "task": False, "cell_type": cell.cell_type, **kind}
     cell.metadata["nbgrader"] = marks | ({} if points is None else {"points": points})

@@ -34,7 +34,7 @@ def images():
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    """The animation of a cube, saved twice: players, and the contents of their files."""
+    """Save the animation of a cube twice; return the players and the contents of their files."""
     made = []
     for _ in "ab":
         folder, (fig, update) = tmp_path_factory.mktemp("figures"), cube()
@@ -56,8 +56,8 @@ def test_without_files_no_frames_are_drawn_and_the_player_is_the_same(saved, tmp
         player.save("cube.gif")
 
 
-def test_without_files_the_layout_is_that_of_the_frames(tmp_path, monkeypatch):
-    """The label of an axis has its place when the frames are drawn, or when they would be."""
+def test_the_layout_is_the_same_with_and_without_files(tmp_path, monkeypatch):
+    """The label of an axis has the same place whether or not the frames are drawn."""
     pages = []
     for folder in (str(tmp_path), ""):
         monkeypatch.setenv("RBCOURSE_FIGURES", folder)
@@ -74,7 +74,7 @@ def test_without_files_the_layout_is_that_of_the_frames(tmp_path, monkeypatch):
 
 
 def held(page):
-    """The data in the script of a player."""
+    """Return the data in the script of a player."""
     return json.loads(re.search(r"revive\(image, (\{.*\})\);\n", page)[1])
 
 
@@ -83,7 +83,7 @@ def pixels(picture):
 
 
 def full(fig, artists, dpi):
-    """A figure as Matplotlib draws it, all at once."""
+    """Return a figure as Matplotlib draws it, all at once."""
     for artist in artists:
         artist.set_animated(False)
     fig.savefig(content := io.BytesIO(), format="png", dpi=dpi)
@@ -92,7 +92,8 @@ def full(fig, artists, dpi):
 
 @pytest.mark.parametrize(
     ("make", "some", "most", "share"),
-    [(cube, (0, 5, 11), 16, 0.01), (images, (1, 300), 7, 0)],  # stars before, not after a cube
+    # the stars are drawn before the cube, not after it
+    [(cube, (0, 5, 11), 16, 0.01), (images, (1, 300), 7, 0)],
 )
 def test_each_frame_equals_a_full_drawing(make, some, most, share):
     fig, update = make()
@@ -118,7 +119,7 @@ def test_the_gif_shows_each_frame_in_its_colours(saved):
 
 
 @pytest.mark.parametrize(("count", "seconds"), [(60, 4), (100, 1.99), (3, 1), (7, 0.5)])
-def test_a_gif_takes_its_time(count, seconds):
+def test_a_gif_lasts_as_long_as_asked(count, seconds):
     shades = [Image.new("L", (4, 4), 2 * i) for i in range(count)]
     with Image.open(io.BytesIO(animate.gif(shades, seconds))) as picture:
         durations = [picture.seek(i) or picture.info["duration"] for i in range(picture.n_frames)]
@@ -150,9 +151,10 @@ def test_the_player_starts_with_the_still_frame(still, count):
     pngs = map(io.BytesIO, (player.shown, player.background))
     shown, background = (pixels(Image.open(png)) for png in pngs)
     twice = full(fig, update(still % count), 2 * fig.dpi)
-    assert np.abs(shown - twice).mean() < 1  # stars before the cube
-    assert (np.abs(background - [0xD5, 0x5E, 0x00]).max(axis=-1) >= 30).all()  # no orange square
-    assert (background < 128).any()  # the axes
+    assert np.abs(shown - twice).mean() < 1  # the stars are drawn before the cube
+    # the orange square is hidden
+    assert (np.abs(background - [0xD5, 0x5E, 0x00]).max(axis=-1) >= 30).all()
+    assert (background < 128).any()  # the axes are drawn
     plt.close(fig)
 
 
@@ -170,14 +172,15 @@ def test_the_player_is_complete(saved):
     player = saved[0][0]
     page, other = (replace(player, alt=alt)._repr_html_() for alt in (player.alt, "other"))
     one, two = (re.search(r'id="(\w+)"', text)[1] for text in (page, other))
-    assert one != two  # though the name is the same
+    assert one != two  # the identifiers differ although the name is the same
     assert f'querySelectorAll("#{one}")' in page
     assert not re.search(r"https?:|src=\"(?!data:)", page)
-    assert "$" not in re.sub(r"\$\{|\"data:[^\"]*\"", "", page)  # all is filled in
+    assert "$" not in re.sub(r"\$\{|\"data:[^\"]*\"", "", page)  # all placeholders are filled in
     assert 'alt="a &quot;cube&quot;"' in page
     assert page.count("data:image/png;base64,") == 2  # the still, and the fixed artists
     assert '>a "cube" <small>cube.gif, .png, .pdf, .csv</small></figcaption>' in page
     data = held(page)
     shares = data["controls"][0]["values"]
     assert (data["milliseconds"], len(shares), shares[0], shares[-1]) == (250, 12, "0 %", "100 %")
-    assert not re.search("<(button|input)", page.split("<script>")[0])  # none without a script
+    # the page has no controls without its script
+    assert not re.search("<(button|input)", page.split("<script>")[0])

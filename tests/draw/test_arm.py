@@ -1,4 +1,4 @@
-"""Arms are drawn where the path says, and described by its numbers."""
+"""Arms are drawn where the path says, and their descriptions state its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,17 +19,17 @@ def axes():
 
 
 def ends(q, lengths=(2, 1.5)):
-    """The joints and the tip as complex numbers."""
+    """Return the joints and the tip as complex numbers."""
     return np.append(0, np.cumsum(np.array(lengths) * np.exp(1j * np.cumsum(q))))
 
 
 def off(found, wanted):
-    """How far places are from others: those of a line, pairs, or complex numbers."""
+    """Return the largest distance of places (of a line, pairs, or complex numbers) from others."""
     pairs = np.transpose(found.get_data()) if hasattr(found, "get_data") else np.array(found)
     return np.abs((pairs if np.iscomplexobj(pairs) else pairs @ [1, 1j]) - wanted).max()
 
 
-def test_a_table_holds_angles_and_ends():
+def test_the_table_of_a_path_has_joint_angles_and_the_ends_of_links():
     path, lengths = np.random.default_rng(1).uniform(-3, 3, (4, 3)), (1, 2, 3)
     table = arm.path_table(path, lengths)
     places = [f"{axis}{k} [m]" for k in (1, 2, 3) for axis in "xy"]
@@ -85,7 +85,7 @@ def test_the_reach_is_bounded_by_circles(axes, lengths, radii):
 
 
 @pytest.mark.source("RR 4.1", "RR 4.3", "RR Fig. 8", "RR Fig. 9")
-def test_arms_move_and_their_ways_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
+def test_arms_move_and_their_paths_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
     tips = np.array([ends(q)[-1] for q in PATH])
     update = arm.moving_arm(axes[0], PATH, shown=[0, 2])
     for i in (0, 3, 1):
@@ -102,10 +102,10 @@ def test_arms_move_and_their_ways_are_drawn_in_the_room_and_in_the_plane_of_the_
         with pytest.raises(ValueError, match="shorter"):
             draw(axes[1], dict.fromkeys("abcd", PATH))
     for line, i in zip(axes[0].lines[:2] + axes[1].lines[:3], (0, 2, 0, 2, 3), strict=True):
-        assert off(line, ends(PATH[i])) < 1e-14  # pale
+        assert off(line, ends(PATH[i])) < 1e-14  # the pale arms
 
 
-def test_descriptions_give_numbers():
+def test_descriptions_state_numbers():
     tips, steps = np.array([ends(q)[-1] for q in PATH]), np.diff(PATH, axis=0)
     covered, (first, second) = np.abs(np.diff(tips)).sum(), np.degrees(np.abs(steps).sum(axis=0))
     said = arm.describe_arm(PATH) + arm.describe_arm(np.zeros((1, 2)), [1e-3, 1000])

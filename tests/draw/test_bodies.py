@@ -21,12 +21,12 @@ def axes():
 
 
 def off(box, pose, in_body):
-    """How far the corners of a box are from those of a box in this pose."""
+    """Return the largest distance of the corners of a box from those of a box in this pose."""
     return np.abs(box.corners - (in_body @ pose[:3, :3].T + pose[:3, 3])).max()
 
 
 @pytest.mark.source("BK Fig. 5")
-def test_cubes_with_a_square_on_one_face_are_where_the_poses_are(axes):
+def test_cubes_with_a_square_on_one_face_are_drawn_at_the_poses(axes):
     in_body = bodies.draw_box(axes[1], np.eye(4), 2.0).corners
     faces, square = in_body[:6], in_body[6]
     assert np.all(np.abs(faces) == 1)
@@ -49,7 +49,7 @@ def test_cubes_with_a_square_on_one_face_are_where_the_poses_are(axes):
     assert np.allclose(np.divide(*(axes[0].get_box_aspect()[:2])), np.divide(*(high - low)[:2]))
 
 
-def test_boxes_move_and_one_that_stays_at_the_origin_fills_its_axes(axes):
+def test_boxes_move_and_a_box_that_stays_at_the_origin_fills_its_axes(axes):
     edges = np.array([0.3, 0.2, 0.03])
     still = rb.pose_from_components(rb.exp_so3(np.outer(TIMES, [1.0, 2, 3])), np.zeros(3))
     update = bodies.moving_boxes(axes, {"screw": SCREW, "still": still}, edges)
@@ -63,7 +63,7 @@ def test_boxes_move_and_one_that_stays_at_the_origin_fills_its_axes(axes):
     assert [text.get_text() for text in axes[1].texts] == ["x", "y", "z"]
 
 
-def test_ways_are_the_paths_with_the_frame_at_the_start_and_once_at_each_end(axes):
+def test_paths_are_drawn_with_the_frame_at_the_start_and_at_each_different_end(axes):
     lines = bodies.draw_ways(axes[0], MOTIONS)
     for line, (name, poses) in zip(lines, MOTIONS.items(), strict=True):
         assert np.array_equal(line.get_data_3d(), poses[:, :3, 3].T)
@@ -75,7 +75,7 @@ def test_ways_are_the_paths_with_the_frame_at_the_start_and_once_at_each_end(axe
     names = [[text.get_text() for text in ax.texts if "$" in text.get_text()] for ax in axes]
     assert names == 2 * [["$x_0$", "$y_0$", "$z_0$"]]
     bodies.draw_ways(axes[0], {"straight": GEODESIC})
-    axes[0].sight()  # though the way is in no plane
+    axes[0].sight()  # this works although the path is not in a plane
 
 
 @pytest.mark.parametrize("view", [(18, -22), (32, -65), (60, 140)])
@@ -104,8 +104,9 @@ def test_letters_of_a_frame_are_beyond_its_arrows(axes):
         assert beyond @ direction > 1.1
 
 
-def test_descriptions_give_numbers():
-    bump = 4 * TIMES * (1 - TIMES) ** 2  # most at 1/3, of the six times at 0.4
+def test_descriptions_state_numbers():
+    # the maximum is at 1/3; of the six times, the largest value is at 0.4
+    bump = 4 * TIMES * (1 - TIMES) ** 2
     turns = rb.exp_so3(np.radians(50) * np.outer(bump, [0, 0.6, 0.8]))
     tilted = rb.pose_from_components(turns, [0, 0, 0])
     angle = np.degrees(np.linalg.norm([0.3, -0.5, 1.0]))

@@ -1,4 +1,4 @@
-"""Display lists: unpacked, they are the polygons that were drawn, in their places and colours."""
+"""Display lists: when unpacked, they are the drawn polygons in their places and colours."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,7 +13,7 @@ from rbcourse.draw.display import PARTS, Display, joined
 
 @pytest.fixture
 def ax():
-    """Axes from 0 to 1 that fill a figure of 300 by 200 pixels."""
+    """Return axes from 0 to 1 that fill a figure of 300 by 200 pixels."""
     fig = plt.figure(figsize=(3, 2), dpi=100, layout="none")
     axes = fig.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, 1), ylim=(0, 1))
@@ -32,12 +32,12 @@ def test_a_line_is_recorded_with_its_places_and_its_style(ax):
     ((style, more, places),) = recorded(ax, line)
     assert np.abs(places - [[0, 200], [150, 0], [300, 150]]).max() <= 0.5 / PARTS
     assert style[:3] == (None, "#ff8000ff", 5.0)
-    assert style[3] == (10.0, 5.0)  # in widths of the line
+    assert style[3] == (10.0, 5.0)  # in units of the line width
     assert style[4:] == ("butt", "round", (0, 0, 300, 200), ())
     assert not more
 
 
-def test_patches_have_their_colours_and_holes_belong_to_them(ax):
+def test_patches_keep_their_colours_and_their_holes(ax):
     patch = ax.add_patch(Rectangle((0.1, 0.25), 0.5, 0.5, fc=(0, 0, 1, 0.5), ec="black", lw=0))
     ring = ax.add_patch(Annulus((0.5, 0.5), 0.4, 0.2))
     (style, _, places), outer, inner = recorded(ax, patch, ring)
@@ -50,7 +50,7 @@ def test_patches_have_their_colours_and_holes_belong_to_them(ax):
         assert np.ptp(places[:, 0]) == pytest.approx(2 * 300 * radius, abs=1)
 
 
-def test_each_state_has_what_is_drawn_then_and_none_may_be_empty(ax):
+def test_each_state_has_its_own_polygons_and_a_state_may_be_empty(ax):
     (line,) = ax.plot([], [])
     display, states = Display(ax.figure), []
     for x in (0.2, np.nan, 0.6):
@@ -64,7 +64,7 @@ def test_each_state_has_what_is_drawn_then_and_none_may_be_empty(ax):
     assert len(display.styles) == 1
 
 
-def test_a_marker_is_kept_once_and_drawn_at_each_point(ax):
+def test_a_marker_is_stored_once_and_drawn_at_each_point(ax):
     (dots,) = ax.plot([0.1, np.nan, 0.5], [0.5, 0.5, 1], "s", ms=7.2, mew=0, color="#0000ff")
     ((style, _, places),) = recorded(ax, dots)
     assert np.abs(places - [[30, 100], [150, 0]]).max() <= 0.5 / PARTS
@@ -75,7 +75,7 @@ def test_a_marker_is_kept_once_and_drawn_at_each_point(ax):
 
 
 @pytest.mark.parametrize("width", [3, 15])
-def test_lines_that_leave_the_picture_keep_their_slope_and_far_places_their_side(ax, width):
+def test_lines_that_leave_the_picture_keep_their_slope_and_far_places_stay_on_their_side(ax, width):
     ax.figure.set_size_inches(width, 4)
     (line,) = ax.plot([0, 5], [0, 5])
     patch = ax.add_patch(Rectangle((-1e6, 0), 2e6, 1e6))
@@ -96,7 +96,7 @@ def test_figures_that_are_too_large_are_refused(ax):
 
 
 def test_faces_are_recorded_at_their_places_and_those_without_area_as_edges(ax):
-    """In the browser the plane of a face without area would part nothing from nothing."""
+    """In the browser, the plane of a face without area would not separate anything."""
     space = ax.figure.add_subplot(projection="space")
     space.fit(np.full(3, -1.5), np.full(3, 4.5))
     cube, sight = bodies.draw_box(space, np.eye(4), 1.0), space.sight()

@@ -1,4 +1,4 @@
-"""Rectangles are drawn where the path says, and described by its numbers."""
+"""Rectangles are drawn where the path says, and their descriptions state its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,9 +22,9 @@ def way_of(line):
 
 
 def assert_body(outline, nose, pose, length):
-    """The body is in this pose, and in the picture."""
+    """Check that the body is in this pose, and in the picture."""
     A, ax = rb.planar.matrix_from_planar(pose), outline.axes
-    ahead = A @ [length / 2, 0, 1]  # as the lesson says
+    ahead = A @ [length / 2, 0, 1]  # the nose is ahead of the centre, as the lesson says
     assert np.abs(way_of(nose)[1] - ahead[:2]).max() < 1e-14
     corners = length / 4 * np.array([[-2, -1], [2, -1], [2, 1], [-2, 1]]) @ A[:2, :2].T + A[:2, 2]
     assert np.abs(outline.get_xy()[:4] - corners).max() < 1e-14
@@ -34,7 +34,7 @@ def assert_body(outline, nose, pose, length):
 
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
-def test_rectangles_stand_at_the_poses_of_the_table_and_move_along_their_way(ax):
+def test_rectangles_are_drawn_at_the_poses_of_the_table_and_move_along_their_path(ax):
     way, *bodies = plane.draw_route(ax, PATH, 1.5, shown=[0, 1, 2, 3])
     assert {text.get_text(): text.xy[0] for text in ax.texts} == {"start": 0, "goal": 1}
     table = plane.path_table(PATH)
@@ -50,11 +50,11 @@ def test_rectangles_stand_at_the_poses_of_the_table_and_move_along_their_way(ax)
     for i in (0, 3, 2, 1):
         outline, nose, way = update(i)
         assert_body(outline, nose, PATH[i], 0.8)
-        assert way.get_zorder() > outline.get_zorder()  # the end of the way is seen
+        assert way.get_zorder() > outline.get_zorder()  # the end of the path stays visible
         assert np.array_equal(way_of(way), PATH[: i + 1, :2])
 
 
-def test_two_ways_are_compared(ax):
+def test_two_paths_are_compared(ax):
     raised = PATH + np.array([0, 1, 0]) * [[0], [1], [2], [0.5]]
     pair, points = {"one": PATH, "other": raised}, ([0, 0], [0.3, -0.2])
     artists = plane.draw_compared(ax, pair, 1, shown=[1], points=points)
@@ -73,7 +73,7 @@ def test_two_ways_are_compared(ax):
     )
 
 
-def test_the_description_says_from_where_to_where_and_how_it_turns():
+def test_the_description_states_the_start_the_goal_and_the_turns():
     said = plane.describe_route(PATH)
     assert "from (0, 0) m, heading 0 degrees, to (1, 4) m, heading -115 degrees" in said
     assert f"its centre covers {3 + 2 + np.sqrt(8):.2f} m" in said

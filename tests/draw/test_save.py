@@ -1,4 +1,4 @@
-"""Figures as files: the same bytes each time, colours for all eyes."""
+"""Saved figures: the same bytes each time, and colours that all eyes can tell apart."""
 
 import html
 import re
@@ -31,7 +31,7 @@ def test_picture_document_and_numbers_have_the_same_bytes_each_time(tmp_path, mo
 
 
 def seen(colour, matrix):
-    """A colour as CIE Lab, as an eye sees it whose deficiency is a matrix on linear RGB."""
+    """Return a colour as CIE Lab for an eye whose deficiency is a matrix on linear RGB."""
     channels = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750]]
@@ -50,29 +50,30 @@ EYES = {
 
 
 @pytest.mark.parametrize("eye", EYES)
-def test_colours_can_be_told_apart_by_all_eyes(eye):
-    """The deficiencies in full, by Machado, Oliveira and Fernandes 2009; differences as CIE76."""
+def test_colours_can_be_distinguished_by_all_eyes(eye):
+    """The full deficiencies are those of Machado, Oliveira and Fernandes 2009; the difference is
+    CIE76."""
     matrix = np.array(EYES[eye].split(), dtype=float).reshape(3, 3)
     for one, other in combinations(save.COLOURS.values(), 2):
         assert np.linalg.norm(seen(one, matrix) - seen(other, matrix)) > 16.9, (one, other)
 
 
 def test_all_colours_have_a_contrast_of_3_on_white():
-    """That of WCAG 2, for graphical objects; the Y of Lab is the relative luminance."""
+    """The contrast is that of WCAG 2 for graphical objects. The Y of Lab is the luminance."""
     for colour in [*save.COLOURS.values(), save.PALE]:
         lightness, *_ = seen(colour, np.eye(3))
         luminance = max((lightness + 16) / 116, 6 / 29) ** 3
         assert 1.05 / (luminance + 0.05) >= 3, colour
 
 
-def test_by_default_figures_go_beside_the_notebook(tmp_path, monkeypatch):
+def test_figures_are_saved_beside_the_notebook_by_default(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RBCOURSE_FIGURES", raising=False)
     save.save_table("empty", TABLE)
     assert (tmp_path / "figures" / "empty.csv").exists()
 
 
-def test_no_files_are_written_where_none_are_wanted(tmp_path, monkeypatch):
+def test_no_files_are_written_if_the_folder_is_empty(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RBCOURSE_FIGURES", "")
     fig, ax = plt.subplots()
@@ -90,7 +91,7 @@ def test_no_files_are_written_where_none_are_wanted(tmp_path, monkeypatch):
         ('A < "B": no end', 'A &lt; "B": no end'),
     ],
 )
-def test_the_caption_is_the_first_sentence_and_the_files(alt, sentence):
+def test_the_caption_has_the_first_sentence_and_the_files(alt, sentence):
     picture = save.Picture("line", alt, b"", 100)
     page, files = picture._repr_html_(), "line.png, .pdf, .csv"
     assert repr(picture) == f"line: {alt}"

@@ -28,13 +28,13 @@ def ax():
 
 
 def drawn(ax):
-    """The parts of a scene in the order in which they are drawn, and how it is seen."""
+    """Return the parts of a scene in the order in which they are drawn, and the view."""
     pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
     return scene.in_sight(pieces, ax.sight().eye), ax.sight()
 
 
 @pytest.mark.parametrize("fitted", [True, False])
-def test_the_view_is_matplotlibs_with_equal_units_about_a_fixed_middle(fitted):
+def test_the_view_agrees_with_matplotlib_and_has_equal_units_and_a_fixed_centre(fitted):
     fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "space"})
     ax.plot([0, 1], [0, 5], [0, 20])
     if fitted:
@@ -64,7 +64,7 @@ def test_the_view_is_matplotlibs_with_equal_units_about_a_fixed_middle(fitted):
         (("set_title", r"$\frac{1$"), "frac"),
     ],
 )
-def test_scenes_that_cannot_be_drawn_are_refused_and_nothing_stays_hidden(ax, call, message):
+def test_scenes_that_cannot_be_drawn_are_refused_and_no_artist_stays_hidden(ax, call, message):
     (line,) = ax.plot([0, 1], [0, 0], [0, 0])
     getattr(ax, call[0])(*call[1:])
     with pytest.raises(ValueError, match=message):
@@ -73,7 +73,7 @@ def test_scenes_that_cannot_be_drawn_are_refused_and_nothing_stays_hidden(ax, ca
 
 
 def book(ax):
-    """A book, and its three axes through it."""
+    """Draw a book, and its three axes through it."""
     R = rb.sample_rotation(rng=np.random.default_rng(3))
     bodies.draw_box(ax, rb.pose_from_components(R, np.zeros(3)), np.array([0.9, 0.6, 0.14]))
     for axis in R.T:
@@ -81,7 +81,7 @@ def book(ax):
 
 
 def tangle(ax):
-    """Triangles, lines and marks that pass through one another."""
+    """Draw triangles, lines and marks that pass through one another."""
     rng = np.random.default_rng(2)
     for _ in range(8):
         ax.add_artist(space.Faces(rng.uniform(-1, 1, (1, 3, 3)), ["red"]))
@@ -90,20 +90,20 @@ def tangle(ax):
 
 
 def ball(ax):
-    """A ball, with points and lines on it, and a line through it."""
+    """Draw a ball with points on it, and a line through it."""
     spheres.draw_sphere(ax)
     ax.plot(*rb.sample_rotation(100, rng=np.random.default_rng(4))[:, :, 0].T, "o")
     ax.plot([-1.2, 1.2], [0.3, -0.3], [0, 0])
 
 
 def sampled(part):
-    """Places of a part: of a line or a face on its edges."""
+    """Return sample points of a part: on a line, or on the edges of a face."""
     ends, shares = part.places[:, :3], np.linspace(0.02, 0.98, 40)[:, None, None]
     return ends if part.marker else (ends[:-1] + shares * np.diff(ends, axis=0)).reshape(-1, 3)
 
 
 def covers(face, places, sight):
-    """Which places a face, or the disc of a ball, is seen over, before them or behind them."""
+    """Return which places overlap a face, or the disc of a ball, in the view."""
     corners = sight.flat(face.places)
     (x, y), to = (np.roll(corners, -1, axis=0) - corners).T, sight.flat(places)[:, None] - corners
     if face.kind == "ball":
@@ -133,7 +133,8 @@ def test_each_part_is_drawn_before_the_faces_that_hide_it(ax, make):
 
 def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     bodies.draw_box(ax, np.eye(4), 0.5)
-    corners = np.array([[-1, 0.1, 0.05], [1, 0.1, 0], [-1, -0.1, -0.05]])  # there and back
+    # the line goes there and comes back
+    corners = np.array([[-1, 0.1, 0.05], [1, 0.1, 0], [-1, -0.1, -0.05]])
     ax.plot(*corners.T, ls="--", lw=3)
     parts, sight = drawn(ax)
     line = [part.places for part in parts if part.gc.get_linewidth() == 3]
@@ -144,7 +145,7 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     assert max(places[-1, 3] for places in line) == pytest.approx(steps.sum())
 
 
-def test_a_line_that_leaves_a_side_and_returns_in_points_of_the_plane_is_two_lines_there(ax):
+def test_a_line_that_crosses_a_plane_at_two_of_its_points_is_cut_into_three_lines(ax):
     corners = np.array([[0, 0, 5], [1, 0, 0], [2, 0, -5], [3, 0, 0], [4, 0, 5.0]])
     ax.plot(*corners.T, lw=3)
     pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
@@ -162,19 +163,19 @@ def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
         pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
         found = scene.in_sight(pieces, ax.sight().eye, 2)
         parts = [part.places[:, 0] for part in found if part.gc.get_linewidth() == 3]
-        far, near = sorted(parts, key=np.mean)  # seen from +x
+        far, near = sorted(parts, key=np.mean)  # the view is from +x
         assert far.max() - near.min() == pytest.approx(overlap)
         line.remove()
 
 
 def test_bodies_that_pass_through_each_other_have_an_outline_where_they_meet(ax):
-    """The corner of a cube in that of another one: six lines, which end at one another."""
+    """The corner of a cube is inside another cube: six lines meet at their ends."""
     corners, apart = bodies.draw_box(ax, np.eye(4), 1.0).corners[:6], np.array([0.4, 0.3, 0.2])
     ax.artists[0].remove()
     cube, other = (ax.add_artist(space.Faces(c, 6 * ["0.9"])) for c in (corners, corners + apart))
     pieces, scale = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer()), ax.sight().scale
     lines = np.array([piece.places[:, :3] / scale for piece in pieces if piece.kind == "line"])
-    for centre in (0, apart):  # of a cube: the lines are on its faces
+    for centre in (0, apart):  # the lines are on the faces of both cubes
         assert np.abs(np.abs(lines - centre).max(axis=-1) - 0.5).max() < 1e-12
     ends, counts = np.unique(lines.reshape(-1, 3).round(9), axis=0, return_counts=True)
     assert (len(lines), len(ends), set(counts)) == (6, 6, {2})
@@ -198,7 +199,7 @@ def test_edges_are_drawn_after_both_faces_that_they_bound(ax):
                     assert max(np.array([k for k, _ in lines])[on]) > i
 
 
-def test_the_zorder_decides_in_the_plane_of_a_face_and_over_everything(ax):
+def test_the_zorder_decides_in_the_plane_of_a_face_and_above_the_scene(ax):
     ax.plot([-0.4, 0.4], [0, 0], [0.5, 0.5], lw=3, zorder=9)
     bodies.draw_box(ax, np.eye(4), 1.0)
     ax.text(0, 0, 0, "inside", zorder=scene.OVER)
@@ -218,7 +219,7 @@ def test_a_line_has_no_parts_in_its_gaps_and_markevery_selects_its_marks(ax):
     parts, sight = drawn(ax)
     scale = sight.scale
     assert sorted(part.places[:, 1].tolist() for part in parts) == [[0, 0], [scale, scale]]
-    assert {part.gc.get_capstyle() for part in parts} == {"butt"}  # parts must not overlap
+    assert {part.gc.get_capstyle() for part in parts} == {"butt"}  # the parts must not overlap
     line.set(linestyle="", marker="o")
     line.set_data_3d(np.arange(5), np.zeros(5), np.zeros(5))
     for every, marked in ((None, [0, 1, 2, 3, 4]), (2, [0, 2, 4]), ([0, 3], [0, 3])):
@@ -245,7 +246,7 @@ def test_only_pieces_that_changed_are_made_again(ax):
     assert len(drawn(ax)[0]) == 1
 
 
-def test_artists_and_legends_are_drawn_once_and_hidden_axes_not_at_all(ax):
+def test_artists_and_legends_are_drawn_once_and_hidden_axes_are_not_drawn(ax):
     (line,) = ax.plot([-1, 1], [0, 0], [0, 0], color="red", lw=8, alpha=0.5, label="a line")
     legend, inside = ax.legend(loc="upper left"), [line, space.Ball(), ax.text(0, 0, 0, "")]
     assert space.scenes(ax.figure) == [ax.scene]
@@ -253,7 +254,8 @@ def test_artists_and_legends_are_drawn_once_and_hidden_axes_not_at_all(ax):
     ax.figure.savefig(content := io.BytesIO(), dpi=100)
     assert line.get_visible()
     picture = np.asarray(Image.open(content).convert("RGB"), dtype=int)
-    assert picture[200:, :, 1].min() == pytest.approx(127, abs=2)  # twice it would be 64
+    # drawn twice, the value would be 64
+    assert picture[200:, :, 1].min() == pytest.approx(127, abs=2)
     assert (picture[:100] < 100).all(axis=-1).any()  # the letters of the legend
     ax.set_visible(False)
     canvas = FigureCanvasAgg(ax.figure)
@@ -261,7 +263,7 @@ def test_artists_and_legends_are_drawn_once_and_hidden_axes_not_at_all(ax):
     assert (np.asarray(canvas.buffer_rgba())[..., :3] == 255).all()
 
 
-def test_faces_without_area_part_nothing_and_faces_that_are_not_flat_are_drawn(ax):
+def test_faces_without_area_separate_nothing_and_faces_that_are_not_flat_are_drawn(ax):
     plate = bodies.draw_box(ax, np.eye(4), np.array([1.6, 1.6, 0.0]))
     ax.plot([-1, 1], [0, 0], [-0.6, -0.6], lw=3)
     ax.view_init(20, -60)
@@ -273,7 +275,7 @@ def test_faces_without_area_part_nothing_and_faces_that_are_not_flat_are_drawn(a
     assert sum(part.kind == "face" for part in drawn(ax)[0]) == 1
 
 
-def test_the_number_of_faces_is_not_limited_by_recursion(ax, request):
+def test_the_number_of_faces_is_not_limited_by_the_depth_of_recursion(ax, request):
     corners = np.tile([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]], (150, 1, 1))
     corners[..., 2] = np.linspace(-1, 1, 150)[:, None]
     ax.add_artist(space.Faces(corners, 150 * ["red"]))

@@ -22,7 +22,7 @@ from rbclassroom.assignments.locked_cells import grade_id, restore
 
 @pytest.fixture(scope="module")
 def release(tmp_path_factory):
-    """The tiny set as nbgrader hands it out."""
+    """Return the tiny set as nbgrader releases it."""
     path = write_tiny_set(tmp_path_factory.mktemp("assignments"))
     notebook = nbformat.read(path, as_version=4)
     for step in (LockCells(), ClearSolutions(), ClearHiddenTests(), ComputeChecksums()):
@@ -31,7 +31,7 @@ def release(tmp_path_factory):
 
 
 def answered(release, edit=None, **answers):
-    """The set with the right answers, but for those that are given, edited."""
+    """Return the set with the right answers, or with given ones instead, after an edit."""
     notebook = nbformat.reads(release, as_version=4)
     given = {f"{key}-answer": text for key, text in answers.items()}
     notebook.metadata.kernelspec.name = "mine"
@@ -44,7 +44,8 @@ def answered(release, edit=None, **answers):
 
 @pytest.fixture
 def hand_in(tmp_path, release):
-    """A function that writes a student's file into the unpacked handout, and returns its path."""
+    """Return a function that writes a student's file into the unpacked handout, and returns its
+    path."""
     folder = tmp_path / "my folder ü" / "ps0"
     (folder / "original").mkdir(parents=True)
     (folder / "original" / "ps0.ipynb").write_text(release, encoding="utf-8")
@@ -86,14 +87,14 @@ def test_an_answered_set_is_run_and_written_without_nbgrader(hand_in):
     assert last.endswith("ps0.ipynb")
     assert submitted(path).cells[-1].outputs[0].text == "é∞ 1\n"
     assert submitted(path).metadata.kernelspec.name == "python3"
-    # an output widget keeps nothing for itself
+    # the output widget does not keep the output for itself
     assert cell(submitted(path), "half-answer").outputs[0].text == "inside\n"
     assert path.read_bytes() == before
     names = sorted(file.name for file in path.parent.rglob("*.*"))
     assert names == ["points.csv", "ps0.ipynb", "ps0.ipynb", "ps0.ipynb"]
 
 
-def test_faults_are_named_and_do_not_keep_from_handing_in(hand_in, capsys, monkeypatch):
+def test_faults_are_named_and_the_file_can_still_be_handed_in(hand_in, capsys, monkeypatch):
     def change(notebook):
         cell(notebook, "half-test").source = "assert True"
         notebook.cells.append(new_code_cell("open('made_by_a_run', 'w').close(); nowhere"))
@@ -115,16 +116,16 @@ def test_faults_are_named_and_do_not_keep_from_handing_in(hand_in, capsys, monke
         assert words in said
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
     slow = "took more than half of the 30 s that grading allows"
-    assert said.count(slow) == 6  # of each cell with code, for the clock jumps
+    assert said.count(slow) == 6  # for each cell with code, since the clock jumps
     assert BoxedExecute().timeout == signature(check.check).parameters["seconds"].default == 30
     assert not (path.parent / "made_by_a_run").exists()
 
 
 @pytest.fixture
 def endless(monkeypatch, tmp_path):
-    """``endless(name, patience)``: only that cell has a limit, which begins with its loop.
+    """Return a function that limits only one cell: ``endless(name, patience)``.
 
-    The loop begins when it has run the code that is returned.
+    The limit begins with the endless loop of the cell, when it has run the code that is returned.
     """
 
     def begin(name, patience):
@@ -142,7 +143,7 @@ def endless(monkeypatch, tmp_path):
     return begin
 
 
-def test_an_endless_loop_is_stopped_its_output_is_cut_and_a_dead_kernel_is_named(
+def test_an_endless_loop_is_stopped_its_output_is_cut_and_a_dead_kernel_is_reported(
     hand_in, capsys, endless
 ):
     def ran_before(notebook):
@@ -163,7 +164,7 @@ def test_an_endless_loop_is_stopped_its_output_is_cut_and_a_dead_kernel_is_named
     assert (path.parent / "to_submit" / "ps0.ipynb").stat().st_size < 3_000_000
 
 
-@pytest.mark.skipif(os.name == "nt", reason="there interrupts are no signals")
+@pytest.mark.skipif(os.name == "nt", reason="interrupts are not signals on Windows")
 def test_a_loop_that_cannot_be_stopped_ends_the_run(hand_in, capsys, endless):
     stuck = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
     begin = endless("square-test", 1)
@@ -175,7 +176,7 @@ def test_a_loop_that_cannot_be_stopped_ends_the_run(hand_in, capsys, endless):
     assert "0 of 2 visible tests passed" in said
 
 
-def test_problems_without_an_answer_and_hidden_tests_are_not_counted(release, capsys):
+def test_problems_without_an_answer_or_with_hidden_tests_only_are_not_counted(release, capsys):
     notebook = nbformat.reads(release, as_version=4)
     assert check._print_problems(notebook, notebook) == [False, False]
     empty = "; ".join(f"cell {at} is not answered yet" for at in (3, 5, 8))
@@ -233,9 +234,9 @@ TEST = "cell 4, test of “A tiny set”"
         (with_test(lambda t: t.metadata.update(editable=True)), [f"{TEST} was unlocked; it is"]),
     ],
 )
-def test_locked_cells_are_put_back_and_answers_kept(release, edit, said):
+def test_locked_cells_are_restored_and_answers_are_kept(release, edit, said):
     original, notebook = nbformat.reads(release, as_version=4), answered(release, edit)
-    there = {grade_id(each): each.source for each in notebook.cells}  # of copies the last
+    there = {grade_id(each): each.source for each in notebook.cells}  # of copies, the last one
     given = restore(notebook, original)
     nbformat.validate(notebook)
     assert all(map(str.__contains__, given, said))
@@ -270,7 +271,7 @@ BROKEN = b"no json", b'{"cells": 3}', b"\xff\xfe", b'{\n<<<<<<< HEAD\n"a": 1\n==
     [(b"", "empty"), (b"%PDF-1.7", "a PDF or an archive")]
     + [(content, "damaged or not a notebook") for content in BROKEN],
 )
-def test_a_file_that_is_no_notebook_is_refused_in_one_line(content, word, hand_in):
+def test_a_file_that_is_not_a_notebook_is_refused_in_one_line(content, word, hand_in):
     path = hand_in()
     path.write_bytes(content)
     with pytest.raises(ValueError, match=word):
@@ -278,7 +279,7 @@ def test_a_file_that_is_no_notebook_is_refused_in_one_line(content, word, hand_i
     assert not (path.parent / "to_submit").exists()
 
 
-def test_the_original_is_made_from_the_source_in_the_course_and_missing_elsewhere(
+def test_the_original_is_made_from_the_source_in_the_course_and_required_elsewhere(
     hand_in, tmp_path, monkeypatch
 ):
     def checked(path):
@@ -299,7 +300,7 @@ def test_the_original_is_made_from_the_source_in_the_course_and_missing_elsewher
         checked(path.rename(tmp_path / "mine.ipynb"))
 
 
-def test_errors_are_told_also_where_their_output_is_lost_and_hints_alone():
+def test_errors_are_reported_even_if_their_output_is_lost_and_hints_are_reported_alone():
     notebook = new_notebook(cells=[new_code_cell("1 / 0")])
     reply = {"status": "error", "ename": "ZeroDivisionError", "evalue": "by zero", "traceback": []}
     check._Client(notebook).on_cell_executed(notebook.cells[0], 0, {"content": reply})

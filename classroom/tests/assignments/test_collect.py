@@ -1,4 +1,5 @@
-"""Downloads from Moodle and Canvas, put where nbgrader looks for them."""
+"""The collection of downloads from Moodle and Canvas, at the place where nbgrader looks for
+them."""
 
 import csv
 import io
@@ -26,7 +27,7 @@ FILES = {"collected", "unchanged", "duplicates", "unmatched", "refused", "ignore
 
 @pytest.fixture
 def course(tmp_path):
-    """A course with two sets, and an empty folder for downloads."""
+    """Return a course with two sets, and an empty folder for downloads."""
     assignments = tmp_path / "notebooks" / "assignments"
     for name in ("ps1", "ps2"):
         path = write_tiny_set(assignments, name)
@@ -40,14 +41,14 @@ def moodle(student, file="ps1.ipynb"):
 
 
 def answered(course, words="mine", name="ps1"):
-    """A notebook of a set, as bytes."""
+    """Return a notebook of a set, as bytes."""
     notebook = nbformat.read(course / "source" / name / f"{name}.ipynb", as_version=4)
     notebook.cells.append(new_markdown_cell(words, id="own"))
     return nbformat.writes(notebook).encode()
 
 
 def packed(entries, date=DAY, method=zipfile.ZIP_STORED):
-    """A zip, as bytes."""
+    """Return a zip, as bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", method) as archive:
         for name, content in entries.items():
@@ -57,7 +58,7 @@ def packed(entries, date=DAY, method=zipfile.ZIP_STORED):
 
 
 def collected(course, files, due=None):
-    """Collect files that lie in the folder of downloads; return the lists."""
+    """Collect files from the folder of downloads; return the lists."""
     folder = course.parents[1] / "downloads"
     for name, content in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -69,7 +70,7 @@ def collected(course, files, due=None):
         kept = [tuple(row.values()) for row in csv.DictReader(stream)]
     assert [tuple(cell.removeprefix("'") for cell in row) for row in kept] == rows or not rows
     named = [what for kind, what, _ in rows if kind in FILES]
-    assert len(named) == len(set(named)), "a file is in one list"
+    assert len(named) == len(set(named)), "a file is in more than one list"
     return rows
 
 
@@ -78,7 +79,7 @@ def of(kind, rows):
 
 
 def files(course):
-    """The notebooks in the folders of students, and the text of the students."""
+    """Return the text of each student, by the folders of the collected notebooks."""
     paths = (course / "submitted").glob("*/*/*.ipynb")
     notebooks = {path: nbformat.read(path, as_version=4) for path in paths}
     return {
@@ -108,7 +109,9 @@ def files(course):
     ],
 )
 @pytest.mark.parametrize("packing", ["zip", "loose"])
-def test_known_names_tell_the_student(entry, student, packing, course):
+def test_the_student_is_read_from_the_file_names_of_moodle_and_canvas(
+    entry, student, packing, course
+):
     content = answered(course)
     given = {"ROB_2026_01_all.zip": packed({entry: content})} if packing == "zip" else {}
     rows = collected(course, given or {entry: content})
@@ -123,7 +126,7 @@ def test_known_names_tell_the_student(entry, student, packing, course):
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
-def test_other_encodings_are_stored_in_utf8_and_named(encoding, course):
+def test_other_encodings_are_stored_in_utf8_and_reported(encoding, course):
     content, name = answered(course, "ü"), moodle("A_1")
     rows = collected(course, {name: content.decode().encode(encoding)})
     assert of("collected", rows) == [(name, "a, ps1; it is now stored in UTF-8")]
@@ -139,7 +142,7 @@ def test_no_name_becomes_a_formula_in_a_spreadsheet(course):
     assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
 
 
-def test_sets_are_told_by_cells_and_names(course):
+def test_sets_are_recognised_by_cells_and_names(course):
     empty = nbformat.writes(new_notebook(cells=[new_markdown_cell("mine")])).encode()
     one, two = answered(course), answered(course, name="ps2")
     given = {
@@ -166,7 +169,7 @@ def test_sets_are_told_by_cells_and_names(course):
     assert files(course).keys() == wanted
 
 
-def test_names_in_undeclared_utf8_and_in_parts_are_one_student(course):
+def test_a_name_in_undeclared_utf8_or_with_combining_marks_is_the_same_student(course):
     content, plain = answered(course), moodle("Jörg Müller_1")
     undeclared = bytearray(packed({plain: content}))
     for mark, at in ((b"PK\x03\x04", 7), (b"PK\x01\x02", 9)):
@@ -178,7 +181,7 @@ def test_names_in_undeclared_utf8_and_in_parts_are_one_student(course):
     assert all("Jörg Müller" in what for _, what, _ in rows)
 
 
-def test_students_of_one_name_are_kept_apart_whenever_they_come(course):
+def test_students_with_the_same_name_are_kept_apart_in_any_order(course):
     collected(course, {moodle("Al Li_11"): answered(course, "first")})
     rows = collected(course, {moodle("Al Li_22"): answered(course, "second")})
     why = "2 students have this name, and now numbered folders; delete this one"
@@ -188,13 +191,13 @@ def test_students_of_one_name_are_kept_apart_whenever_they_come(course):
     assert found["al_li_22/ps1"] == "second"
 
 
-def test_a_student_has_one_id_in_each_set_though_moodle_numbers_anew(course):
+def test_a_student_has_one_id_in_all_sets_although_moodle_changes_the_numbers(course):
     two = answered(course, name="ps2")
     collected(course, {moodle("Al Li_11"): answered(course), moodle("Al Li_99", "ps2.ipynb"): two})
     assert files(course).keys() == {"al_li/ps1", "al_li/ps2"}
 
 
-def test_the_roster_gives_ids_and_tells_who_is_missing(course):
+def test_the_roster_gives_ids_and_shows_missing_students(course):
     roster = "id,first_name,last_name,email,lms_user_id\n"
     roster += "s1,Jörg,Müller,,\ns2,Eva,Maria Roth,,\ns3,Al,Li,,500\ns4,Bo,Ek,,\ns5,Al,O'Neil,,\n"
     (course / "students.csv").write_text(roster, "utf-8-sig")
@@ -207,7 +210,7 @@ def test_the_roster_gives_ids_and_tells_who_is_missing(course):
     assert of("not on the roster", rows) == [("new_one", "New One (8)")]
 
 
-def test_rosters_of_spreadsheets_are_read_and_others_refused(course):
+def test_rosters_of_spreadsheets_are_read_and_others_are_refused(course):
     roster = course / "students.csv"
     roster.write_text("id;first_name;last_name\ns1;Jörg;Müller\n", "utf-8")
     collected(course, {moodle("Müller Jörg_500"): answered(course)})
@@ -221,7 +224,7 @@ def test_rosters_of_spreadsheets_are_read_and_others_refused(course):
             collected(course, {})
 
 
-def test_of_the_zip_of_a_student_the_file_to_submit_is_taken(course):
+def test_the_file_to_submit_is_taken_from_the_zip_of_a_student(course):
     inner = {
         "work/ps1.ipynb": answered(course, "work"),
         "ps1/to_submit/ps1.ipynb": answered(course, "to submit"),
@@ -240,13 +243,13 @@ def test_of_the_zip_of_a_student_the_file_to_submit_is_taken(course):
 @pytest.mark.parametrize(
     "inner", [moodle("Bob Bee_2"), "ps1_2026_11_final.ipynb", "img/plot_2026_11_20"]
 )
-def test_a_file_in_the_zip_of_a_student_is_theirs_whatever_its_name(course, inner):
+def test_all_files_in_the_zip_of_a_student_belong_to_the_student(course, inner):
     upload = packed({"ps1.ipynb": answered(course), inner: answered(course)}, NEWEST)
     theirs = {moodle("Ann Ay_1", "ps1.zip"): upload}
     for given in ({"all.zip": packed(theirs)}, theirs):
         collected(course, given)
         assert list(files(course)) == ["ann_ay/ps1"]
-        # entries of a student's zip have the dates of the student's machine
+        # the entries of a student's zip have the dates of the student's machine
         assert "2030" not in (course / "submitted/ann_ay/ps1/timestamp.txt").read_text()
 
 
@@ -274,7 +277,7 @@ def test_unsafe_files_are_refused_and_the_others_are_collected(course):
     }
     zips = [packed(entries), bytes(encrypted), bytes(broken), bomb, b"PK", b""]
     rows = collected(course, {f"{k}.zip": content for k, content in enumerate(zips)})
-    # a name that leads out leads nowhere: of it only the student is read
+    # a name with a path outside the folder is only read for the student
     assert files(course).keys() == {f"{who}/ps1" for who in ("a", "b", "d", "good_one")}
     why = [reason for _, reason in of("refused", rows)]
     assert len(why) == 9
@@ -284,7 +287,7 @@ def test_unsafe_files_are_refused_and_the_others_are_collected(course):
     assert len(of("ignored", rows)) == 2
 
 
-@pytest.mark.skipif(os.name == "nt", reason="links need a permission there")
+@pytest.mark.skipif(os.name == "nt", reason="links need a permission on Windows")
 def test_links_in_the_folder_are_not_followed(course):
     folder = course.parents[1] / "downloads"
     (folder / "A_1_assignsubmission_file_ps1.ipynb").symlink_to(course / "source/ps1")
@@ -292,7 +295,7 @@ def test_links_in_the_folder_are_not_followed(course):
     assert of("refused", rows) == [("A_1_assignsubmission_file_ps1.ipynb", "it is a link")]
 
 
-def test_of_several_uploads_to_canvas_the_last_is_taken_whatever_the_dates(course):
+def test_the_last_of_several_uploads_to_canvas_is_taken_whatever_its_date(course):
     names = {"li_5_100_ps1.ipynb": LATER, "li_5_300_ps1-2.ipynb": DAY, "li_5_200_ps1-1.ipynb": DAY}
     zips = {f"{k}.zip": packed({k: answered(course, k)}, when) for k, when in names.items()}
     rows = collected(course, zips)
@@ -300,7 +303,7 @@ def test_of_several_uploads_to_canvas_the_last_is_taken_whatever_the_dates(cours
     assert len(of("duplicates", rows)) == 2
 
 
-def test_only_newer_downloads_replace_and_mended_files_stay(course):
+def test_only_newer_downloads_replace_files_and_corrected_files_are_kept(course):
     name, two = moodle("A_1"), answered(course, "", "ps2")
     first = {"a.zip": packed({name: answered(course, "new")}, LATER), "b_2_3_ps2.ipynb": two}
     assert len(of("collected", collected(course, first))) == 2
@@ -317,7 +320,7 @@ def test_only_newer_downloads_replace_and_mended_files_stay(course):
     assert files(course)["a/ps1"] == "mended by hand"
 
 
-def test_late_is_what_canvas_marks_and_perhaps_a_date_after_the_due_date(course):
+def test_late_files_are_marked_by_canvas_or_dated_after_the_due_date(course):
     names = moodle("A_1"), "b_2_3_ps1.ipynb", "c_LATE_3_4_ps1.ipynb"
     entries = dict.fromkeys(names, answered(course))
     rows = collected(course, {"a.zip": packed(entries, LATER)}, datetime(2026, 12, 1, 23, 59))

@@ -13,7 +13,7 @@ LOCKED = [
 
 
 def found(source, locked=LOCKED):
-    """The remarks on a cell of a student below locked cells."""
+    """Return the remarks on a cell of a student below locked cells."""
     marks = {"grade_id": "locked", "locked": True}
     cells = [new_code_cell(text, metadata={"nbgrader": marks}) for text in locked]
     return [(line, what) for _, line, what in find_in_cells([*cells, new_code_cell(source)])]
@@ -62,7 +62,7 @@ def found(source, locked=LOCKED):
         ("match 1:\n    case math: pass", "gives math another meaning"),
     ],
 )
-def test_code_that_replaces_what_tests_use_is_found(source, what):
+def test_code_that_replaces_names_of_the_tests_is_found(source, what):
     assert what in [said for _, said in found(source)]
 
 
@@ -92,21 +92,21 @@ def test_code_that_replaces_what_tests_use_is_found(source, what):
         "f = " + "lambda: (a := " * 40 + "1" + ")" * 40,
     ],
 )
-def test_everyday_code_is_not_found(source):
+def test_usual_code_is_accepted(source):
     assert found(source) == []
 
 
-def test_the_line_is_that_of_the_cell():
+def test_the_reported_line_is_that_of_the_cell():
     assert found("\n\nx = 1\nnp.allclose = print") == [(4, "replaces np.allclose")]
     assert found("%%time\nx = 1\nnp.allclose = print") == [(3, "replaces np.allclose")]
 
 
-def test_what_the_locked_cells_do_themselves_may_be_done_in_another_way():
+def test_students_may_import_in_another_way_whatever_the_locked_cells_import():
     locked = ["import matplotlib.pyplot as plt\nimport math\nmath.tau = 6"]
     assert found("from matplotlib import pyplot as plt", locked) == []
     assert found("from json import tool as plt", locked)
 
 
-def test_long_code_is_read_in_a_moment():
-    """A second would be years if the time grew with the square of the length."""
+def test_the_time_for_long_code_is_not_quadratic():
+    """With quadratic time, the second that the test takes would become years."""
     assert found("%matplotlib" + " " * 10**6 + ";")

@@ -1,4 +1,4 @@
-"""A class full of submissions is graded in one go, and none of them harms another."""
+"""A class of submissions is graded in one run, and no submission affects another."""
 
 import os
 import re
@@ -54,8 +54,8 @@ def square(x):
 ### BEGIN HIDDEN TESTS
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """
-# It prints more than a cell may before its limit begins, and then slowly: without a pause it would
-# fill the memory within the limit, or not, as fast as the machine is.
+# This answer prints more than a cell may before its limit begins, and then slowly. Without the
+# pause, only fast machines would fill the memory within the limit.
 LOUD = f"""
 import sys, time
 from IPython.display import HTML, display
@@ -79,7 +79,7 @@ while True:
 LOOP, DOUBLE = f"{begun()}\nwhile True: pass", "def square(x):\n    return 2 * x"
 HUGE, DIES = "x = bytearray(2 * 10**9)", "import os\nos._exit(1)"
 SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tiny set”"
-# Student, change, answers, points (none if it is refused), and words of the remarks.
+# Student, change, answers, points (none if refused), and words of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
     (
@@ -104,7 +104,7 @@ FILES = [
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """A class that was graded at once."""
+    """Return a class that was graded in one run."""
     template = make_template(tmp_path_factory.mktemp("template"))
     course = Class(tmp_path_factory.mktemp("a course"), template)
     with course.gradebook() as gradebook:
@@ -128,7 +128,7 @@ def rows(course):
     [(student, *wanted) for student, _, _, *wanted in CLASS]
     + [(student, " ", [why]) for student, _, _, why in FILES],
 )
-def test_points_and_remarks(course, rows, student, points, remarks):
+def test_each_submission_has_its_points_and_remarks(course, rows, student, points, remarks):
     row = rows[student]
     assert f"{row['square-test']} {row['half-test']}" == points, row
     assert all(remark in row["remarks"] for remark in remarks), row
@@ -143,14 +143,14 @@ def test_points_and_remarks(course, rows, student, points, remarks):
         assert row["late"] == ("1.5 h" if student == "good one" else "")
 
 
-def test_tests_are_put_back_before_grading(course):
+def test_tests_are_restored_before_grading(course):
     notebook = nbformat.read(course.graded("tampers"), as_version=4)
     assert "BEGIN HIDDEN TESTS" in cell(notebook, "square-test").source
     assert cell(notebook, "half-test").metadata.nbgrader.points == 1
     assert cell(notebook, "half-test").cell_type == "code"
 
 
-def test_feedback_shows_points_and_where_tests_fail_and_no_hidden_tests(course):
+def test_feedback_shows_points_and_failures_but_no_hidden_tests(course):
     for path in (course.folder / "feedback").glob("*/ps0/ps0.html"):
         text = re.sub(r"\s", "", course.feedback(path.parents[1].name))
         assert not [line for line in HIDDEN if line in text], path
@@ -171,7 +171,7 @@ def test_feedback_shows_points_and_where_tests_fail_and_no_hidden_tests(course):
 
 
 class Killed(ProcessPoolExecutor):
-    """A worker that is killed when it begins with a student."""
+    """A pool of workers; the worker of one student is killed at its start."""
 
     def submit(self, work, name, student, *further):
         if student == "half right":
@@ -191,7 +191,7 @@ LISTED = [
 
 @pytest.fixture(scope="module")
 def again(tmp_path_factory, course):
-    """The class graded again, after a human: one gave other words, one an empty file.
+    """Grade the class again after manual grading; one answer was changed, and one file is empty.
 
     A worker is killed, and a cell cannot be stopped.
     """
@@ -218,7 +218,7 @@ def again(tmp_path_factory, course):
     return again
 
 
-def test_grading_again_keeps_what_a_human_gave(again):
+def test_grading_again_keeps_manual_scores_and_comments(again):
     rows = again.rows()
     row = rows["good one"]
     assert (row["words-answer"], row["automatic"], row["total"]) == ("2.5", "3", "5.5")
@@ -232,8 +232,8 @@ def test_grading_again_keeps_what_a_human_gave(again):
         assert gradebook.find_submission("ps0", "nosy").score == 2.5
 
 
-def test_who_was_not_graded_or_not_collected_has_a_line_in_the_table(again):
-    """A worker ended, and a cell could not be stopped."""
+def test_students_who_were_not_graded_or_not_collected_are_in_the_table(again):
+    """A worker was killed, and a cell could not be stopped."""
     remarks = {student: row["remarks"] for student, row in again.rows().items()}
     del remarks["good one"], remarks["nosy"]
     assert remarks == {
@@ -246,14 +246,14 @@ def test_who_was_not_graded_or_not_collected_has_a_line_in_the_table(again):
     }
 
 
-def test_alembic_is_found_where_the_environment_is_not_activated(monkeypatch):
-    """nbgrader calls it by its name."""
+def test_alembic_is_found_if_the_environment_is_not_activated(monkeypatch):
+    """nbgrader calls alembic by its name."""
     monkeypatch.setenv("PATH", os.defpath)
     configure(Config())
     assert Path(shutil.which("alembic")).parent == Path(sys.executable).parent
 
 
-def test_sets_without_submissions_and_unknown_sets_are_named(tmp_path):
+def test_sets_without_submissions_and_unknown_sets_are_refused(tmp_path):
     write_tiny_set(tmp_path)
     with pytest.raises(ValueError, match="ps0: a submission in"):
         grade(["ps0"], tmp_path)
@@ -264,13 +264,13 @@ def test_sets_without_submissions_and_unknown_sets_are_named(tmp_path):
 
 
 def test_the_commands_of_nbgrader_are_configured_in_the_same_way():
-    """All that grading needs is in the configuration that nbgrader's own commands read."""
+    """The configuration that nbgrader's own commands read has all that grading needs."""
     wanted = Config()
     configure(wanted)
     assert read_config(ROOT / "notebooks" / "assignments") == wanted
 
 
-def test_nothing_runs_without_a_box_that_was_there(tmp_path, monkeypatch):
+def test_grading_stops_if_the_sandbox_is_no_longer_available(tmp_path, monkeypatch):
     monkeypatch.setattr(sandbox, "missing", lambda: "it failed")
     with pytest.raises(Refused, match="the sandbox does not work any more: it failed"):
         grade_one("ps0", "ann", tmp_path, boxed=True)

@@ -1,4 +1,4 @@
-"""The handout has all that students need, and no solutions."""
+"""The handout has all files that students need, and no solutions."""
 
 import os
 import subprocess
@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """A course folder, in a path with a space, with the tiny set and a file beside it."""
+    """Return a course folder, in a path with a space, with the tiny set and a file beside it."""
     folder = tmp_path_factory.mktemp("a course") / "assignments"
     path = write_tiny_set(folder)
     (path.parent / "table.csv").write_text("1,2\n")
@@ -37,7 +37,7 @@ def unpacked(course, tmp_path_factory):
     return folder / "ps0"
 
 
-def test_the_handout_holds_what_a_student_needs(course, unpacked):
+def test_the_handout_has_all_files_that_a_student_needs(course, unpacked):
     names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*.*")}
     wheels = sorted(path.name for path in unpacked.glob("*.whl"))
     assert [name.partition("-")[0] for name in wheels] == ["rbcourse", "rbcourse_classroom"]
@@ -74,7 +74,7 @@ def test_the_same_handout_is_made_each_time(course):
     assert [file.name for file in path.parent.iterdir()] == ["ps0.zip"]
 
 
-def test_a_private_set_replaces_that_of_the_course(tmp_path):
+def test_a_private_set_replaces_the_set_of_the_course(tmp_path):
     write_tiny_set(tmp_path)
     private = write_tiny_set(tmp_path / "other")
     private.write_text(private.read_text().replace("A tiny set", "My own set"))
@@ -93,7 +93,7 @@ def test_a_private_set_replaces_that_of_the_course(tmp_path):
         (2, {"metadata": {"note": "it is def square(x):"}}, r"gives away 'def square\(x\):'"),
     ],
 )
-def test_sets_that_give_something_away_are_refused(tmp_path, at, change, message):
+def test_sets_that_reveal_solutions_or_hidden_tests_are_refused(tmp_path, at, change, message):
     path = write_tiny_set(tmp_path)
     notebook = nbformat.read(path, as_version=4)
     cell = notebook.cells[at]
@@ -115,7 +115,7 @@ def test_a_file_with_a_solution_and_a_second_notebook_are_refused(tmp_path):
         release("ps0", tmp_path)
 
 
-def test_unknown_sets_and_folders_without_sets_are_named(course, tmp_path, monkeypatch):
+def test_unknown_sets_and_folders_without_sets_are_refused(course, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"one of the problem sets is wanted \(ps0\), got ps9"):
         release("ps9", course)
     monkeypatch.chdir(tmp_path)
@@ -124,7 +124,7 @@ def test_unknown_sets_and_folders_without_sets_are_named(course, tmp_path, monke
         main()
 
 
-def test_solutions_are_run_and_hold_no_hidden_test_and_no_mark_scheme(course):
+def test_solutions_are_run_and_have_no_hidden_test_and_no_mark_scheme(course):
     path = make_solutions("ps0", course)
     assert path == course / "handouts" / "ps0-solutions.ipynb"
     notebook = nbformat.read(path, as_version=4)

@@ -63,11 +63,11 @@ def test_wrong_answers_get_a_hint_or_a_description(body, said):
     assert all(map(np.array_equal, before, [x for x, _ in DOUBLE.inputs]))
 
 
-def test_a_function_with_other_arguments_is_named():
+def test_the_error_for_a_wrong_number_of_arguments_is_reported():
     assert "takes 1 positional argument but 2 were given" in told(DOUBLE, "def answer(x): return x")
 
 
-def test_full_turns_do_not_count_where_the_problem_says_so():
+def test_full_turns_are_ignored_if_the_problem_says_so():
     x = np.array([1.0, 2.0])
     problem = Problem(["x"], [(x,)], [x], angles=[1])
     turned = "import numpy as np\ndef answer(x): return x + 2 * np.pi * np.array([{}, {}])"
@@ -140,7 +140,7 @@ DATA, EDGES, HEIGHTS = [0.5, 1.2, 1.4], [0, 1, 2], [1 / 3, 2 / 3]
         lambda ax: (ax.axvspan(0, 1), ax.hist(DATA, EDGES, density=True)),
     ],
 )
-def test_bars_and_steps_are_curves(draw):
+def test_bars_and_steps_are_read_as_curves(draw):
     draw(ax := Figure().subplots())
     wanted = [[0.5, 1 / 3], [1.5, 2 / 3]]
     assert any(np.shape(c) == (2, 2) and np.allclose(c, wanted) for c in curves_of(ax))

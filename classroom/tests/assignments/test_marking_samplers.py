@@ -1,4 +1,4 @@
-"""A right sampler is as good as never refused; a wrong one is, with the reason."""
+"""A right sampler is almost never refused; a wrong one is refused with the reason."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ COIN = Sampler(
 
 
 def draws(law, n, rng):
-    """Right draws, by SciPy."""
+    """Return right draws, by SciPy."""
     if law == "direction":
         points = rng.normal(size=(n, 3))
         return points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -31,9 +31,9 @@ def draws(law, n, rng):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
-    """The chances by Massart's bound add up to that, for every number of draws.
+    """The probabilities of refusal by Massart's bound add up to 1e-6 for every number of draws.
 
-    If rows had other laws than the uniform one, 20 times as many draws would show it.
+    If the distribution of a row were not uniform, 20 times as many draws would show it.
     """
     problem = Sampler(**LAWS[law], mistakes=())
     drawn = draws(law, 20 * problem.draws, np.random.default_rng(17))
@@ -80,7 +80,7 @@ def told(problem, source, rng=1):
         ("rng.random() / 2", "These draws are not uniform. The distribution of the number"),
     ],
 )
-def test_wrong_samplers_get_the_reason(body, said):
+def test_wrong_samplers_are_refused_with_the_reason(body, said):
     assert told(COIN, f"def answer(rng): return {body}").startswith(said)
 
 
@@ -93,20 +93,20 @@ def test_wrong_samplers_get_the_reason(body, said):
         ("1 / 0", "Your function stops: ZeroDivisionError"),
     ],
 )
-def test_a_fault_late_in_the_run_is_seen(late, said):
+def test_an_error_late_in_the_run_is_found(late, said):
     counted = "calls = []\ndef answer(rng):\n    calls.append(0)\n    "
     source = f"{counted}return rng.random() if len(calls) < 3000 else {late}"
     assert told(COIN, source).startswith(said)
 
 
 @pytest.mark.parametrize("step", [1, -1])
-def test_of_two_similar_mistakes_the_nearer_gets_its_hint(step):
+def test_the_nearer_of_two_similar_mistakes_gets_its_hint(step):
     near = [Mistake("near", [[quantiles(np.linspace(0, 1, 4001) ** 2.02)]]), *COIN.mistakes]
     alike = replace(COIN, mistakes=near[::step], draws=40_000)
     assert told(alike, "def answer(rng): return rng.random() ** 1.98", 5) == "squared"
 
 
-def test_draws_that_are_used_twice_are_seen():
+def test_draws_that_are_used_twice_are_detected():
     source = """
         import numpy as np
         last = []

@@ -1,4 +1,4 @@
-"""The problem sets: the reference passes, nothing passes, and each wrong answer gets its hint."""
+"""The problem sets: references pass, empty answers fail, and each wrong answer gets its hint."""
 
 import ast
 import contextlib
@@ -34,7 +34,7 @@ sets = pytest.mark.parametrize("name", SETS)
 
 
 def cells(name):
-    """The cells of a set by their grade_ids."""
+    """Return the cells of a set by their grade_ids."""
     return {cell.metadata.nbgrader.grade_id: cell for cell in SETS[name].cells}
 
 
@@ -44,7 +44,7 @@ def compiled(text):
 
 
 def namespace(name, *further):
-    """The names in the notebook after its answers and further cells."""
+    """Return the names in the notebook after its answers and further cells."""
     sources = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
     answers = [text for key, text in sources.items() if key.endswith("-answer")]
     space = {"__name__": "__main__"}
@@ -55,7 +55,7 @@ def namespace(name, *further):
 
 
 def head(name, slug):
-    """The first lines of an answer, without the solution, and the name of its function."""
+    """Return the first lines of an answer, without the solution, and the name of its function."""
     text = re.split(r" *### BEGIN SOLUTION", cells(name)[f"{slug}-answer"].source)[0]
     return text, re.search(r"def (\w+)\(", text)[1]
 
@@ -72,24 +72,24 @@ def no_figure_stays():
 
 
 @problems
-def test_the_reference_passes_also_with_lists_and_the_stub_does_not(name, slug):
-    """An answer that passes the visible tests must not fail the hidden ones for its type."""
+def test_the_reference_passes_even_if_it_returns_lists_and_the_stub_fails(name, slug):
+    """The type of an answer that passes the visible tests must not make the hidden ones fail."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
     with pytest.raises(NotYet, match="Nothing is written here yet"):
         namespace(name, f"{start}    raise NotImplementedError()", test)
     listed = f"_inner = {function}\n\n\ndef {function}(*arguments):\n"
     listed += "    result = _inner(*arguments)\n    return np.asarray(result).tolist()\n"
-    random = "law" in TABLES[name][slug]  # its draws are made an array first
+    random = "law" in TABLES[name][slug]  # draws of a sampler are converted to an array first
     for wrapper in [""] if random else ["", listed]:
         namespace(name, wrapper, test)
 
 
 @problems
 def test_wrong_answers_get_their_hints(name, slug):
-    """The first of random answers with as many draws as students make, which takes a second.
+    """The first wrong sampler makes as many draws as a student's, which takes a second.
 
-    The others with fewer: faults are harder to see, and to tell apart, in fewer draws.
+    The others make fewer draws, in which errors are harder to see and to tell apart.
     """
     start, function = head(name, slug)
     judge, seed = known(name, slug), [5] if "law" in TABLES[name][slug] else []
@@ -114,7 +114,7 @@ def place(numbers, form="g"):
 
 
 def examples():
-    """What each question gives as an example, from the reference answers."""
+    """Return the examples that the questions state, from the reference answers."""
     one, two = namespace("ps1"), namespace("ps2")
     plan = [(np.array([1, 0, 0]), 3), (np.array([0, 0, 0.5]), 2)]
     poses = one["run_plan"](np.zeros(3), plan)
@@ -193,7 +193,7 @@ def test_every_cell_has_its_own_name_and_its_place_in_the_grading(name):
 
 @problems
 def test_test_cells_end_with_assertions_and_hidden_tests_need_no_package(name, slug):
-    """Of a bare expression nbgrader takes the value for the points."""
+    """At the end of a cell, nbgrader would take the value of a bare expression for the points."""
     source = cells(name)[f"{slug}-test"].source
     visible, hidden, end = re.split(r"### (?:BEGIN|END) HIDDEN TESTS", source)
     for text in (source, visible + end):
@@ -207,7 +207,7 @@ def test_test_cells_end_with_assertions_and_hidden_tests_need_no_package(name, s
 
 
 @problems
-def test_hidden_tests_alone_refuse_an_answer_that_knows_the_visible_inputs(name, slug):
+def test_hidden_tests_refuse_an_answer_that_only_knows_the_visible_inputs(name, slug):
     if "law" in TABLES[name][slug]:
         return
     hidden = cells(name)[f"{slug}-test"].source.partition("### BEGIN HIDDEN TESTS")[2]
@@ -219,7 +219,7 @@ def test_hidden_tests_alone_refuse_an_answer_that_knows_the_visible_inputs(name,
         exec(hidden, space)
 
 
-def test_the_example_of_the_page_for_teachers_runs(tmp_path, monkeypatch):
+def test_the_example_on_the_page_for_teachers_runs(tmp_path, monkeypatch):
     page = (SOURCE.parent / "README.md").read_text("utf-8")
     (table,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     (test,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
@@ -240,7 +240,7 @@ def test_the_example_of_the_page_for_teachers_runs(tmp_path, monkeypatch):
         exec(f"{start}    return 2 * np.pi * r\n{test}", {"__name__": "__main__"})
 
 
-def test_missing_or_broken_tables_and_data_are_named(tmp_path, monkeypatch):
+def test_missing_or_broken_tables_and_data_are_reported(tmp_path, monkeypatch):
     shutil.copytree(SOURCE / "ps2", tmp_path / "ps2", ignore=shutil.ignore_patterns("*.json"))
     monkeypatch.chdir(tmp_path / "ps2")
     with pytest.raises(NotYet, match=r"^ps2\.json is missing"):

@@ -1,4 +1,4 @@
-"""The problem sets handed out, handed in and graded, as students and teachers meet them."""
+"""The problem sets handed out, handed in and graded, as students and teachers see them."""
 
 import base64
 import csv
@@ -24,7 +24,7 @@ UNSEEN = "HIDDEN TESTS|MARK SCHEME"
 
 
 def regions(name, kinds):
-    """The lines that students must not see, but short ones and those that they see elsewhere."""
+    """Return the lines that students must not see, except short ones and those shown elsewhere."""
     text = "\n".join(cell.source for cell in SETS[name].cells)
     inside = re.findall(rf"BEGIN (?:{kinds})(.*?)END (?:{kinds})", text, re.DOTALL)
     outside = re.sub(r"(?s)BEGIN [A-Z]+.*?END [A-Z]+", "", text)
@@ -34,7 +34,7 @@ def regions(name, kinds):
 
 
 def points(name):
-    """The points of the cells with tests, and of those in words."""
+    """Return the points of the cells with tests, and of the answers in words."""
     marks = [cell.metadata.nbgrader for cell in SETS[name].cells]
     graded = {mark.grade_id: mark.points for mark in marks if mark.grade}
     tests = {key: value for key, value in graded.items() if key.endswith("-test")}
@@ -42,7 +42,7 @@ def points(name):
 
 
 def wrong(grade_id, source):
-    """A wrong answer of the first set."""
+    """Return a wrong answer of the first set."""
     slug, table = grade_id.removesuffix("-answer"), TABLES[FIRST]
     if slug not in table:
         return source
@@ -53,9 +53,9 @@ def wrong(grade_id, source):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """A course in which two sets were graded: solved, the first one wrong and untouched too.
+    """Return a course in which two sets were graded, the first one also wrong and untouched.
 
-    Another student solves each, so that all can be graded at once.
+    A different student solves each set, so that all can be graded in one run.
     """
     folder = tmp_path_factory.mktemp("course")
     shutil.copytree(SOURCE, folder / "source")
@@ -84,8 +84,8 @@ def row(course, name, student):
 
 
 @pytest.mark.parametrize("name", [FIRST, LAST])
-def test_the_reference_gets_all_points_in_a_release_that_is_what_nbgrader_makes(course, name):
-    """Of the other sets, test_problems.py sees that the reference passes."""
+def test_the_reference_gets_all_points_and_the_release_is_the_one_of_nbgrader(course, name):
+    """For the other sets, test_problems.py checks that the reference passes."""
     tests, words = points(name)
     student = f"solved {name}"
     found = row(course, name, student)
@@ -102,8 +102,8 @@ def test_the_reference_gets_all_points_in_a_release_that_is_what_nbgrader_makes(
     assert made == release(name, course)[f"{name}.ipynb"]
 
 
-def test_wrong_answers_get_no_points_and_their_hints_and_feedback_shows_nothing_unseen(course):
-    """Of the other sets, test_problems.py sees that their tests fail, and how."""
+def test_wrong_answers_get_hints_and_no_points_and_feedback_shows_no_hidden_lines(course):
+    """For the other sets, test_problems.py checks that their tests fail, and how."""
     untouched = row(course, FIRST, "untouched")
     assert float(untouched["total"]) == float(untouched["automatic"]) == 0
     assert (untouched["by hand"], untouched["remarks"]) == ("", "")
@@ -120,7 +120,7 @@ def test_wrong_answers_get_no_points_and_their_hints_and_feedback_shows_nothing_
 
 
 def files_in(content, place=""):
-    """Every file of a zip, and of the zips and wheels in it."""
+    """Yield every file of a zip, and of the zips and wheels in it."""
     with ZipFile(io.BytesIO(content)) as archive:
         for name in archive.namelist():
             inner = archive.read(name)
@@ -132,13 +132,13 @@ def files_in(content, place=""):
 
 @pytest.fixture(scope="module")
 def handed_out(course):
-    """The files of the handout of the first set."""
+    """Return the files of the handout of the first set."""
     return dict(files_in(make_handout(FIRST, course, SOURCE.parents[2]).read_bytes()))
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_no_file_of_a_handout_gives_anything_away(course, handed_out, name):
-    """Nor does the release of the set; in it a question without words is no work for a human."""
+def test_no_file_of_a_handout_reveals_solutions_or_hidden_tests(course, handed_out, name):
+    """The release of each set is tested, too. Untouched answers in words need no manual grading."""
     own = {path: content.decode() for path, content in release(name, course).items()}
     files = {**handed_out, **own}
     assert any("whl/rbclassroom/assignments/marking.py" in path for path in files)
@@ -162,5 +162,5 @@ def test_no_file_of_a_handout_gives_anything_away(course, handed_out, name):
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_no_reference_is_refused_for_what_it_uses(name):
+def test_no_reference_is_refused_for_forbidden_code(name):
     assert list(find_in_cells(SETS[name].cells)) == []

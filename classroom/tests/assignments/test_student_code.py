@@ -8,7 +8,7 @@ from rbclassroom.assignments.student_code import NotYet, call_student
 
 
 def student(source, name="answer"):
-    """A function as a notebook defines it."""
+    """Return a function as a notebook defines it."""
     space = {"__name__": "__main__"}
     exec(compile(dedent(source), "<cell>", "exec"), space)
     return space[name]
@@ -38,7 +38,7 @@ BORROWED = {
 
 
 @pytest.mark.parametrize("source", BORROWED.values(), ids=BORROWED)
-def test_functions_of_libraries_are_named(source):
+def test_borrowed_functions_of_libraries_are_reported(source):
     library = "scipy" if "scipy" in source else r"rb(course|classroom)\."
     with pytest.raises(NotYet, match=rf"Your function uses {library}.*Write it yourself"):
         call_student(student(source), ([0.1, 0.2, 0.3],), ())
@@ -83,14 +83,14 @@ def test_the_libraries_that_matplotlib_loads_are_allowed():
     call_student(student(source), (), ())
 
 
-def test_the_error_of_a_function_is_told():
+def test_the_error_of_a_function_is_reported():
     with pytest.raises(NotYet, match=r"stops.*ZeroDivisionError: division by zero"):
         call_student(student("def answer(x): return 1 / 0"), (1,), ())
     with pytest.raises(NotYet, match="stops: TypeError: 'float' object is not callable"):
         call_student(1.5, (1,), ())
 
 
-def test_a_notebook_shows_the_hint_alone_in_lines_that_fit():
+def test_a_notebook_shows_only_the_hint_in_lines_that_fit():
     lines = NotYet("a long hint " * 30)._render_traceback_()
     assert max(map(len, lines)) <= 80
     assert "\n".join(lines).split() == ["a", "long", "hint"] * 30

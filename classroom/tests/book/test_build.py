@@ -1,4 +1,4 @@
-"""The sources of the book, and the folder that it is written to."""
+"""The sources of the book, and the folder to which it is written."""
 
 import json
 import re
@@ -22,7 +22,7 @@ FIGURES = ROOT / "figures"
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """The folders of the sources, with the pages of two files of code only."""
+    """Return the folders of the sources, with code pages for only two files."""
     folder = tmp_path_factory.mktemp("book")
     with pytest.MonkeyPatch.context() as patch:
         code = ["rbcourse/so3.py", "tests/test_so3.py"]
@@ -33,7 +33,7 @@ def written(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def source(written):
-    """The source of a page: ``source("ledger.md")``."""
+    """Return a function that reads the source of a page: ``source("ledger.md")``."""
     return lambda page: (written / "sources" / page).read_text("utf-8")
 
 
@@ -68,7 +68,7 @@ def test_problem_sets_come_without_solutions(source):
         assert not LEFTOVER.search(text)
 
 
-def test_the_course_comes_along_without_outputs_and_the_notebooks_of_teachers(written, source):
+def test_the_course_is_included_without_outputs_and_without_notebooks_for_teachers(written, source):
     with ZipFile(written / "extra/course.zip") as archive:
         names = {name.removeprefix("rbcourse/") for name in archive.namelist()}
         lesson = json.loads(archive.read("rbcourse/notebooks/06_geodesics.ipynb"))
@@ -84,7 +84,7 @@ def test_the_course_comes_along_without_outputs_and_the_notebooks_of_teachers(wr
     assert "Download ZIP" not in install
 
 
-def test_stray_files_are_not_taken_along(tmp_path):
+def test_stray_files_are_not_included(tmp_path):
     root, extra = tmp_path / "course", tmp_path / "extra"
     stray = ["grades.csv", "notebooks/ps1.ipynb", "rbcourse/a.py~", "rbcourse/.b/c.py"]
     stray += ["rbcourse/.d.py", "rbcourse/__pycache__/a.cpython-311.pyc", "rbcourse/grades.csv"]
@@ -99,14 +99,14 @@ def test_stray_files_are_not_taken_along(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["https://github.com/us/course", "us", "us/a b"])
-def test_a_repository_is_an_owner_and_a_name(name, monkeypatch, capsys):
+def test_a_repository_must_be_an_owner_and_a_name(name, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["build", "--repository", name])
     with pytest.raises(SystemExit):
         build.main()
     assert "owner/name wanted" in capsys.readouterr().err
 
 
-def test_a_folder_that_is_no_book_is_left_alone(tmp_path):
+def test_a_folder_that_is_not_a_book_is_left_alone(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(ValueError, match="is no book that was made here"):
         build.build(ROOT, tmp_path)
@@ -114,7 +114,7 @@ def test_a_folder_that_is_no_book_is_left_alone(tmp_path):
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_the_page_of_a_lesson_has_all_of_it_but_its_run_sheet(path, source):
+def test_the_page_of_a_lesson_has_all_of_it_except_its_run_sheet(path, source):
     stored = nbformat.read(path, as_version=4).cells
     cells = nbformat.reads(source(f"lessons/{path.name}"), as_version=4).cells
     code, page_code = (
@@ -140,7 +140,7 @@ def test_the_page_of_a_lesson_has_all_of_it_but_its_run_sheet(path, source):
         assert stored[-1].source.split()[-1] in sheet
 
 
-def test_lessons_that_are_named_are_linked_and_explorers_live(source):
+def test_mentions_of_lessons_are_links_and_explorers_are_interactive(source):
     text = source("lessons/06_geodesics.ipynb")
     assert "([lesson 3](03_rotations_in_space.ipynb))" in text
     assert "Go on to [lesson 1](01_plane.ipynb)" in source("lessons/00_start_here.ipynb")
@@ -159,7 +159,7 @@ def test_the_ledger_has_a_row_for_every_key(source):
     assert "code/tests/test_projected_line.html#" in cells[3]
     assert "lessons/06_geodesics.html#s6" in cells[4]
     assert "figures.html#lesson06_chord" in cells[5]
-    # the figures of the texts are their own pictures
+    # the entries for figures of the texts list their own pictures
     for key, names in {
         "bk-fig-4": ["paper_fig4a", "paper_fig4b", "paper_fig4c"],
         "bk-fig-5": ["paper_fig5a", "paper_fig5b"],
@@ -170,7 +170,7 @@ def test_the_ledger_has_a_row_for_every_key(source):
 
 
 def row(page, anchor):
-    """The cells of a row of the ledger."""
+    """Return the cells of a row of the ledger."""
     cells = page[page.index(f'id="{anchor}"') :].split("\n* - ")[0]
     return re.split(r"\n  - ", cells)
 
@@ -200,7 +200,7 @@ def test_works_are_listed_once_with_all_their_lessons(source):
     assert listed == cited
 
 
-def test_answers_of_questions_are_folded(source):
+def test_answers_to_questions_are_folded(source):
     answers = (ROOT / "notebooks/QUESTIONS.md").read_text("utf-8").count("#### Answers")
     page = source("teach/questions.md")
     assert page.count("<details") == page.count("</details>") == answers > 50
@@ -209,7 +209,9 @@ def test_answers_of_questions_are_folded(source):
     )
 
 
-def test_the_package_has_pages_that_begin_with_functions_and_none_for_maintainers(source, written):
+def test_pages_of_the_package_begin_with_functions_and_maintainers_modules_have_none(
+    source, written
+):
     page = source("package/index.md")
     assert "| [so3](so3.rst) | " in page
     assert "```{toctree}\n:hidden:\n\nso3\nquaternion\n" in page

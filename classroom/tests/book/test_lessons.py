@@ -52,7 +52,7 @@ def test_pictures_become_files_and_figures_are_not_written_twice(tmp_path):
     assert "base64" not in found
 
 
-def test_living_pictures_share_what_draws_them_and_equal_ones_their_states(tmp_path):
+def test_interactive_pictures_share_their_scripts_and_equal_ones_share_their_states(tmp_path):
     root = Path(__file__).parents[3]
     cube, arm = (living(name, root) for name in ("cube", "arm"))
     found = lessons.with_script_files(cube + arm + cube, tmp_path, "there")
@@ -73,7 +73,7 @@ def test_living_pictures_share_what_draws_them_and_equal_ones_their_states(tmp_p
     assert f'"{sources[1].removesuffix(".js")}"</script>' in found
 
 
-def test_a_caption_links_its_files_and_a_still_its_picture():
+def test_a_caption_links_to_its_files_and_a_still_to_its_picture():
     small = "<figcaption>A turn. <small>turn.png, .csv</small></figcaption></figure>"
     image = '<img width="3" src="../figures/turn.png"/>'
     linked = '<small><a href="../figures/turn.png">turn.png</a>, '
@@ -86,7 +86,7 @@ def test_a_caption_links_its_files_and_a_still_its_picture():
     assert linked in player
 
 
-def test_the_figures_of_a_lesson_have_their_sections():
+def test_the_figures_of_a_lesson_are_listed_with_their_sections():
     lines = 'save_animation(\n    fig, "lesson01_way", data, alt)'
     data = {"text/plain": "lesson01_way: A way.", "text/html": "…"}
     drawn = new_code_cell(lines, outputs=[new_output("execute_result", data=data)])
@@ -100,7 +100,7 @@ def test_the_figures_of_a_lesson_have_their_sections():
 
 
 @pytest.mark.parametrize("repository", ["", "us/course"])
-def test_a_lesson_can_be_downloaded_and_with_a_repository_be_run(repository):
+def test_a_lesson_can_be_downloaded_and_can_be_run_if_a_repository_is_given(repository):
     ran = new_code_cell("1", outputs=[new_output("stream", text="1")])
     notebook = new_notebook(cells=[*markdown("# T\n\ntext"), ran])
     lessons.add_buttons(notebook, "01_plane.ipynb", repository)
@@ -113,7 +113,7 @@ def test_a_lesson_can_be_downloaded_and_with_a_repository_be_run(repository):
     assert lessons.without_outputs(notebook).cells[1].outputs == []
 
 
-def test_a_wide_still_is_cut_between_its_panels_and_one_that_is_not_wide_is_whole():
+def test_a_wide_still_is_cut_between_its_panels_and_other_stills_are_not_cut():
     def still(*panels, size=(900, 400)):
         shown = Image.new("RGB", size, "white")
         for left, right in panels:
@@ -128,7 +128,7 @@ def test_a_wide_still_is_cut_between_its_panels_and_one_that_is_not_wide_is_whol
     assert lessons.cuts_of(still((10, 430), (470, 690), size=(700, 400))) == []
 
 
-def test_imports_come_last_neighbours_are_joined_and_code_is_folded_but_answers_to_exercises():
+def test_imports_come_last_and_all_code_except_answers_to_exercises_is_folded():
     shown = [new_output("stream", text="2")]
     cells = markdown("# A", "## 1", "### Answer to poll 1", "### Answer to exercise 1", "## 2")
     cells.insert(1, new_code_cell("import numpy as np"))

@@ -4,13 +4,13 @@ from rbclassroom.book.places import anchor, file_of, full_name, relinked, source
 from rbclassroom.course.ledger import MISPRINTS, WHAT
 
 
-def test_each_key_has_an_anchor_of_its_own():
+def test_each_key_has_its_own_anchor():
     keys = [*WHAT, *MISPRINTS]
     assert len({anchor(key) for key in keys}) == len(keys)
     assert anchor("BK 1") != anchor("BK (1)")
 
 
-def test_keys_in_a_text_and_nothing_else_lead_to_the_ledger():
+def test_only_keys_in_a_text_become_links_to_the_ledger():
     assert with_keys("<small>BK 6.1, BK (16)</small>", "lessons/06_geodesics.ipynb") == (
         '<small><a href="../ledger.html#bk-6-1">BK 6.1</a>, '
         '<a href="../ledger.html#bk-eq-16">BK (16)</a></small>'

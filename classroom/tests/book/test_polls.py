@@ -1,4 +1,4 @@
-"""Polls of the book: each option has one line, its own."""
+"""Polls of the book: each option has its own line."""
 
 import re
 from pathlib import Path
@@ -21,7 +21,7 @@ OPTION = re.compile(
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_each_option_has_a_line_of_its_own_and_the_right_one_is_that_of_the_slides(
+def test_each_option_has_its_own_line_and_the_right_one_agrees_with_the_slides(
     path,
 ):
     verdicts = {slide.poll: slide for slide in deck_of(path).shown if slide.kind == "verdict"}

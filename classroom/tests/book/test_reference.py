@@ -10,7 +10,7 @@ from rbclassroom.book import reference
 ROOT = Path(__file__).parents[3]
 
 
-def test_every_public_module_has_a_page_but_those_for_maintainers():
+def test_every_public_module_has_a_page_except_those_for_maintainers():
     packages = ROOT / "rbcourse", ROOT / "classroom/rbclassroom"
     paths = {path.relative_to(package) for package in packages for path in package.rglob("*.py")}
     names = {".".join(path.with_suffix("").parts) for path in paths if path.stem[0] != "_"}
@@ -25,7 +25,7 @@ def test_every_public_module_has_a_page_but_those_for_maintainers():
     assert not any(name.startswith("classroom/tests/assignments") for name in shown)
 
 
-def test_the_tests_of_a_function_are_those_that_name_it():
+def test_the_tests_listed_for_a_function_are_those_that_use_it():
     named = reference.naming(ROOT)
     for name, home in {"so3.hat_so3": "test_so3.py", "draw.save.save_figure": "draw/test_"}.items():
         found = reference.tests_of(name, named)
@@ -37,8 +37,8 @@ def test_the_tests_of_a_function_are_those_that_name_it():
     assert reference.tests_of("so3.hat", named) == ["test_so3.py::b"]
 
 
-def test_a_test_names_what_it_imports(tmp_path):
-    """By whatever name; `str.split` is no function of the package."""
+def test_a_test_is_listed_for_the_functions_that_it_uses(tmp_path):
+    """Any import name counts. `str.split` is not a function of the package."""
     (tmp_path / "rbcourse/draw").mkdir(parents=True)
     (tmp_path / "tests").mkdir()
     (tmp_path / "rbcourse/__init__.py").write_text("from rbcourse.so3 import exp_so3\n")
@@ -54,7 +54,7 @@ def test_a_test_names_what_it_imports(tmp_path):
     assert not any("split" in name or "vee" in name for name in found)
 
 
-def test_code_has_an_anchor_for_each_definition_and_loses_nothing():
+def test_code_has_an_anchor_for_each_definition_and_is_complete():
     source = (ROOT / "rbcourse/so3.py").read_text("utf-8")
     page = reference.coloured(source)
     names = [node.name for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]

@@ -1,4 +1,4 @@
-"""A headless Chromium for each worker, and a JupyterLab where a test asks for one."""
+"""A headless Chromium for each worker, and a JupyterLab for the tests that need one."""
 
 import os
 import shutil
@@ -16,14 +16,14 @@ from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
-PATIENCE = 600_000  # milliseconds; long enough for a slow machine
+PATIENCE = 600_000  # milliseconds, long enough for a slow machine
 QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session):
-    """Find a browser, and configure JupyterLab, before there are workers."""
+    """Find a browser, and configure JupyterLab, before the workers start."""
     if not (hasattr(session.config, "workerinput") or session.config.option.collectonly):
         names = "chromium", "chromium-browser", "google-chrome", "msedge"
         os.environ["CHROMIUM"] = os.environ.get("CHROMIUM") or find_program("chromium", *names)
@@ -32,7 +32,7 @@ def pytest_sessionstart(session):
 
 @pytest.fixture(scope="session")
 def context():
-    """The browser context that the pages of a worker share, with its cache."""
+    """Return the browser context that the pages of a worker share, with its cache."""
     expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         path = os.environ["CHROMIUM"]
@@ -45,7 +45,8 @@ def context():
 
 @pytest.fixture(scope="session")
 def home(tmp_path_factory):
-    """The folder of the course in the home of a user, who has copies; and the environment."""
+    """Return the course folder in the home of a user with copies of the lessons, and the
+    environment."""
     home = tmp_path_factory.mktemp("home")
     kept = ("PATH", "SYSTEMROOT", "LANG")
     env = {name: os.environ[name] for name in kept if name in os.environ}
@@ -60,7 +61,7 @@ def home(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def lab(home):
-    """The address of something in JupyterLab, with its token: ``lab(path)``."""
+    """Return a function for addresses in JupyterLab, with the token: ``lab(path)``."""
     course, env = home
     words = ["jupyterlab", "--no-browser", "--ServerApp.port=0", "--expose-app-in-browser"]
     words.append(f"--ServerApp.root_dir={course / 'work'}")
@@ -74,7 +75,7 @@ def lab(home):
 
 @pytest.fixture
 def page(context):
-    """A page for a test alone, see `watched`."""
+    """Return a page for a single test, see `watched`."""
     with watched(context) as page:
         yield page
 

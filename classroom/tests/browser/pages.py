@@ -1,4 +1,4 @@
-"""Actions of a person on the pages: open them, press keys, look."""
+"""Actions of a user on the pages: open them, press keys, look."""
 
 import re
 from contextlib import contextmanager
@@ -7,7 +7,7 @@ from pixels import shown
 from playwright.sync_api import expect
 
 IDLE = re.compile(r"\| Idle$")
-# faults of the pictures and players on the page
+# A function of the page that returns the faults of its pictures and players.
 SEEN = """() => {
   const faults = [], parts = ":is(.jp-Cell figure, .rbcourse-explorer) :is(img, canvas)";
   for (const picture of document.querySelectorAll(parts)) {
@@ -35,16 +35,16 @@ FRAMES = "async (count) => { while (count--) await new Promise(requestAnimationF
 
 @contextmanager
 def watched(context):
-    """A page that must send no request to another machine, and log no error."""
+    """Yield a page that must not send requests to another machine, and must not log errors."""
     page, faults = context.new_page(), []
     page.set_viewport_size({"width": 1280, "height": 800})
     local = ("http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:", "file:///")
     page.on("request", lambda r: r.url.startswith(local) or faults.append(f"asked {r.url}"))
-    # JupyterLab shows why it cannot save, and then throws it
+    # JupyterLab shows why it cannot save, and then throws this error
     meant = "is an original, and is not saved"
     page.on("pageerror", lambda error: meant in str(error) or faults.append(f"error {error}"))
-    # an original that JupyterLab cannot save is refused: 403; and widgets say that they cannot
-    # send the values of their sliders to a kernel that has ended
+    # JupyterLab gets a 403 for an original, which cannot be saved. Widgets report that they cannot
+    # send the values of their sliders to a kernel that has ended.
     known = re.compile("^(?!error)|403|Could not send widget sync message")
     page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
     yield page
@@ -53,13 +53,13 @@ def watched(context):
 
 
 def open_in_lab(page, address):
-    """Open a notebook in JupyterLab, and wait until its cells are there."""
+    """Open a notebook in JupyterLab, and wait until its cells are shown."""
     page.goto(address)
     page.locator(".jp-NotebookPanel .jp-Cell").first.wait_for()
 
 
 def run_all(page):
-    """Run all cells and wait until the last of them is done."""
+    """Wait until the kernel is idle, and start all cells."""
     page.get_by_text(IDLE).wait_for()
     page.evaluate("jupyterapp.commands.execute('notebook:run-all-cells')")
 
@@ -68,7 +68,7 @@ def wait_for(explorer):
     """Wait until an explorer has its picture and its numbers; return it."""
     explorer.locator(".widget-readout", has_text=re.compile(r"\d")).last.wait_for()
     explorer.locator("table").wait_for()
-    explorer.get_by_role("img").wait_for()  # a canvas is one when it has been drawn
+    explorer.get_by_role("img").wait_for()  # a canvas has this role after it is drawn
     return explorer
 
 
@@ -78,9 +78,9 @@ def centre(explorer):
 
 
 def move_every_control(explorer):
-    """Move each slider by a key and by the mouse, and choose by both; time is moved first.
+    """Move each slider by key and by mouse, and choose options by both; time is moved first.
 
-    Numbers follow at once, and then picture and text.
+    The numbers have to change at once; the picture and the text may follow later.
     """
     table, sliders = explorer.locator("table"), explorer.locator(".widget-slider").all()
     said, picture = table.inner_text(), shown(explorer.locator("canvas"))

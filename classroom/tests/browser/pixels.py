@@ -8,19 +8,19 @@ from PIL import Image
 
 
 def pixels(png):
-    """A PNG as numbers, shape (rows, columns, 3)."""
+    """Return a PNG as numbers, shape (rows, columns, 3)."""
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
 
 
 def shown(canvas):
-    """The picture of a canvas of the page, as a PNG."""
+    """Return the picture of a canvas of the page, as a PNG."""
     return base64.b64decode(canvas.evaluate("(canvas) => canvas.toDataURL()").split(",")[1])
 
 
 def check_alike(drawn, want, background):
-    """Under 1 % of the pixels, and under half of those that move, are off by more than 64 levels.
+    """Check that under 1 % of the pixels, and at most half of those that move, are off by over 64.
 
-    The first alone an empty canvas would fulfil: thin lines cover little.
+    An empty canvas would pass the first condition alone, since thin lines cover little.
     """
     drawn, want, background = map(pixels, (drawn, want, background))
     assert drawn.shape == want.shape == background.shape

@@ -1,4 +1,4 @@
-"""Programs that run while a test looks at them."""
+"""Programs that run during a test."""
 
 import re
 import subprocess
@@ -11,7 +11,8 @@ import psutil
 
 @contextmanager
 def serving(words, folder, env, pattern):
-    """Run a module of Python that prints an address; return the match, and print its output."""
+    """Run a Python module that prints an address; yield the match, and print the module's
+    output."""
     words = [sys.executable, "-m", *words]
     output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
     lines = []
@@ -30,11 +31,11 @@ def serving(words, folder, env, pattern):
             _end(job)
             if rest.ident:
                 rest.join()
-            print("".join(lines)[-5000:])  # for a test that fails
+            print("".join(lines)[-5000:])  # shown if a test fails
 
 
 def _end(job):
-    """End a program and all that it has started, at the latest after a minute."""
+    """End a program and all processes that it has started, at the latest after a minute."""
     family = [psutil.Process(job.pid)] if job.poll() is None else []
     family += [child for parent in family for child in parent.children(recursive=True)]
     for process in family:

@@ -77,7 +77,7 @@ def parsed():
     return {name: Page(name) for name in PAGES}
 
 
-def test_every_page_is_whole_and_every_link_leads_somewhere(parsed):
+def test_every_page_is_complete_and_every_link_has_a_target(parsed):
     assert set(KINDS) <= set(PAGES)
     assert {name: page.faults for name, page in parsed.items() if page.faults} == {}
     broken = []
@@ -94,10 +94,11 @@ def test_every_page_is_whole_and_every_link_leads_somewhere(parsed):
                 broken.append(f"{name}: {target}")
     assert broken == []
     assert len(MOVED) >= 20
-    assert all(len(parsed[name].links) == 2 for name in MOVED)  # by itself, and to click on
+    # one link for the automatic redirect, and one to click on
+    assert all(len(parsed[name].links) == 2 for name in MOVED)
 
 
-def test_it_is_small_enough_to_be_carried():
+def test_the_book_is_small():
     sizes = {path: path.stat().st_size for path in BOOK.rglob("*") if path.is_file()}
     inside = {name: BOOK / name for name in ("slides", "_static/live")}
     slides, live = (
@@ -109,7 +110,7 @@ def test_it_is_small_enough_to_be_carried():
     assert live < 45e6
 
 
-def test_it_is_the_same_each_time_and_without_python_in_its_pages(tmp_path):
+def test_the_book_is_the_same_each_time_also_without_python_in_its_pages(tmp_path):
     again = tmp_path / "book"
     code = f"from rbclassroom.book.build import *; build(Path(), Path({str(again)!r}))"
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
@@ -117,14 +118,14 @@ def test_it_is_the_same_each_time_and_without_python_in_its_pages(tmp_path):
     live = re.compile(rb' tag_try-[\w-]+|\s*<[^>]*"\.\./_static/live/[^>]*>(?:</script>)?')
     there = {path.relative_to(BOOK) for path in BOOK.rglob("*") if path.is_file()}
     assert files == {path for path in there if not path.is_relative_to("_static/live")}
-    # the text above a problem set differs, and so do the words that a search looks through
+    # The text above a problem set differs, and so do the words that the search indexes.
     apart = {Path(f"problems/ps{k}.html") for k in range(1, 8)}
     apart |= {Path("_static/texts.js"), Path("searchindex.js")}
     for path in files - apart:
         assert (again / path).read_bytes() == live.sub(b"", (BOOK / path).read_bytes()), path
 
 
-def test_all_formulas_of_the_book_can_be_set(parsed, page):
+def test_all_formulas_of_the_book_can_be_typeset(parsed, page):
     formulas = sorted({formula for each in parsed.values() for formula in each.formulas})
     assert len(formulas) > 1000
     page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
@@ -148,8 +149,9 @@ def test_all_formulas_of_the_book_can_be_set(parsed, page):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_page_of_each_kind_can_be_read_on_every_screen(name, page):
-    """Light and dark: nothing is cut or pale, texts are apart, lines are neither long nor short."""
+def test_a_page_of_each_kind_is_readable_on_every_screen(name, page):
+    """In light and dark schemes, nothing is cut, pale or overlapping, and lines have a moderate
+    length."""
     page.goto((BOOK / name).as_uri())
     page.evaluate("window.MathJax?.startup.promise")
     page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
@@ -162,7 +164,7 @@ def test_a_page_of_each_kind_can_be_read_on_every_screen(name, page):
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_the_first_picture_of_a_lesson_is_seen_at_once(path, page):
+def test_the_first_picture_of_a_lesson_is_visible_without_scrolling(path, page):
     page.set_viewport_size({"width": 1280, "height": 800})
     page.goto(path.as_uri())
     box = page.locator(".content img").first.bounding_box()
@@ -171,7 +173,7 @@ def test_the_first_picture_of_a_lesson_is_seen_at_once(path, page):
 
 
 def test_an_option_of_a_poll_shows_its_own_line_and_no_other(page):
-    """By mouse and by keys, with the names and states that screen readers use."""
+    """Test mouse and keys, with the names and states that screen readers use."""
     page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
     poll = page.get_by_role("group", name="Poll 1")
     ideas = poll.locator(".idea")
@@ -190,7 +192,7 @@ def test_an_option_of_a_poll_shows_its_own_line_and_no_other(page):
     expect(poll.locator(".idea:visible")).to_have_count(0)
 
 
-def test_code_is_folded_until_it_is_asked_for(page):
+def test_code_is_folded_until_the_reader_asks_for_it(page):
     page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
     code = page.locator(".cell_input pre")
     expect(code.locator("visible=true")).to_have_count(0)
@@ -199,7 +201,7 @@ def test_code_is_folded_until_it_is_asked_for(page):
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
-def test_the_picture_of_the_start_page_plays_once_where_motion_is_wanted(motion, page):
+def test_the_picture_of_the_start_page_plays_once_unless_the_reader_reduces_motion(motion, page):
     page.emulate_media(reduced_motion=motion)
     page.goto((BOOK / "index.html").as_uri())
     hero = page.locator("figure.hero")
@@ -207,7 +209,9 @@ def test_the_picture_of_the_start_page_plays_once_where_motion_is_wanted(motion,
     if motion == "no-preference":
         expect(play).to_have_text("❚❚")
         middle = str(int(time.get_attribute("max")) // 2)
-        expect(time).to_have_value(middle)  # where it rests at the end, and passes before
+        expect(time).to_have_value(
+            middle
+        )  # the player passes this value and stops there at the end
     expect(play).to_have_text("▶")
     if motion == "no-preference":
         assert time.input_value() == middle
@@ -221,7 +225,7 @@ def test_the_picture_of_the_start_page_plays_once_where_motion_is_wanted(motion,
     expect(play).to_have_text("❚❚")
 
 
-def test_a_page_that_moved_leads_to_its_new_address(page):
+def test_a_page_that_moved_redirects_to_its_new_address(page):
     old, new = next(iter(MOVED.items()))
     page.goto((BOOK / old).as_uri())
     expect(page).to_have_url((BOOK / new).as_uri())
@@ -229,7 +233,7 @@ def test_a_page_that_moved_leads_to_its_new_address(page):
 
 
 @pytest.mark.parametrize("name", ["index.html", "lessons/06_geodesics.html"])
-def test_keys_move_living_pictures(name, page):
+def test_keys_move_interactive_pictures(name, page):
     page.goto((BOOK / name).as_uri())
     figures = page.locator("figure:has(script)")
     assert figures.count()
@@ -248,7 +252,7 @@ def test_keys_move_living_pictures(name, page):
             assert shown(canvas) != turned
 
 
-def test_search_finds(page):
+def test_the_search_finds_lessons_keys_and_functions(page):
     for words, wanted in {
         "geodesic": "lessons/06_geodesics.html",
         "Slerp": "lessons/06_geodesics.html",
@@ -267,7 +271,7 @@ def test_search_finds(page):
         assert len(excerpt.inner_text()) > 60
 
 
-def test_the_ledger_is_filtered(page):
+def test_the_filter_of_the_ledger_selects_rows(page):
     page.goto((BOOK / "ledger.html").as_uri())
     rows, filter_ = page.locator("table.ledger tbody tr:visible"), page.locator("#filter")
     every = rows.count()

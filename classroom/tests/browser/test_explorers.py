@@ -1,4 +1,4 @@
-"""Explorers of each kind in JupyterLab: pictures follow keys; printed as a table, how fast."""
+"""Explorers of each kind in JupyterLab: pictures follow keys; a table shows how fast."""
 
 import re
 import statistics
@@ -11,11 +11,12 @@ from playwright.sync_api import expect
 from rbclassroom import explorers
 from rbclassroom.course.notebooks import KERNEL
 
-# in the plane, with a menu, with buttons, and in space: the slider whose keys are pressed, by its
-# place and its name; it changes the text; that of the last one is solved for each picture
+# The kinds are plane, with a menu, with buttons, and in space. Each has the place and the name of
+# the slider whose keys are pressed; the slider changes the text. The last explorer is solved for
+# each picture.
 KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
-# when keys go down, and when the screen shows a new picture
+# A function that records when keys go down, and when the screen shows a new picture.
 NOTE = """() => {
   window.keys = []; window.pictures = [];
   let frame = null;
@@ -37,7 +38,7 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     notebook = nbformat.v4.new_notebook(metadata={"kernelspec": KERNEL})
     notebook.cells = [nbformat.v4.new_code_cell(source) for source in cells]
     nbformat.write(notebook, home[0] / "work" / "explorers.ipynb")
-    page.set_viewport_size({"width": 1280, "height": 4000})  # all explorers are there at once
+    page.set_viewport_size({"width": 1280, "height": 4000})  # all explorers are rendered at once
     open_in_lab(page, lab("workspaces/explorers/tree/explorers.ipynb"))
     run_all(page)
     there = page.locator(".rbcourse-explorer")
@@ -58,8 +59,8 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
             waits.append(pictures[0] - keys[0])
         keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
         after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
-        # one on its way, one being drawn, and one of where the slider has come to
-        assert len(after) <= 3, f"{name}: keys held down left a backlog"
+        # one picture on its way, one being drawn, and one for the last position of the slider
+        assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
         rate = 1000 * len(pictures) / (max(*pictures, keys[-1]) - keys[0])
         kind = "3-D" if explorer.display.rooms else "2-D"
         row = f"{name:22}{kind:4}{statistics.median(waits):7.0f} ms{max(waits):7.0f} ms"
@@ -68,7 +69,7 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
 
 
 def press(element, explorer, place, name, *keys):
-    """Press keys on a slider until its picture is there; return when keys and pictures came."""
+    """Press keys on a slider until its picture is shown; return the times of keys and pictures."""
     element.locator(".noUi-handle").nth(place).focus()
     element.page.evaluate("keys.length = pictures.length = 0")
     for key in keys:

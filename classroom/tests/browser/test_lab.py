@@ -1,4 +1,4 @@
-"""A lesson in JupyterLab: as it is stored, run as a person does, as an original, without Python."""
+"""A lesson in JupyterLab: as stored, run by a user, as an original, and without Python."""
 
 import html
 import re
@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 
 PANEL = "jupyterapp.shell.currentWidget"
 DIRTY = f"{PANEL}.context.model.dirty"
-# whether pictures of these descriptions, and no others, are there, and players have their states
+# A function that tests whether just the pictures with these descriptions are shown, with states.
 WHOLE = """(wanted) => {
   const pictures = [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")];
   const found = pictures.filter((picture) => picture.complete ?? true)
@@ -22,12 +22,12 @@ WHOLE = """(wanted) => {
     && !document.querySelector("img[data-read]")
     && [...new Set(found)].sort().join() === [...wanted].sort().join();
 }"""
-# the boxes of an explorer that scroll up and down: their classes and heights
+# A function that returns the classes and heights of the boxes that scroll up and down.
 SCROLLING = """(explorer) => [explorer, ...explorer.querySelectorAll("*")]
   .filter((box) => box.scrollHeight > box.clientHeight + 0.5)
   .filter((box) => ["auto", "scroll"].includes(getComputedStyle(box).overflowY))
   .map((box) => [box.className, box.scrollHeight, box.clientHeight])"""
-# wait until an explorer plays, and stop it, within the page: a slow test cannot come too late
+# A function that stops an explorer when it plays. It runs in the page, so a slow test is not late.
 PAUSE = """async (explorer) => {
   const number = [...explorer.querySelectorAll(".widget-readout")].at(-1);
   while (parseFloat(number.innerText) < 0.1) await new Promise(requestAnimationFrame);
@@ -37,7 +37,10 @@ PAUSE = """async (explorer) => {
 
 @pytest.fixture
 def opened(home, lab, page):
-    """Open a copy of a lesson: ``opened("06_geodesics", "mine")`` returns its path."""
+    """Return a function that opens a copy of a lesson: ``opened("06_geodesics", "mine")``.
+
+    The function returns the path of the copy.
+    """
     page.set_viewport_size({"width": 1280, "height": 30_000})  # all cells are rendered
 
     def open_(lesson, name):
@@ -52,9 +55,9 @@ def opened(home, lab, page):
 
 
 def show_all(page, path):
-    """Wait until the last cell is there.
+    """Wait until the last cell is shown.
 
-    On a busy machine JupyterLab may stop before, until its window has another height.
+    On a busy machine JupyterLab may stop early, until its window gets another height.
     """
     number = len(nbformat.read(path, as_version=4).cells) - 1
     last = page.locator(f".jp-Cell[data-windowed-list-index='{number}']")
@@ -66,7 +69,7 @@ def show_all(page, path):
 
 
 def run_explorer(page, path):
-    """Run the cell of the explorer alone, as its still tells its reader."""
+    """Run only the cell of the explorer, as its still tells the reader."""
     cells = nbformat.read(path, as_version=4).cells
     number = next(i for i, cell in enumerate(cells) if "_explorer()" in cell.source)
     page.evaluate(f"{PANEL}.content.activeCellIndex = {number}")
@@ -75,15 +78,16 @@ def run_explorer(page, path):
 
 
 def descriptions(path):
-    """The descriptions of the pictures that a lesson stores."""
+    """Return the descriptions of the pictures that a lesson stores."""
     cells = nbformat.read(path, as_version=4).cells
     outputs = [output.get("data", {}) for cell in cells for output in cell.get("outputs", [])]
     text = "".join(data.get("text/html", "") for data in outputs)
     return sorted(set(map(html.unescape, re.findall(r'<img[^>]* alt="([^"]*)"', text))))
 
 
-def test_a_stored_lesson_is_whole_and_its_explorer_lives_as_long_as_its_kernel(opened, page):
-    """Without Python it says so, and is a still when it is opened again."""
+def test_a_stored_lesson_is_complete_and_its_explorer_works_until_its_kernel_ends(opened, page):
+    """Without Python the explorer reports this, and it is a still when the lesson is opened
+    again."""
     path = opened("06_geodesics", "stored")
     stored = descriptions(path)
     assert len(stored) > 3
@@ -111,7 +115,7 @@ def test_a_stored_lesson_is_whole_and_its_explorer_lives_as_long_as_its_kernel(o
 
 
 def settled(page, text):
-    """A text when the kernel is idle and no more pictures come."""
+    """Return a text when the kernel is idle and no more pictures come."""
     now = None
     while now != (now := text.inner_text()):
         page.get_by_text(IDLE).wait_for()
@@ -132,7 +136,7 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(opened, page):
     expect(time).to_have_text("0.00")
     play.press("Enter")
     expect(time).not_to_have_text("0.00")
-    reset.press("Enter")  # while it plays
+    reset.press("Enter")  # during the playback
     expect(time).to_have_text("0.00")
     assert settled(page, time) == "0.00"
     handle = explorer.locator(".noUi-handle").last
@@ -150,11 +154,11 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(opened, page):
     canvas.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
     refused = explorer.get_by_role("alert").get_by_text("from the base wanted")
     refused.wait_for()
-    assert "wanted" in settled(page, refused)  # when the player has been prepared
+    assert "wanted" in settled(page, refused)  # after the player has been prepared
     assert page.evaluate(SEEN) == []
 
 
-def test_an_original_that_was_changed_is_not_saved_and_says_where_the_copy_is(home, lab, page):
+def test_a_changed_original_is_not_saved_and_the_message_names_the_copy(home, lab, page):
     work = home[0] / "work"
     original = work / "notebooks" / "01_plane.ipynb"
     for folder in ("notebooks", "work"):

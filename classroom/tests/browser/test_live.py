@@ -1,4 +1,4 @@
-"""Python in the pages of the book, sent by a web server: lessons to try, problem sets to solve."""
+"""Python in the pages of the book, from a web server: lessons to try, problem sets to solve."""
 
 import base64
 import csv
@@ -51,7 +51,7 @@ class Handler(SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="session")
 def address():
-    """Where the book is, served from this machine."""
+    """Return the address at which this machine serves the book."""
     handler = partial(Handler, directory=str(BOOK))
     with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         Thread(target=server.serve_forever, daemon=True).start()
@@ -61,7 +61,10 @@ def address():
 
 @pytest.fixture(scope="module")
 def run(context, address):
-    """Run a cell by the interface of the engine: ``run(above, source, page)``, its outputs."""
+    """Return a function that runs a cell by the engine and returns its outputs.
+
+    It is called as ``run(above, source, page)``.
+    """
     with watched(context) as page:
         page.goto(f"{address}/lessons/00_start_here.html")
         yield lambda above, source, name="": page.evaluate(
@@ -70,12 +73,12 @@ def run(context, address):
 
 
 def shown(text):
-    """Text as a terminal shows it: after a carriage return a line begins again."""
+    """Return text as a terminal shows it: after a carriage return a line begins again."""
     return "\n".join(line.rstrip("\r").rpartition("\r")[2] for line in text.split("\n")).strip()
 
 
 def told(outputs):
-    """The texts of stored outputs, and the descriptions of stored pictures."""
+    """Return the texts of stored outputs, and the descriptions of stored pictures."""
     texts, pictures = "", []
     for output in outputs:
         data = output.get("data", {})
@@ -88,8 +91,8 @@ def told(outputs):
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
-def test_each_cell_gives_its_stored_text_but_for_those_left_out(run, path):
-    """Cells that are left out do differ, so that the list is exact; slow ones are not run."""
+def test_each_cell_gives_its_stored_text_except_for_those_left_out(run, path):
+    """Cells that are left out must differ, so that the list is exact. Slow cells are not run."""
     notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
     stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
     differ = set()
@@ -130,7 +133,7 @@ def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
             for body in mistake["code"]:
                 wrong = start + indent(body.strip(), "    ")
                 found = run([*setup, *code], f"{wrong}\n\n{visible}", name)
-                if "law" in TABLES[name][slug]:  # the first with as many draws as students make
+                if "law" in TABLES[name][slug]:  # the first one makes as many draws as a student's
                     visible = "\n".join([visible.split("assert")[0], *fewer])
                 if ["hint", mistake["hint"]] not in found:
                     missed[slug, mistake["hint"]] = found
@@ -143,8 +146,8 @@ def opened(page, address, name):
     return page
 
 
-def test_nothing_is_loaded_before_the_reader_acts_and_little_then(page, address):
-    """At most 10 MB to the first result, at most 20 to the first figure, from this server alone."""
+def test_nothing_is_loaded_before_the_reader_acts_and_little_afterwards(page, address):
+    """The first result needs at most 10 MB, the first figure at most 20, from this server alone."""
     asked = []
     page.on("request", lambda request: asked.append(request))
     page.on("dialog", lambda dialog: dialog.accept())
@@ -164,13 +167,13 @@ def test_nothing_is_loaded_before_the_reader_acts_and_little_then(page, address)
     expect(page.locator(".differences")).to_contain_text("32 bits")
 
 
-def test_a_cell_is_changed_stopped_and_reset_and_its_stored_output_stays(page, address):
+def test_a_cell_can_be_changed_stopped_and_reset_and_its_stored_output_stays(page, address):
     opened(page, address, "lessons/10_rigid_body_motion.html")
     page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
     part = page.locator(".tag_try-cell-16")
     before = part.locator(".cell_output").get_by_role("button").count()
     part.get_by_role("button", name="Try it").click()
-    expect(part.locator(".outputs figure canvas")).to_be_visible()  # it can be turned
+    expect(part.locator(".outputs figure canvas")).to_be_visible()  # this picture can be turned
     expect(part.locator(".cell_output canvas")).to_be_visible()
     code = part.locator(".cm-content")
     code.press("ControlOrMeta+a")
@@ -188,13 +191,13 @@ def test_a_cell_is_changed_stopped_and_reset_and_its_stored_output_stays(page, a
     assert part.locator(".cell_output").first.get_by_role("button").count() == before
 
 
-def test_outputs_go_to_the_cells_that_they_are_of(page, address):
-    """Of two cells that are run at once, and of one that is run twice."""
+def test_outputs_appear_below_their_own_cells(page, address):
+    """Two cells are run at once, and one is run twice."""
     opened(page, address, "problems/ps1.html")
     for number, code in enumerate(("import time\ntime.sleep(2)\nprint('one')", "print('two')")):
         write(page, number, code)
     checks = page.get_by_role("button", name="Check")
-    for _ in range(2):  # while Python is loaded, and when it is there
+    for _ in range(2):  # during the loading of Python, and after it
         checks.nth(0).click()
         page.wait_for_timeout(500)
         checks.nth(1).click()
@@ -203,7 +206,7 @@ def test_outputs_go_to_the_cells_that_they_are_of(page, address):
             expect(shown).to_have_text(said)
 
 
-def test_a_second_visit_works_from_the_memory_of_the_first_and_loads_scipy(context, address):
+def test_a_second_visit_uses_the_memory_of_the_first_and_loads_scipy(context, address):
     codes = "import scipy.linalg as la; print(la.expm([[0.0]]))", "import rbcourse; print(1)"
     for visit in range(2):
         with watched(context) as page:
@@ -215,7 +218,7 @@ def test_a_second_visit_works_from_the_memory_of_the_first_and_loads_scipy(conte
             assert "rbcourse engine" in page.evaluate(kept)
 
 
-def test_below_file_addresses_the_buttons_say_what_is_missing(page):
+def test_the_buttons_on_pages_opened_as_files_explain_what_is_missing(page):
     page.goto((BOOK / "problems/ps1.html").as_uri())
     page.get_by_role("button", name="Check").first.click()
     expect(page.locator(".outputs .error").first).to_contain_text("web server")
@@ -225,7 +228,7 @@ def test_below_file_addresses_the_buttons_say_what_is_missing(page):
 
 
 def write(page, number, text):
-    """Write an answer, as its `number`th editor."""
+    """Write an answer into the editor with this number."""
     editor = page.locator(".editor").nth(number)
     editor.get_by_role("textbox").focus()
     words = editor.evaluate("(editor) => Boolean(editor.closest('.answer-in-words'))")
@@ -237,7 +240,7 @@ def write(page, number, text):
 def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     page, address, tmp_path, capsys
 ):
-    """The road of a class: wrong once, then right; `check`, `collect` and `grade` take the file."""
+    """The answer is wrong once, then right. `check`, `collect` and `grade` accept the file."""
     sources = {key: cell.source for key, cell in cells("ps1").items() if key.endswith("-answer")}
     right = [re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text) for text in sources.values()]
     opened(page, address, "problems/ps1.html")
@@ -253,7 +256,7 @@ def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     for number, text in enumerate(right):
         write(page, number, text.strip())
     words = page.locator(".answer-in-words").get_by_role("textbox")
-    assert words.evaluate("(area) => area.tagName") == "TEXTAREA"  # it is no code
+    assert words.evaluate("(area) => area.tagName") == "TEXTAREA"  # this answer is not code
     checks.first.click()
     expect(page.locator(".outputs.right")).to_contain_text("The function is correct")
     checks.nth(5).click()
@@ -283,7 +286,7 @@ def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     submitted = check(tmp_path / "ps1.ipynb")
     assert "7 of 7 visible tests passed" in capsys.readouterr().out
     uploaded = tmp_path / "downloads" / "Ada Lovelace_123_assignsubmission_file" / "ps1.ipynb"
-    for file in (tmp_path / "ps1.ipynb", submitted):  # with and without a check
+    for file in (tmp_path / "ps1.ipynb", submitted):  # without and with a check
         uploaded.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(file, uploaded)
         collect(tmp_path / "downloads", tmp_path / "course")
@@ -293,8 +296,8 @@ def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     assert (row["automatic"], row["by hand"], row["remarks"]) == ("17", "tip-words-answer", "")
 
 
-def test_no_file_of_the_site_gives_a_set_away():
-    """Hidden tests, mark schemes and model answers: as they are, backwards, and as base64."""
+def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
+    """Search for hidden tests, mark schemes and model answers, also reversed and as base64."""
     kinds = "SOLUTION|HIDDEN TESTS|MARK SCHEME"
     secrets = {line for name in SETS for line in regions(name, kinds) if len(line) >= 30}
     code = [*ROOT.glob("rbcourse/**/*.py"), *ROOT.glob("classroom/rbclassroom/**/*.py")]

@@ -19,8 +19,8 @@ FOLDER = Path(__file__).parents[3] / "figures" / "explorers"
 
 
 @plt.style.context(["default", "rbcourse.rbcourse"])
-def test_a_player_equals_the_drawing_plays_and_is_a_still_where_it_cannot_be_unpacked(page):
-    """Holes, dashes, corners, and lines that are cut at the edges of the axes."""
+def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpacked(page):
+    """The drawing has holes, dashes, corners, and lines that are cut at the edges of the axes."""
     fig, ax = plt.subplots(figsize=(9, 4), dpi=80)
     ax.set(xlim=(0, 9), ylim=(0, 4))
     ring = ax.add_patch(Annulus((0, 2), 1.9, 1.2, fc="#0072B2", ec="black", lw=4))
@@ -61,7 +61,7 @@ def test_a_player_equals_the_drawing_plays_and_is_a_still_where_it_cannot_be_unp
 
 
 @pytest.mark.parametrize("name", ["planar", "chain", "random", "minimum_acceleration", "cube"])
-def test_a_page_shows_what_the_explorer_shows_and_keys_and_mouse_move_it(name, page):
+def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, page):
     page.clock.install()
     page.set_viewport_size({"width": 1400, "height": 1000})
     page.goto((FOLDER / f"{name}.html").as_uri())
@@ -98,7 +98,8 @@ def test_a_page_shows_what_the_explorer_shows_and_keys_and_mouse_move_it(name, p
         assert low[0] != text
         assert low[1] != shown(canvas)
         assert page.get_by_text(text, exact=True).count()
-        slider.fill(str(round(0.6 * float(slider.get_attribute("max")))))  # where all is seen
+        # at this value all is visible
+        slider.fill(str(round(0.6 * float(slider.get_attribute("max")))))
     if explorer.display.rooms:
         before = shown(canvas)
         canvas.press("ArrowLeft")
@@ -112,7 +113,7 @@ def test_a_page_shows_what_the_explorer_shows_and_keys_and_mouse_move_it(name, p
     assert time.input_value() == "3"
 
 
-def test_few_steps_are_shown_where_little_motion_is_wanted(page):
+def test_few_steps_are_shown_if_the_reader_reduces_motion(page):
     page.clock.install()
     page.emulate_media(reduced_motion="reduce")
     page.goto((FOLDER / "theta.html").as_uri())
@@ -122,7 +123,7 @@ def test_few_steps_are_shown_where_little_motion_is_wanted(page):
         assert page.locator("input").last.input_value() == str(step)
 
 
-def test_without_scripts_a_page_is_its_still_and_says_what_is_missing(context):
+def test_a_page_without_scripts_is_its_still_and_says_what_is_missing(context):
     file = FOLDER / "theta.html"
     plain = context.browser.new_context(java_script_enabled=False)
     page = plain.new_page()

@@ -1,4 +1,4 @@
-"""Scenes in space, turned in Chromium: seen from each side as Python draws them from there."""
+"""Scenes in space, turned in Chromium, compared with Python's drawings from the same sides."""
 
 import io
 import re
@@ -20,7 +20,7 @@ SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
 STYLES = ["default", "rbcourse.rbcourse"]
 SIZE = {"figsize": (4, 4), "dpi": 100, "subplot_kw": {"projection": "space"}}
 
-# the parts of a state in the order in which they are drawn, in each of some views
+# A function that returns the parts of a state in the order of drawing, for each of some views.
 SEEN = """({ state, styles, room, views }) => {
   const all = rbcourseDisplay.decode(Int16Array.from(state), styles);
   const pieces = all.map(({ style, runs }) =>
@@ -30,14 +30,14 @@ SEEN = """({ state, styles, room, views }) => {
 
 
 def sphere(ax):
-    """A sphere with points, and a line that goes through it."""
+    """Draw a sphere with points, and a line that goes through it."""
     spheres.draw_sphere(ax)
     ax.plot(*rb.sample_rotation(80, rng=np.random.default_rng(2))[:, :, 0].T, "o", color="red")
     ax.plot([-1.2, 1.2], [0.3, -0.3], [0, 0], color="blue", lw=3)
 
 
 def far(ax):
-    """Cubes and a floor that are not about the origin, a line that leaves the picture, a legend."""
+    """Draw cubes and a floor far from the origin, a line that leaves the picture, and a legend."""
     poses = rb.screw_se3(np.eye(4), GOAL)(np.linspace(0, 1, 6))
     poses[:, :3, 3] += [100, 3, 7]
     bodies.draw_cube_motion(ax, poses, side=1)
@@ -46,8 +46,8 @@ def far(ax):
 
 
 def crossing(ax):
-    """Two boxes that pass through one another, dashes through both, and letters."""
-    ax.plot([-0.7, 0.7], [0.3, 0.3], [0.15, 0.15], color="green", lw=5)  # on the box
+    """Draw two boxes that pass through one another, dashes through both, and letters."""
+    ax.plot([-0.7, 0.7], [0.3, 0.3], [0.15, 0.15], color="green", lw=5)  # the line lies on the box
     bodies.draw_box(ax, np.eye(4), np.array([1.6, 0.8, 0.3]))
     bodies.draw_box(ax, rb.pose_from_coordinates([0.5, 0.4, 1.0, 0.2, 0.1, 0.1]), 0.7)
     ax.plot([-1, 1], [-0.8, 0.9], [0.3, -0.2], color="black", lw=3, ls="--")
@@ -56,7 +56,7 @@ def crossing(ax):
 
 
 def turn_to(page, canvas, now, side):
-    """Drag from a view to another one: half a degree for a pixel, in steps within the canvas."""
+    """Drag from one view to another: half a degree for a pixel, in steps within the canvas."""
     box, (up, across) = canvas.bounding_box(), np.subtract(side, now)
     steps = int(max(abs(up), abs(across)) // 60 + 1)
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -82,8 +82,10 @@ def put(page, player):
 
 @pytest.mark.parametrize(("make", "sides"), [(sphere, SIDES[::5]), (far, SIDES[2::4])])
 @plt.style.context(STYLES)
-def test_a_turned_scene_equals_the_drawing_from_there(make, sides, page, tmp_path, monkeypatch):
-    """Where lines leave a body, too: within a pixel or two, as many pixels as differ are few."""
+def test_a_turned_scene_equals_the_drawing_from_the_same_side(
+    make, sides, page, tmp_path, monkeypatch
+):
+    """The place where a line leaves a body may be a pixel or two off, so few pixels differ."""
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
     fig, ax = plt.subplots(**SIZE)
     make(ax)
@@ -100,10 +102,11 @@ def test_a_turned_scene_equals_the_drawing_from_there(make, sides, page, tmp_pat
         check_alike(shown(canvas), full.getvalue(), player.background)
 
 
-def test_the_browser_cuts_and_orders_as_python_does(page):
-    """The same parts, one after the other, at the same places, dashes as far along their line.
+def test_the_browser_cuts_and_orders_parts_as_python_does(page):
+    """The parts, their order, their places, and the phases of their dashes are the same.
 
-    They do not overlap here: rounding would decide whether the next plane cuts the piece beyond it.
+    The parts do not overlap in this test. Otherwise, rounding would decide whether the next plane
+    cuts the piece beyond it.
     """
     fig, ax = plt.subplots(**SIZE)
     crossing(ax)
@@ -120,14 +123,14 @@ def test_the_browser_cuts_and_orders_as_python_does(page):
             assert (part["style"][0] is None) == (piece.fill is None)
             flat = sight.flat(piece.places[:, :3]) * [1, -1] + [0, display.height]
             run = np.array(part["runs"][0])[: len(flat)]
-            assert np.abs(run - flat).max() < 0.5  # pixels
+            assert np.abs(run - flat).max() < 0.5  # in pixels
             if piece.gc.get_dashes()[1]:
                 assert abs(part["along"] - piece.places[0, 3]) < 1
     plt.close(fig)
 
 
 @plt.style.context(STYLES)
-def test_buttons_and_keys_set_the_view_which_is_told_and_can_be_saved(page, tmp_path):
+def test_buttons_and_keys_set_the_view_which_is_stated_and_can_be_saved(page, tmp_path):
     fig, axes = plt.subplots(1, 2, dpi=80, subplot_kw={"projection": "space"})
     motion = rb.screw_se3(np.eye(4), GOAL)(np.linspace(0, 1, 5))
     update = bodies.moving_boxes(axes, {"one": motion, "other": motion}, edges=1)
@@ -148,14 +151,14 @@ def test_buttons_and_keys_set_the_view_which_is_told_and_can_be_saved(page, tmp_
     page.clock.run_for(500)
     expect(page.locator("[role=status]")).to_have_text(told((90, -90)))
     canvas.press("ArrowUp")
-    expect(view).to_have_text(told((90, -90)))  # not over the top
+    expect(view).to_have_text(told((90, -90)))  # the view does not pass over the top
     for key in ("Home", "ArrowRight", "ArrowDown"):
         canvas.press(key)
     expect(view).to_have_text(told((13, -27)))
     page.get_by_role("button", name="as printed").click()
     expect(view).to_have_text(first)
     assert shown(canvas) == seen[first]
-    time.press("End")  # turning stays while time runs
+    time.press("End")  # the view is kept while time runs
     page.get_by_role("button", name="side").click()
     time.press("Home")
     expect(view).to_have_text(told((0, 0)))

@@ -36,7 +36,7 @@ def of(path):
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
-def test_every_slide_fits_and_can_be_read_from_the_last_row(context, path):
+def test_every_slide_fits_and_is_legible_from_the_last_row(context, path):
     for size, theme in (((1920, 1080), ""), ((1280, 720), "?dark")):
         with watched(context) as page:
             page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
@@ -46,7 +46,7 @@ def test_every_slide_fits_and_can_be_read_from_the_last_row(context, path):
             assert faults == []
             assert len(thin) <= 3, thin
     cells = nbformat.read(path, as_version=4).cells
-    small = {  # numbers of 13.5 points at 100 pixels per inch, letters of 14.5 at 80
+    small = {  # numbers of 13.5 points at 100 pixels per inch, letters of 14.5 points at 80
         output.data["text/plain"].partition(": ")[2]
         for cell in cells
         for output in cell.get("outputs", [])
@@ -58,7 +58,7 @@ def test_every_slide_fits_and_can_be_read_from_the_last_row(context, path):
         assert letters > 0.025 * 1080, (number, alt, letters)
 
 
-def test_decks_are_small_enough_to_be_sent():
+def test_decks_are_small_enough_for_mail():
     decks = [path for path in SLIDES.glob("*.html") if not path.stem.endswith("_crib")]
     assert {path.stem for path in decks} == {path.stem for path in LESSONS}
     assert max(path.stat().st_size for path in decks) < 1.2e6
@@ -68,13 +68,13 @@ def test_decks_are_small_enough_to_be_sent():
 
 @pytest.fixture
 def deck(page):
-    """The slides of lesson 06."""
+    """Return the slides of lesson 06."""
     page.set_viewport_size({"width": 1280, "height": 720})
     return opened(page, of(LESSONS[6]))
 
 
 def until(page, selector, key="PageDown"):
-    """Press a key until a slide is shown."""
+    """Press a key until the wanted slide is shown."""
     for _ in range(150):
         if page.evaluate("(what) => Reveal.getCurrentSlide().matches(what)", selector):
             return
@@ -85,7 +85,7 @@ def until(page, selector, key="PageDown"):
     raise AssertionError(f"no slide {selector}")
 
 
-def test_a_remote_control_leads_through_all_steps_also_after_a_slider_was_touched(deck):
+def test_a_remote_control_goes_through_all_steps_even_after_a_slider_was_moved(deck):
     seen, steps = [], 0
     until(deck, ":has(figure input)")
     slider = deck.locator("section.present > section.present figure input").first
@@ -111,7 +111,7 @@ def test_a_remote_control_leads_through_all_steps_also_after_a_slider_was_touche
     assert "Questions?" in deck.evaluate(HERE)
 
 
-def test_keys_change_what_is_seen_and_it_is_never_dark_by_itself(context):
+def test_keys_change_the_display_and_the_dark_scheme_is_never_automatic(context):
     with watched(context) as page:
         page.emulate_media(color_scheme="dark")
         opened(page, of(LESSONS[6]))
@@ -148,7 +148,7 @@ def test_keys_change_what_is_seen_and_it_is_never_dark_by_itself(context):
         page.keyboard.press("m")
         until(page, ".verdict")
         until(page, ":has(figure input)", "PageUp")
-        expect(table).to_be_visible()  # the vote is over
+        expect(table).to_be_visible()  # since the vote is over
 
 
 @contextmanager
@@ -159,10 +159,10 @@ def lecture(home, *words):
         yield found[1]
 
 
-def test_phones_vote_and_the_count_stands_on_the_poll_and_on_its_verdict(context, home):
+def test_phones_vote_and_the_count_is_shown_on_the_poll_and_on_its_verdict(context, home):
     with lecture(home, "--votes", "127.0.0.1") as address, watched(context) as page:
         opened(page, address)
-        page.keyboard.press("t")  # there is no poll here
+        page.keyboard.press("t")  # this slide has no poll
         until(page, ".poll")
         page.keyboard.press("t")
         panel = page.locator("#vote")
@@ -192,7 +192,7 @@ def test_phones_vote_and_the_count_stands_on_the_poll_and_on_its_verdict(context
         expect(page.locator("section.present > section.present .option").nth(2)).to_have_attribute(
             "data-count", counts[2]
         )
-        page.goto("about:blank")  # before the server ends
+        page.goto("about:blank")  # leave the page before the server ends
 
 
 def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck, context):
@@ -218,7 +218,7 @@ def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck,
     speaker.close()
 
 
-def test_the_pdf_has_a_page_for_each_slide_and_its_letters(home):
+def test_the_pdf_has_a_page_for_each_slide_and_contains_its_fonts(home):
     course, env = home
     words = [sys.executable, "-m", "rbclassroom.lecture.serve", "06", "--pdf"]
     done = subprocess.run(words, cwd=course, env=env, capture_output=True, text=True)

@@ -1,4 +1,4 @@
-"""A new run and its stored results agree up to rounding; every real change is seen."""
+"""A new run and its stored results agree up to rounding; every real change is detected."""
 
 import base64
 import io
@@ -23,7 +23,7 @@ PAGE = (Path(__file__).parents[3] / "figures/explorers/random.html").read_text("
 
 
 def changed(change, page=None):
-    """The picture whose states, styles, texts and settings were changed in place."""
+    """Return the picture after its states, styles, texts and settings were changed in place."""
     data = json.loads(re.search(agreement.LIVING, page or LIVING)[1])
     states, known = (zlib.decompress(base64.b64decode(data[key])) for key in ("states", "known"))
     states, (styles, texts) = [x.copy() for x in agreement.split(states)], json.loads(known)
@@ -39,11 +39,11 @@ def shortened(states, styles, texts, data):
 
 
 LIVING = changed(shortened, PAGE)
-"""A living picture in the plane and in space, with markers, texts and three states."""
+"""An interactive picture in the plane and in space, with markers, texts and three states."""
 
 
 def moved(states, styles, texts, data, by=1, at=-1):
-    """Move the last point, or all of the first polygon, which is in space: ``at=2``."""
+    """Move the last point, or with ``at=2`` all of the first polygon, which is in space."""
     states[0][at] += by
 
 
@@ -57,7 +57,7 @@ def view_moved(states, styles, texts, data, by=0.01):
 
 
 def renumbered(states, styles, texts, data):
-    """The style of the first polygon has another number: nothing that is seen changes."""
+    """Give the style of the first polygon another number, which does not change the picture."""
     styles.append(styles[states[0][0]])
     states[0][0] = len(styles) - 1
 
@@ -78,7 +78,7 @@ CHANGES = [
 
 
 @pytest.mark.parametrize("change", [*ROUNDING, *CHANGES])
-def test_of_a_living_picture_rounding_is_not_seen_and_a_change_is(change):
+def test_in_an_interactive_picture_rounding_is_ignored_and_a_change_is_detected(change):
     again = changed(change)
     assert again != LIVING
     assert reconciled(LIVING, again) == (LIVING if change in ROUNDING else again)
@@ -94,7 +94,7 @@ def image(array):
     return f"<img src='data:image/png;base64,{base64.b64encode(content.getvalue()).decode()}'> 3.1"
 
 
-def test_a_picture_in_a_page_is_kept_where_it_looks_the_same():
+def test_a_picture_in_a_page_is_kept_if_it_looks_the_same():
     grey = np.full((200, 200, 4), 128, np.uint8)
     hardly, visibly, clear = grey.copy(), grey.copy(), grey.copy()
     hardly[5, 5] = 138
@@ -107,7 +107,7 @@ def test_a_picture_in_a_page_is_kept_where_it_looks_the_same():
         assert reconciled(stored, other) == other
 
 
-def test_another_letter_in_a_large_picture_is_seen():
+def test_a_different_letter_in_a_large_picture_is_detected():
     plots = []
     for label in ("w1 [rad]", "w2 [rad]", "w1 [rad/s]", "v1 [rad]"):
         fig, ax = plt.subplots(figsize=(9, 5.5))
@@ -120,7 +120,7 @@ def test_another_letter_in_a_large_picture_is_seen():
 
 
 def notebook(*pages, ids=True):
-    """A notebook whose cells show pages."""
+    """Return a notebook whose cells show pages."""
     made = new_notebook()
     for number, page in enumerate(pages):
         output = new_output("execute_result", data={"text/html": page}, execution_count=number)
@@ -139,7 +139,7 @@ def test_a_notebook_that_was_run_again_keeps_its_bytes(ids):
     assert list(agreement.changed_lines(stored, again)) == []
 
 
-def test_beside_a_new_cell_others_are_recognised_and_changed_lines_are_those_that_differ():
+def test_the_other_cells_are_recognised_after_a_new_cell_and_only_real_changes_are_listed():
     stored, again = notebook("It is 1.", LIVING), notebook("It is 2.", changed(moved))
     lines = list(agreement.changed_lines(stored, again))
     assert [line.strip() for line in lines[3:]] == ['-       "It is 1."', '+       "It is 2."']
@@ -151,7 +151,7 @@ def test_beside_a_new_cell_others_are_recognised_and_changed_lines_are_those_tha
 
 
 def files(number="0.5", colour="#808080", duration=50, **others):
-    """The files of a figure, by their endings."""
+    """Return the files of a figure, by their endings."""
     still, moving = io.BytesIO(), io.BytesIO()
     Image.new("RGB", (200, 200), colour).save(still, "png")
     frames = [Image.new("RGB", (20, 20), colour) for colour in ("red", "blue")]

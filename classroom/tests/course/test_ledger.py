@@ -1,4 +1,4 @@
-"""The ledger is complete and fresh, and every name in it resolves."""
+"""The ledger is complete and up to date, and every name in it exists."""
 
 import importlib
 import re
@@ -21,7 +21,7 @@ def found():
     return ledger.collect(ROOT)
 
 
-def test_the_stored_ledger_is_fresh_and_legible(found):
+def test_the_stored_ledger_is_up_to_date_and_legible(found):
     assert ledger.render(found) == PAGE
     entries = PAGE.partition("## Misprints")[0].splitlines()
     assert max(map(len, entries)) <= 165
@@ -37,8 +37,9 @@ def test_every_entry_has_function_test_and_lesson(found):
     assert len(ledger.MISPRINTS) == 22
 
 
-def test_all_of_both_texts_is_listed():
-    """Equations, propositions, corollaries, remarks, figures and sections, by their numbers."""
+def test_all_parts_of_both_texts_are_listed():
+    """Check equations, propositions, corollaries, remarks, figures and sections, by their
+    numbers."""
     counts = {
         **{"BK ({})": 21, "BK Prop. {}": 7, "BK Cor. {}": 2, "BK Remark {}": 7, "BK Fig. {}": 5},
         **{"BK 2.{}": 6, "BK 3.{}": 2, "BK 6.{}": 3, "RR ({})": 23, "RR Fig. {}": 9},
@@ -49,7 +50,7 @@ def test_all_of_both_texts_is_listed():
     assert set(ENTRIES) - wanted == {"BK 1", "BK 3", "BK 4", "BK 5", "BK 6", "BK 7", "RR 2", "RR 4"}
 
 
-def test_every_name_resolves(found):
+def test_every_function_and_test_in_the_ledger_exists(found):
     for name in {name for entry in found.values() for name in entry.functions}:
         module, function = name.rsplit(".", 1)
         assert hasattr(importlib.import_module(full_name(module)), function), name
@@ -87,8 +88,8 @@ def not_a_test():
 """
 
 
-def test_keys_are_collected_and_an_unknown_one_is_named(tmp_path):
-    """Of one function, one test and one lesson."""
+def test_keys_are_collected_and_an_unknown_key_is_refused(tmp_path):
+    """The keys come from one function, one constant, one test and one lesson."""
     for folder in ("rbcourse", "tests", "notebooks"):
         (tmp_path / folder).mkdir()
     (tmp_path / "rbcourse/so3.py").write_text(CODE, "utf-8")

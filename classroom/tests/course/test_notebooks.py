@@ -1,4 +1,4 @@
-"""The machinery that runs, stores and copies lessons."""
+"""The modules that run, store and copy lessons."""
 
 import os
 import runpy
@@ -23,7 +23,7 @@ def notebook_at(path, *sources):
     return path
 
 
-def test_a_lesson_is_run_by_a_kernel_that_listens_at_files(tmp_path):
+def test_the_kernel_that_runs_a_lesson_listens_at_files(tmp_path):
     sources = [
         "print('one', flush=True)\nprint('two')",
         "import ipykernel, json\nprint(json.loads(ipykernel.get_connection_info())['transport'])",
@@ -37,8 +37,8 @@ def test_a_lesson_is_run_by_a_kernel_that_listens_at_files(tmp_path):
     assert cells[2].outputs[0].data["text/plain"] == "<object at 0x0>"
 
 
-@pytest.mark.skipif(os.name == "nt", reason="there kernels listen at ports")
-def test_kernels_of_lessons_that_are_tests_listen_at_files(monkeypatch, request):
+@pytest.mark.skipif(os.name == "nt", reason="kernels listen at ports on Windows")
+def test_the_kernel_that_tests_a_lesson_listens_at_files(monkeypatch, request):
     monkeypatch.setattr(nbval.kernel, "KernelManager", KernelManager)
     conftest = Path(__file__).parents[3] / "notebooks/conftest.py"
     runpy.run_path(str(conftest))["pytest_configure"](request.config)
@@ -66,14 +66,14 @@ def test_differences_between_runs_and_machines_are_not_stored():
     assert set(stored.metadata) == {"kernelspec", "language_info"}
 
 
-def test_without_lessons_nothing_is_removed(tmp_path):
+def test_nothing_is_removed_from_a_folder_without_lessons(tmp_path):
     (tmp_path / "thesis.pdf").touch()
     with pytest.raises(ValueError, match="has no lessons; run this"):
         notebooks.regenerate(tmp_path, tmp_path)
     assert (tmp_path / "thesis.pdf").exists()
 
 
-def test_nothing_is_rewritten_when_a_lesson_fails(tmp_path):
+def test_nothing_is_rewritten_if_a_lesson_fails(tmp_path):
     good = "import os, pathlib\npathlib.Path(os.environ['RBCOURSE_FIGURES'], 'new.png').touch()"
     paths = [
         notebook_at(tmp_path / "01_good.ipynb", good),
@@ -88,9 +88,9 @@ def test_nothing_is_rewritten_when_a_lesson_fails(tmp_path):
     assert [file.name for file in figures.iterdir()] == ["old.png"]
 
 
-def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path, monkeypatch):
+def test_one_lesson_is_stored_again_without_a_change_of_other_files(tmp_path, monkeypatch):
     def execute(path, figures):
-        """Draw a figure of the lesson's name, and return the lesson with another source."""
+        """Draw a figure with the lesson's name, and return the lesson with another source."""
         name = path.stem[3:]
         (figures / f"{name}.png").write_text(name)
         return nbformat.writes(new_notebook(cells=[new_code_cell(name, id="cell-0")])) + "\n"
@@ -119,7 +119,7 @@ def test_one_lesson_is_stored_again_and_nothing_else_is_touched(tmp_path, monkey
 
 @pytest.fixture
 def folders(tmp_path, monkeypatch):
-    """A folder with one lesson and one assignment, and one to work in."""
+    """Return a folder with one lesson and one assignment, and a folder to work in."""
     monkeypatch.setenv("JUPYTER_DATA_DIR", str(tmp_path / "data"))
     source = tmp_path / "notebooks"
     source.mkdir()
@@ -129,14 +129,14 @@ def folders(tmp_path, monkeypatch):
 
 
 def new_version(folders, source="2"):
-    """Change the lesson, and copy the lessons twice: the second time changes nothing."""
+    """Change the lesson, and copy the lessons twice; the second time changes nothing."""
     notebook_at(folders[0] / "01_plane.ipynb", source)
     for _ in range(2):
         notebooks.copy_lessons(*folders)
     return sorted(path.name for path in folders[1].glob("*.ipynb"))
 
 
-def test_copies_are_trusted_and_assignments_left_out(folders):
+def test_copies_are_trusted_and_assignments_are_not_copied(folders):
     notebooks.copy_lessons(*folders)
     (copy,) = folders[1].glob("*.ipynb")
     assert copy.name == "01_plane.ipynb"
@@ -147,7 +147,7 @@ def test_copies_are_trusted_and_assignments_left_out(folders):
 
 @pytest.mark.parametrize("damaged", [None, b"", b"[]", b"{", b"\xff\xfe", b"null"])
 @pytest.mark.parametrize("run", [False, True])
-def test_a_new_version_replaces_a_copy_that_was_left_alone_or_only_run(folders, damaged, run):
+def test_a_new_version_replaces_a_copy_that_was_not_edited(folders, damaged, run):
     """A damaged record of copies is ignored."""
     notebooks.copy_lessons(*folders)
     copy = folders[1] / "01_plane.ipynb"
@@ -164,8 +164,8 @@ def test_a_new_version_replaces_a_copy_that_was_left_alone_or_only_run(folders, 
 
 @pytest.mark.parametrize("there", [False, True])
 @pytest.mark.parametrize("work", ["my notes", nbformat.writes(new_notebook())])
-def test_a_copy_that_was_worked_in_is_never_touched(folders, capsys, there, work):
-    """Nor one that was there before, or is no notebook any more."""
+def test_a_copy_that_was_edited_is_never_changed(folders, capsys, there, work):
+    """A file that existed before, or that is not a notebook any more, is not changed either."""
     if there:
         folders[1].mkdir()
     else:
@@ -180,18 +180,18 @@ def test_a_copy_that_was_worked_in_is_never_touched(folders, capsys, there, work
     assert "your copy is kept, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
 
 
-def test_a_lesson_that_is_no_notebook_is_named_and_not_copied(folders, monkeypatch):
+def test_a_lesson_that_is_not_a_notebook_is_named_and_not_copied(folders, monkeypatch):
     closed, close = [], SQLiteSignatureStore.close
     monkeypatch.setattr(SQLiteSignatureStore, "close", lambda s: closed.append(close(s)))
     (folders[0] / "02_arm.ipynb").write_text("<<<<<<< HEAD")
     with pytest.raises(ValueError, match=r"02_arm\.ipynb is not a notebook"):
         notebooks.copy_lessons(*folders)
-    assert len(closed) == 1  # signatures are in a database
+    assert len(closed) == 1  # the signatures are in a database
     assert not (folders[1] / "02_arm.ipynb").exists()
     assert (folders[1] / "01_plane.ipynb").exists()
 
 
-def test_a_copy_that_cannot_be_signed_is_still_a_copy(folders, monkeypatch, capsys):
+def test_a_copy_that_cannot_be_signed_is_still_made(folders, monkeypatch, capsys):
     def refuse(self, notebook):
         raise PermissionError("read-only home")
 
@@ -200,7 +200,7 @@ def test_a_copy_that_cannot_be_signed_is_still_a_copy(folders, monkeypatch, caps
     assert "not marked as trusted: read-only home" in capsys.readouterr().out
 
 
-def test_stills_of_widgets_are_saved_and_widgets_beside_them_are_not():
+def test_stills_of_widgets_are_saved_without_the_widgets():
     widget = {"application/vnd.jupyter.widget-view+json": {"model_id": "1"}}
     still, alone = {"text/html": "<img>", **widget}, {"text/plain": "IntSlider()", **widget}
     outputs = [{"data": still}, {"name": "stdout", "text": "1"}, {"data": alone}]
@@ -212,7 +212,7 @@ def test_stills_of_widgets_are_saved_and_widgets_beside_them_are_not():
     assert alone == {"text/plain": "IntSlider()", **widget}
 
 
-def test_an_original_that_was_run_keeps_its_bytes_and_one_that_was_changed_is_not_saved(
+def test_an_original_keeps_its_bytes_after_a_run_and_a_changed_one_is_not_saved(
     folders, monkeypatch, request
 ):
     lesson, (place, _) = "notebooks/01_plane.ipynb", folders

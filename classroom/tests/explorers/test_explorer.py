@@ -1,4 +1,4 @@
-"""What all explorers have in common: the protocol on a small one, and each of them complete."""
+"""The properties of all explorers: the protocol of a small one, and checks of each of them."""
 
 import io
 import json
@@ -52,19 +52,19 @@ def explorer():
 
 
 def sent(explorer):
-    """The states that were sent last: of each the place of the dot, if there is one, and texts."""
+    """Return the states that were sent last: the places of the dot in each state, and the texts."""
     run = explorer.picture.run
     drawn = [polygons(state, run["styles"]) for state in split(run["states"])]
     return [[place for _, _, ((*place,),) in state] for state in drawn], run["texts"]
 
 
 def at(x, y):
-    """Where the dot is in the picture, in pixels from the upper left."""
+    """Return where the dot is in the picture, in pixels from the upper left."""
     return pytest.approx([560 * (0.1 + 0.08 * x), 380 * (0.85 - 0.8 * (y + 1) / 3)], abs=0.07)
 
 
-def test_the_picture_follows_the_controls_and_reset_brings_everything_back(explorer):
-    assert sent(explorer) == ([[at(2, 0)]], [FIRST])  # before it is touched
+def test_the_picture_follows_the_controls_and_reset_restores_everything(explorer):
+    assert sent(explorer) == ([[at(2, 0)]], [FIRST])  # before any control is moved
     assert explorer.picture.run["index"] == 4
     assert (explorer.play.min, explorer.play.value, explorer.play.max) == (0, 4, 20)
     assert explorer.play.interval == 4000 / 20
@@ -72,7 +72,7 @@ def test_the_picture_follows_the_controls_and_reset_brings_everything_back(explo
     runs = []
     explorer.picture.observe(lambda change: runs.append(change.new), "run")
     explorer.controls["x"].value = 5.0
-    assert runs == []  # the control that plays asks by itself
+    assert runs == []  # the control that plays asks for its states itself
     explorer.controls["kind"].value = "high"
     assert sent(explorer) == ([[at(5, 1)]], [[[("place", "5.0\nhigh")], "", repr(explorer)]])
     explorer.put(x=7.0, kind="low")
@@ -86,7 +86,7 @@ def test_the_picture_follows_the_controls_and_reset_brings_everything_back(explo
     assert list(explorer._fig.axes[0].lines) == [explorer.artists["dot"]]
 
 
-def test_the_browser_is_sent_the_states_it_asks_for_one_after_the_other(explorer):
+def test_the_browser_receives_the_states_that_it_asks_for_in_order(explorer):
     version, known = explorer.picture.run["version"], 0
     while known < 21:
         tell(explorer, index=known)
@@ -105,7 +105,7 @@ def test_the_browser_is_sent_the_states_it_asks_for_one_after_the_other(explorer
     assert explorer.picture.run["version"] > version
 
 
-def test_settings_that_fail_and_warnings_are_said(explorer):
+def test_settings_that_fail_and_warnings_are_reported(explorer):
     explorer.put(x=FAR)
     said = "Nothing to show here: x: too <far>"
     assert sent(explorer) == ([[]], [[[], said, f"A dot. {said}"]])
@@ -123,10 +123,10 @@ def test_settings_that_fail_and_warnings_are_said(explorer):
         explorer.controls["kind"].value = "high"
 
 
-def test_a_click_sets_controls_or_says_why_not(explorer):
+def test_a_click_sets_controls_or_states_the_reason_of_its_refusal(explorer):
     tell(explorer, place=[0.5, 0.5])
     assert explorer.values == {"x": 4.0, "kind": "high"}
-    for _ in range(2):  # the same place again
+    for _ in range(2):  # the second click is at the same place
         version = explorer.picture.run["version"]
         tell(explorer, place=[0.125, 0.1])
         assert explorer.picture.run["version"] > version
@@ -138,7 +138,7 @@ def test_a_click_sets_controls_or_says_why_not(explorer):
     assert shown == [True, True, False]
 
 
-def test_a_drawing_shows_the_same_at_each_zoom_with_letters_of_18_pixels(explorer):
+def test_a_drawing_is_the_same_at_each_zoom_with_letters_of_18_pixels(explorer):
     shown = explorer.state(x=7.0).shown
     for zoom in (1, 2, 3):
         drawn = np.asarray(Image.open(io.BytesIO(explorer.draw(shown, zoom))).convert("L"))
@@ -150,10 +150,10 @@ def test_a_drawing_shows_the_same_at_each_zoom_with_letters_of_18_pixels(explore
     labels = explorer._fig.axes[0].get_xticklabels()
     assert {label.get_fontsize() for label in labels} == {LABELS}
     assert LABELS / 72 * 100 >= 18
-    assert mpl.rcParams["xtick.labelsize"] == "medium"  # the style is left alone
+    assert mpl.rcParams["xtick.labelsize"] == "medium"  # the style is not changed
 
 
-def test_the_output_has_a_still_for_readers_without_a_kernel_and_all_can_be_sent(explorer):
+def test_the_output_has_a_still_for_readers_without_a_kernel_and_can_be_serialised(explorer):
     bundle = explorer._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in bundle
     assert 'alt="A dot. place: 2.0 low"' in bundle["text/html"]
@@ -162,14 +162,16 @@ def test_the_output_has_a_still_for_readers_without_a_kernel_and_all_can_be_sent
     for widget in (explorer, explorer.picture, *explorer.controls.values(), explorer.play):
         state, _, parts = _remove_buffers(widget.get_state())
         json.dumps(state)
-        assert len(parts) == (2 if widget is explorer.picture else 0)  # background, and states
+        # the background, and the states
+        assert len(parts) == (2 if widget is explorer.picture else 0)
     assert explorer.picture.made["background"].startswith(b"\x89PNG")
 
 
-def test_readouts_have_the_digits_of_the_step():
+def test_readouts_have_as_many_digits_as_the_step():
     for step, shown in ((1.0, ".0f"), (0.25, ".2f"), (0.05, ".2f"), (5.0, ".0f")):
         assert slider("x (m)", 0.0, 0.0, 10.0, step).readout_format == shown
-    control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)  # steps and nothing between
+    # the control has steps and no values between them
+    control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)
     assert control._options_labels == ("−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3")
     assert [value for _, value in control.options] == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]
 
@@ -178,7 +180,7 @@ LESSONS = lesson_paths(Path(__file__).parents[3] / "notebooks")
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_the_cell_of_an_explorer_needs_no_other_cell_and_shows_something_at_once(path):
+def test_the_cell_of_an_explorer_needs_no_other_cell_and_shows_numbers_at_once(path):
     cells = nbformat.read(path, as_version=4).cells
     (cell,) = [cell for cell in cells if re.search(r"^explorers\.\w+\(", cell.source, re.MULTILINE)]
     *lines, last = cell.source.splitlines()
@@ -200,7 +202,7 @@ WITHOUT_UNIT = "time t", "seed", "rotations", "y leans", "z leans", "z stretched
 
 
 @pytest.mark.parametrize("name", explorers.__all__)
-def test_each_explorer_has_units_large_letters_its_artists_and_a_range_to_play(name):
+def test_each_explorer_has_units_large_letters_its_own_artists_and_a_range_to_play(name):
     explorer = made(name.removesuffix("_explorer"))
     for control in explorer.controls.values():
         if isinstance(control, ipywidgets.FloatSlider | ipywidgets.SelectionSlider):

@@ -1,4 +1,4 @@
-"""The recorded explorers: complete, small, and in every state the explorer itself."""
+"""The recorded explorers are complete and small, and their states equal those of the explorers."""
 
 import base64
 import html
@@ -31,7 +31,7 @@ def test_every_explorer_is_recorded_and_together_they_are_small():
 
 @pytest.mark.parametrize("name", sorted(recorded.MOVED))
 def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
-    """At random states."""
+    """Compare states at random settings."""
     explorer, (moved, stride) = made(name), recorded.MOVED[name]
     explorer.restart()
     page = (FOLDER / f"{name}.html").read_text(encoding="utf-8")
@@ -78,10 +78,10 @@ def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
         for (style, more, points), (kept, goes_on, found) in zip(*pairs, strict=True):
             assert json.loads(json.dumps(style)) == kept
             assert more == goes_on
-            assert np.abs(points - found).max() < 0.2  # pixels
+            assert np.abs(points - found).max() < 0.2  # in pixels
 
 
-def test_a_record_has_its_states_in_order_the_same_bytes_each_time_and_its_first_value():
+def test_a_record_has_its_states_in_order_and_the_same_bytes_each_time():
     theta = made("theta")
     theta.restart()
     moved = {"angle": [60.0, 120.0]}

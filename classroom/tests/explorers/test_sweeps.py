@@ -24,7 +24,7 @@ def off(found, wanted):
 
 
 def assert_box(box, R, half, place=(0, 0, 0), turned=1e-11, placed=1e-11):
-    """A box of these half edges has this orientation and place, but for so much."""
+    """Check that a box with these half edges has this orientation and place, within tolerances."""
     faces = box.corners[:6]
     assert off(faces.mean(axis=(0, 1)), place) < placed
     assert off(faces.mean(axis=1)[:3] - place, (half * R).T) < turned
@@ -36,7 +36,7 @@ def assert_within(places, *limits):
 
 
 def assert_seen(ax, places, *limits):
-    """Places in space, shape (..., 3), are seen between these limits, in pixels."""
+    """Check that places in space, shape (..., 3), are seen between these limits, in pixels."""
     x, y, _ = proj3d.proj_transform(*np.reshape(places, (-1, 3)).T, ax.get_proj())
     assert_within(ax.transData.transform(np.stack([x, y], axis=-1)), *limits)
 
@@ -48,17 +48,18 @@ def assert_seen(ax, places, *limits):
         ("body", {}, "torque", "1.11, 1.11, 1.00 × the least"),
         ("body", DIAGONAL, "acceleration", "1.36, 1.00, 1.04 × the least"),
         ("body", DIAGONAL, "torque", "1.62, 1.03, 1.00 × the least"),
-        ("cube", {}, "their ratio", "1.773"),  # 77 % more: lesson 9, the figure of the paper
+        # 77 % more, as in lesson 9 and the figure of the paper
+        ("cube", {}, "their ratio", "1.773"),
         ("minimum_acceleration", {"k": 5.0}, "their ratio", "1.174"),  # case (c)
         ("minimum_acceleration", {"k": 0.0}, "cost, projection", "0.222 rad²"),  # case (a)
-        # of turns at constant ω: the geodesic; the projection costs 3e-11 rad² and 3e-14 rad²
+        # For turns at constant ω, the geodesic: the projection costs 3e-11 rad² and 3e-14 rad².
         ("minimum_acceleration", {"k": 0, "size": 0.1}, "their ratio", COSTS_NOTHING),
         ("minimum_acceleration", {"k": 0, "size": 0.05}, "their ratio", "none: both cost nothing"),
         ("flip", {"axis": "axis 1", "t": 8.0}, "turned over", "0 times"),
         ("flip", {"axis": "axis 2", "t": 8.0}, "turned over", "2 times"),
         ("flip", {"axis": "axis 2", "t": 3.0}, "turned over", "once"),
         ("flip", {"axis": "axis 3", "t": 8.0}, "turned over", "0 times"),
-        # the axis is √(1 + cot²(angle/2)) m away, 3.07 and 2.996 m; up to 3 m are in sight
+        # The axis is √(1 + cot²(angle/2)) m away, 3.07 and 2.996 m; the picture shows up to 3 m.
         ("screw", {"angle": 38.0, "z": 0.0}, "its axis through", "(1.0, 2.9, 0.0) m, not in sight"),
         ("screw", {"angle": 39.0, "z": 0.0}, "its axis through", "(1.0, 2.8, 0.0) m"),
         ("screw", {"angle": 0.0}, "its axis through", "none"),
@@ -71,24 +72,27 @@ def assert_seen(ax, places, *limits):
         ("random", {"number": 80.0}, "p-values", "from 100 rotations on"),
     ],
 )
-def test_examples_of_the_lessons_and_singular_settings(name, values, key, text):
+def test_texts_are_right_in_examples_of_the_lessons_and_at_singular_settings(
+    name, values, key, text
+):
     made(name).restart()
     made(name).put(**values)
     assert read_off(made(name)).get(key) == text
     assert notice(made(name)) == ""
 
 
-def test_no_answer_of_a_poll_is_seen_before_a_slider_is_touched():
+def test_no_answer_to_a_poll_is_visible_before_a_slider_is_moved():
     for name in ("theta", "planar", "arm", "cube", "projection", "flip"):
         made(name).restart()
     theta, plan, arm = (made(name) for name in ("theta", "planar", "arm"))
-    assert "f" not in theta.artists  # poll 3 asks for it
+    assert "f" not in theta.artists  # poll 3 asks for f
     assert theta.values["angle"] not in (90, 150)
     assert made("cube").values == {"turn": 1.0, "spin": 1.0, "rise": 3.0, "t": 0.0}
     assert off(tips("projection", "nearest"), np.eye(3)) < 1e-15
     assert arm.values["t"] == plan.values["t"] == 0
     links, way = (points(arm.artists[name]) for name in ("links", "way"))
-    assert off(points(arm.artists["links"].axes.lines[0]), links) < 1e-15  # on its pale twin
+    # the links cover their pale twin
+    assert off(points(arm.artists["links"].axes.lines[0]), links) < 1e-15
     assert np.ptp(way, axis=0).max() < 1e-15
     plan.put(t=4.0)
     assert off(*(points(plan.artists[f"{frame} way"]) for frame in ("world", "body"))) < 1e-15
@@ -100,7 +104,10 @@ PANELS = {"as if a ball": (-15, 202), "least acceleration": (172, 389), "least t
 
 @cache
 def turned_books(about, turn, thickness):
-    """The three curves, the inertia, and both costs of each over the least; solved once."""
+    """Return the three curves, the inertia, and both costs of each curve over the least costs.
+
+    Each problem is solved once.
+    """
     (axis,) = (np.array(x, float) for name, x in AXES.items() if about.startswith(name))
     G = rb.metrics.box_inertia([0.3, 0.2, thickness / 100])
     goal = rb.exp_so3(np.radians(turn) * axis / np.linalg.norm(axis))
@@ -112,7 +119,7 @@ def turned_books(about, turn, thickness):
 
 
 @pytest.mark.source("beyond BK 3", "beyond BK 4")
-def test_three_books_their_torques_and_their_costs():
+def test_the_three_books_their_torques_and_their_costs_agree_with_the_package():
     artists = made("body").artists
     for v, said in sweep("body", thickness=30.0, t=0.4):
         curves, G, costs = turned_books(v["about"], v["turn"], v["thickness"])
@@ -131,7 +138,7 @@ def test_three_books_their_torques_and_their_costs():
 
 
 @pytest.mark.source("BK Prop. 6", "BK Cor. 1")
-def test_projected_lines_their_dots_and_their_chord():
+def test_the_projected_line_its_dots_and_its_chord_agree_with_the_package():
     t, f = np.linspace(0, 1, 101), rb.projected_line
     for v, said in sweep("theta", angle=100.0, t=0.3):
         a, now = np.radians(v["angle"]), v["t"]
@@ -154,17 +161,17 @@ def test_projected_lines_their_dots_and_their_chord():
 
 
 @pytest.mark.source("BK (10)", "BK (14)")
-def test_a_screw_and_a_geodesic_and_the_axis():
+def test_the_screw_the_geodesic_and_the_axis_agree_with_the_package():
     artists = made("screw").artists
     for v, said in sweep("screw", tilt=35.0, t=0.6):
         tilt, angle, d = np.radians(v["tilt"]), abs(v["angle"]), np.array([v["x"], 0, v["z"]])
         r = np.radians(v["angle"]) * np.array([np.sin(tilt), 0, np.cos(tilt)])
         goal = rb.pose_from_components(rb.exp_so3(r), d)
-        r = rb.log_so3(goal[:3, :3])  # of a half-turn, either
+        r = rb.log_so3(goal[:3, :3])  # of a half-turn, either sign
         along = expm(v["t"] * rb.hat_se3(rb.log_se3(goal)))
         geodesic = rb.pose_from_components(rb.exp_so3(v["t"] * r), v["t"] * d)
         for name, pose in (("screw", along), ("geodesic", geodesic), ("goal", goal)):
-            # half-turns lose half the digits
+            # half the digits are lost at half-turns
             assert_box(artists[name], pose[:3, :3], 0.4, pose[:3, 3], turned=1e-7, placed=1e-12)
             assert_seen(artists[name].axes, artists[name].corners, (0, 560), (0, 380))
             if name != "goal":
@@ -174,7 +181,8 @@ def test_a_screw_and_a_geodesic_and_the_axis():
         assert reads(said["origins apart"], np.linalg.norm(along[:3, 3] - geodesic[:3, 3]))
         if 0 < angle < 180:
             axis = points(artists["axis"])
-            steps = axis @ goal[:3, :3].T + d - axis  # the same for all its points, and along it
+            # equal for all points of the axis, and along it
+            steps = axis @ goal[:3, :3].T + d - axis
             assert off(*steps) < 1e-10
             assert np.abs(np.cross(steps[0], axis[1] - axis[0])).max() < 1e-10
             through = axis.mean(axis=0)
@@ -186,11 +194,11 @@ def test_a_screw_and_a_geodesic_and_the_axis():
 
 @cache
 def spun(axis, tilt):
-    """The motion of the book, integrated on its own, the momentum upright at the start."""
+    """Return the motion of the book, integrated independently; the momentum starts upright."""
     w0 = np.full(3, 4 * np.sin(np.radians(tilt)) / np.sqrt(2))
     w0[int(axis[-1]) - 1] = 4 * np.cos(np.radians(tilt))
     momentum = MOMENTS * w0 / np.linalg.norm(MOMENTS * w0)
-    assert momentum[2] >= 0  # upwards, if only a little
+    assert momentum[2] >= 0  # the momentum points upwards, if only a little
     cross = np.cross(momentum, [0, 0, 1])
     turn = np.linalg.norm(cross)
     start = rb.exp_so3(np.arcsin(turn) * cross / turn) if turn else np.eye(3)
@@ -201,7 +209,7 @@ def spun(axis, tilt):
 
 
 @pytest.mark.source("BK (8)")
-def test_the_book_and_its_spin():
+def test_the_book_and_its_angular_velocity_agree_with_the_package():
     artists = made("flip").artists
     for v, said in sweep("flip", axis="axis 2", t=6.0):
         times, R, w = spun(v["axis"], v["off"])
@@ -224,7 +232,7 @@ def test_the_book_and_its_spin():
         assert list(artists["now"].get_xdata()) == [v["t"], v["t"]]
 
 
-def test_the_numbers_of_the_book_are_seen_at_first_and_another_axis_starts_anew():
+def test_the_numbers_on_the_book_are_visible_at_first_and_a_new_axis_restarts_the_motion():
     book = made("flip")
     eye = book.artists["book"].axes.sight().eye
     for axis in ("axis 1", "axis 2", "axis 3"):
@@ -243,7 +251,10 @@ KNOWN = {}
 
 
 def solved(optimum, rival, ends):
-    """Both curves of these ends, and the costs of their rotations; each is solved once."""
+    """Return both curves for these ends, and the costs of their rotations.
+
+    Each problem is solved once.
+    """
     key = rival.__name__, str(ends)
     if key not in KNOWN:
         curves = optimum(*ends), rival(*ends)
@@ -252,7 +263,7 @@ def solved(optimum, rival, ends):
 
 
 def assert_compared(said, curves, costs, t, rival="projection"):
-    """The texts tell the costs, and by how much the motions are turned apart at these times."""
+    """Check that the texts state the costs, and the angle between the motions at these times."""
     for name, cost in zip(("optimum", rival), costs, strict=True):
         assert reads(said[f"cost, {name}"], cost)
     ratio, (low, high) = said["their ratio"], costs
@@ -264,7 +275,7 @@ def assert_compared(said, curves, costs, t, rival="projection"):
 
 
 @pytest.mark.source("BK (19)", "BK (21)", "BK Fig. 4")
-def test_an_optimum_its_rivals_and_their_costs():
+def test_the_optimum_its_rivals_and_their_costs_agree_with_the_package():
     artists = made("minimum_acceleration").artists
     for v, said in sweep("minimum_acceleration", k=3.0):
         sigma = v["size"] * np.pi / 6 * np.array([1, 2, 3])
@@ -275,8 +286,9 @@ def test_an_optimum_its_rivals_and_their_costs():
             drawn = np.transpose([points(artists[f"{name} {axis}"])[:, 1] for axis in "xyz"])
             assert off(drawn, rb.log_so3(curve(TIMES))) < 1e-12
             assert_box(artists[f"{name} box"], curve(v["t"]), [0.65, 0.4, 0.125], turned=1e-12)
-            if v["rival"] != "Cayley" or name != "rival":  # it may leave the picture
-                assert np.abs(np.diff(drawn, axis=0)).max() < 0.5  # never round a ball of radius π
+            if v["rival"] != "Cayley" or name != "rival":  # Cayley's curve may leave the picture
+                # the curve never jumps across the ball of radius π
+                assert np.abs(np.diff(drawn, axis=0)).max() < 0.5
                 assert_within(drawn, *[artists["σ₁"].axes.get_ylim()] * 3)
         heights = [artists[f"σ{number}"].get_position()[1] for number in "₁₂₃"]
         assert min(np.diff(heights)) > 0.25  # the labels do not overlap
@@ -285,7 +297,7 @@ def test_an_optimum_its_rivals_and_their_costs():
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
-def test_both_cubes_their_ways_and_their_costs():
+def test_both_cubes_their_paths_and_their_costs_agree_with_the_package():
     artists = made("cube").artists
     for v, said in sweep("cube", spin=2.0, t=0.4):
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
@@ -304,7 +316,7 @@ def test_both_cubes_their_ways_and_their_costs():
 
 
 @pytest.mark.parametrize(("name", "seconds"), [("flip", 8), ("chain", 6)])
-def test_a_motion_with_a_duration_in_seconds_plays_in_as_many(name, seconds):
+def test_a_motion_plays_for_its_duration_in_seconds(name, seconds):
     explorer = made(name)
     explorer.restart()
     assert explorer.values.get("duration", explorer.steps[-1]) == seconds
@@ -325,7 +337,7 @@ def curve_of(name, knots):
     return rb.minimum_acceleration_spline_se3(knots, POSES, tuple(rest))
 
 
-def test_the_box_its_way_and_its_speeds_are_those_of_the_chain():
+def test_the_box_its_path_and_its_speeds_are_those_of_the_chain():
     artists = made("chain").artists
     assert np.array_equal(points(artists["poses"]), POSES[:, :3, 3])
     for v, said in sweep("chain", curve="cubics, parabolas", duration=4.0, t=0.4):
@@ -356,7 +368,7 @@ def test_the_box_its_way_and_its_speeds_are_those_of_the_chain():
 
 
 @pytest.mark.source("beyond BK 13")
-def test_both_curves_pass_the_orientations_and_show_their_accelerations():
+def test_both_curves_pass_through_the_orientations_and_show_their_accelerations():
     artists = made("spline").artists
     for v, said in sweep("spline", pitch=15.0, third=2.3, t=1.4):
         times, angles = np.array([0, 1, v["third"], 4]), ANGLES.copy()
@@ -391,7 +403,7 @@ def test_both_curves_pass_the_orientations_and_show_their_accelerations():
 
 
 @pytest.mark.source("beyond BK 16")
-def test_the_timing_keeps_below_the_limits_of_its_path():
+def test_the_timing_stays_below_the_limits_of_its_path():
     artists, path = made("timing").artists, rb.projected_spline_se3(np.arange(4.0), POSES)
     for v, said in sweep("timing", angular_speed=1.0, speed=1.2, acceleration=2.5, t=0.3):
         limits = {name: v[name] for name in ("angular_speed", "speed", "acceleration")}
@@ -401,7 +413,7 @@ def test_the_timing_keeps_below_the_limits_of_its_path():
         turned, moved = (np.linalg.norm(part, axis=1) for part in (V[:, :3], V[:, 3:]))
         speeds = np.minimum(v["angular_speed"] / turned, v["speed"] / moved)
         assert off(points(artists["speed limits"])[:, 1] / speeds, 1) < 1e-12
-        bend = np.linalg.norm(np.cross(V[:, 3:], A), axis=1) / moved  # across the path
+        bend = np.linalg.norm(np.cross(V[:, 3:], A), axis=1) / moved  # perpendicular to the path
         highest = points(artists["acceleration limit"])[:, 1]
         assert off(highest**2 * bend / v["acceleration"], 1) < 1e-9
         rate = points(artists["one rate"])[0, 1]
@@ -416,14 +428,14 @@ def test_the_timing_keeps_below_the_limits_of_its_path():
 
 
 def planned(v, t, frame):
-    """The states of the two commands of a plan, up to a time."""
+    """Return the last pose of a plan of two commands, up to a time."""
     first, second = ([v[f"vx{i}"], v[f"vy{i}"], np.radians(v[f"omega{i}"])] for i in (1, 2))
     commands = [(first, min(t, 2.0)), (second, max(t - 2.0, 0.0))]
     return rb.planar.propagate_planar([0, 0, 0], commands, frame=frame)[-1]
 
 
 @pytest.mark.source("RR (17)", "RR (18)", "RR (19)")
-def test_both_bodies_are_where_the_plan_leads_them():
+def test_both_bodies_are_at_the_poses_of_the_plan():
     artists = made("planar").artists
     for v, said in sweep("planar", omega1=45.0, t=4.0):
         for frame in ("world", "body"):
@@ -450,7 +462,7 @@ def hand(q):
 
 
 @pytest.mark.source("RR (20)", "RR (21)")
-def test_the_arm_and_the_way_of_its_hand():
+def test_the_arm_and_the_path_of_its_hand_agree_with_the_package():
     artists = made("arm").artists
     for v, said in sweep("arm", theta0=77.0, theta1=-40.0):
         goal = np.radians([v["theta0"], v["theta1"]])
@@ -465,7 +477,7 @@ def test_the_arm_and_the_way_of_its_hand():
 
 
 @pytest.mark.parametrize("elbow", [110.0, -70.0])
-def test_the_arm_goes_where_its_angles_are_set_or_a_click_is_or_says_why_not(elbow):
+def test_the_arm_moves_to_its_angles_or_to_a_click_or_states_why_it_cannot(elbow):
     arm = made("arm")
     arm.restart()
     arm.controls["theta1"].value = elbow
@@ -478,7 +490,7 @@ def test_the_arm_goes_where_its_angles_are_set_or_a_click_is_or_says_why_not(elb
         tell(arm, place=[x / box.width, 1 - y / box.height])
         if 0.5 <= np.hypot(*place) <= 3.5:
             assert off(points(links)[-1], place) < 1e-6
-            assert arm.values["theta1"] * elbow > 0  # on its side
+            assert arm.values["theta1"] * elbow > 0  # the elbow stays on its side
             assert notice(arm) == ""
         else:
             assert "0.5 to 3.5 m from the base" in notice(arm)
@@ -486,14 +498,14 @@ def test_the_arm_goes_where_its_angles_are_set_or_a_click_is_or_says_why_not(elb
 
 
 def tips(explorer, name):
-    """The columns of a matrix whose axes are drawn."""
+    """Return the columns of a matrix whose axes are drawn."""
     lines = np.array([points(made(explorer).artists[f"{name} {axis}"]) for axis in "xyz"])
     assert not lines[:, 0].any()
     return lines[:, 1].T
 
 
 @pytest.mark.source("RR (7)", "RR (8)", "RR 2.1")
-def test_box_axes_turns_and_gimbal_lock_belong_to_the_angles():
+def test_box_axes_turns_and_gimbal_lock_agree_with_the_angles():
     orientation, (x, y, z) = made("rotation"), np.eye(3)
     artists = orientation.artists
     for v, said in sweep("rotation"):
@@ -505,7 +517,7 @@ def test_box_axes_turns_and_gimbal_lock_belong_to_the_angles():
         for name, axis in turns.items():
             assert np.abs(np.cross(points(artists[name]), axis)).max() < 1e-14
         one, angle = points(artists["axis"]), np.linalg.norm(rb.log_so3(R))
-        assert off(one @ R.T, one) < 1e-8  # near half-turns the axis has half the digits
+        assert off(one @ R.T, one) < 1e-8  # half the digits of the axis are lost near half-turns
         assert one.any() == (angle > 1e-9)
         assert reads(said["matrix"], R)
         assert reads(said["quaternion"], rb.quaternion_from_matrix(R))
@@ -523,14 +535,14 @@ def test_box_axes_turns_and_gimbal_lock_belong_to_the_angles():
 
 
 @pytest.mark.source("BK Prop. 2")
-def test_matrices_and_their_repairs():
+def test_matrices_and_their_projections_agree_with_the_package():
     letter = made("projection").artists["nearest x letter"]
     for v, said in sweep("projection", pull=1.0, e23=-0.3):
         M = np.eye(3) + v["pull"] * np.array([[0, v["e12"], 0], [0, 0, v["e23"]], [0, 0, v["e33"]]])
         drawn, R, G = (tips("projection", name) for name in ("M", "nearest", "Gram–Schmidt"))
         S, det = R.T @ M, np.linalg.det(M)
         assert off(drawn, M) < 1e-15
-        assert off(S, S.T) < 1e-14  # nearest, by definition
+        assert off(S, S.T) < 1e-14  # the definition of the nearest rotation
         assert np.linalg.eigvalsh(S)[:2].sum() > -1e-14
         assert np.linalg.det(R) > 0
         assert off(letter.get_position_3d(), 1.2 * R[:, 0]) < 1e-14
@@ -552,7 +564,7 @@ def test_matrices_and_their_repairs():
 
 
 @pytest.mark.source("RR 2.1", "RR 2.2")
-def test_dots_and_histogram_are_of_the_first_rotations():
+def test_dots_and_histogram_show_the_first_rotations():
     dots, histogram = (made("random").artists[name] for name in ("points", "histogram"))
     samplers = {"three angles": rb.sampling.sample_rotation_naive, "uniform": rb.sample_rotation}
     for v, said in sweep("random"):

@@ -1,7 +1,7 @@
-"""What figures of the lessons show that is in no CSV, and what their descriptions say.
+"""The parts of the lessons' figures that are not in a CSV, and their descriptions.
 
-Where a lesson draws a figure, it is compared with the stored one, and its artists with the CSV:
-that they hold its numbers under their names, have labels, and are not clipped (tests/shown.py).
+When a lesson draws a figure, the figure is compared with the stored one, and its artists with the
+CSV: they hold its numbers under their names, have labels, and are not clipped (tests/shown.py).
 """
 
 import matplotlib.pyplot as plt
@@ -35,7 +35,7 @@ MARGINS = {
 
 @pytest.fixture
 def axes():
-    """A function that makes axes of some projections."""
+    """Return a function that makes axes with the given projections."""
 
     def make(*kinds):
         fig = plt.figure()
@@ -61,7 +61,7 @@ def check_said(said, *words):
 
 
 @pytest.mark.source("RR (8)", "RR 2.1", "BK Fig. 1")
-def test_descriptions_of_turns_and_frames():
+def test_descriptions_of_turns_and_frames_state_their_numbers():
     t, R = np.linspace(0, 1, 11), rb.exp_so3([[0, 0, np.pi / 2]])
     angles = {"t [1]": t, "slow α [rad]": -t, "slow β [rad]": -t, "slow γ [rad]": 2 * t}
     words = "slow: β goes to -57 degrees, and the middle half of α's change takes 50.0 %"
@@ -74,7 +74,7 @@ def test_descriptions_of_turns_and_frames():
 
 
 @pytest.mark.source("BK Prop. 2", "RR 1.4")
-def test_descriptions_of_repaired_matrices():
+def test_descriptions_of_projected_matrices_state_their_numbers():
     drift = numbers("lesson04_drift")
     words = f"After 100000 products it is, rounded step: {drift['rounded step [1]'][-1]:.0e}"
     check_said(lesson04.describe_drift(drift), words)
@@ -94,9 +94,10 @@ def test_descriptions_of_repaired_matrices():
 
 
 @pytest.mark.source("RR 2")
-def test_histograms_count_all_beside_their_laws(axes):
+def test_histograms_count_all_draws_and_show_the_exact_distributions(axes):
     many = {"a": rb.sample_rotation(5000, rng=2), "b": rb.exp_so3(np.zeros((10, 3)))}
-    many["b"][:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)  # heights beyond 1, by rounding
+    # some heights are beyond 1 by rounding
+    many["b"][:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)
     bins, axes = lesson05.histograms(many), axes(None, None, None)
     lesson05.draw_histograms(axes, bins)
     for ax, (edges, densities) in zip(axes, bins.values(), strict=True):
@@ -111,7 +112,7 @@ def test_histograms_count_all_beside_their_laws(axes):
 
 
 @pytest.mark.source("BK Fig. 2", "BK Fig. 3")
-def test_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
+def test_the_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
     angle, t = np.meshgrid(np.arange(1, 23) * np.pi / 24, np.linspace(0, 1, 5), indexing="ij")
     table = {"angle [rad]": angle, "t [1]": t, "theta [1]": rb.projected_line.theta(t, angle)}
     ax, space, other = axes(None, "3d", None)
@@ -140,7 +141,7 @@ def test_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
 
 
 @pytest.mark.source("BK Fig. 4")
-def test_lines_that_are_in_no_table_have_their_labels(axes):
+def test_lines_that_are_not_in_a_table_have_their_labels(axes):
     chord, torques, sigma = map(numbers, ("lesson06_chord", "lesson13_torques", "paper_fig4c"))
     first, second, *others = axes(None, None, None, None, None)
     lesson06.draw_chord(first, chord)
@@ -156,12 +157,12 @@ def test_lines_that_are_in_no_table_have_their_labels(axes):
     lesson09.draw_comparison(fig, sigma)
     best, near = vectors("{} sigma{} [rad]", sigma, "123").values()
     held = {("", f"σ{'₁₂₃'[i]}"): [part] for i, part in enumerate((near - best).T)}
-    check_held(fig.axes, held | {("", "_"): [*best.T, *near.T]})  # over time
+    check_held(fig.axes, held | {("", "_"): [*best.T, *near.T]})  # the coordinates over time
     (legend,) = [*fig.legends, *(ax.get_legend() for ax in fig.axes if ax.get_legend())]
     assert [text.get_text() for text in legend.get_texts()][:3] == ["optimum", "projection", "σ₁"]
 
 
-def test_descriptions_of_curves():
+def test_descriptions_of_curves_state_their_numbers():
     data = numbers("paper_fig4c")
     best, near = vectors("{} sigma{} [rad]", data, "123").values()
     far = np.linalg.norm(near - best, axis=-1)
@@ -183,13 +184,13 @@ def test_descriptions_of_curves():
     largest = np.linalg.norm(vectors("{} {} [N m]", torques)["least torque"], axis=-1).max()
     words = f"least torque: {largest:.2g} N m"
     check_said(lesson13.describe_torques(torques), words)
-    # 30 t² (1 − t)² of 2.67 rad: 1.875 times as much at half time
+    # The speed is 30 t² (1 − t)² of 2.67 rad, which is 1.875 times as much at half time.
     check_said(lesson13.describe_speeds(numbers("lesson13_jerk")), "least jerk at most 5.0")
 
 
 @pytest.mark.source("BK (8)", "BK (9)")
-def test_descriptions_of_free_and_carried_bodies():
-    """Circles about axes 1 and 3, and one about axis 1 that passes close to axis 2."""
+def test_descriptions_of_free_and_carried_bodies_state_their_numbers():
+    """The paths are circles about axes 1 and 3; one about axis 1 passes close to axis 2."""
     spins = vectors("{} w{} [rad]", numbers("lesson08_spins"), "123")
     flips = np.count_nonzero(np.diff(np.sign(spins["axis 2"][:, 1])))
     kept = "it keeps its sign"
@@ -203,7 +204,7 @@ def test_descriptions_of_free_and_carried_bodies():
     check_said(lesson08.describe_carried(np.radians([0, 90, 180])), "After 0, 90, 180 degrees")
 
 
-def test_descriptions_of_the_atlas(axes):
+def test_descriptions_of_the_atlas_state_its_numbers(axes):
     size, table = np.array([0.25, 1, 3]), {}
     for k, way in enumerate(("projection", "Bézier", "normal"), 1):
         table |= {f"{way} median excess [1]": k * 1e-3 * size**4}
@@ -211,7 +212,7 @@ def test_descriptions_of_the_atlas(axes):
     table["size [rad]"], (ax,) = size, axes(None)
     words = "projection from 3.9e-06 to 8.1e-02", "normal from 1.2e-05 to 2.4e-01"
     check_said(atlas_figures.describe_growth(table), *words)
-    atlas_figures.draw_growth(ax, table)  # of the curves that are in the table
+    atlas_figures.draw_growth(ax, table)  # only the curves in the table are drawn
     ticks = [tick.get_text() for tick in ax.get_yticklabels()]
     assert all(tick.startswith("$10^") for tick in ticks) or not any("$" in x for x in ticks)
     colours = [line.get_color() for line in ax.lines]
@@ -227,7 +228,7 @@ def test_descriptions_of_the_atlas(axes):
     check_said(said, f"Bézier d {1 / 16 / 12 / 9:.1e}")
 
 
-def test_each_problem_is_a_mark_of_its_family(axes):
+def test_each_problem_has_the_mark_of_its_family(axes):
     axes, line, held = axes(None, None), np.array([0.02, 0.7]), {}
     atlas_figures.draw_margins(axes, MARGINS)
     for way in ("projection", "quaternion"):
@@ -238,7 +239,7 @@ def test_each_problem_is_a_mark_of_its_family(axes):
     check_held(axes, held | {("projection", "slope −3"): [line, line**-3]})
 
 
-def test_profiles_have_the_times_of_poses_and_axes_that_hold_them(axes):
+def test_profiles_show_the_times_of_poses_and_their_axes_contain_the_data(axes):
     axes = axes(None, None)
     data = {"t [s]": [0, 1, 2], "speed [m/s]": [0, 2.5, 1], "turn [rad/s]": [1, 0, 0.25]}
     lesson14.draw_profiles(axes, data, [0, 1.5])
@@ -254,7 +255,7 @@ def test_profiles_have_the_times_of_poses_and_axes_that_hold_them(axes):
     assert [ax.get_ylim() for ax in axes] == [(0, 1), pytest.approx((-1.08, 3.24))]
 
 
-def test_profiles_are_those_of_the_motion():
+def test_profiles_agree_with_the_motion():
     poses = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 3, 4, 0], [0, 0, 1, 3, 4, 5]])
     table = lesson14.profile_table(rb.chain([0, 2, 4], poses, leg=rb.geodesic_se3), 1, 5)
     assert table["t [s]"].tolist() == [0, 1, 2, 3, 4]
@@ -273,13 +274,15 @@ def test_profiles_are_those_of_the_motion():
 
 @pytest.mark.source("beyond BK 7")
 def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
-    """They leave the lines t w with the square of w in exponential ones, with the cube here."""
+    """Free motions leave the lines t w as w² in exponential coordinates, and as w³ in normal
+    ones."""
     book, t = rb.metrics.box_inertia([0.30, 0.20, 0.03]), np.linspace(0, 1, 5)
     w = np.array([[0.8, 0.6, 1], [-0.6, 0.8, 1]])
     kinds = "exponential coordinates", "normal coordinates"
 
     def off(inertia, size):
-        """By how much the two motions leave their lines in the plane, in both coordinates."""
+        """Return by how much the two motions leave their lines in the plane, in both
+        coordinates."""
         lines = vectors("{} {} [rad]", lesson13.normal_table(t, size * w, inertia), "xy")
         for k in (1, 2):
             assert np.allclose(lines[f"straight {k}"], t[:, None] * size * w[k - 1, :2], 1e-15)
@@ -292,7 +295,7 @@ def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
     w_dot = -np.cross(w, w @ book) @ np.linalg.inv(book)  # Euler's equations
     want = 0.01**2 / 2 * w_dot[:, :2]
     assert off(book, 0.01)[0, :, -1] == pytest.approx(want, abs=0.03 * np.abs(want).max())
-    assert np.abs(off(2 * np.eye(3), 1)).max() < 1e-13  # of a ball: both are straight
+    assert np.abs(off(2 * np.eye(3), 1)).max() < 1e-13  # for a ball, both are straight
 
     data, panes = numbers("lesson13_normal"), axes(None, None)
     lesson13.draw_normal(panes, data)
@@ -317,8 +320,8 @@ def test_the_turns_are_natural_splines_through_the_angles_and_their_bends_end_at
         assert np.abs(curvature[[0, -1]]).max() < 0.05 * np.abs(curvature).max()
 
 
-def test_limit_curves_are_the_largest_rates_that_some_change_of_the_rate_allows():
-    """By trying many changes of the rate at each place."""
+def test_limit_curves_are_the_largest_rates_for_any_change_of_the_rate():
+    """The test tries many changes of the rate at each place."""
     path = rb.minimum_acceleration_se3(
         np.eye(4),
         rb.pose_from_coordinates([1, 0, 1, 2, 1, 0]),
@@ -340,8 +343,8 @@ def test_limit_curves_are_the_largest_rates_that_some_change_of_the_rate_allows(
         assert rate == pytest.approx(norms.max(axis=1).min() ** -0.5, rel=1e-5)
 
 
-def test_two_passes_are_the_largest_squares_below_all_cones():
-    """x_i is the least of highest_j + step |i − j|, with 0 at both ends."""
+def test_two_passes_give_the_largest_squared_rates_below_all_limits():
+    """x_i is the minimum of highest_j + step |i − j|, with 0 at both ends."""
     highest = np.random.default_rng(3).uniform(0.5, 6, 12)
     highest[[0, -1]] = 0
     apart = np.abs(np.subtract.outer(np.arange(12), np.arange(12)))
@@ -351,7 +354,7 @@ def test_two_passes_are_the_largest_squares_below_all_cones():
     assert back == pytest.approx(later.min(axis=1))
 
 
-def test_shares_are_norms_over_limits(axes):
+def test_the_used_shares_are_norms_over_limits(axes):
     path = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
     data = lesson15.share_table(path, {"angular_speed": 4.0, "speed": 5.0})
     assert data["angular speed [1]"] == pytest.approx(0.5)

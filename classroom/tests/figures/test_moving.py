@@ -16,7 +16,7 @@ V = np.array([0, -0.8, 0.6])
 
 @pytest.fixture
 def axes():
-    """In the plane, and in space."""
+    """Return axes in the plane, and in space."""
     fig = plt.figure()
     yield [fig.add_subplot(1, 2, k, projection=kind) for k, kind in ((1, None), (2, "space"))]
     plt.close(fig)
@@ -42,7 +42,7 @@ def test_the_book_turns_with_its_pin(axes):
         assert tip @ foot > foot @ foot
 
 
-def test_the_description_of_the_book_has_the_times_when_it_turns_over():
+def test_the_description_of_the_book_states_when_it_turns_over():
     t = np.linspace(0, 4, 41)
     over = rb.exp_so3(np.outer(np.where(t > 1.95, np.pi, 0), [1, 0, 0]))
     upright, still = rb.exp_so3([np.pi / 2, 0, 0]), np.broadcast_to(np.eye(3), over.shape)
@@ -56,7 +56,10 @@ def test_the_description_of_the_book_has_the_times_when_it_turns_over():
 
 @pytest.fixture(scope="module")
 def level():
-    """The points of a level, shape (4 - k, 2 or 3, times), from the table of the construction."""
+    """Return a function for the points of a level, from the table of the construction.
+
+    The points have the shape (4 - k, 2 or 3, times).
+    """
     table = lesson11.casteljau_table(T, POINTS, ENDS, V)
 
     def points(name, k):
@@ -67,7 +70,7 @@ def level():
     return points
 
 
-def test_casteljaus_points_are_bernsteins_cubic_and_beziers_curve_with_their_controls(level):
+def test_casteljaus_construction_gives_bernsteins_cubic_and_beziers_curve(level):
     s = 1 - T
     bernstein = np.array([s**3, 3 * s**2 * T, 3 * s * T**2, T**3])
     assert np.abs(level("plane", 3)[0] - POINTS.T @ bernstein).max() < 1e-12
@@ -78,7 +81,7 @@ def test_casteljaus_points_are_bernsteins_cubic_and_beziers_curve_with_their_con
     assert np.array_equal(level("plane", 0)[:, :, 3], POINTS)
 
 
-def test_the_construction_moves_by_its_table_along_lines_and_geodesics(axes, level):
+def test_the_construction_moves_along_lines_and_geodesics_as_in_its_table(axes, level):
     update = lesson11.moving_casteljau(axes, T, POINTS, ENDS, V)
     for i in (0, 4, 20, 7):
         clock, *artists = update(i)
@@ -93,7 +96,8 @@ def test_the_construction_moves_by_its_table_along_lines_and_geodesics(axes, lev
     a, b = level("plane", 2)[..., 7]
     assert np.abs(straight - (a[:, None] + np.outer(b - a, np.linspace(0, 1, 33)))).max() < 1e-12
     assert np.abs(np.linalg.norm(arc, axis=0) - 1).max() < 1e-12
-    assert np.linalg.svd(arc - arc[:, :1], compute_uv=False)[2] < 1e-12  # a circle, in one plane
+    # the arc is in one plane, so it is a circle
+    assert np.linalg.svd(arc - arc[:, :1], compute_uv=False)[2] < 1e-12
     assert np.ptp(np.linalg.norm(np.diff(arc, axis=1), axis=0)) < 1e-12
     first, last = (np.degrees(np.linalg.norm(w) / 3) for w in ENDS[2:])
     said = lesson11.describe_casteljau(ENDS)

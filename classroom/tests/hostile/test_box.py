@@ -1,4 +1,4 @@
-"""Processes in a box end: by themselves, and with the process that grades."""
+"""Processes in a sandbox end after their time, and with the process that grades."""
 
 import os
 import sys
@@ -28,7 +28,7 @@ def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(
     assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
 
 
-def test_a_box_and_its_worker_end_with_the_process_that_grades(tmp_path, template):
+def test_a_sandbox_and_its_worker_end_with_the_process_that_grades(tmp_path, template):
     course = Class(tmp_path, template)
     asleep = f"8{os.getpid():08d}"
     course.submit("ann", half=f"import subprocess\nsubprocess.run(['sleep', '{asleep}'])")

@@ -33,7 +33,7 @@ REFUSALS = {"AssertionError", "CalledProcessError", "OperationalError"}
 KINDS = [OSError, *OSError.__subclasses__(), *ConnectionError.__subclasses__()]
 REFUSALS |= {kind.__name__ for kind in KINDS}
 
-# Each is the answer with the square, to which the right one is added, or only that with the half.
+# Each is the beginning of a student's answer to the second problem; the right answer follows it.
 HONEST = {
     "widgets": "from ipywidgets import FloatSlider, HBox, Output, interact, interactive_output\n"
     "interact(lambda x: print(x), x=(0.0, 3.0));\nout = Output()\nwith out:\n    print('in')\n"
@@ -50,7 +50,7 @@ HONEST = {
     "odd outputs": "odd = {'text/plain': {'a': 1}, 'application/x-odd': [float('inf')]}\n"
     "display(odd, raw=True)",
 }
-# Their attacks fail, and they report the results; the points are those of their answers.
+# Their attacks fail, and they report the results. The points are those of their answers.
 SNEAKS = {
     "reads the set": "print(open('COURSE/source/ps0/ps0.ipynb').read())",
     "reads others": "import os\nprint(os.listdir('COURSE/submitted'))",
@@ -75,7 +75,7 @@ SNEAKS = {
     "becomes root": "import os\nos.setuid(0)",
     "mounts": "import subprocess as s\ns.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
-# These succeed inside the box only; the points are those of their answers.
+# These attacks succeed inside the sandbox only. The points are those of their answers.
 LOUD = {
     "leaves daemons": "import subprocess\nfor _ in range(50):\n"
     "    subprocess.Popen(['setsid', 'sleep', 'SLEEP'], start_new_session=True)",
@@ -96,7 +96,7 @@ LOUD = {
     "display({'image/png': '', 'text/plain': ''}, raw=True,\n"
     "    metadata={'filenames': {'image/png': 'https://evil.example/x.png'}})",
 }
-# It tries to pass data to the next run: in a file, and in the kernel's keyring.
+# This answer tries to pass data to the next run: in a file, and in the kernel's keyring.
 TELLS = """
 import base64, linecache, platform
 import numpy
@@ -153,7 +153,7 @@ CELL_5 = "cell 5, answer of “A tiny set”"
 TRANSFORMS = "import sys\nsys.modules['IPython'].get_ipython().input_transformers_post.append(abs)"
 CHANGES = {"writes words": write_words, "adds a cell": add_cell, "forges remarks": forge_remarks}
 SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
-# Student, answer, points (none if it is refused), and how the remark, or the refusal, begins.
+# Student, answer, points (none if refused), and the beginning of the remark or the refusal.
 OTHERS = [
     *((student, "half = 0.5", "2 1", "") for student in ("tells", "writes words", "adds a cell")),
     ("forges remarks", "half = 0.5", "2 1", "cell 1, locked cell of “A tiny set” was changed; it"),
@@ -161,12 +161,12 @@ OTHERS = [
     ("returns points", "half = 1\n100.0", "2 0", ""),
     ("=cmd|' -C calc'!A0", "half = 1", "2 0", ""),
     ("loops", f"{begun()}\nwhile True: pass", "2 0", f"{CELL_5}: stopped after"),
-    # it is stopped when its time is over, or when the memory is full
+    # The endless output is stopped when the time is over, or when the memory is full.
     ("floods", f"{begun()}\nwhile True: print('x' * 9**4)", "2 0", f"{CELL_5}: "),
     ("takes memory", "bytearray(3 * 10**9)", "2 0", f"{CELL_5}: takes too much memory"),
     ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
     ("ends itself", "import os\nos.kill(os.getpid(), 9)", " ", "Python ended in or before cell 5"),
-    # test_forbidden.py has more ways round the tests
+    # test_forbidden.py has more ways to circumvent the tests.
     ("transforms", TRANSFORMS, " ", f"{CELL_5}, line 2 uses get_ipython; grade by hand"),
     ("an alias", "m = [math][0]\nm.isclose = print", " ", f"{CELL_5}, line 2 replaces m.isclose"),
     ("a shell", "!ls", " ", f"{CELL_5}, line 1 uses a magic or a shell"),
@@ -228,7 +228,7 @@ def hand_in_all(course, port):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory, template):
-    """All of them graded at once, while a server and a socket wait to be asked."""
+    """Grade all of them in one run, while a server and a socket wait for connections."""
     assert sandbox.missing() == ""
     course = Class(tmp_path_factory.mktemp("course"), template)
     asked = []
@@ -256,14 +256,14 @@ def rows(course):
 
 
 def state(folder):
-    """What there is outside of what grading writes."""
+    """Return the files that grading must not change."""
     paths = [*folder.glob("source/**/*"), *folder.glob("submitted/**/*")]
     return {path: path.read_bytes() for path in paths if path.is_file()}
 
 
 @pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
-def test_each_submission_has_its_points_and_a_clear_line(course, rows, student, wanted, remark):
-    """Noise costs no points. A remark that is None may have any text."""
+def test_each_submission_has_its_points_and_a_clear_remark(course, rows, student, wanted, remark):
+    """Large outputs cost no points. A remark that is None may have any text."""
     row = rows["'" * student.startswith("=") + student]
     assert f"{row['square-test']} {row['half-test']}" == wanted, row
     assert row["remarks"].isprintable()
@@ -275,12 +275,12 @@ def test_each_submission_has_its_points_and_a_clear_line(course, rows, student, 
 
 
 @pytest.mark.parametrize("student", SNEAKS)
-def test_attempts_to_get_out_of_the_box_fail(course, student):
+def test_attempts_to_leave_the_sandbox_fail(course, student):
     answer = cell(nbformat.read(course.graded(student), as_version=4), "half-answer")
     assert {output.get("ename") for output in answer.outputs} & REFUSALS, answer.outputs
 
 
-def test_nothing_outside_is_changed_and_nothing_is_left_running(course, rows):
+def test_nothing_outside_is_changed_and_no_process_is_left(course, rows):
     assert state(course.folder) == course.before
     assert not (Path(rbcourse.__file__).parent / "mine.py").exists()
     assert {row["boxed"] for row in rows.values()} == {"yes"}
@@ -292,7 +292,7 @@ def pages(course):
     return {p.parts[-3]: p.read_text("utf-8") for p in course.folder.glob("feedback/*/ps0/*.html")}
 
 
-def test_pages_hold_nothing_of_students_that_runs_or_loads(pages):
+def test_pages_have_no_content_of_students_that_runs_or_loads(pages):
     for student, page in pages.items():
         body = page.split("<body>", 1)[1]
         assert "<script" not in body, student
@@ -307,7 +307,7 @@ def test_pages_hold_nothing_of_students_that_runs_or_loads(pages):
     assert "gone (attachment:b.png is missing)" in words
 
 
-def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(pages):
+def test_pages_have_no_hidden_test_in_any_encoding_and_no_environment(pages):
     for student, page in pages.items():
         text = html.unescape(re.sub(r"<[^>]*>", "", page))
         for line in HIDDEN:
@@ -317,8 +317,8 @@ def test_pages_hold_no_hidden_test_in_any_writing_and_no_environment(pages):
         assert SECRET not in page
 
 
-def test_grading_without_a_box_is_announced_or_refused(tmp_path, template, monkeypatch, capsys):
-    """As on macOS: without a box a submission has the rights of the teacher."""
+def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, monkeypatch, capsys):
+    """On macOS, for instance, a submission has the rights of the teacher."""
     why = "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
     monkeypatch.setattr(sandbox, "missing", lambda: why)
     course = Class(tmp_path, template)
@@ -337,8 +337,8 @@ def test_grading_without_a_box_is_announced_or_refused(tmp_path, template, monke
         ("ann", "The points of ann changed during the grading of bob"),
     ],
 )
-def test_points_that_a_submission_writes_are_found(tmp_path, template, who, said, monkeypatch):
-    """Its own are above the maximum, those of another have changed."""
+def test_points_that_a_submission_writes_are_detected(tmp_path, template, who, said, monkeypatch):
+    """A submission gives itself points above the maximum, or changes those of another student."""
     course = Class(tmp_path, template)
     course.submit("ann")
     grade(["ps0"], course.folder)
@@ -357,5 +357,5 @@ def test_points_that_a_submission_writes_are_found(tmp_path, template, who, said
     monkeypatch.setattr(grading, "wait", harmed)
     with pytest.raises(ValueError, match=said):
         grade(["ps0"], course.folder)
-    assert "bob" not in course.rows()  # of the table before
+    assert "bob" not in course.rows()  # in the table of the first grading
     assert (course.folder / "gradebook.before-ps0.db").exists()

@@ -54,7 +54,7 @@ def free_ports(count):
 
 @pytest.fixture(scope="module")
 def hub(tmp_path_factory):
-    """The address of a hub whose users have the lessons, and a token of its administrator."""
+    """Start a hub whose users have the lessons; yield its address and an administrator's token."""
     if not shutil.which("npm"):
         pytest.skip("npm is needed, for configurable-http-proxy")
     folder = tmp_path_factory.mktemp("hub")
@@ -71,7 +71,7 @@ def hub(tmp_path_factory):
     for name, value in {**replaced, "DEFAULT": url}.items():
         text = re.sub(rf"\b{name}\b", str(value), text)
     (folder / "jupyterhub_config.py").write_text(text)
-    # after the lessons are copied as the hook in values.yaml does it
+    # The lessons are copied as the hook in values.yaml copies them.
     (command,) = [VALUES["singleuser"]["lifecycleHooks"]["postStart"]["exec"]["command"]]
     paths = os.pathsep.join(map(str, (site, ROOT, ROOT / "classroom")))
     env = {**os.environ, "PYTHONPATH": paths}
@@ -90,7 +90,7 @@ def hub(tmp_path_factory):
 
 
 async def answer(address, token="", method="GET", body=None, **more):
-    """What a server answers, as JSON; it is asked again while it starts."""
+    """Return the answer of a server, as JSON; ask again while it starts."""
     client, until = AsyncHTTPClient(), time.monotonic() + 120
     headers = {"Authorization": f"token {token}"} if token else {}
     while True:
@@ -106,7 +106,7 @@ async def answer(address, token="", method="GET", body=None, **more):
 
 
 async def run_cells(address, token, sources):
-    """Run cells one after the other in a kernel; return the texts that each prints, and errors."""
+    """Run cells one after the other in a kernel; return the printed text of each, and errors."""
     kernel = await answer(f"{address}/api/kernels", token, "POST", "{}")
     channel = f"{address}/api/kernels/{kernel['id']}/channels".replace("http", "ws", 1)
     headers = {"Authorization": f"token {token}"}
@@ -125,7 +125,7 @@ async def run_cells(address, token, sources):
             raw = await socket_.read_message()
             if isinstance(
                 raw, bytes
-            ):  # with buffers, of an explorer: their number, where parts begin
+            ):  # a message with buffers begins with their number and their places
                 begins = [int.from_bytes(raw[k : k + 4], "big") for k in (4, 8)]
                 raw = raw[slice(*begins)]
             message = json.loads(raw)
@@ -143,7 +143,7 @@ async def run_cells(address, token, sources):
 
 
 async def work(hub, token, user):
-    """Log in, start a server, open lesson 00, run lesson 06."""
+    """Log in, start a server, open lesson 00, and run lesson 06."""
     page = await AsyncHTTPClient().fetch(f"{hub}/hub/login")
     cookies = [each.partition(";")[0] for each in page.headers.get_list("Set-Cookie")]
     xsrf = next(each.partition("=")[2] for each in cookies if each.startswith("_xsrf="))

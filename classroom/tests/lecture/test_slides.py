@@ -29,7 +29,8 @@ def text(source, slide=None, **more):
 
 
 def picture(name, slide=None, size=(400, 300), **more):
-    """A code cell with a black picture of this size on a white margin of a tenth on each side."""
+    """Return a code cell with a black picture; the white margin is a tenth of its size on each
+    side."""
     still = Image.new("L", size, 255)
     still.paste(0, (size[0] // 10, size[1] // 10, size[0] * 9 // 10, size[1] * 9 // 10))
     file = io.BytesIO()
@@ -43,7 +44,7 @@ def picture(name, slide=None, size=(400, 300), **more):
 
 
 def tiny(folder, *cells, sheet=""):
-    """The deck of a lesson that has a title and these cells."""
+    """Return the deck of a lesson that has a title and these cells."""
     cells = [text(QUESTION), *cells, *([text(SHEET + sheet)] if sheet else [])]
     (folder / "notebooks").mkdir(exist_ok=True)
     path = folder / "notebooks" / "01_tiny.ipynb"
@@ -55,7 +56,7 @@ def shown(deck):
     return [(slide.title, slide.kind, slide.parts) for slide in deck.shown]
 
 
-def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lecturer(tmp_path):
+def test_slides_show_only_the_text_that_an_author_wrote_for_them_and_notes_have_the_rest(tmp_path):
     deck = tiny(
         tmp_path,
         text("## 1 · One\n\nLong.", "Short.\n\n. . .\n\nThen.\n\n---\n\nNext."),
@@ -89,7 +90,7 @@ def test_only_what_an_author_wrote_is_on_a_slide_and_the_rest_is_told_to_the_lec
             tiny(tmp_path, cell)
 
 
-def test_a_picture_stands_with_the_text_of_its_cell_and_may_be_borrowed(tmp_path):
+def test_a_picture_is_shown_with_the_text_of_its_cell_and_can_be_borrowed(tmp_path):
     matrix = new_code_cell("print(R)", metadata={"slide": r"$$R = \printed$$"})
     matrix.outputs = [new_output("stream", text="[[ 1.   0.5 ]\n [-0.25 1.  ]]\n")]
     deck = tiny(
@@ -152,14 +153,14 @@ def test_a_poll_comes_before_the_evidence_and_its_verdict_after_it(tmp_path):
     page = pages.section(verdict)
     assert page.count('class="option wrong"') == 3
     assert page.count('class="option right"') == 1
-    assert page.count("fragment") == 3  # each wrong idea comes by itself
+    assert page.count("fragment") == 3  # each wrong idea appears separately
     seen = pages.section(asked).partition("<aside")[0]
     assert seen.count('class="option"') == 4
     assert "even" not in seen
     assert "Right: **B**." in asked.notes
 
 
-def test_what_is_behind_the_end_is_grouped_and_long_tables_are_parted(tmp_path):
+def test_slides_behind_the_end_are_grouped_and_long_tables_are_split(tmp_path):
     rows = "".join(f"| row {i} | x |\n" for i in range(7))
     deck = tiny(
         tmp_path,
@@ -180,7 +181,7 @@ def test_what_is_behind_the_end_is_grouped_and_long_tables_are_parted(tmp_path):
     assert deck.shown[-2].title == "Recap"
 
 
-def test_each_row_of_the_run_sheet_begins_on_its_slide_with_its_share_of_the_time(tmp_path):
+def test_each_row_of_the_run_sheet_begins_at_its_slide_with_its_share_of_the_time(tmp_path):
     sheet = """| 0 | question | Ask. | |
 | 2 | poll 1, a vote | | the second |
 | 12 | recap, homework | | |
@@ -208,21 +209,21 @@ def test_each_row_of_the_run_sheet_begins_on_its_slide_with_its_share_of_the_tim
     assert slides.starts_of(deck.shown, slides.rows_of(two)) == [0, 1, 2, len(deck.shown) - 1]
 
 
-def test_no_line_parts_a_number_from_its_unit_or_leaves_a_short_word_alone():
+def test_no_line_break_separates_a_number_from_its_unit_or_leaves_a_short_word_alone():
     text = "[In](01.ipynb#s2) 5 % of 12 m, pages 3–9, it is so – or 1 : 2 of *it* is."
     whole = "In 5_% of 12_m, pages 3~–~9, it is so_– or 1_: 2 of <em>it</em>_is."
     marks = {"_": "\N{NO-BREAK SPACE}", "~": "\N{WORD JOINER}"}
     assert pages.marked(text).strip() == f"<p>{whole.translate(str.maketrans(marks))}</p>"
 
 
-def test_a_question_of_the_run_sheet_is_asked_when_the_vote_is_over(tmp_path):
+def test_a_question_of_the_run_sheet_is_asked_after_the_vote(tmp_path):
     sheet = "| 0 | question, 1, poll 1 | Why B? | |\n| 9 | recap | And so? | |\n"
     deck = tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=sheet)
     asked = {slide.kind: [n for n in slide.notes if "Ask" in n] for slide in deck.shown[:4]}
     assert asked == {"title": [], "poll": [], "plain": [], "verdict": ["**Ask:** Why B?"]}
     assert "**Ask:** And so?" in deck.shown[4].notes
     cells = poll()
-    cells[3].id = "proof"  # its row begins before the verdict, and after the vote
+    cells[3].id = "proof"  # the row of this cell begins before the verdict, and after the vote
     deck = tiny(tmp_path, *cells, sheet="| 0 | poll 1 | Why B? | |\n| 5 | proof | | |\n")
     assert "**Ask:** Why B?" in deck.shown[2].notes
 
@@ -237,7 +238,7 @@ def decks():
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
-def test_lessons_keep_the_rules_for_authors(path, decks):
+def test_lessons_follow_the_rules_for_authors(path, decks):
     deck = decks[path.stem]
     assert len(deck.shown) > 8
     polls = [slide for slide in deck.shown if slide.kind == "poll"]
@@ -264,19 +265,19 @@ def test_lessons_keep_the_rules_for_authors(path, decks):
 
 
 def plain(tex):
-    """TeX without what changes only its look."""
+    """Return TeX without the commands that change only its look."""
     return re.sub(
         r"\\(?:bigl|bigr|Bigl|Bigr|left|right|qquad|quad|[,;:! ])|[\s&{}]", "", tex
     ).rstrip(".,;")
 
 
 def pieces(formula):
-    """A formula, and if it is one of several or a chain its parts."""
+    """Return the parts of a formula that is a chain or one of several; else, return the formula."""
     return [part for part in re.split(r"\\q?quad|=|\\\\", formula) if part.strip()]
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
-def test_slides_have_no_number_and_no_formula_that_their_section_has_not(path):
+def test_every_number_and_formula_on_a_slide_is_in_its_section(path):
     sections, now = [], []
     for cell in nbformat.read(path, as_version=4).cells:
         if re.match(r"## ", cell.source):

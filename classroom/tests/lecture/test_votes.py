@@ -1,4 +1,4 @@
-"""Votes: the ballot by its rules, and thirty phones at the port of a lecture."""
+"""Votes: the rules of the ballot, and thirty phones at the port of a lecture."""
 
 import json
 import re
@@ -53,7 +53,7 @@ def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
             ballot.vote(b, letter)
     assert [ballot.vote_of(phone) for phone in (a, silent)] == ["C", ""]
     assert ballot.state() == {"poll": "Poll 1", "open": True, "voters": 3, "counts": []}
-    for _ in range(2):  # to close it again changes nothing
+    for _ in range(2):  # closing the vote again changes nothing
         ballot.close()
         counted = {"poll": "Poll 1", "open": False, "voters": 3, "counts": [0, 0, 2, 1]}
         assert ballot.state() == counted
@@ -71,12 +71,12 @@ def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
 @pytest.mark.parametrize(
     "address", ["0.0.0.0", "224.0.0.1", "255.255.255.255", "192.0.2.77", "::1", "06", "a.org"]
 )
-def test_an_address_that_is_not_of_this_machine_is_refused(address):
+def test_an_address_of_another_machine_is_refused(address):
     with pytest.raises(ValueError, match=f"Phones cannot vote at {address}: "):
         open_votes(address)
 
 
-def test_without_a_network_the_class_votes_by_hand(monkeypatch, capsys):
+def test_the_class_votes_by_hand_without_a_network(monkeypatch, capsys):
     def nowhere():
         raise OSError("Network is unreachable")
 
@@ -85,11 +85,11 @@ def test_without_a_network_the_class_votes_by_hand(monkeypatch, capsys):
     assert "show of hands" in capsys.readouterr().out
 
 
-def test_the_address_that_is_found_is_of_this_machine():
+def test_the_address_that_is_found_belongs_to_this_machine():
     try:
         address = find_address()
     except OSError:
-        return  # there is no network
+        return  # the machine has no network
     with socket.socket() as probe:
         probe.bind((address, 0))
 
@@ -98,7 +98,8 @@ FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
 
 def vote(url, letters):
-    """Open the page as a phone does, and vote, once for each letter; return page and cookie."""
+    """Open the page as a phone does, and vote once for each letter; return the page and the
+    cookie."""
     status, page, cookie = ask(url)
     assert status == 200
     assert re.findall(r'value="(.)"', page) == list("ABCD")
@@ -111,7 +112,7 @@ def vote(url, letters):
     return page, cookie
 
 
-def test_thirty_phones_vote_and_nobody_sees_the_count_before_it_is_closed(tmp_path):
+def test_thirty_phones_vote_and_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
     lesson_at(
         tmp_path,
         new_markdown_cell("# Tiny"),
@@ -142,9 +143,9 @@ def test_thirty_phones_vote_and_nobody_sees_the_count_before_it_is_closed(tmp_pa
         letters = ["BA", "DA", *"CCCCCBBBBDDDAAAAAAAAAABCBCBC", "AB"]
         with ThreadPoolExecutor(30) as phones:
             pages, cookies = zip(*phones.map(vote, [url] * len(letters), letters), strict=True)
-        assert len(set(cookies)) == len(letters)  # a random name each
+        assert len(set(cookies)) == len(letters)  # each phone has a random name
         assert not any(re.search(r"\b\d+ votes?\b|<meter", page) for page in pages)
-        assert ask(url, "POST", late, **FORM)[0] == 303  # of no phone that was admitted
+        assert ask(url, "POST", late, **FORM)[0] == 303  # no phone with this cookie was admitted
         assert ask(url, "POST", late, **FORM, Cookie="vote-1=a")[0] == 303
         assert ask(url, "POST", "choice=E", **FORM, Cookie=cookies[0])[0] == 400
         now = state()
@@ -158,10 +159,10 @@ def test_thirty_phones_vote_and_nobody_sees_the_count_before_it_is_closed(tmp_pa
         assert "Poll 1: the result" in result
         values = re.findall(r'<meter max="(\d+)" value="(\d+)">', result)
         assert values == [(str(len(letters)), str(counts[letter])) for letter in "ABCD"]
-        assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # too late
+        assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # the vote is closed
         assert state() == closed
         state(begin)
-        assert "Tap your answer" in ask(url, Cookie=cookies[0])[1]  # another vote
+        assert "Tap your answer" in ask(url, Cookie=cookies[0])[1]  # this is another vote
         with socket.create_connection(("127.0.0.1", urlsplit(url).port)):
             end = signal.SIGTERM if sys.platform == "win32" else signal.SIGINT
             server.send_signal(end)

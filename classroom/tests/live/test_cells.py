@@ -1,4 +1,4 @@
-"""Cells run after the statements above that they need, in whatever order."""
+"""Cells run after the statements above that they need, in any order."""
 
 import ast
 import sys
@@ -21,7 +21,7 @@ def run(above, source, known=()):
 
 
 def kept(above, source):
-    """The statements above that are kept, as text."""
+    """Return the statements above that are kept, as text."""
     parts = cells.needed([cells.parsed(each, "<cell>") for each in above], cells.parsed(source, ""))
     return [ast.unparse(each) for some in parts for each in some]
 
@@ -29,7 +29,7 @@ def kept(above, source):
 ABOVE = ["import math, json\nfrom os import path, sep", "a = 1\nb = a + 1\nprint(b)", "a = 5"]
 
 
-def test_only_what_a_cell_needs_is_kept_and_each_import_by_itself():
+def test_only_statements_that_a_cell_needs_are_kept_and_imports_are_kept_separately():
     assert kept(ABOVE, "b") == ["a = 1", "b = a + 1"]
     assert kept(ABOVE, "a + math.pi") == ["import math", "a = 5"]
     assert kept(ABOVE, "a = sep\na") == ["from os import sep"]
@@ -59,12 +59,12 @@ def test_only_what_a_cell_needs_is_kept_and_each_import_by_itself():
         ),
     ],
 )
-def test_a_cell_prints_what_it_prints_when_all_above_was_run(above, source, wanted, capsys):
+def test_a_cell_prints_the_same_as_after_all_cells_above(above, source, wanted, capsys):
     space = {}
     for text in [*above, source]:
         exec(text, space)
     assert capsys.readouterr().out.strip() == wanted
-    for _ in "ab":  # as often as it is run
+    for _ in "ab":  # the output is the same each time
         assert run(above, source)[1].strip() == wanted
 
 
@@ -74,14 +74,15 @@ def test_texts_values_pages_and_figures_are_shown():
     assert run([page], "P()")[2] == [("html", "<b>x</b>")]
     draw = "import matplotlib.pyplot as plt\n_ = plt.figure()"
     above = "import matplotlib.pyplot as plt\nfig = plt.figure()"
-    assert run([above], "fig.number")[2] == [("text", "1")]  # not the figure that is drawn above
+    # the figure that is drawn above is not shown
+    assert run([above], "fig.number")[2] == [("text", "1")]
     ((kind, content),) = run([], draw)[2]
     assert kind == "html"
     assert content.startswith('<img alt="The figure that the cell draws" src="data:image/png')
     assert len(run([], f"print('x' * {cells.CUT + 5})")[1]) < cells.CUT + 60
 
 
-def test_errors_tell_where_and_a_hint_speaks_for_itself():
+def test_errors_state_their_place_and_a_hint_is_shown_alone():
     _, text, found = run(["def f(x):\n    return 1 / x"], "print(1)\nf(0)")
     assert text == "1\n"
     kind, said = found[-1]
@@ -95,7 +96,7 @@ def test_errors_tell_where_and_a_hint_speaks_for_itself():
     assert run([], hint)[2] == [("hint", str(NotYet("Turn it round.")))]
 
 
-def test_a_package_that_can_be_loaded_is_named_and_others_are_errors():
+def test_a_missing_package_is_named_if_it_can_be_loaded_and_is_an_error_otherwise():
     assert run([], "import not_there.part", ["not_there"])[0] == "not_there"
     missing, _, found = run([], "import not_there")
     assert missing == ""

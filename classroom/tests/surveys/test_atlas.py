@@ -18,7 +18,7 @@ def norms(x):
     return np.linalg.norm(x, axis=-1)
 
 
-def test_each_cell_has_its_displacements_and_end_velocities_in_all_ways_of_its_family():
+def test_each_cell_has_its_displacements_and_end_velocities_in_the_directions_of_its_family():
     ends = atlas.atlas_problems(DRAWS, rng=1)
     family, turn, speed, _ = np.indices((2, 10, 10, DRAWS)).reshape(4, -1)
     sigma, w = turns(ends), np.stack([ends.w0, ends.w1])
@@ -33,10 +33,10 @@ def test_each_cell_has_its_displacements_and_end_velocities_in_all_ways_of_its_f
     assert np.mean(np.abs(across) < np.cos(np.pi / 4)) == pytest.approx(0.5, abs=0.1)
 
 
-def test_random_problems_fill_balls():
+def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
-        share = (norms(x) / radius) ** 3  # of the volume: uniform
+        share = (norms(x) / radius) ** 3  # the share of the volume, which is uniform
         assert share.max() < 1 + 1e-9
         assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
@@ -45,7 +45,7 @@ def test_random_problems_fill_balls():
 @pytest.mark.parametrize(
     "make", [atlas.atlas_problems, lambda n, rng: atlas.random_problems(n, 1, rng=rng)]
 )
-def test_a_seed_gives_the_same_problems_again(make):
+def test_the_same_seed_gives_the_same_problems(make):
     one, again, other = make(2, rng=5), make(2, rng=5), make(2, rng=6)
     assert all(np.array_equal(a, b) for a, b in zip(one, again, strict=True))
     assert not any(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
@@ -53,7 +53,7 @@ def test_a_seed_gives_the_same_problems_again(make):
         make(0, rng=5)
 
 
-def test_bad_sizes_and_families_are_named():
+def test_bad_sizes_and_families_are_refused():
     for size in (0, -1, 3.2, np.nan, "a", [1, 2]):
         with pytest.raises(ValueError, match=r"^size"):
             atlas.random_problems(2, size)
@@ -62,7 +62,8 @@ def test_bad_sizes_and_families_are_named():
 
 
 def about_the_identity(R0, R1, w0, w1):
-    """σ taken about I: neither left-invariant nor right-invariant, but reversible."""
+    """Return a curve by σ taken about I; it is reversible, but neither left- nor
+    right-invariant."""
     a, b = rb.log_so3(R0), rb.log_so3(R1)
     return lambda t: rb.exp_so3(a + t[:, None, None] * (b - a))
 
@@ -80,7 +81,7 @@ def test_moved_ends_move_all_closed_forms_and_exchanged_ends_reverse_some():
         assert off["reversed"] < 1e-11 if way in reversible else off["reversed"] > 0.1, way
 
 
-def test_nothing_is_divided_by_an_optimum_near_zero():
+def test_the_excess_is_nan_if_the_optimum_is_near_zero():
     """Along the axis of a turn by a, w0 = w1 = a + d costs 24 d²."""
     a, d = 1.0, np.array([0.0, 0.005, 0.01, 0.5])
     e, R0 = np.eye(3)[2], np.tile(np.eye(3), (4, 1, 1))
@@ -94,7 +95,7 @@ def test_nothing_is_divided_by_an_optimum_near_zero():
     assert excess["other"] == pytest.approx([np.nan, 1, 1, 1], nan_ok=True)
 
 
-def test_a_quantile_is_the_number_that_so_many_do_not_pass_with_four_digits():
+def test_a_quantile_is_a_number_of_the_sample_rounded_to_four_digits():
     x = np.random.default_rng(7).random((3, 50))
     x[0, ::2] = np.nan
     for share in (0.1, 0.5, 0.9, 1):

@@ -1,4 +1,4 @@
-"""Heat maps of the atlas show the cells of their tables; its other figures: see test_drawn.py."""
+"""Heat maps of the atlas show the cells of their tables. Its other figures are in test_drawn.py."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -42,7 +42,7 @@ def test_each_cell_has_its_colour(fig, family):
     assert fig.get_supylabel() == f"end velocity, {family} the axis (rad)"
 
 
-def test_the_line_is_where_the_excess_is_10_percent(fig):
+def test_the_contour_is_at_an_excess_of_10_percent(fig):
     slope = np.repeat(np.linspace(-3, 1, 10), 10)  # over the displacement, in powers of ten
     table = CELLS | {f"{way} excess [1]": np.tile(10.0**slope, 2) for way in atlas.WAYS}
     atlas_figures.draw_atlas(fig, table, "along", "median")
@@ -52,7 +52,7 @@ def test_the_line_is_where_the_excess_is_10_percent(fig):
     assert drawn[:, 0] == pytest.approx(place)
 
 
-def test_the_description_has_the_shares_of_cells():
+def test_the_description_states_the_shares_of_cells():
     said = atlas_figures.describe_atlas(CELLS, "across", "median")
     x = CELLS["projection excess [1]"][100:]
     shares = ", ".join(f"{100 * np.mean(x < level):.0f}" for level in (0.01, 0.1, 1))

@@ -14,13 +14,13 @@ def norms(x):
     return np.linalg.norm(x, axis=-1)
 
 
-def test_end_velocities_point_in_any_direction():
+def test_end_velocities_are_uniform_in_direction():
     many = body_atlas.body_problems(100, 2)
     sigma, quartiles = rb.log_so3(many.R0.mT @ many.R1), [-0.5, 0, 0.5]
     for x, y in ((many.w0, sigma), (many.w1, sigma), (many.w0, many.w1)):
         cosine = np.sum(x * y, axis=-1) / norms(x) / norms(y)
         assert np.quantile(cosine, [0.25, 0.5, 0.75]) == pytest.approx(quartiles, abs=0.03)
-    for x in (many.w0, many.w1):  # in the body: uniform, too
+    for x in (many.w0, many.w1):  # uniform in the body frame, too
         direction = x / norms(x)[:, None]
         assert np.abs(direction.mean(axis=0)).max() < 0.03
         assert direction.T @ direction / 10000 == pytest.approx(np.eye(3) / 3, abs=0.02)
@@ -29,7 +29,7 @@ def test_end_velocities_point_in_any_direction():
 @pytest.mark.parametrize(
     ("name", "turn", "speed", "count"), [("small", 36, 1.8, 4), ("medium", 90, 4.5, 25)]
 )
-def test_a_domain_has_the_limits_that_its_words_name(name, turn, speed, count):
+def test_a_domain_has_the_limits_that_its_description_states(name, turn, speed, count):
     ends, inside = body_atlas.body_problems(3, 1), body_atlas.domain(name, 3)
     sigma = np.degrees(norms(rb.log_so3(ends.R0.mT @ ends.R1)))
     v = np.hypot(norms(ends.w0), norms(ends.w1))
@@ -39,7 +39,7 @@ def test_a_domain_has_the_limits_that_its_words_name(name, turn, speed, count):
 
 
 @pytest.mark.parametrize("body", ["ball", "book"])
-def test_the_chosen_curves_are_the_cheapest_of_two_and_three(body):
+def test_the_chosen_curves_are_the_cheapest_of_two_and_of_three(body):
     ends, inertia = body_atlas.body_problems(1, 3).take(slice(0, None, 5)), body_atlas.BODIES[body]
     costs = survey.survey(ends, inertia=inertia, ways=body_atlas.curves_for(body))
     excess = body_atlas.with_choices(atlas.excesses(ends, costs, inertia))
@@ -50,7 +50,7 @@ def test_the_chosen_curves_are_the_cheapest_of_two_and_three(body):
     assert excess["three"] == pytest.approx(three / costs["optimum"] - 1)
     ball = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends), inertia)
     assert excess["ball's optimum"] == pytest.approx(ball / costs["optimum"] - 1, abs=1e-5)
-    if body == "ball":  # its inertia says nothing
+    if body == "ball":  # the inertia of a ball makes no difference
         assert excess["weighted"] == pytest.approx(excess["projection"], rel=1e-5)
         assert excess["normal"] == pytest.approx(excess["exponential"], rel=1e-5, abs=1e-9)
         assert np.abs(excess["ball's optimum"]).max() < 1e-6
@@ -58,7 +58,8 @@ def test_the_chosen_curves_are_the_cheapest_of_two_and_three(body):
 
 @pytest.fixture
 def excess():
-    """Made-up excesses for 50 problems in each cell; seven of the small domain are near zero."""
+    """Return made-up excesses of 50 problems in each cell; seven in the small domain are near
+    zero."""
     rng = np.random.default_rng(2)
     x = {curve: 0.2 * rng.random(5000) for curve in CURVES}
     x["projection"][:7] = np.nan
@@ -75,7 +76,7 @@ def test_the_maps_have_a_row_for_each_cell_of_each_body(excess):
         assert table[f"three {name} [1]"] == pytest.approx(both, rel=5e-4)
 
 
-def test_intervals_are_binomial_for_quantiles_and_clopper_and_pearsons_for_shares(excess):
+def test_intervals_are_binomial_for_quantiles_and_clopper_pearson_for_shares(excess):
     table = body_atlas.intervals(excess, 50)
     assert table["curve"].tolist() == 3 * list(CURVES)
     cheapest = np.min([excess[curve] for curve in CLOSED_FORMS], axis=0)
@@ -84,7 +85,8 @@ def test_intervals_are_binomial_for_quantiles_and_clopper_and_pearsons_for_share
         x, n = np.sort(excess[curve][inside]), inside.sum()
         assert table["problems [1]"][k] == n
         for name, share in (("median", 0.5), ("90 %", 0.9)):
-            fewer = binom.cdf(np.arange(n), n, share)  # at most this number of n are below
+            # the probability that at most this number of n are below
+            fewer = binom.cdf(np.arange(n), n, share)
             ends = x[np.sum(fewer <= 0.025) - 1], np.quantile(x, share), x[np.sum(fewer < 0.975)]
             found = [table[f"{name}{end} [1]"][k] for end in (" low", "", " high")]
             assert found == pytest.approx(ends, rel=5e-4)

@@ -1,4 +1,4 @@
-"""Surveys: costs of curves, on any executor, and an atlas that goes on when it was stopped."""
+"""Surveys: the costs of curves on any executor, and the tables of the atlas."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ from rbclassroom.surveys import atlas, body_atlas, progress, survey
 from rbclassroom.surveys.survey import costs, several_starts
 
 SOME = atlas.random_problems(60, 3, rng=2)
-# A turn from rest by a little less than 180°: the margin of the projection is 2 cos(89.9°).
+# A turn from rest by a little less than 180°. The margin of the projection is 2 cos(89.9°).
 SHARP = atlas.Ends(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
 FEW = atlas.Ends(*map(np.concatenate, zip(SOME.take(slice(20)), SHARP, strict=True)))
 BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
@@ -22,10 +22,10 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 
 @pytest.mark.source("BK (18)", "beyond BK 1", "beyond BK 2")
 @pytest.mark.parametrize("inertia", [None, BOOK], ids=["ball", "book"])
-def test_a_survey_has_the_optimum_and_the_integral_of_every_way(inertia):
+def test_a_survey_has_the_optimum_and_the_integral_for_every_curve(inertia):
     assert rb.projected_cubic_so3(*SHARP).margin < 0.004
     found = survey.survey(FEW, inertia=inertia)
-    best = rb.minimum_acceleration_so3(*FEW, inertia)  # not on one thread, as in a survey
+    best = rb.minimum_acceleration_so3(*FEW, inertia)  # several threads, while a survey uses one
     assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
     makers = dict(atlas.FORMS)
     if inertia is not None:
@@ -38,13 +38,13 @@ def test_a_survey_has_the_optimum_and_the_integral_of_every_way(inertia):
         assert np.all(found[way] > (1 - 1e-6) * best.cost)
 
 
-def test_a_survey_of_nothing_is_empty():
+def test_a_survey_of_no_problems_is_empty():
     none = SOME.take(slice(0))
     for found in (survey.survey(none), several_starts(none)):
         assert {cost.shape for cost in found.values()} == {(0,)}
 
 
-def test_an_optimum_that_is_not_found_is_nan_and_silent():
+def test_an_optimum_that_is_not_found_is_nan_without_a_warning():
     w0, w1 = SOME.w0[:3].copy(), SOME.w1[:3].copy()
     w0[1], w1[1] = [1e3, 0, 0], [0, 1e3, 0]
     ends = atlas.Ends(SOME.R0[:3], SOME.R1[:3], w0, w1)
@@ -55,7 +55,7 @@ def test_an_optimum_that_is_not_found_is_nan_and_silent():
 
 @pytest.mark.source("BK (19)")
 def test_the_optimum_is_the_lowest_of_several_starts():
-    """From the projected cubic the solver turns the wrong way round in a good part of them."""
+    """From the projected cubic, the solver turns in the wrong direction in many of the problems."""
     used, found = rb.minimum_acceleration_so3(*SOME).cost, several_starts(SOME)
     left_out = "corrected", "Cayley"
     assert list(found) == [*(way for way in atlas.WAYS if way not in left_out), "long way round"]
@@ -79,7 +79,7 @@ class Backwards(Executor):
         return future
 
 
-def test_every_executor_gives_the_same_bytes_and_tells_how_far_it_is(monkeypatch):
+def test_every_executor_gives_the_same_bytes_and_reports_its_progress(monkeypatch):
     monkeypatch.setattr(survey, "CHUNK", 5)
     monkeypatch.setattr(survey, "processes", partial(survey.processes, 1))
     known, told, found = {"inertia": BOOK, "ways": {"Bézier": rb.bezier_so3}}, [], []
@@ -97,7 +97,7 @@ def refuses(*ends):
 
 
 @pytest.mark.parametrize(("chunk", "first"), [(20, "0|20|40"), (60, "0")])
-def test_an_error_ends_a_survey_and_names_the_way(monkeypatch, chunk, first):
+def test_an_error_ends_a_survey_and_names_the_curve(monkeypatch, chunk, first):
     monkeypatch.setattr(survey, "CHUNK", chunk)
     said = rf"^chunk from problem ({first}) on: none: no curve"
     ways = {"projection": atlas.projection, "none": refuses}
@@ -117,7 +117,7 @@ def test_an_error_ends_a_survey_and_names_the_way(monkeypatch, chunk, first):
         ({"ways": {"five": 5}}, r"^ways: make\(R0, R1, w0, w1\) is wanted, got 'five': 5 is"),
     ],
 )
-def test_bad_arguments_are_named_before_anything_is_computed(bad, said):
+def test_bad_arguments_are_refused_before_anything_is_computed(bad, said):
     def reported(*done):
         raise AssertionError
 
@@ -125,7 +125,7 @@ def test_bad_arguments_are_named_before_anything_is_computed(bad, said):
         survey.survey(**{"problems": SOME, **bad}, report=reported)
 
 
-def test_ways_that_cannot_be_sent_are_refused_and_computed_in_this_process(monkeypatch):
+def test_functions_that_cannot_be_sent_to_processes_are_refused_or_run_in_this_process(monkeypatch):
     ways = {"own": lambda *ends: atlas.projection(*ends)}
     found = survey.survey(SOME, ways=ways)
     assert np.array_equal(found["own"], costs(atlas.projection, SOME))
@@ -148,7 +148,7 @@ def test_ways_that_cannot_be_sent_are_refused_and_computed_in_this_process(monke
         lambda *ends: None,
     ],
 )
-def test_curves_that_are_not_one_for_each_problem_are_refused(make):
+def test_a_maker_that_does_not_return_one_curve_for_each_problem_is_refused(make):
     with pytest.raises(ValueError, match=r"^make: one curve on SO\(3\) and \[0, 1\] per"):
         costs(make, SOME)
 
@@ -164,7 +164,7 @@ if __name__ == "__main__":
 
 
 def test_processes_end_when_their_parent_is_killed(tmp_path):
-    """They hold the pipe of its output open until they end."""
+    """The worker processes hold the pipe of the parent's output open until they end."""
     script = tmp_path / "parent.py"
     script.write_text(KILLED)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
@@ -174,7 +174,7 @@ def test_processes_end_when_their_parent_is_killed(tmp_path):
         assert job.communicate(timeout=600)[0] == ""
 
 
-def test_the_tables_of_the_atlas_are_those_of_the_first_seed_and_of_all(tmp_path, monkeypatch):
+def test_the_maps_are_made_from_the_first_seed_and_the_intervals_from_all(tmp_path, monkeypatch):
     surveyed = []
 
     def made_up(problems, executor, *, inertia, ways, report):
@@ -189,11 +189,11 @@ def test_the_tables_of_the_atlas_are_those_of_the_first_seed_and_of_all(tmp_path
     body_atlas.make_tables("executor", tmp_path, 1, [5, 6])
     assert len(set(surveyed)) == 6
     assert {executor for executor, *_ in surveyed} == {"executor"}
-    assert len(body_atlas.stored("maps")["body"]) == 300  # of the first seed
+    assert len(body_atlas.stored("maps")["body"]) == 300  # from the first seed
     assert body_atlas.stored("intervals")["seed [1]"].tolist() == [5] * 33 + [6] * 33
 
 
-def test_a_bar_grows_and_ends_as_a_line(monkeypatch):
+def test_a_progress_bar_grows_and_ends_as_a_line(monkeypatch):
     stages = []
     handle = SimpleNamespace(update=lambda stage, raw: stages.append(stage))
     shown = {"display": lambda stage, **_: stages.append(stage) or handle}
