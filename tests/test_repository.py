@@ -382,6 +382,14 @@ def test_every_task_is_listed_in_the_readme_or_in_contributing():
     assert len(read("README.md").splitlines()) <= 130
 
 
+def test_the_tests_that_contributing_names_exist():
+    """A row of the table of promises has a test, or says how to look."""
+    named = re.findall(r"`([\w/]+\.py)::(\w+)`", read("CONTRIBUTING.md"))
+    assert len(named) > 25
+    for file, test in named:
+        assert f"\ndef {test}(" in read(file), (file, test)
+
+
 @pytest.fixture(scope="module")
 def wheels(tmp_path_factory):
     """Build the wheels of rbcourse and of rbcourse-classroom; return their paths."""
