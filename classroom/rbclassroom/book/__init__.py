@@ -1,1 +1,1 @@
-"""The whole course as pages that open without a server and without a network."""
+"""The whole course as web pages, which need neither a server nor a network."""

@@ -1,4 +1,7 @@
-"""Make the book: its sources from the stored lessons, its pages by Sphinx. Nothing is run."""
+"""Make the book from the stored lessons: write its sources, and let Sphinx make its pages.
+
+No code of the lessons is run.
+"""
 
 import argparse
 import http.server
@@ -56,8 +59,9 @@ MADE = "made-by-course.txt"
 class Sources:
     """Writes the sources of pages to `folder`, and files that are copied to the book to `extra`.
 
-    `repository` is where Binder finds the lessons on GitHub, ``owner/name``, or empty; `live` is
-    whether Python runs in the pages; `shown` is the data of the templates in ``pages/``.
+    `repository` is the GitHub repository ``owner/name`` from which Binder takes the lessons, or is
+    empty. `live` tells whether Python runs in the pages. `shown` is the data of the templates in
+    ``pages/``.
     """
 
     root: Path
@@ -69,7 +73,7 @@ class Sources:
 
     @cached_property
     def works(self) -> dict[str, str]:
-        """How the works that the course cites are called."""
+        """The names of the works that the course cites."""
         return names(self.read("notebooks/REFERENCES.bib"))
 
     def read(self, path: str) -> str:
@@ -203,20 +207,20 @@ class Sources:
                 self.shown["run"] = relinked(
                     text[text.index("| to learn |") : text.index("<!--")], path, page
                 )
-                continue  # there is a template for the page
+                continue  # the page has a template
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
-            # Sphinx makes `split` of such a formula, where no number is allowed
+            # Sphinx puts such a formula into `split`, which allows no number
             tagged = r"\$\$(.*?\\tag\{\d+\})\$\$"
             text = re.sub(tagged, r"\\begin{equation*}\n\1\n\\end{equation*}", text)
             self.put(page, relinked(text, path, page))
 
     def put_course(self) -> None:
-        """Write ``course.zip``, which runs: the package, the lessons without outputs, `course.py`.
+        """Write ``course.zip``, a course that runs: package, lessons without outputs, `course.py`.
 
-        The problem sets, with model answers and hidden tests, are left out; the check that students
-        run before they submit is in the package.
+        The problem sets have model answers and hidden tests, so the zip does not contain them. It
+        contains the check that students run before they submit.
         """
         homes = "rbcourse", "classroom/rbclassroom"
         inside = (path for home in homes for path in (self.root / home).rglob("*.*"))
@@ -250,9 +254,9 @@ def _write(path: Path, text: str) -> None:
 def write_sources(
     root: Path, folder: Path, extra: Path, repository: str = "", pyodide: Path | None = None
 ) -> None:
-    """Write all that the book is made of to two folders, see `Sources`.
+    """Write all sources of the book to two folders, see `Sources`.
 
-    With the files of Pyodide, in a folder, Python runs in its pages.
+    If `pyodide`, a folder with the files of Pyodide, is given, Python runs in the pages.
     """
     sources = Sources(root, folder, extra, repository, live=pyodide is not None)
     if pyodide:
@@ -266,12 +270,12 @@ def write_sources(
 
 
 def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = None) -> None:
-    """Make the book of a course, in a folder that is not there or is an older book.
+    """Make the book of a course, in a new folder or in the folder of an older book.
 
     `pyodide` is a folder with the files of Pyodide, for a book in which Python runs.
     """
     if book.exists() and not (book / MADE).exists():
-        raise ValueError(f"{book} is no book that was made here: move it away or delete it")
+        raise ValueError(f"{book} is not a book that was made here; move it away or delete it")
     with tempfile.TemporaryDirectory(dir=book.absolute().parent, prefix=".book-") as folder:
         sources, extra, pages = (Path(folder, name) for name in ("sources", "extra", "pages"))
         print("Reading the lessons ...", flush=True)
@@ -286,7 +290,7 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
         )
         (pages / ".buildinfo").unlink()
         (pages / "_sources").rmdir()
-        (pages / ".nojekyll").touch()  # or GitHub Pages leaves out _static
+        (pages / ".nojekyll").touch()  # without this file, GitHub Pages omits _static
         (pages / MADE).write_text("The book of rbcourse; course.py makes it anew.\n")
         if book.exists():
             book.rename(Path(folder, "old"))
@@ -297,11 +301,11 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, *_: object) -> None:
-        """Tell of no request."""
+        """Print nothing about requests."""
 
 
 def serve(book: Path) -> None:
-    """Show the book in a browser, from this machine, until Ctrl-C."""
+    """Serve the book from this machine and show it in a browser, until Ctrl-C."""
     handler = partial(_Quiet, directory=str(book))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         address = f"http://127.0.0.1:{server.server_port}/"

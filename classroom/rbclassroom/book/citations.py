@@ -11,7 +11,7 @@ _WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
 
 
 def names(bibliography: str) -> dict[str, str]:
-    r"""Return how each work of a BibTeX file is called in a text, by its key.
+    r"""Return the name of each work of a BibTeX file in a text, by its key.
 
     Examples
     --------
@@ -39,7 +39,8 @@ def names(bibliography: str) -> dict[str, str]:
 def with_citations(text: str, known: Mapping[str, str], here: set[str], elsewhere: str) -> str:
     """Return a text with its citations as links, and the works of its list as their targets.
 
-    Those not in the list of this page, whose keys are `here`, lead to the page `elsewhere`.
+    Works whose keys are in `here` are in the list of this page; links to other works lead to the
+    page `elsewhere`.
     """
 
     def put(match: re.Match[str]) -> str:

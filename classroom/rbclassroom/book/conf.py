@@ -1,4 +1,4 @@
-"""What Sphinx is to do with the sources of the book; it reads this file itself."""
+"""The configuration of Sphinx for the sources of the book; Sphinx reads this file itself."""
 
 import json
 import os
@@ -23,7 +23,7 @@ nb_code_prompt_show, nb_code_prompt_hide = "Show the code", "Hide the code"
 myst_enable_extensions = ["amsmath", "dollarmath"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-toc_object_entries = False  # the navigation of each page would hold them all
+toc_object_entries = False  # otherwise the navigation of each page would contain all of them
 
 html_theme = "furo"
 html_static_path = ["static"]
@@ -38,7 +38,7 @@ mathjax3_config = {"svg": {"scale": 0.97, "mtextInheritFont": True}}
 
 
 def name_sections(_app: Any, doctree: Any) -> None:
-    """Give the headings of lessons addresses that stay: ``#s3`` for section 3."""
+    """Give the headings of lessons permanent addresses: ``#s3`` for section 3."""
     if Path(doctree["source"]).parent.name == "lessons":
         for section in doctree.findall(lambda node: node.tagname == "section"):
             if section.parent is not doctree:
@@ -46,7 +46,7 @@ def name_sections(_app: Any, doctree: Any) -> None:
 
 
 def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
-    """Leave out members that other packages describe, and a page of JavaScript."""
+    """Omit members that other packages describe, and a page of JavaScript."""
     module = getattr(obj, "__module__", None) or "rbcourse"
     own = module.startswith(("rbcourse", "rbclassroom"))
     return True if name == "ENGINE" or not own else None
@@ -63,7 +63,7 @@ def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str
 
 
 def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
-    """Return a link for a name that stands in another module."""
+    """Return a link for a name that another module defines."""
     from sphinx.util.nodes import make_refnode
 
     found = [
@@ -79,7 +79,7 @@ def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
 
 
 def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
-    """Return where the source of an object is."""
+    """Return the address of the source of an object."""
     name = found["fullname"].partition(".")[0]
     file = file_of(found["module"].partition(".")[2] or "__init__")
     return f"../code/{file.removesuffix('.py')}.html#{name}"
@@ -100,7 +100,7 @@ def write_texts(app: Any, failed: Exception | None) -> None:
 
 
 def add_python(app: Any, name: str, _template: str, _context: Any, _doctree: Any) -> None:
-    """Let Python run in the pages of lessons and problem sets, where the book has it."""
+    """Let Python run in the pages of lessons and problem sets, if the book contains Python."""
     live = Path(os.environ["RBCOURSE_BOOK_EXTRA"], "_static", "live")
     if live.exists() and name.startswith(("lessons/", "problems/")):
         app.add_css_file("live/live.css")
@@ -109,7 +109,7 @@ def add_python(app: Any, name: str, _template: str, _context: Any, _doctree: Any
 
 
 def setup(app: Any) -> None:
-    """Add MathJax, and what these functions do, before the contents of a page are collected."""
+    """Add MathJax, and call these functions before the contents of a page are collected."""
     app.config.html_static_path.append(str(mathjax()))
     app.add_config_value("tests", reference.naming(Path()), "")
     app.config.html_extra_path.append(os.environ["RBCOURSE_BOOK_EXTRA"])

@@ -1,6 +1,6 @@
-"""A stored lesson as a page: its picture first, polls to answer, code and answers folded.
+"""A stored lesson as a page: the picture comes first, polls can be answered, and code is folded.
 
-Outputs are kept, and the run sheet is split off.
+Answers are folded, too. Outputs are kept. The run sheet gets a page of its own.
 """
 
 import base64
@@ -41,7 +41,7 @@ _EXPLORER = re.compile(r"explorers\.(\w+)_explorer\(\)")
 class Figure:
     """A figure of a lesson.
 
-    Its files have its `name`. The lesson and the section that draw it are its `place`, such as
+    Its files have its `name`. Its `place` is the lesson and the section that draw it, such as
     ``06_geodesics.ipynb, 3``. The `text` describes it.
     """
 
@@ -77,7 +77,7 @@ def cited_in(notebook: NotebookNode) -> list[str]:
 
 
 def without_outputs(notebook: NotebookNode) -> NotebookNode:
-    """Return a lesson as it is to be run: a file that is small."""
+    """Return a lesson without outputs, which makes its file small."""
     plain = copy.deepcopy(notebook)
     for cell in plain.cells:
         if cell.cell_type == "code":
@@ -86,7 +86,7 @@ def without_outputs(notebook: NotebookNode) -> NotebookNode:
 
 
 def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells with each answer, up to the next heading, in something that opens."""
+    """Return cells with each answer, up to the next heading, in an element that opens."""
     result, inside = [], False
     for cell in cells:
         heading = cell.cell_type == "markdown" and re.match(r"#+ ([^\n]*)\n?", cell.source)
@@ -106,10 +106,11 @@ def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
 def with_picture_files(
     shown: str, known: dict[bytes, str], folder: Path, loading: str = "lazy"
 ) -> str:
-    """Return HTML whose pictures are files, by default loaded when they come into sight.
+    """Return HTML whose pictures are files; by default, they are loaded when they become visible.
 
-    Those that are not `known`, as addresses by contents, are written to ``pictures`` in a folder.
-    Where a wide one can be cut between its panels is in the attribute ``data-cuts``.
+    `known` has the addresses of pictures by their contents. Other pictures are written to
+    ``pictures`` in a folder. The attribute ``data-cuts`` has the places between the panels of a
+    wide picture at which it can be cut.
     """
 
     def put(match: re.Match[str]) -> str:
@@ -129,10 +130,10 @@ def with_picture_files(
 
 
 def cuts_of(still: Image.Image) -> list[float]:
-    """Return where a wide still can be cut between its panels, as shares of its width.
+    """Return the places between panels at which a wide still can be cut, as shares of its width.
 
-    The cuts are in the middle of blank columns, near those of equal parts that are up to half
-    as wide again as they are high.
+    The cuts are in the middle of blank columns, near the cuts into equal parts whose width is at
+    most 1.5 times their height.
     """
     width, height = still.size
     if width < 1.8 * height:
@@ -147,10 +148,10 @@ def cuts_of(still: Image.Image) -> list[float]:
 
 
 def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
-    """Return HTML whose living pictures have their states, and what draws them, in files.
+    """Return HTML whose interactive pictures have their states and their scripts in files.
 
-    The files are written to ``pictures`` in a folder, whose address is `to`; each once. Pages of
-    lessons draw by themselves; those of slides have data for their own script.
+    Each file is written once, to ``pictures`` in a folder, whose address is `to`. Pages of lessons
+    load a script that draws; pages of slides have only the data for their own script.
     """
 
     def kept(data: str) -> tuple[str, str]:
@@ -202,7 +203,7 @@ def with_lead(text: str, picture: str) -> str:
 
 
 def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells with those of code ahead of the first section, the imports, at the end."""
+    """Return cells with the code before the first section, which imports, moved to the end."""
     first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
     imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
     others = [cell for cell in cells if not any(cell is each for each in imports)]
@@ -223,7 +224,7 @@ def joined(cells: list[NotebookNode]) -> list[NotebookNode]:
 
 
 def hide_code(cells: list[NotebookNode]) -> None:
-    """Fold the code of cells, but for that which is the answer to an exercise."""
+    """Fold the code of cells, except for code that answers an exercise."""
     inside = False
     for cell in cells:
         if cell.cell_type == "markdown" and re.match("</?details", cell.source):
@@ -237,7 +238,7 @@ def prepared(
 ) -> str:
     """Prepare the notebook of a lesson for the book, and return its run sheet.
 
-    Its pictures become files, see `with_picture_files`; the one that it begins with is `lead`.
+    Its pictures become files, see `with_picture_files`; `lead` is the picture at its beginning.
     """
     path, page, sheet_page = f"notebooks/{name}", f"lessons/{name}", f"teach/{Path(name).stem}.md"
     lessons = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
@@ -273,7 +274,7 @@ def prepared(
 
 
 def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
-    """Put the number of a lesson before its title, and ways to run it below."""
+    """Put the number of a lesson before its title, and links to run the lesson below the title."""
     title, _, rest = notebook.cells[0].source.partition("\n")
     slides = f"../slides/{Path(name).stem}.html"
     ways = [

@@ -1,4 +1,4 @@
-"""Where in the book the files of the course are: its addresses stay as they are."""
+"""The addresses of the course's files in the book, which must not change."""
 
 import re
 import tomllib
@@ -20,7 +20,7 @@ _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
 
 
 def source_of(path: str) -> str | None:
-    """Return the source of the page that shows a file of the course, None if no page does."""
+    """Return the source of the page that shows a file of the course, or None if there is none."""
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
     if code := re.fullmatch(r"(rbcourse|classroom/rbclassroom)/([\w/]+)\.py", path):
@@ -30,7 +30,7 @@ def source_of(path: str) -> str | None:
 
 
 def full_name(module: str) -> str:
-    """Return the dotted name of a module or function, from that within its package."""
+    """Return the dotted name of a module or function, from its name within the package."""
     package = "rbclassroom" if module.split(".")[0] in CLASSROOM else "rbcourse"
     return f"{package}.{module}"
 
@@ -48,7 +48,7 @@ def file_of(module: str) -> str:
 
 
 def has_page(module: str) -> bool:
-    """Tell whether a module has a page besides its code: no private one, none for maintainers."""
+    """Tell whether a module has its own page; private and maintainers' modules have none."""
     return not re.search(r"\b_|^(?:figures|course|lecture|assignments|book)\b", module)
 
 
@@ -91,14 +91,14 @@ def to_test(test: str, page: str = "ledger.md") -> str:
 
 
 def to_tests(tests: list[str], page: str = "ledger.md") -> str:
-    """Return links to tests, shown when they are asked for; a single one as it is."""
+    """Return links to tests, in an element that opens if there are several."""
     links = "<br>".join(to_test(test, page) for test in tests)
     more = f"<details><summary>{len(tests)} tests</summary>{links}</details>"
     return more if len(tests) > 1 else links
 
 
 def to_function(name: str, page: str = "ledger.md") -> str:
-    """Return a link to a function: to its docstring; to its code if it is private."""
+    """Return a link to the docstring of a function, or to its code if the function is private."""
     module, _, own = name.rpartition(".")
     to = f"package/{module}.html#{full_name(name)}"
     if not has_page(module):
@@ -139,8 +139,8 @@ def with_keys(text: str, page: str = "ledger.md") -> str:
 def relinked(text: str, path: str, page: str) -> str:
     r"""Return Markdown of a file for a page of the book.
 
-    A link to a file with a page leads to the page, others to a copy in the folder ``files``.
-    The transposed of a matrix has the sign ``\top``, which the font of formulas has.
+    A link to a file that has a page leads to this page; other links lead to a copy in the folder
+    ``files``. The sign of a transpose becomes ``\top``, which the font of formulas contains.
     """
     text = re.sub(r"\\mathsf(?: T|\{T\})", r"\\top", text)
 

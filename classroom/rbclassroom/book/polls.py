@@ -1,4 +1,4 @@
-"""Polls of a lesson whose options can be chosen: each shows the line on its own idea, no other."""
+"""Polls of a lesson whose options can be chosen: an option shows the line on its own idea only."""
 
 import re
 
@@ -12,7 +12,8 @@ _IDEA = re.compile(r"(?:(?<=[.?!)] )|^)(?=\*\*[A-Z]\*\*)", re.MULTILINE)
 def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
     r"""Return the right letter of a poll, and the line on each letter, from the texts of an answer.
 
-    A paragraph has the right one, in bold letters; the others are items of a list.
+    The line on the right letter is a paragraph that contains the letter in bold; the other lines
+    are items of a list.
 
     Examples
     --------
@@ -22,7 +23,7 @@ def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
     outside = "\n\n".join(_ITEM.sub("", text) for text in texts)
     right = re.search(r"^(?:.* )?\*\*([A-Z])\*\*.*$", outside, re.MULTILINE)
     if not right:
-        raise ValueError("no paragraph of the answer has its letter")
+        raise ValueError("no paragraph of the answer contains its letter")
     found = {right[1]: re.sub(r":$", ".", right[0].partition("*Look for")[0].strip())}
     for item in (match[1] for text in texts for match in _ITEM.finditer(text)):
         for idea in (part.strip() for part in _IDEA.split(item) if part):
@@ -31,7 +32,7 @@ def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
 
 
 def voted(cells: list[NotebookNode]) -> None:
-    """Make the options of all polls among the cells of a lesson buttons, with their lines."""
+    """Turn the options of all polls in the cells of a lesson into buttons with their lines."""
     texts = [cell.source if cell.cell_type == "markdown" else "" for cell in cells]
     headings = [i for i, text in enumerate(texts) if text.startswith("#")] + [len(cells)]
     for k in headings[:-1]:

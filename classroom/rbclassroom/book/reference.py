@@ -32,7 +32,7 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def module(name: str, root: Path) -> dict[str, Any]:
-    """Return a module's names, its summary, and its public members: constants are the last."""
+    """Return a module's names, its summary, and its public members; the constants come last."""
     tree = ast.parse((root / file_of(name)).read_text(encoding="utf-8"))
     kinds = ast.FunctionDef | ast.ClassDef
     public = [node.name for node in tree.body if isinstance(node, kinds) and node.name[0] != "_"]
@@ -48,7 +48,7 @@ def module(name: str, root: Path) -> dict[str, Any]:
 
 
 def _documented(tree: ast.Module) -> list[str]:
-    """Return the public constants of a module with a text below them."""
+    """Return the public constants of a module that have a docstring."""
     found = []
     for node, after in pairwise(tree.body):
         match node, after:
@@ -61,7 +61,7 @@ def _documented(tree: ast.Module) -> list[str]:
 
 
 def shown_code(root: Path) -> list[str]:
-    """Return the files with a page in the folder ``code``: none that answers a problem."""
+    """Return the files that have a page in the folder ``code``; none answers a problem."""
     packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
@@ -91,9 +91,9 @@ def coloured(source: str) -> str:
 
 
 def naming(root: Path) -> dict[str, list[str]]:
-    """Return for each function, such as ``so3.exp_so3``, the tests that name it.
+    """Return the tests that name each function, such as ``so3.exp_so3``.
 
-    They are named as in the ledger: ``test_so3.py::test_exp``.
+    The tests have their names in the ledger: ``test_so3.py::test_exp``.
     """
     found, exported = defaultdict(list), {}
     for init in (root / "rbcourse").rglob("__init__.py"):
@@ -127,7 +127,7 @@ def _imported(tree: ast.Module) -> dict[str, str]:
 
 
 def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return the tests of a function: those for its module that name it, otherwise all that do."""
+    """Return the tests that name a function: the tests of its module, or all if there are none."""
     *room, module, _ = name.split(".")
     own = "/".join([*room, f"test_{module}"])
     found = named.get(name, [])
@@ -135,7 +135,7 @@ def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
 
 
 def pictures_of(key: str, entry: Entry, figures: Iterable[Figure]) -> list[Figure]:
-    """Return the figures in the sections that teach an entry; of a figure, those it is."""
+    """Return the figures in the sections that teach an entry; for a figure, that figure itself."""
     if figure := re.fullmatch(r"(BK|RR) Fig\. (\d+)", key):
         own = re.compile(rf"{ {'BK': 'paper', 'RR': 'report'}[figure[1]] }_fig{figure[2]}[a-z]?")
         if drawn := [each for each in figures if own.fullmatch(each.name)]:
@@ -153,7 +153,7 @@ def files_of(name: str, files: set[str]) -> list[str]:
 
 
 def folded_answers(text: str) -> str:
-    """Return the page of questions with the answers of each in something that opens."""
+    """Return the page of questions, with the answers in elements that open."""
     answers = re.compile(r"^#### Answers\n(.*?)(?=^#|\Z)", re.MULTILINE | re.DOTALL)
     shown = r'<details class="answer"><summary>Answers</summary>\n\n\1\n</details>\n\n'
     return answers.sub(shown, text)

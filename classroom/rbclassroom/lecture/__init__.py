@@ -1,1 +1,1 @@
-"""Slides of the lessons, shown to a class: votes by phone, a speaker view, PDF, a crib."""
+"""Slides of the lessons for a class: votes by phone, a speaker view, a PDF and a crib sheet."""

@@ -1,4 +1,4 @@
-"""Slides as pages: a deck for each lesson, a crib for its lecturer, and the files they share."""
+"""Slides as pages: for each lesson a deck, and a crib sheet for its lecturer."""
 
 import html
 import re
@@ -19,9 +19,9 @@ WIDE = 1.9
 """A picture that is wider, over its height, is below its text."""
 IDEA = 26
 """The most words of an idea behind an option, unless its first sentence has more."""
-_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # of works: they stay in the book
-_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # to files of the course
-_TOGETHER = {  # patterns of what no line shall part
+_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # links to works, which are in the book
+_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to files of the course
+_TOGETHER = {  # patterns of texts without a line break
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
     r" –": "\N{NO-BREAK SPACE}–",
     r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
@@ -42,7 +42,7 @@ _MARKDOWN.use(dollarmath_plugin, renderer=_math)
 
 
 def marked(text: str) -> str:
-    """Return Markdown as HTML; a formula stays on one line with the mark that follows it."""
+    """Return Markdown as HTML, without a line break between a formula and the next mark."""
     page: str = _MARKDOWN.render(_LINK.sub(r"\1", _KEYS.sub("", text)))
     for pattern, kept in _TOGETHER.items():
         page = re.sub(pattern, kept, page)
@@ -55,7 +55,7 @@ def _inline(text: str) -> str:
 
 
 def _words(slide: Slide) -> str:
-    """Return the text of a slide; parts after the first one, and items of lists, are steps."""
+    """Return the text of a slide. All parts except the first, and all items of lists, are steps."""
     first, *later = slide.parts or [""]
     parts = [marked(first), *(f'<div class="fragment">{marked(part)}</div>' for part in later)]
     return "".join(parts).replace("<li>", '<li class="fragment">')
@@ -76,7 +76,7 @@ def _options(slide: Slide) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Return the first sentence of an idea, and more while there are at most `IDEA` words."""
+    """Return the first sentence of an idea, and further sentences up to `IDEA` words in total."""
     kept, *rest = re.split(r"(?<=[.?!])\s+(?=[A-Z$*(])", text.strip())
     while rest and words_of(f"{kept} {rest[0]}") <= IDEA:
         kept = f"{kept} {rest.pop(0)}"
@@ -107,7 +107,7 @@ def section(slide: Slide) -> str:
 
 
 def deck_page(deck: Deck) -> str:
-    """Return the page of a deck; its last column is the end, with exercises and references."""
+    """Return the page of a deck; its last column has the end, the exercises and the references."""
     *parts, end = deck.sections
     stacks = [part for part in parts if part] + [[*end, *deck.behind]]
     joined = ("".join(map(section, part)) for part in stacks)
@@ -119,7 +119,7 @@ def deck_page(deck: Deck) -> str:
 
 
 def crib_page(deck: Deck) -> str:
-    """Return the crib of a lecture, one sheet: its run sheet with slides, and right answers."""
+    """Return the crib sheet of a lecture: its run sheet with slides, and the right answers."""
     rows = rows_of(deck.sheet)
     starts = starts_of(deck.shown, rows)
     lines = [
@@ -142,9 +142,10 @@ def crib_page(deck: Deck) -> str:
 def write(
     decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = lambda page: page
 ) -> None:
-    """Write decks and cribs by their names, and all files that they share, to a folder.
+    """Write decks and crib sheets by their names, and all files that they share, to a folder.
 
-    A page is made `ready` first: in the book its stills are files that the lesson has, too.
+    The function `ready` is applied to each page first: in the book, its stills are files that it
+    shares with the lesson.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, deck in decks.items():
@@ -155,12 +156,12 @@ def write(
     shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)
     for name in ("slides.css", "slides.js"):
         shutil.copyfile(STATIC / name, shared / name)
-    # reveal.js scales slides, and a canvas is to have one pixel for each of the screen
+    # reveal.js scales slides; a canvas must have as many pixels as it has on the screen
     _put(shared / "display.js", ENGINE.replace("window.devicePixelRatio", "window.pixels"))
 
 
 def put_mathjax(folder: Path) -> None:
-    """Copy MathJax to where the book has it, ``_static`` beside the folder of the decks."""
+    """Copy MathJax to its place in the book, ``_static`` beside the folder of the decks."""
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(mathjax(), folder / "tex-svg.js")
 

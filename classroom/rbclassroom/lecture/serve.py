@@ -44,7 +44,10 @@ def find_lesson(number: str, folder: Path) -> Path:
 
 
 class _Here(RequestHandler):
-    """Answers only requests to this machine by its number: no page of another site sends these."""
+    """A handler that answers only requests to the IP address of this machine, never to a host name.
+
+    Pages of other sites cannot send such requests.
+    """
 
     def prepare(self) -> None:
         if self.request.host_name != HOST:
@@ -56,7 +59,7 @@ class Slides(_Here, StaticFileHandler):
 
 
 class Desk(_Here):
-    """Opens, watches and closes votes, for requests with the token."""
+    """The handler that opens, watches and closes votes, for requests with the token."""
 
     def initialize(self, phones: Phones, token: str) -> None:
         """Keep the votes and the token."""
@@ -111,7 +114,7 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
         if phones:
             print(f"Phones vote at {phones.url}", flush=True)
         print("Stop it with Ctrl-C.", flush=True)
-        if browser:  # some return only when they are closed
+        if browser:  # some browsers return only when they are closed
             threading.Thread(target=webbrowser.open, args=[shown], daemon=True).start()
         await asyncio.Event().wait()
 
@@ -126,7 +129,7 @@ async def print_pdf(address: str, pdf: Path) -> None:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         words = ["--headless", "--disable-gpu", "--no-first-run", "--remote-debugging-port=0"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
-            words.append("--no-sandbox")  # Chromium has none for the administrator
+            words.append("--no-sandbox")  # Chromium has no sandbox for the administrator
         words += [f"--user-data-dir={profile}", f"{address}?print-pdf"]
         quiet = asyncio.subprocess.DEVNULL
         job = await asyncio.create_subprocess_exec(found, *words, stdout=quiet, stderr=quiet)
@@ -163,7 +166,7 @@ async def _printed(told: Path) -> bytes:
 
 
 def open_votes(address: str) -> Phones | None:
-    """Let phones vote at an address, or at that of this machine in its network, if it has one."""
+    """Let phones vote at an address; by default, at the address of this machine in its network."""
     try:
         address = address or find_address()
     except OSError:

@@ -1,7 +1,7 @@
-"""A stored lesson as slides: the metadata `slide` of a cell is the text that the class sees of it.
+"""A stored lesson as slides: the metadata `slide` of a cell is the text that the class sees.
 
-A cell without it makes no slide; its text goes to the notes of the slide before. CONTRIBUTING.md
-has the rules for authors.
+A cell without this metadata makes no slide; its text goes to the notes of the previous slide.
+CONTRIBUTING.md has the rules for authors.
 """
 
 import base64
@@ -29,7 +29,7 @@ _LIVING = re.compile(r"rbcourseDisplay\.revive\(image, (\{.*\})\);\s*\}</script>
 
 @dataclass
 class Picture:
-    """A picture of a code cell: its HTML, and its width over its height."""
+    """A picture of a code cell: its HTML, and the ratio of its width to its height."""
 
     html: str
     aspect: float
@@ -39,9 +39,9 @@ class Picture:
 class Slide:
     """The content of a slide, and the notes for the lecturer.
 
-    Of the `parts`, Markdown texts, each after the first one appears at a key. A row of the run
-    sheet calls the slide by one of its `keys`. A poll has `options`; its verdict also has the
-    `ideas` behind them, and which is `right`.
+    The `parts` are Markdown texts; each part after the first one appears at a key press. A row of
+    the run sheet names the slide by one of its `keys`. A poll has `options`; its verdict also has
+    the `ideas` behind them and the `right` letter.
     """
 
     title: str
@@ -58,7 +58,7 @@ class Slide:
 
     @property
     def words(self) -> int:
-        """How many words its text has; a formula within a text counts as one."""
+        """The number of words of its text; a formula within a text counts as one word."""
         return words_of("\n\n".join(self.parts))
 
 
@@ -87,7 +87,7 @@ class Deck:
 
 
 class _Reader:
-    """Reads the cells of a lesson in their order."""
+    """A reader of the cells of a lesson, in their order."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -111,7 +111,7 @@ class _Reader:
         (self.behind if self.after else self.sections[-1]).append(slide)
 
     def put_text(self, wish: str, own: Picture | None = None) -> None:
-        """Add the slides of a text; the picture of its cell goes to the last one."""
+        """Add the slides of a text; the picture of its cell goes to the last of them."""
         texts = [text.strip() for text in re.split(r"^---$", wish, flags=re.M)]
         for text in texts:
             borrowed = [self.borrowed(name) for name in _PICTURE.findall(text)]
@@ -131,7 +131,7 @@ class _Reader:
             cells = nbformat.read(path, as_version=4).cells
         found = [picture_of(each, self.root) for each in cells if each.id == cell]
         if not found or not found[0]:
-            raise ValueError(f"slide: {name} is no cell with a stored picture")
+            raise ValueError(f"slide: {name} is not a cell with a stored picture")
         return found[0]
 
     def note(self, text: str, ahead: bool = False) -> None:
@@ -147,7 +147,7 @@ class _Reader:
         for cell in cells:
             wish = cell.metadata.get("slide", False)
             if wish is not False and not isinstance(wish, str):
-                raise ValueError(f"slide: a text or false wanted in {cell.id}, got {wish!r}")
+                raise ValueError(f"slide: a text or false is wanted in {cell.id}, got {wish!r}")
             if {"solution", "not-in-lectures"} & {*cell.metadata.get("tags", [])}:
                 continue
             if cell.cell_type == "code":
@@ -200,7 +200,7 @@ class _Reader:
             self.put_text(wish)
 
     def begins(self, level: int, words: str, text: str, wish: str) -> bool:
-        """Begin the part with this heading; return whether the rest of its cell is read, too."""
+        """Begin the part with this heading; return whether the rest of its cell must be read."""
         self.answer = words if words.startswith("Answer") else ""
         if level == 1:
             question = re.search(r"\*\*The question of this \w+\.\*\* (.*)", text)
@@ -236,7 +236,7 @@ class _Reader:
         self.put(self.poll)
 
     def put_answer(self, poll: Slide, text: str, wish: str) -> None:
-        """Read a cell of an answer: evidence, or the list of ideas, which makes the verdict."""
+        """Read a cell of an answer: evidence, or the list of ideas, which becomes the verdict."""
         listed = [*_ITEM.finditer(text)]
         outside = re.search(r"(?:^|[^-] )\*\*([A-Z])\*\*(.*(?:\n.+)*)", _ITEM.sub("", text), re.M)
         if outside and not poll.right:
@@ -260,7 +260,7 @@ class _Reader:
         self.put_text(wish)
 
     def put_behind(self, text: str) -> None:
-        """Add slides behind the end, several of them for a long table or list."""
+        """Add slides behind the end; a long table or list needs several."""
         text = text.strip()
         if text.startswith("<small>") and "\n" not in text:
             return
@@ -301,7 +301,7 @@ def printed(cell: NotebookNode) -> str:
 
 
 def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
-    """Return the picture of a code cell: alive where it can be, without its caption."""
+    """Return the picture of a code cell without its caption, interactive if possible."""
     explorer = re.search(r"explorers\.(\w+)_explorer\(\)", cell.source)
     page = "".join(o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {}))
     if explorer and (root / "figures" / "explorers" / f"{explorer[1]}.html").exists():
@@ -324,7 +324,7 @@ def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
 
 
 def margins(still: Image.Image) -> tuple[float, ...]:
-    """Return how much of a still is white margin: left, top, right, bottom, as shares."""
+    """Return the white margins of a still: left, top, right and bottom, as shares."""
     grey = still.convert("L")
     box = grey.point([255 * (x < 245) for x in range(256)]).getbbox() or (0, 0, *still.size)
     sides = box[0], box[1], still.width - box[2], still.height - box[3]
@@ -333,7 +333,7 @@ def margins(still: Image.Image) -> tuple[float, ...]:
 
 
 def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
-    r"""Return the rows of a run sheet: minute, part, what to ask and hear, what to skip when late.
+    r"""Return the rows of a run sheet: minute, part, question and answer, text that may be skipped.
 
     Examples
     --------
@@ -347,7 +347,7 @@ def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
 def named_in(slides: list[Slide], part: str) -> list[int]:
     """Return the first slide of each name in a part of the run sheet, ``poll 1, explorer``.
 
-    Names that are of no slide are for the lecturer.
+    Other names are for the lecturer.
     """
     found = []
     for name in re.split(r"[,;] | and ", part.lower()):
@@ -360,9 +360,9 @@ def named_in(slides: list[Slide], part: str) -> list[int]:
 
 
 def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> list[int]:
-    """Return the slide at which each row of a run sheet begins: the first one that it names.
+    """Return the slide at which each row of a run sheet begins: the first slide that it names.
 
-    Homework is at the end, in a lesson of two lectures also on the last slide of the first one.
+    Homework is on the last slide; in a lesson of two lectures, also on the last slide of the first.
     """
     starts: list[int] = []
     later = [i for i, row in enumerate(rows[1:], 1) if row[0] < rows[i - 1][0]]
@@ -382,7 +382,7 @@ def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> lis
 def plan(slides: list[Slide], sheet: str) -> None:
     """Give each slide its row of the run sheet, and its share of the time.
 
-    The question of a row is asked at the last slide that it names, and never before a vote is over.
+    The question of a row is asked at the last slide that it names, and only after the vote.
     """
     rows = rows_of(sheet)
     starts = starts_of(slides, rows)

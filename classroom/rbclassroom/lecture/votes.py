@@ -1,4 +1,4 @@
-"""Votes on a poll, from telephones in the class network: anonymous, and nothing is kept."""
+"""Anonymous votes on a poll, from phones in the class network; nothing is stored."""
 
 import ipaddress
 import secrets
@@ -18,10 +18,10 @@ MOST = 500
 
 
 class Ballot:
-    """One vote at a time: opened, taken, closed, and then counted.
+    """The current vote: it is opened, takes votes, is closed, and then counted.
 
-    Of the vote that was opened last, `key` is a random name, `poll` the poll, and `options` has the
-    text of each letter, as HTML. Votes are taken while it is `open`, and counted in `counts` then.
+    For the vote that was opened last, `key` is a random name, `poll` the poll, and `options` the
+    text of each letter as HTML. It takes votes while it is `open`; then `counts` has their numbers.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class Ballot:
         self.open = True
 
     def admit(self) -> str:
-        """Return a random name for a phone, good until the vote is closed."""
+        """Return a random name for a phone, which is valid until the vote is closed."""
         if len(self._votes) == MOST:
             raise ValueError(f"{MOST} phones are here already.")
         phone = secrets.token_hex(16)
@@ -55,7 +55,7 @@ class Ballot:
         return phone in self._votes
 
     def vote(self, phone: str, letter: str) -> None:
-        """Take the vote of a phone that was admitted, in place of its last one."""
+        """Take the vote of a phone that was admitted; it replaces an earlier vote of the phone."""
         if letter not in self.options:
             raise ValueError(f"The options are {', '.join(self.options)}.")
         if not self.knows(phone):
@@ -63,11 +63,11 @@ class Ballot:
         self._votes[phone] = letter
 
     def vote_of(self, phone: str) -> str:
-        """Return the last vote of a phone; ``""`` if it has not voted."""
+        """Return the last vote of a phone, or ``""`` if it has not voted."""
         return self._votes.get(phone, "")
 
     def close(self) -> None:
-        """Close the vote, if it is open, count it, and forget who voted for what."""
+        """Close the vote if it is open, count it, and delete the single votes."""
         if self.open:
             self.counts = Counter(filter(None, self._votes.values()))
             self._votes.clear()
@@ -91,8 +91,8 @@ class WithBallot(RequestHandler):
 class Phone(WithBallot):
     """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
 
-    A phone is known by a random number in a cookie, which is another one for each vote.
-    When the vote is closed the page shows the counts.
+    A cookie with a random number, which is new for each vote, identifies a phone. When the vote is
+    closed, the page shows the counts.
     """
 
     def set_default_headers(self) -> None:
@@ -108,7 +108,7 @@ class Phone(WithBallot):
         return self.get_cookie(f"vote-{self.ballot.key}", "") or ""
 
     def get(self) -> None:
-        """Show the options, or that there is nothing to vote on."""
+        """Show the options, or the message that no vote is open."""
         ballot = self.ballot
         if ballot.open and not ballot.knows(self.phone):
             try:
@@ -119,7 +119,7 @@ class Phone(WithBallot):
         self.render("phone.html", ballot=ballot, choice=ballot.vote_of(self.phone))
 
     def post(self) -> None:
-        """Take a vote, and show the page again; a vote that comes too late is not taken."""
+        """Take a vote, unless it comes too late, and show the page again."""
         if self.ballot.knows(self.phone):
             try:
                 self.ballot.vote(self.phone, self.get_body_argument("choice"))
@@ -129,15 +129,15 @@ class Phone(WithBallot):
 
 
 class State(WithBallot):
-    """Which vote is open: a page that was made for another one loads again."""
+    """The vote that is open; a page that was made for another vote reloads itself."""
 
     def get(self) -> None:
-        """Answer with the key of the vote, nothing if it is closed."""
+        """Answer with the key of the vote, or with nothing if the vote is closed."""
         self.finish(self.ballot.key if self.ballot.open else "")
 
 
 class _Server(HTTPServer):
-    """A server that closes further connections when it has `MOST` of them."""
+    """A server that refuses further connections when it has `MOST` of them."""
 
     def handle_stream(self, stream: Any, address: Any) -> None:
         if len(self._connections) < MOST:
@@ -149,7 +149,7 @@ class _Server(HTTPServer):
 def find_address() -> str:
     """Return the address of this machine in its network, or raise an OSError; nothing is sent."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect(("192.0.2.1", 9))  # an address for documentation, of no machine
+        probe.connect(("192.0.2.1", 9))  # an address that is reserved for documentation
         address: str = probe.getsockname()[0]
         return address
 
@@ -157,7 +157,7 @@ def find_address() -> str:
 class Phones:
     """The port at which phones vote, at one IPv4 address of this machine.
 
-    Port 8000 is taken, or another where that is in use; `url` is the address of the page, and
+    The port is 8000, or another one if 8000 is in use. `url` is the address of the page, and
     `ballot` has the votes.
     """
 
@@ -175,12 +175,12 @@ class Phones:
         application = Application(
             [(r"/", Phone, {"ballot": self.ballot}), (r"/state", State, {"ballot": self.ballot})],
             template_path=str(TEMPLATES),
-            log_function=lambda handler: None,  # who asks is not written down
+            log_function=lambda handler: None,  # requests are not logged
         )
         self._server = _Server(
             application, max_body_size=1000, body_timeout=5, idle_connection_timeout=10
         )
 
     def start(self) -> None:
-        """Answer phones, on the event loop that runs, until the process ends."""
+        """Answer phones on the running event loop, until the process ends."""
         self._server.add_socket(self._socket)

@@ -1,1 +1,1 @@
-"""Python in the pages of the book: cells of lessons to edit and run, problem sets to solve."""
+"""Python in the pages of the book: readers run cells of lessons and solve problem sets."""

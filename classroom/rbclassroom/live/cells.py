@@ -1,7 +1,7 @@
-"""Run a cell of a page with the statements above it that it needs; the browser's Python does this.
+"""Run a cell of a page with the statements above it that it needs, in the browser's Python.
 
-Each run has new names: the same code gives the same outputs, however often and in whatever order
-the cells of a page are run.
+Each run begins with new names, so the same code gives the same outputs, however often and in
+whichever order the cells of a page are run.
 """
 
 import ast
@@ -23,15 +23,15 @@ Show = Callable[[str, str], object]
 CUT = 100_000
 """Characters of text that a run may print."""
 
-logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)  # it would tell of its cache
+logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)  # no message about its cache
 
 
 def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> list[list[ast.stmt]]:
-    """Return the statements above a cell, in cells too, that its names depend on.
+    """Return the statements above a cell, as cells, on which its names depend.
 
-    A statement is needed if it binds a name that is wanted below, or may change its object: by an
-    assignment to a part, by a method, as the first argument of a call whose result is not kept,
-    or, a random generator, wherever it stands.
+    A statement is needed if it binds a name that is needed below, or if it may change the object of
+    such a name: by an assignment to a part, by a method, or by a call whose result is not kept and
+    whose first argument it is. For a random generator, every statement that uses it is needed.
     """
     generators = {
         name
@@ -51,7 +51,7 @@ def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> lis
                 names = names - _replaced(statement) | _read(statement)
                 kept.append(statement)
         functions = (each for each in kept if isinstance(each, ast.FunctionDef | ast.ClassDef))
-        late = wanted.union(*map(_read, functions))  # a function finds them when it is called
+        late = wanted.union(*map(_read, functions))  # looked up at the call
         if late == wanted:
             return [[each for each in some if each in kept] for some in above]
         wanted = late
@@ -75,8 +75,8 @@ def parsed(source: str, name: str) -> list[ast.stmt]:
 def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> str:
     """Run a cell after the statements above it that it needs, and show its outputs.
 
-    Return the name of a package that is missing and `known`: to be loaded, for the cell to be run
-    again; or an empty string.
+    Return the name of a missing package if it is `known`, so that the page loads it and runs the
+    cell again; otherwise return an empty string.
     """
     module = sys.modules["__main__"] = ModuleType("__main__")
     written, error = _Written(show), None
@@ -104,7 +104,7 @@ def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> 
 
 
 class _Written(io.TextIOBase):
-    """Shows printed text, up to `CUT` characters; nothing without `show`."""
+    """A stream that shows printed text, up to `CUT` characters; without `show` nothing."""
 
     def __init__(self, show: Show | None) -> None:
         self._show, self._room = show, CUT
@@ -150,8 +150,8 @@ def _show_figures(show: Show) -> None:
 
 
 def _told(error: BaseException) -> str:
-    """Return an error as a student reads it: where in the cells, and what."""
-    if hasattr(error, "_render_traceback_"):  # a hint speaks for itself
+    """Return an error as a student should read it: its place in the cells, and its message."""
+    if hasattr(error, "_render_traceback_"):  # a hint is shown without the name of its error
         return str(error)
     lines = [
         f"{frame.f_code.co_filename.strip('<>')}, line {line}: "
@@ -187,7 +187,7 @@ def _read(statement: ast.stmt) -> set[str]:
 
 
 def _replaced(statement: ast.stmt) -> set[str]:
-    """Return the names that surely have a new value after a statement."""
+    """Return the names that certainly have a new value after a statement."""
     sure = ast.Assign | ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
     return _bound(statement) if isinstance(statement, sure) else set()
 

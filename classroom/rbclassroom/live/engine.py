@@ -1,8 +1,8 @@
-"""The Python that pages run: official Pyodide files, fetched once, checked, kept in a cache.
+"""The Python of the pages: official files of Pyodide, downloaded once, checked, and cached.
 
-``pyodide.json`` has the SHA-256 of each file; the entries of its packages are those of the lock
-file that Pyodide publishes. For another version, change `VERSION`, unpack ``npm pack pyodide``, and
-run ``python -m rbclassroom.live.engine FOLDER``, which writes the lock again.
+``pyodide.json`` has the SHA-256 of each file; the entries of its packages come from the lock file
+that Pyodide publishes. For another version, change `VERSION`, unpack ``npm pack pyodide``, and run
+``python -m rbclassroom.live.engine FOLDER``, which writes the lock file again.
 """
 
 import gzip
@@ -41,7 +41,7 @@ STATIC = Path(__file__).with_name("static")
 
 
 class EngineError(Exception):
-    """A file of Pyodide could not be had, or is not the official one."""
+    """The error that a file of Pyodide could not be downloaded, or is not the official file."""
 
 
 @cache
@@ -57,7 +57,7 @@ def files() -> dict[str, str]:
 
 
 def fetch(folder: Path | None = None) -> Path:
-    """Return a folder with all files, each checked; those that it lacks are fetched."""
+    """Return a folder with all files, each checked; download the missing ones."""
     folder = folder or _cache()
     folder.mkdir(parents=True, exist_ok=True)
     for source in (_official, _mirrored):
@@ -110,7 +110,7 @@ def _is_good(path: Path) -> bool:
 
 
 def write(root: Path, folder: Path, source: Path) -> None:
-    """Write to a folder of the site all that pages need to run Python.
+    """Write all files that pages need to run Python to a folder of the site.
 
     The files of Pyodide are in the folder `source`; the code of the course is in `root`.
     """
@@ -141,7 +141,7 @@ def _own(root: Path) -> dict[str, bytes]:
 
 
 def _facts(folder: Path) -> dict[str, Any]:
-    """Return facts for the pages: versions, the MB that a start loads, the files for drawing."""
+    """Return data for the pages: versions, the MB that a start loads, the files for drawing."""
     start = "*.packed", "pyodide.js", "*.json", "python_stdlib.zip", "rbcourse.zip", "numpy-*.whl"
     size = sum(path.stat().st_size for form in start for path in folder.glob(form))
     packages = lock()["packages"]
@@ -156,7 +156,7 @@ def _facts(folder: Path) -> dict[str, Any]:
 
 
 def _with_needs(names: Iterable[str], packages: dict[str, Any] | None = None) -> set[str]:
-    """Return packages with all that are loaded with them."""
+    """Return packages with all packages that they need."""
     packages, found = packages or lock()["packages"], list(names)
     for name in found:
         found += {*packages[name]["depends"]} - {*found} - APART

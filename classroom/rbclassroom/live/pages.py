@@ -1,4 +1,4 @@
-"""Marks in the pages of the book: cells that can be tried, answers and tests of problem sets."""
+"""Marks in the pages of the book: cells that can be run, answers and tests of problem sets."""
 
 import html
 import re
@@ -21,12 +21,12 @@ _IN_PAGES = {  # sentences about Jupyter, and the sentences that replace them
 
 @cache
 def left_out() -> dict[str, dict[str, str]]:
-    """Return, for each lesson, the cells that cannot be tried in a page, and why."""
+    """Return the cells of each lesson that cannot be run in a page, with the reasons."""
     return tomllib.loads(Path(__file__).with_name("left_out.toml").read_text("utf-8"))
 
 
 def cells_of(notebook: NotebookNode) -> list[dict[str, str]]:
-    """Return the code of a lesson in its order, without that of explorers, which need Jupyter.
+    """Return the code of a lesson in its order, without the explorers, which need Jupyter.
 
     Code without an output belongs to the code that follows it, as in the pages.
     """
@@ -41,7 +41,7 @@ def cells_of(notebook: NotebookNode) -> list[dict[str, str]]:
 
 
 def mark_lesson(notebook: NotebookNode, name: str) -> None:
-    """Mark the cells of a lesson that can be tried."""
+    """Mark the cells of a lesson that can be run."""
     can = {each["id"] for each in cells_of(notebook)} - left_out().get(name, {}).keys()
     for cell in notebook.cells:
         if cell.id in can and cell.cell_type == "code":

@@ -1,4 +1,4 @@
-// What pages of the book do: polls, folded code, formulas that fit, panels on phones, excerpts.
+// Scripts of the book's pages: polls, folded code, formulas that fit, panels on phones, excerpts.
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
 
@@ -23,7 +23,7 @@ addEventListener("DOMContentLoaded", () => {
     for (const each of all("details.hide")) each.open = shown;
   });
 
-  // A formula stays on one line with the marks around it.
+  // A formula and the punctuation marks next to it are not separated by a line break.
   const join = () => {
     for (const formula of all("span.math:has(> mjx-container)")) {
       const before = formula.previousSibling, after = formula.nextSibling, whole = document.createElement("span");
@@ -38,7 +38,7 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Formulas that are too wide become smaller, down to four fifths; others scroll, by keys as well.
+  // Formulas that are too wide are made smaller, to 80 % at least; wider ones scroll, also by keys.
   const fit = () => {
     for (const formula of all('mjx-container[display="true"]')) {
       formula.style.fontSize = "";
@@ -57,11 +57,11 @@ addEventListener("DOMContentLoaded", () => {
   addEventListener("resize", fit);
   addEventListener("toggle", fit, { capture: true }); // something folded is open now
 
-  // The page that is shown is in sight in the list of pages.
+  // The list of pages is scrolled to the current page.
   const current = all(".sidebar-tree .current-page").at(-1), list = document.querySelector(".sidebar-scroll");
   if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
 
-  // The panels of a wide still, below one another and equally large; CSS shows them on phones.
+  // The panels of a wide still, in a column and of equal size; CSS shows them on phones.
   for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
     const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
     const shares = ends.slice(1).map((end, k) => end - ends[k]), [wide, high] = still.style.aspectRatio.split("/").map(Number);
@@ -76,10 +76,10 @@ addEventListener("DOMContentLoaded", () => {
     still.after(panels);
   }
 
-  // "drag to turn" goes when it is done.
+  // "drag to turn" disappears when the reader drags.
   addEventListener("pointerdown", ({ target }) => target.closest("figure")?.classList.add("touched"));
 
-  // The picture of the start page plays once when it is seen; all but its slider is behind "more".
+  // The picture of the start page plays once when it is visible; "more" hides all controls except its slider.
   const hero = document.querySelector("figure.hero");
   const ready = new MutationObserver(() => {
     const canvas = hero.querySelector("canvas"), slider = all("input", hero).at(-1);
@@ -108,7 +108,7 @@ addEventListener("DOMContentLoaded", () => {
   });
   if (hero) ready.observe(hero, { childList: true, subtree: true });
 
-  // Excerpts below what a search finds, from the words of all pages.
+  // Excerpts below the results of a search, from the words of all pages.
   const results = document.querySelector("#search-results");
   if (!results) return;
   const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/).filter(Boolean);

@@ -1,4 +1,4 @@
-// Of the ledger the rows are shown whose name the filter is; or else that contain it, or else its words.
+// The filter of the ledger shows the rows whose name it is, or else the rows that contain it, or else the rows that contain all its words.
 addEventListener("DOMContentLoaded", () => {
   const filter = document.getElementById("filter"), found = document.getElementById("found");
   const plain = (text) => text.toLowerCase().replace(/\bfigures?\b/g, "fig.").replace(/\s+/g, " ").trim();

@@ -1,11 +1,11 @@
 "use strict";
-// Slides of a lesson: sizes, living pictures, keys, votes. All that is asked for is in the folder.
+// Slides of a lesson: sizes, interactive pictures, keys, votes. All files that they need are in the folder.
 const all = (what, where = document) => [...where.querySelectorAll(what)];
 const printing = /[?&](print-pdf|view=print)/.test(location.search);
 const voting = /[?&]token=/.test(location.search) && window === window.top;
 const sections = all(".slides section section");
 
-// A picture is as large as its place allows, with its controls; white margins are cut off.
+// A picture with its controls is as large as its place allows; white margins are cut off.
 const fit = (figure) => {
   const seen = figure.querySelector(":scope > :is(canvas, img)"), panel = figure.querySelector(":scope > div");
   if (!seen || !figure.clientWidth) return;
@@ -24,8 +24,8 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene turns out of its margins
 };
 
-// Text alone is larger, where it fits; text too long for its slide gets smaller, down to 80 %, and a
-// formula that is wider than its column, down to 62 %.
+// A slide without pictures has larger text if it fits. Text that is too long is made smaller, to 80 %
+// at least, and a formula that is wider than its column to 62 % at least.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
   const formulas = all("mjx-container[display=true]", section);
@@ -41,7 +41,7 @@ const settle = (section) => {
   for (set(size); over() && size > 36; size = size > 45 ? 45 : size - 1) set(size > 45 ? 45 : size - 1);
 };
 
-// Pictures come to life when their slide is next; on paper they stay stills.
+// A picture becomes interactive when its slide is the next one; on paper, pictures are stills.
 const revive = async (section) => {
   for (const script of section ? all("figure > script[type]", section) : []) {
     const figure = script.parentElement, image = figure.querySelector("img"), own = JSON.parse(script.text);
@@ -77,7 +77,7 @@ const keys = {
   }],
 };
 
-// Votes are counted by the server that hands out this page; without its token there are none.
+// The server of this page counts the votes; without its token, voting is not possible.
 let state = { open: false };
 const ask = async (body) => {
   const answer = await fetch(`votes${location.search}`, body && { method: "POST", body: JSON.stringify(body) }).catch(() => null);
@@ -134,7 +134,7 @@ const begin = async () => {
   Reveal.on("resize", sharpen);
   Reveal.on("slidechanged", show);
   show({ currentSlide: Reveal.getCurrentSlide() });
-  // a remote control turns slides also after a slider was touched; "?" is elsewhere on some keyboards
+  // a remote control changes slides even after a slider was moved; some keyboards have "?" on another key
   addEventListener("keydown", (event) => {
     const act = { PageDown: "next", PageUp: "prev", "?": "toggleHelp" }[event.key];
     if (!act || (event.key !== "?" && !event.target.closest?.("figure"))) return;

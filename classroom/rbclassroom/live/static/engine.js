@@ -4,14 +4,14 @@ window.rbcourseEngine = (() => {
   const facts = FACTS;
   let draws = false, worker, started, hear, finish, leave, turn = Promise.resolve();
 
-  // Why Python cannot run here, or an empty text.
+  // The reason why Python cannot run here, or an empty text.
   function missing() {
     if (location.protocol === "file:") return "This page was opened from a file. Python runs in it when a web server sends it, as on the web, or by: python3 course.py book --live --serve";
     const old = ["Worker", "WebAssembly", "DecompressionStream", "indexedDB"].find((name) => !window[name]);
     return old ? `This browser is too old to run Python: it has no ${old}.` : "";
   }
 
-  // Load Python, once; show("loaded", bytes) tells how much has come.
+  // Load Python once; show("loaded", bytes) shows how much has been loaded.
   function start(show) {
     if (!started) hear = show;
     started ??= new Promise((resolve, reject) => {
@@ -24,7 +24,7 @@ window.rbcourseEngine = (() => {
         else if (kind === "failed") fail(content);
         else if (kind === "done") finish?.("done");
         else hear(kind, content);
-        // While Python starts there is time to load what it takes to draw; the worker finds it in the cache.
+        // The files for drawing are loaded while Python starts; the worker finds them in the cache.
         if (draws && kind === "loaded" && content > 0.95e6 * facts.start) {
           draws = false;
           for (const file of facts.drawing) fetch(folder + file).then((answer) => answer.arrayBuffer()).catch(() => {});
@@ -34,7 +34,7 @@ window.rbcourseEngine = (() => {
     return started;
   }
 
-  // Run a cell, { above, source, files }, when those before it are done. Return "done" or "stopped";
+  // Run a cell, { above, source, files }, when earlier cells are done. Return "done" or "stopped";
   // its outputs are shown by show(kind, content), of the kinds text, html, hint, error and clear.
   function run(cell, show) {
     draws ||= /\bplt\./.test(cell.source);
@@ -47,7 +47,7 @@ window.rbcourseEngine = (() => {
     return next;
   }
 
-  // End what runs, and Python with it; the next run starts another.
+  // Stop the running cell and end Python; the next run starts Python again.
   function stop() {
     worker?.terminate();
     worker = started = null;

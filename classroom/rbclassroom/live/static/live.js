@@ -1,4 +1,4 @@
-// Cells of lessons to try, and problem sets to solve: editors, outputs, and answers that are kept.
+// Editors and outputs for the cells of lessons and for problem sets, whose answers are stored.
 addEventListener("DOMContentLoaded", () => {
   const engine = window.rbcourseEngine, about = engine.facts, megabytes = (bytes) => (bytes / 1e6).toFixed(1);
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
@@ -14,7 +14,7 @@ addEventListener("DOMContentLoaded", () => {
   const page = () => (data ??= fetch(`${engine.folder}pages/${name}.json`).then((answer) => answer.json())
     .catch((error) => { data = null; throw error; }));
 
-  // A text area, which becomes CodeMirror if there is something to run; edit(text) replaces its text.
+  // A text area, which becomes CodeMirror if the page can run code; edit(text) replaces its text.
   function editor(text, label, changed, go) {
     const area = make("textarea", { value: text, ariaLabel: label, spellcheck: !go });
     const part = make("div", { className: "editor" }, area);
@@ -55,7 +55,7 @@ addEventListener("DOMContentLoaded", () => {
     return { part, upgrade, edit };
   }
 
-  // Where outputs are shown.
+  // The element that shows outputs.
   function outputs() {
     const part = make("div", { className: "outputs", role: "status" });
     let text;
@@ -79,7 +79,7 @@ addEventListener("DOMContentLoaded", () => {
     return { part, show };
   }
 
-  // HTML whose scripts run, and whose names are its own.
+  // Insert HTML with unique names, and run its scripts.
   function revived(html) {
     count += 1;
     for (const [, id] of html.matchAll(/<img id="(\w+)"/g)) html = html.replaceAll(id, `${id}_${count}`);
@@ -88,7 +88,8 @@ addEventListener("DOMContentLoaded", () => {
     return part;
   }
 
-  // Run a cell below its editor; the buttons tell and stop it. Return whether it ran without an error.
+  // Run a cell and show its outputs below its editor; buttons show its state and stop it. Return whether
+// it ran without an error.
   async function perform(read, bar, shown, show) {
     const wrong = engine.missing(), [go, halt] = all("button", bar);
     show("clear");
@@ -167,7 +168,7 @@ addEventListener("DOMContentLoaded", () => {
     part.prepend(start);
   }
 
-  // Answers are kept in the browser, by page and cell.
+  // The browser stores answers by page and cell.
   const kept = () => new Promise((resolve, reject) => {
     const ask = indexedDB.open("rbcourse", 1);
     ask.onupgradeneeded = () => ask.result.createObjectStore("answers");

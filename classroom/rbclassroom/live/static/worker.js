@@ -1,7 +1,7 @@
-// Python in a worker of the page: it loads Pyodide from the folder of this file, and runs cells.
+// Python in a worker of the page: the worker loads Pyodide from the folder of this file, and runs cells.
 const here = self.location.href.replace(/[^/]*$/, ""), facts = FACTS, plain = self.fetch.bind(self);
 
-// Text is sent ten times a second at most: a loop may print for ever.
+// Text is sent at most ten times a second, since a loop may print without end.
 let text = "", sent = 0;
 function tell(kind, content = "") {
   if (kind === "text") {
@@ -13,7 +13,7 @@ function tell(kind, content = "") {
   if (kind !== "text") self.postMessage([kind, content]);
 }
 
-// What is fetched is counted, and what is packed is unpacked.
+// Downloaded bytes are counted, and compressed files are unpacked.
 let loaded = 0, told = 0;
 const counter = () => new TransformStream({
   transform(chunk, out) {
@@ -35,7 +35,7 @@ self.fetch = async (address, options) => {
   return new Response(content, { headers: { "Content-Type": type } });
 };
 
-// Packages are unpacked and not "loaded": then only those libraries are compiled that are imported.
+// Packages are unpacked and not "loaded", so that only imported libraries are compiled.
 const lock = fetch(`${here}pyodide-lock.json`).then((answer) => answer.json()), files = {};
 const buffer = (file) => (files[file] ??= fetch(here + file).then((answer) => answer.arrayBuffer()));
 const site = { extractDir: "/lib/python3.12/site-packages" };
@@ -51,7 +51,7 @@ async function load(python, name) {
   }
 }
 
-// The memory of a Python that has just started is kept for the next visit, which is faster by half.
+// The memory of Python just after its start is stored for the next visit, which then needs half the time.
 const memory = (mode, act) => new Promise((resolve) => {
   const ask = indexedDB.open("rbcourse engine", 1);
   ask.onupgradeneeded = () => ask.result.createObjectStore("memory");
