@@ -108,7 +108,7 @@ def test_a_repository_must_be_an_owner_and_a_name(name, monkeypatch, capsys):
 
 def test_a_folder_that_is_not_a_book_is_left_alone(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(ValueError, match="is no book that was made here"):
+    with pytest.raises(ValueError, match="is not a book that was made here"):
         build.build(ROOT, tmp_path)
     assert (tmp_path / "mine.txt").read_text() == "mine"
 

@@ -114,7 +114,7 @@ def test_a_picture_is_shown_with_the_text_of_its_cell_and_can_be_borrowed(tmp_pa
     assert look in pages.section(wide)
     wanted = r"$$R = \begin{pmatrix}1.00 & 0.50 \\ -0.25 & 1.00\end{pmatrix}$$"
     assert printed.parts == [wanted]
-    with pytest.raises(ValueError, match="nowhere is no cell with a stored picture"):
+    with pytest.raises(ValueError, match="nowhere is not a cell with a stored picture"):
         tiny(tmp_path, text("## 1", "![](nowhere)"))
     for output, why in (("1", "prints no matrix"), ("", "run 'course.py figures'")):
         bare = new_code_cell("1", metadata={"slide": r"$$\printed$$"} if output else {"slide": ""})
