@@ -81,7 +81,7 @@ class Sources:
         return (self.root / path).read_text(encoding="utf-8")
 
     def put(self, page: str, text: str) -> None:
-        """Write the source of a page, and copy the files without a page that it links to."""
+        """Write the source of a page, and copy the linked files that have no page."""
         _write(self.folder / page, text)
         for name in re.findall(r"\]\((?:\.\./)*files/([^)#]+)", text):
             target = self.folder / "files" / name
@@ -207,7 +207,7 @@ class Sources:
                 self.shown["run"] = relinked(
                     text[text.index("| to learn |") : text.index("<!--")], path, page
                 )
-                continue  # the page has a template
+                continue  # a template makes this page
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")

@@ -63,7 +63,7 @@ def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str
 
 
 def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
-    """Return a link for a name that one other module defines."""
+    """Return a link for a name if exactly one module of the book defines it."""
     from sphinx.util.nodes import make_refnode
 
     found = [

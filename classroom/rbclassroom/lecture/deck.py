@@ -16,7 +16,7 @@ from rbcourse.draw.display import ENGINE
 
 STATIC = Path(__file__).with_name("static")
 WIDE = 1.9
-"""A picture whose ratio of width to height is larger is shown below its text."""
+"""A picture whose ratio of width to height exceeds this value is shown below its text."""
 IDEA = 26
 """The largest number of words in an idea behind an option, unless one sentence has more."""
 _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # keys of works, which only the book shows

@@ -35,7 +35,7 @@ READY = "document.documentElement.dataset.ready"
 
 
 def find_lesson(number: str, folder: Path) -> Path:
-    """Return the path of the lesson with a number."""
+    """Return the path of the lesson with the given number."""
     paths = {path.name[:2]: path for path in lesson_paths(folder)}
     if number.zfill(2) not in paths:
         there = ", ".join(paths) or "none; run this in the folder of the course"
@@ -80,7 +80,7 @@ class Desk(_Here):
         self.finish({**state, "address": self.phones.url, "code": self.code})
 
     def post(self) -> None:
-        """Open the vote on a poll, ``{"poll": "Poll 1", "options": []}``, or close it, ``{}``."""
+        """Open a vote for ``{"poll": "Poll 1", "options": []}``, or close it for ``{}``."""
         asked = json_decode(self.request.body)
         ballot = self.phones.ballot
         try:

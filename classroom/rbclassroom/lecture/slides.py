@@ -94,7 +94,7 @@ class _Reader:
         self.sections: list[list[Slide]] = [[]]
         self.behind: list[Slide] = []
         self.section = self.title = ""
-        self.keys: set[str] = set()  # for the next slide
+        self.keys: set[str] = set()  # keys of the next slide
         self.ahead: list[str] = []  # notes for the next slide
         self.poll: Slide | None = None  # the poll whose verdict comes next
         self.answer = ""
@@ -383,7 +383,8 @@ def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> lis
 def plan(slides: list[Slide], sheet: str) -> None:
     """Give each slide its row of the run sheet and its share of the time.
 
-    The question of a row is asked at the last slide that the row names, and only after a vote.
+    The question of a row is asked at the last slide that the row names, but never before its vote
+    has ended.
     """
     rows = rows_of(sheet)
     starts = starts_of(slides, rows)

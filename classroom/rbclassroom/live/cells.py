@@ -55,7 +55,7 @@ def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> lis
                 names = names - _replaced(statement) | _read(statement)
                 kept.append(statement)
         functions = (each for each in kept if isinstance(each, ast.FunctionDef | ast.ClassDef))
-        late = wanted.union(*map(_read, functions))  # names for later calls
+        late = wanted.union(*map(_read, functions))  # read when a function is called
         if late == wanted:
             return [[each for each in some if each in kept] for some in above]
         wanted = late

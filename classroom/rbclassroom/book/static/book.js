@@ -2,7 +2,7 @@
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
 
-  // An option of a poll shows its own line and hides the others.
+  // An option of a poll shows its own explanation and hides the others.
   for (const poll of all(".poll")) {
     const buttons = all("button", poll), line = (button) => button.closest("li").querySelector(".idea");
     for (const button of buttons) {

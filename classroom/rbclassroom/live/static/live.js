@@ -133,7 +133,7 @@ addEventListener("DOMContentLoaded", () => {
       + "Before a cell runs, Python runs the statements above that the cell needs, as this page shows them."));
   }
 
-  // Lessons: "Try it" turns a cell into an editor and runs it. The stored output stays.
+  // Lessons: "Try it" turns a cell into an editor and runs it. The stored output is kept.
   const texts = new Map(); // the texts of edited cells, by id
   for (const part of all(".cell[class*=tag_try-]")) {
     const id = /tag_try-([\w-]+)/.exec(part.className)[1], folded = part.querySelector("details");
