@@ -138,8 +138,8 @@ def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
 def pictures_of(key: str, entry: Entry, figures: Iterable[Figure]) -> list[Figure]:
     """Return the figures of an entry of the ledger.
 
-    If the entry is a figure of BK or RR, return the figures that reproduce it. Otherwise, or if
-    there are none, return the figures in the sections that teach the entry.
+    For a figure of BK or RR, return the figures that reproduce it. For other entries, and for
+    figures that are not reproduced, return the figures in the sections that teach the entry.
     """
     if figure := re.fullmatch(r"(BK|RR) Fig\. (\d+)", key):
         own = re.compile(rf"{ {'BK': 'paper', 'RR': 'report'}[figure[1]] }_fig{figure[2]}[a-z]?")
