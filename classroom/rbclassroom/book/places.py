@@ -20,7 +20,7 @@ _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
 
 
 def source_of(path: str) -> str | None:
-    """Return the source of the page that shows a file of the course, or None if no page shows it."""
+    """Return the source of the page that shows a file of the course, or None if none shows it."""
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
     if code := re.fullmatch(r"(rbcourse|classroom/rbclassroom)/([\w/]+)\.py", path):
