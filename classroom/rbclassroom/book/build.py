@@ -41,23 +41,23 @@ TEMPLATES = Environment(
 TEMPLATES.globals |= {"ledger": ledger, "places": places, "reference": reference}
 _KEPT = re.compile(r".*\.(css|html|j2|js|md|mplstyle|py|svg|toml|ttf|txt|typed)")
 _TO_READ = """
-*This page is for reading. Get the problem set as a zip from your teacher; teachers make it \
-with* `python3 course.py handout {name}`.
+*This page is for reading. Your teacher can give you the problem set as a zip file. Teachers make \
+this file with* `python3 course.py handout {name}`.
 """
 _TO_SOLVE = """
-**Solve it here**, with nothing to install: write your answers, press *Check*, which tells you \
-what is wrong, and at the end download `{name}.ipynb`, the file to hand in. Until then this \
-browser keeps your answers. For Jupyter, your teacher has the set as a zip.
+**You can solve it here**, with nothing to install. Write your answers and press *Check*, which \
+tells you what is wrong. At the end, download `{name}.ipynb`, the file to hand in. Until then this \
+browser keeps your answers. If you prefer Jupyter, ask your teacher for the set as a zip file.
 """
 LIVE = "_static/live"
-"""The folder of the book with what it takes to run Python in its pages."""
+"""The folder of the book with the files for running Python in its pages."""
 MADE = "made-by-course.txt"
-"""A file in the book by which it is known as one."""
+"""The file that identifies a folder as a book made by this module."""
 
 
 @dataclass
 class Sources:
-    """Writes the sources of pages to `folder`, and files that are copied to the book to `extra`.
+    """The sources of the book in `folder`, and the files in `extra`, which are copied to the book.
 
     `repository` is the GitHub repository ``owner/name`` from which Binder takes the lessons, or is
     empty. `live` tells whether Python runs in the pages. `shown` is the data of the templates in
@@ -73,15 +73,15 @@ class Sources:
 
     @cached_property
     def works(self) -> dict[str, str]:
-        """The names of the works that the course cites."""
+        """The names of the works that the course cites, by their keys."""
         return names(self.read("notebooks/REFERENCES.bib"))
 
     def read(self, path: str) -> str:
-        """Return a file of the course."""
+        """Return the text of a file of the course."""
         return (self.root / path).read_text(encoding="utf-8")
 
     def put(self, page: str, text: str) -> None:
-        """Write the source of a page, and copy the files without a page that it links to."""
+        """Write the source of a page, and copy the linked files that have no page."""
         _write(self.folder / page, text)
         for name in re.findall(r"\]\((?:\.\./)*files/([^)#]+)", text):
             target = self.folder / "files" / name
@@ -93,7 +93,7 @@ class Sources:
         _write(self.extra / LIVE / "pages" / f"{name}.json", json.dumps(data, ensure_ascii=False))
 
     def rendered(self, template: str, **further: Any) -> str:
-        """Return a template in ``pages/`` with its data."""
+        """Return a template in ``pages/``, filled with the data of the book."""
         return TEMPLATES.get_template(template).render(
             self.shown, repository=self.repository, **further
         )
@@ -155,7 +155,7 @@ class Sources:
         write_decks(decks, self.extra / "slides", ready)
 
     def put_problem_sets(self) -> None:
-        """Write the problem sets as students get them."""
+        """Write the problem sets as students receive them."""
         assignments = self.root / "notebooks" / "assignments"
         names = sorted(path.stem for path in assignments.glob("source/ps*/ps*.ipynb"))
         for name in names:
@@ -176,13 +176,13 @@ class Sources:
         self.shown["sets"] = names
 
     def put_package(self) -> None:
-        """Write the pages of modules and code, and the figures."""
+        """Write the pages of modules and of their code, and copy the figures."""
         modules = reference.modules(self.root)
         for module in (each for some in modules.values() for each in some):
             page = self.rendered("module.rst.j2", module=module)
             self.put(f"package/{module['name']}.rst", page)
         addresses = dict(MOVED)
-        for room in set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}:  # without pages
+        for room in set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}:  # no pages
             for file in (self.root / "classroom" / "rbclassroom" / room).glob("[a-z]*.py"):
                 address = f"../code/classroom/rbclassroom/{room}/{file.stem}"
                 addresses[f"package/{room}.{file.stem}"] = address
@@ -200,14 +200,14 @@ class Sources:
         self.shown |= {"modules": modules, "found": found, "files": files}
 
     def put_files(self) -> None:
-        """Write the pages that are files of the course."""
+        """Write the pages that show files of the course, such as its glossary."""
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
                 self.shown["run"] = relinked(
                     text[text.index("| to learn |") : text.index("<!--")], path, page
                 )
-                continue  # the page has a template
+                continue  # a template makes this page
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
@@ -217,10 +217,11 @@ class Sources:
             self.put(page, relinked(text, path, page))
 
     def put_course(self) -> None:
-        """Write ``course.zip``, a course that runs: package, lessons without outputs, `course.py`.
+        """Write ``course.zip``: both packages, the lessons without outputs, and `course.py`.
 
-        The problem sets have model answers and hidden tests, so the zip does not contain them. It
-        contains the check that students run before they submit.
+        Readers can run the course from this zip. It does not contain the problem sets, because they
+        have model answers and hidden tests. It contains the check that students run before they
+        submit.
         """
         homes = "rbcourse", "classroom/rbclassroom"
         inside = (path for home in homes for path in (self.root / home).rglob("*.*"))
@@ -236,7 +237,7 @@ class Sources:
         (self.extra / "course.zip").write_bytes(packed)
 
     def put_fronts(self) -> None:
-        """Write the start page and the pages that lead to others."""
+        """Write the pages that have a template: the start page, the lists and the instructions."""
         cube = living("cube", self.root).replace("<figure>", '<figure class="hero">', 1)
         where = self.extra / "lessons", "lessons/pictures"
         self.put("scene.html", lessons.with_script_files(cube, *where))
@@ -254,7 +255,7 @@ def _write(path: Path, text: str) -> None:
 def write_sources(
     root: Path, folder: Path, extra: Path, repository: str = "", pyodide: Path | None = None
 ) -> None:
-    """Write all sources of the book to two folders, see `Sources`.
+    """Write all sources of the book to the folders `folder` and `extra`, see `Sources`.
 
     If `pyodide`, a folder with the files of Pyodide, is given, Python runs in the pages.
     """
@@ -272,10 +273,10 @@ def write_sources(
 def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = None) -> None:
     """Make the book of a course, in a new folder or in the folder of an older book.
 
-    `pyodide` is a folder with the files of Pyodide, for a book in which Python runs.
+    If `pyodide`, a folder with the files of Pyodide, is given, Python runs in the pages.
     """
     if book.exists() and not (book / MADE).exists():
-        raise ValueError(f"{book} is not a book that was made here; move it away or delete it")
+        raise ValueError(f"{book} is not a book made by this command; move it away or delete it")
     with tempfile.TemporaryDirectory(dir=book.absolute().parent, prefix=".book-") as folder:
         sources, extra, pages = (Path(folder, name) for name in ("sources", "extra", "pages"))
         print("Reading the lessons ...", flush=True)
@@ -291,7 +292,7 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
         (pages / ".buildinfo").unlink()
         (pages / "_sources").rmdir()
         (pages / ".nojekyll").touch()  # without this file, GitHub Pages omits _static
-        (pages / MADE).write_text("The book of rbcourse; course.py makes it anew.\n")
+        (pages / MADE).write_text("This is the book of rbcourse; course.py can make it again.\n")
         if book.exists():
             book.rename(Path(folder, "old"))
         pages.rename(book)
@@ -309,28 +310,28 @@ def serve(book: Path) -> None:
     handler = partial(_Quiet, directory=str(book))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         address = f"http://127.0.0.1:{server.server_port}/"
-        print(f"The book is at {address}. Stop it here, with Ctrl-C.", flush=True)
+        print(f"The book is at {address}. Press Ctrl-C here to stop its server.", flush=True)
         webbrowser.open(address)
         with suppress(KeyboardInterrupt):
             server.serve_forever()
 
 
 def main() -> None:
-    """Make the book, in the folder of the course."""
+    """Make the book in the folder of the course."""
     parser = argparse.ArgumentParser(prog="python -m rbclassroom.book.build")
-    parser.add_argument("--serve", action="store_true", help="show it in the browser")
-    parser.add_argument("--live", action="store_true", help="Python runs in its pages (+ 40 MB)")
+    parser.add_argument("--serve", action="store_true", help="show the book in the browser")
+    parser.add_argument("--live", action="store_true", help="let Python run in its pages (+ 40 MB)")
     parser.add_argument("--repository", default="", help="owner/name on GitHub, for Binder")
     asked = parser.parse_args()
     if not re.fullmatch(r"([\w.-]+/[\w.-]+)?", asked.repository):
-        parser.error(f"--repository: owner/name wanted, got {asked.repository}")
+        parser.error(f"--repository: owner/name is wanted, got {asked.repository}")
     book = Path("book")
     try:
         build(Path(), book, asked.repository, engine.fetch() if asked.live else None)
     except (OSError, ValueError, engine.EngineError) as error:
         sys.exit(str(error))
     except subprocess.CalledProcessError:
-        sys.exit("The pages could not be made; what Sphinx says stands above.")
+        sys.exit("Sphinx could not make the pages; its messages are above.")
     except KeyboardInterrupt:
         sys.exit(130)
     if asked.serve:

@@ -1,4 +1,4 @@
-"""Citations: the keys of works in a text become names with years that lead to the work."""
+"""Citations: the keys of works in a text become names with years, which link to the works."""
 
 import re
 import unicodedata
@@ -11,7 +11,7 @@ _WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
 
 
 def names(bibliography: str) -> dict[str, str]:
-    r"""Return the name of each work of a BibTeX file in a text, by its key.
+    r"""Return the name with which a text cites each work of a BibTeX file, by the key of the work.
 
     Examples
     --------
@@ -37,10 +37,10 @@ def names(bibliography: str) -> dict[str, str]:
 
 
 def with_citations(text: str, known: Mapping[str, str], here: set[str], elsewhere: str) -> str:
-    """Return a text with its citations as links, and the works of its list as their targets.
+    """Return a text whose citations are links, and whose list of works has the targets of links.
 
-    Works whose keys are in `here` are in the list of this page; links to other works lead to the
-    page `elsewhere`.
+    Works whose keys are in `here` are in the list of this page. Citations of other works lead to
+    the page `elsewhere`.
     """
 
     def put(match: re.Match[str]) -> str:

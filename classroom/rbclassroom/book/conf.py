@@ -23,7 +23,7 @@ nb_code_prompt_show, nb_code_prompt_hide = "Show the code", "Hide the code"
 myst_enable_extensions = ["amsmath", "dollarmath"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-toc_object_entries = False  # otherwise the navigation of each page would contain all of them
+toc_object_entries = False  # otherwise the navigation of each page lists all objects
 
 html_theme = "furo"
 html_static_path = ["static"]
@@ -32,13 +32,13 @@ html_js_files = ["book.js"]
 exclude_patterns = ["files"]
 html_favicon = "static/favicon.svg"
 html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
-html_show_search_summary = False  # pages of a folder may not read each other: see `write_texts`
+html_show_search_summary = False  # a page opened from a file cannot read others: `write_texts`
 mathjax_path = "tex-svg.js"
 mathjax3_config = {"svg": {"scale": 0.97, "mtextInheritFont": True}}
 
 
 def name_sections(_app: Any, doctree: Any) -> None:
-    """Give the headings of lessons permanent addresses: ``#s3`` for section 3."""
+    """Give the headings of lessons permanent addresses, such as ``#s3`` for section 3."""
     if Path(doctree["source"]).parent.name == "lessons":
         for section in doctree.findall(lambda node: node.tagname == "section"):
             if section.parent is not doctree:
@@ -46,14 +46,14 @@ def name_sections(_app: Any, doctree: Any) -> None:
 
 
 def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
-    """Omit members that other packages describe, and a page of JavaScript."""
+    """Omit members of other packages, and a constant that holds a page of JavaScript."""
     module = getattr(obj, "__module__", None) or "rbcourse"
     own = module.startswith(("rbcourse", "rbclassroom"))
     return True if name == "ENGINE" or not own else None
 
 
 def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:
-    """Link the keys of a docstring to the ledger, and add the tests of a function."""
+    """Link the keys in a docstring to the ledger, and list the tests of a function below it."""
     for i, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
             lines[i] = KEY.sub(lambda key: f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__", line)
@@ -63,7 +63,7 @@ def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str
 
 
 def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
-    """Return a link for a name that another module defines."""
+    """Return a link for a name if exactly one module of the book defines it."""
     from sphinx.util.nodes import make_refnode
 
     found = [
@@ -79,14 +79,14 @@ def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
 
 
 def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
-    """Return the address of the source of an object."""
+    """Return the address of the page with the source code of an object."""
     name = found["fullname"].partition(".")[0]
     file = file_of(found["module"].partition(".")[2] or "__init__")
     return f"../code/{file.removesuffix('.py')}.html#{name}"
 
 
 def write_texts(app: Any, failed: Exception | None) -> None:
-    """Write the words of all pages, for excerpts beside search results."""
+    """Write the words of all pages to a file, for the excerpts below search results."""
     if failed:
         return
     texts = {}
@@ -109,7 +109,10 @@ def add_python(app: Any, name: str, _template: str, _context: Any, _doctree: Any
 
 
 def setup(app: Any) -> None:
-    """Add MathJax, and call these functions before the contents of a page are collected."""
+    """Add MathJax and the extra files, and connect the functions above to the events of Sphinx.
+
+    `name_sections` is called before Sphinx collects the contents of a page.
+    """
     app.config.html_static_path.append(str(mathjax()))
     app.add_config_value("tests", reference.naming(Path()), "")
     app.config.html_extra_path.append(os.environ["RBCOURSE_BOOK_EXTRA"])

@@ -1,6 +1,7 @@
-"""A stored lesson as a page: the picture comes first, polls can be answered, and code is folded.
+"""A stored lesson as a page of the book.
 
-Answers are folded, too. Outputs are kept. The run sheet gets a page of its own.
+The page begins with a picture. Readers can answer its polls, and open its folded code and answers.
+Stored outputs are kept. The run sheet becomes a page of its own.
 """
 
 import base64
@@ -41,8 +42,8 @@ _EXPLORER = re.compile(r"explorers\.(\w+)_explorer\(\)")
 class Figure:
     """A figure of a lesson.
 
-    Its files have its `name`. Its `place` is the lesson and the section that draw it, such as
-    ``06_geodesics.ipynb, 3``. The `text` describes it.
+    `name` is the name of its files, and `place` is the lesson and the section that draw it, such as
+    ``06_geodesics.ipynb, 3``. `text` is its description.
     """
 
     name: str
@@ -51,12 +52,12 @@ class Figure:
 
     @property
     def caption(self) -> str:
-        """Its caption, as HTML."""
+        """The caption of the figure, as HTML."""
         return re.sub("</?figcaption>", "", caption(self.text))
 
 
 def figures_of(lesson: str, notebook: NotebookNode) -> list[Figure]:
-    """Return the figures that a lesson draws, in their order."""
+    """Return the figures of a lesson, in the order in which it draws them."""
     found, section = [], ""
     for cell in notebook.cells:
         if heading := re.match(r"## (?:(\d+) ·|(.*))", cell.source):
@@ -77,7 +78,7 @@ def cited_in(notebook: NotebookNode) -> list[str]:
 
 
 def without_outputs(notebook: NotebookNode) -> NotebookNode:
-    """Return a lesson without outputs, which makes its file small."""
+    """Return a copy of a lesson without outputs, whose file is small."""
     plain = copy.deepcopy(notebook)
     for cell in plain.cells:
         if cell.cell_type == "code":
@@ -86,7 +87,7 @@ def without_outputs(notebook: NotebookNode) -> NotebookNode:
 
 
 def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells with each answer, up to the next heading, in an element that opens."""
+    """Return cells in which each answer, up to the next heading, is folded."""
     result, inside = [], False
     for cell in cells:
         heading = cell.cell_type == "markdown" and re.match(r"#+ ([^\n]*)\n?", cell.source)
@@ -108,9 +109,9 @@ def with_picture_files(
 ) -> str:
     """Return HTML whose pictures are files; by default, they are loaded when they become visible.
 
-    `known` has the addresses of pictures by their contents. Other pictures are written to
-    ``pictures`` in a folder. The attribute ``data-cuts`` has the places between the panels of a
-    wide picture at which it can be cut.
+    `known` gives the addresses of pictures by their contents. Other pictures are written to the
+    folder ``pictures`` inside `folder`. The attribute ``data-cuts`` of a wide picture lists the
+    places between its panels at which the picture can be cut.
     """
 
     def put(match: re.Match[str]) -> str:
@@ -132,8 +133,8 @@ def with_picture_files(
 def cuts_of(still: Image.Image) -> list[float]:
     """Return the places between panels at which a wide still can be cut, as shares of its width.
 
-    The cuts are in the middle of blank columns, near the cuts into equal parts whose width is at
-    most 1.5 times their height.
+    Each cut is in the middle of blank columns, near a cut of the still into equal parts. The width
+    of these parts is at most 1.5 times their height.
     """
     width, height = still.size
     if width < 1.8 * height:
@@ -150,12 +151,13 @@ def cuts_of(still: Image.Image) -> list[float]:
 def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
     """Return HTML whose interactive pictures have their states and their scripts in files.
 
-    Each file is written once, to ``pictures`` in a folder, whose address is `to`. Pages of lessons
-    load a script that draws; pages of slides have only the data for their own script.
+    Each file is written once, to the folder ``pictures`` inside `folder`; the address of
+    ``pictures`` is `to`. Pages of lessons load a script that draws the pictures. Pages of slides
+    load only the data, because slides have their own script.
     """
 
     def kept(data: str) -> tuple[str, str]:
-        """Write data to a file; return its name, and the tag that loads it."""
+        """Write data to a file; return the name of the data and the tag that loads the file."""
         name = hashlib.sha256(data.encode()).hexdigest()[:16]
         text = f'(window.rbcourseStates ??= {{}})["{name}"] = {data};\n'
         _put(folder / "pictures" / f"{name}.js", text)
@@ -183,7 +185,7 @@ def _put(path: Path, text: str) -> None:
 
 
 def with_files(shown: str) -> str:
-    """Return a figure whose caption links its files; a still leads to its picture in full size."""
+    """Return a figure whose caption links to its files; a still links to its full-size picture."""
 
     def put(caption: re.Match[str]) -> str:
         name, endings = caption[1], caption[2].split(", ")
@@ -197,13 +199,13 @@ def with_files(shown: str) -> str:
 
 
 def with_lead(text: str, picture: str) -> str:
-    """Return the first cell of a lesson with its picture after the question."""
+    """Return the first cell of a lesson with a picture after the question."""
     question, table, rest = text.partition("\n| | |\n")
     return f'{question}\n<figure class="lead">{picture}</figure>\n{table}{rest}'
 
 
 def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells with the code before the first section, which imports, moved to the end."""
+    """Return cells with the imports, the code before the first section, moved to the end."""
     first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
     imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
     others = [cell for cell in cells if not any(cell is each for each in imports)]
@@ -212,7 +214,7 @@ def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
 
 
 def joined(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells with code that has no output together with the code that follows it."""
+    """Return cells in which code without output is joined with the code that follows it."""
     result: list[NotebookNode] = []
     for cell in cells:
         last = result[-1] if result else None
@@ -274,7 +276,7 @@ def prepared(
 
 
 def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
-    """Put the number of a lesson before its title, and links to run the lesson below the title."""
+    """Put the number of a lesson before its title, and buttons for its uses below the title."""
     title, _, rest = notebook.cells[0].source.partition("\n")
     slides = f"../slides/{Path(name).stem}.html"
     ways = [

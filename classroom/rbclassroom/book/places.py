@@ -1,4 +1,4 @@
-"""The addresses of the course's files in the book, which must not change."""
+"""The addresses of the course's files in the book; published addresses must not change."""
 
 import re
 import tomllib
@@ -20,7 +20,7 @@ _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
 
 
 def source_of(path: str) -> str | None:
-    """Return the source of the page that shows a file of the course, or None if there is none."""
+    """Return the source of the page that shows a file of the course, or None if none shows it."""
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
     if code := re.fullmatch(r"(rbcourse|classroom/rbclassroom)/([\w/]+)\.py", path):
@@ -30,7 +30,7 @@ def source_of(path: str) -> str | None:
 
 
 def full_name(module: str) -> str:
-    """Return the dotted name of a module or function, from its name within the package."""
+    """Return the full dotted name of a module or function, from its name within its package."""
     package = "rbclassroom" if module.split(".")[0] in CLASSROOM else "rbcourse"
     return f"{package}.{module}"
 
@@ -53,7 +53,7 @@ def has_page(module: str) -> bool:
 
 
 def anchor(key: str) -> str:
-    """Return the name of a row of the ledger within its page.
+    """Return the anchor of a row in the page of the ledger, from the key of the row.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def anchor(key: str) -> str:
 
 
 def fragment(heading: str) -> str:
-    """Return the part of an address that stands for a heading of a lesson, or for its number.
+    """Return the anchor of a section in the page of a lesson, from its heading or its number.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def to_test(test: str, page: str = "ledger.md") -> str:
 
 
 def to_tests(tests: list[str], page: str = "ledger.md") -> str:
-    """Return links to tests, in an element that opens if there are several."""
+    """Return links to tests; several links are folded."""
     links = "<br>".join(to_test(test, page) for test in tests)
     more = f"<details><summary>{len(tests)} tests</summary>{links}</details>"
     return more if len(tests) > 1 else links
@@ -115,7 +115,7 @@ def to_section(place: str, page: str = "ledger.md") -> str:
 
 
 def lesson_of(place: str) -> str:
-    """Return the address of a section of a lesson, within ``lessons``, from its name.
+    """Return the address of a section within the folder ``lessons``, from its name in the ledger.
 
     Examples
     --------
@@ -127,7 +127,7 @@ def lesson_of(place: str) -> str:
 
 
 def with_keys(text: str, page: str = "ledger.md") -> str:
-    """Return a text with the keys of the two sources as links to their rows of the ledger."""
+    """Return a text in which the keys of BK and RR link to their rows in the ledger."""
 
     def put(key: re.Match[str]) -> str:
         known = key[0] in WHAT or key[0] in MISPRINTS
@@ -137,10 +137,11 @@ def with_keys(text: str, page: str = "ledger.md") -> str:
 
 
 def relinked(text: str, path: str, page: str) -> str:
-    r"""Return Markdown of a file for a page of the book.
+    r"""Return the Markdown of a file, with its links and formulas adapted to a page of the book.
 
-    A link to a file that has a page leads to this page; other links lead to a copy in the folder
-    ``files``. The sign of a transpose becomes ``\top``, which the font of formulas contains.
+    A link to a file that has a page leads to this page. Any other link leads to a copy of its file
+    in the folder ``files``. The sign of a transpose becomes ``\top``, which the font of formulas
+    contains.
     """
     text = re.sub(r"\\mathsf(?: T|\{T\})", r"\\top", text)
 

@@ -1,4 +1,4 @@
-"""Polls of a lesson whose options can be chosen: an option shows the line on its own idea only."""
+"""Polls of a lesson as buttons: each option shows the explanation of its own idea only."""
 
 import re
 
@@ -10,10 +10,10 @@ _IDEA = re.compile(r"(?:(?<=[.?!)] )|^)(?=\*\*[A-Z]\*\*)", re.MULTILINE)
 
 
 def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
-    r"""Return the right letter of a poll, and the line on each letter, from the texts of an answer.
+    r"""Return the right letter of a poll, and the explanation of each letter, from its answer.
 
-    The line on the right letter is a paragraph that contains the letter in bold; the other lines
-    are items of a list.
+    The answer is given as the texts of its cells. A paragraph with the right letter in bold
+    explains this letter; the items of a list explain the other letters.
 
     Examples
     --------
@@ -23,7 +23,7 @@ def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
     outside = "\n\n".join(_ITEM.sub("", text) for text in texts)
     right = re.search(r"^(?:.* )?\*\*([A-Z])\*\*.*$", outside, re.MULTILINE)
     if not right:
-        raise ValueError("no paragraph of the answer contains its letter")
+        raise ValueError("no paragraph of the answer contains the right letter in bold")
     found = {right[1]: re.sub(r":$", ".", right[0].partition("*Look for")[0].strip())}
     for item in (match[1] for text in texts for match in _ITEM.finditer(text)):
         for idea in (part.strip() for part in _IDEA.split(item) if part):
@@ -32,7 +32,7 @@ def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
 
 
 def voted(cells: list[NotebookNode]) -> None:
-    """Turn the options of all polls in the cells of a lesson into buttons with their lines."""
+    """Turn the options of all polls in the cells of a lesson into buttons with explanations."""
     texts = [cell.source if cell.cell_type == "markdown" else "" for cell in cells]
     headings = [i for i, text in enumerate(texts) if text.startswith("#")] + [len(cells)]
     for k in headings[:-1]:
@@ -44,7 +44,7 @@ def voted(cells: list[NotebookNode]) -> None:
         right, lines = ideas(texts[start : headings[headings.index(start) + 1]])
         letters = {option[1] for option in _OPTION.finditer(texts[k])}
         if missing := letters - set(lines):
-            raise ValueError(f"{poll[1]}: the answer has no line on {', '.join(sorted(missing))}")
+            raise ValueError(f"{poll[1]}: the answer does not explain {', '.join(sorted(missing))}")
         cells[k].source = _with_buttons(texts[k], poll[1], right, lines)
 
 

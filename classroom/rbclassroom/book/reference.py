@@ -19,7 +19,7 @@ from rbclassroom.course.ledger import Entry
 
 
 def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the modules that have a page, under their headings; see `module`."""
+    """Return the modules that have a page, by the headings of their groups; see `module`."""
     groups = {title: names.split() for title, names in CONTENTS["modules"].items()}
     for room, title in CONTENTS["rooms"].items():
         folder = root / file_of(room).removesuffix(".py")
@@ -32,7 +32,7 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def module(name: str, root: Path) -> dict[str, Any]:
-    """Return a module's names, its summary, and its public members; the constants come last."""
+    """Return the names, the summary and the public members of a module, with constants last."""
     tree = ast.parse((root / file_of(name)).read_text(encoding="utf-8"))
     kinds = ast.FunctionDef | ast.ClassDef
     public = [node.name for node in tree.body if isinstance(node, kinds) and node.name[0] != "_"]
@@ -61,7 +61,7 @@ def _documented(tree: ast.Module) -> list[str]:
 
 
 def shown_code(root: Path) -> list[str]:
-    """Return the files that have a page in the folder ``code``; none answers a problem."""
+    """Return the files whose code has a page; tests that answer problems have no page."""
     packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
@@ -91,9 +91,10 @@ def coloured(source: str) -> str:
 
 
 def naming(root: Path) -> dict[str, list[str]]:
-    """Return the tests that name each function, such as ``so3.exp_so3``.
+    """Return the tests that use each function, by the name of the function.
 
-    The tests have their names in the ledger: ``test_so3.py::test_exp``.
+    Functions have names such as ``so3.exp_so3``. Tests are named as in the ledger:
+    ``test_so3.py::test_exp``.
     """
     found, exported = defaultdict(list), {}
     for init in (root / "rbcourse").rglob("__init__.py"):
@@ -116,7 +117,7 @@ def naming(root: Path) -> dict[str, list[str]]:
 
 
 def _imported(tree: ast.Module) -> dict[str, str]:
-    """Return the full names of the imports of a file, by the names that it uses."""
+    """Return the full names of the imports of a file, by the names in its code."""
     known = {}
     for node in tree.body:
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -127,7 +128,7 @@ def _imported(tree: ast.Module) -> dict[str, str]:
 
 
 def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return the tests that name a function: the tests of its module, or all if there are none."""
+    """Return the tests that use a function: those of its module if there are any, otherwise all."""
     *room, module, _ = name.split(".")
     own = "/".join([*room, f"test_{module}"])
     found = named.get(name, [])
@@ -135,7 +136,11 @@ def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
 
 
 def pictures_of(key: str, entry: Entry, figures: Iterable[Figure]) -> list[Figure]:
-    """Return the figures in the sections that teach an entry; for a figure, that figure itself."""
+    """Return the figures of an entry of the ledger.
+
+    For a figure of BK or RR, return the figures that reproduce it. For other entries, and for
+    figures that are not reproduced, return the figures in the sections that teach the entry.
+    """
     if figure := re.fullmatch(r"(BK|RR) Fig\. (\d+)", key):
         own = re.compile(rf"{ {'BK': 'paper', 'RR': 'report'}[figure[1]] }_fig{figure[2]}[a-z]?")
         if drawn := [each for each in figures if own.fullmatch(each.name)]:
@@ -144,7 +149,7 @@ def pictures_of(key: str, entry: Entry, figures: Iterable[Figure]) -> list[Figur
 
 
 def files_of(name: str, files: set[str]) -> list[str]:
-    """Return links to the files of a figure, and to tables that belong to several figures."""
+    """Return links to the files of a figure, and to tables that it shares with other figures."""
     found = {f"{name}.{ending}": ending.upper() for ending in ("png", "pdf", "csv", "gif")}
     table = re.compile(re.sub("(?<=[0-9])[a-z]$", "", name) + r"_.*\.csv")
     alone = (x for x in sorted(files) if x.endswith(".csv") and f"{x[:-4]}.png" not in files)
@@ -153,7 +158,7 @@ def files_of(name: str, files: set[str]) -> list[str]:
 
 
 def folded_answers(text: str) -> str:
-    """Return the page of questions, with the answers in elements that open."""
+    """Return the page of questions with folded answers."""
     answers = re.compile(r"^#### Answers\n(.*?)(?=^#|\Z)", re.MULTILINE | re.DOTALL)
     shown = r'<details class="answer"><summary>Answers</summary>\n\n\1\n</details>\n\n'
     return answers.sub(shown, text)

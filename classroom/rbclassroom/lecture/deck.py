@@ -16,12 +16,12 @@ from rbcourse.draw.display import ENGINE
 
 STATIC = Path(__file__).with_name("static")
 WIDE = 1.9
-"""A picture that is wider, over its height, is below its text."""
+"""A picture whose ratio of width to height exceeds this value is shown below its text."""
 IDEA = 26
-"""The most words of an idea behind an option, unless its first sentence has more."""
-_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # links to works, which are in the book
+"""The largest number of words in an idea behind an option, unless one sentence has more."""
+_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # keys of works, which only the book shows
 _LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to files of the course
-_TOGETHER = {  # patterns of texts without a line break
+_TOGETHER = {  # patterns of text that must stay on one line
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
     r" –": "\N{NO-BREAK SPACE}–",
     r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
@@ -42,7 +42,7 @@ _MARKDOWN.use(dollarmath_plugin, renderer=_math)
 
 
 def marked(text: str) -> str:
-    """Return Markdown as HTML, without a line break between a formula and the next mark."""
+    """Return Markdown as HTML; a formula stays on one line with the punctuation after it."""
     page: str = _MARKDOWN.render(_LINK.sub(r"\1", _KEYS.sub("", text)))
     for pattern, kept in _TOGETHER.items():
         page = re.sub(pattern, kept, page)
@@ -55,7 +55,7 @@ def _inline(text: str) -> str:
 
 
 def _words(slide: Slide) -> str:
-    """Return the text of a slide. All parts except the first, and all items of lists, are steps."""
+    """Return the text of a slide as HTML; later parts and items of lists appear one by one."""
     first, *later = slide.parts or [""]
     parts = [marked(first), *(f'<div class="fragment">{marked(part)}</div>' for part in later)]
     return "".join(parts).replace("<li>", '<li class="fragment">')
@@ -76,7 +76,7 @@ def _options(slide: Slide) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Return the first sentence of an idea, and further sentences up to `IDEA` words in total."""
+    """Return the first sentence of an idea, and further sentences up to `IDEA` words in all."""
     kept, *rest = re.split(r"(?<=[.?!])\s+(?=[A-Z$*(])", text.strip())
     while rest and words_of(f"{kept} {rest[0]}") <= IDEA:
         kept = f"{kept} {rest.pop(0)}"
@@ -107,7 +107,7 @@ def section(slide: Slide) -> str:
 
 
 def deck_page(deck: Deck) -> str:
-    """Return the page of a deck; its last column has the end, the exercises and the references."""
+    """Return the page of a deck; its last column has the last slide, exercises and references."""
     *parts, end = deck.sections
     stacks = [part for part in parts if part] + [[*end, *deck.behind]]
     joined = ("".join(map(section, part)) for part in stacks)
@@ -119,11 +119,11 @@ def deck_page(deck: Deck) -> str:
 
 
 def crib_page(deck: Deck) -> str:
-    """Return the crib sheet of a lecture: its run sheet with slides, and the right answers."""
+    """Return the crib sheet of a lecture: its run sheet, numbers of slides and right answers."""
     rows = rows_of(deck.sheet)
     starts = starts_of(deck.shown, rows)
     lines = [
-        "| min | slide | part | question and expected answer | late? skip |",
+        "| min | slide | part | question and expected answer | skip if late |",
         "|--|--|--|--|--|",
     ]
     for i, ((minute, part, ask, skip), start) in enumerate(zip(rows, starts, strict=True)):
@@ -142,10 +142,10 @@ def crib_page(deck: Deck) -> str:
 def write(
     decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = lambda page: page
 ) -> None:
-    """Write decks and crib sheets by their names, and all files that they share, to a folder.
+    """Write decks, crib sheets, and the files that all decks share, to a folder.
 
-    The function `ready` is applied to each page first: in the book, its stills are files that it
-    shares with the lesson.
+    The keys of `decks` are the names of the pages. The function `ready` is applied to each page of
+    slides first. In the book, it replaces stills by files that the slides share with the lesson.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, deck in decks.items():
@@ -156,7 +156,7 @@ def write(
     shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)
     for name in ("slides.css", "slides.js"):
         shutil.copyfile(STATIC / name, shared / name)
-    # reveal.js scales slides; a canvas must have as many pixels as it has on the screen
+    # reveal.js scales slides; with `window.pixels`, a canvas has as many pixels as on the screen
     _put(shared / "display.js", ENGINE.replace("window.devicePixelRatio", "window.pixels"))
 
 
@@ -167,7 +167,7 @@ def put_mathjax(folder: Path) -> None:
 
 
 def mathjax() -> Path:
-    """Return the file of MathJax."""
+    """Return the path of the file of MathJax."""
     found = distribution("sphinx-mathjax-offline")
     return Path(str(found.locate_file("sphinx-mathjax-offline/static/mathjax/tex-svg.js")))
 

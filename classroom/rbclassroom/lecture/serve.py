@@ -1,4 +1,4 @@
-"""Show the slides of a lesson, with votes by phone if wanted, or write them as PDF."""
+"""Show the slides of a lesson, with votes by phone if requested, or write them as PDF."""
 
 import argparse
 import asyncio
@@ -31,15 +31,15 @@ HOST = "127.0.0.1"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
 """Programs that print a page as PDF."""
 READY = "document.documentElement.dataset.ready"
-"""JavaScript: whether the slides are laid out."""
+"""The JavaScript expression that tells whether the slides are laid out."""
 
 
 def find_lesson(number: str, folder: Path) -> Path:
-    """Return the lesson of a number."""
+    """Return the path of the lesson with the given number."""
     paths = {path.name[:2]: path for path in lesson_paths(folder)}
     if number.zfill(2) not in paths:
-        there = ", ".join(paths) or "none; this is run in the folder of the course"
-        raise ValueError(f"There is no lesson {number}; there are: {there}.")
+        there = ", ".join(paths) or "none; run this in the folder of the course"
+        raise ValueError(f"There is no lesson {number}; the lessons are: {there}.")
     return paths[number.zfill(2)]
 
 
@@ -55,14 +55,14 @@ class _Here(RequestHandler):
 
 
 class Slides(_Here, StaticFileHandler):
-    """The files of the slides."""
+    """The handler of the files of the slides."""
 
 
 class Desk(_Here):
     """The handler that opens, watches and closes votes, for requests with the token."""
 
     def initialize(self, phones: Phones, token: str) -> None:
-        """Keep the votes and the token."""
+        """Store the votes and the token."""
         self.phones, self.token = phones, token
         code = segno.make(phones.url, micro=False)
         self.code = code.svg_inline(border=2, light="white", omitsize=True)
@@ -75,12 +75,12 @@ class Desk(_Here):
             raise HTTPError(403)
 
     def get(self) -> None:
-        """Answer with the state, the address and its code."""
+        """Answer with the state of the vote, and the address for phones with its QR code."""
         state = self.phones.ballot.state()
         self.finish({**state, "address": self.phones.url, "code": self.code})
 
     def post(self) -> None:
-        """Open the vote on a poll, ``{"poll": "Poll 1", "options": []}``, or close it, ``{}``."""
+        """Open a vote for ``{"poll": "Poll 1", "options": []}``, or close it for ``{}``."""
         asked = json_decode(self.request.body)
         ballot = self.phones.ballot
         try:
@@ -110,22 +110,22 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
         shown = f"{address}?token={token}" if phones else address
         print(f"{path.name} is shown at {shown}", flush=True)
         if Path(folder, "slides", f"{path.stem}_crib.html").exists():
-            print(f"Its crib is at {address.replace('.html', '_crib.html')}", flush=True)
+            print(f"Its crib sheet is at {address.replace('.html', '_crib.html')}", flush=True)
         if phones:
             print(f"Phones vote at {phones.url}", flush=True)
-        print("Stop it with Ctrl-C.", flush=True)
+        print("Press Ctrl-C to stop.", flush=True)
         if browser:  # some browsers return only when they are closed
             threading.Thread(target=webbrowser.open, args=[shown], daemon=True).start()
         await asyncio.Event().wait()
 
 
 async def print_pdf(address: str, pdf: Path) -> None:
-    """Print slides as PDF with a browser that has the engine of Chromium."""
+    """Print slides as PDF with a browser that is based on Chromium."""
     named = os.environ.get("BROWSER", "")
     found = next(filter(None, map(shutil.which, (named, *BROWSERS))), None)
     if not found:
-        wanted = f"no browser is found that prints; wanted is one of {', '.join(BROWSERS)}"
-        raise ValueError(f"{wanted}, or name it in the variable BROWSER")
+        wanted = f"no browser that prints was found; install one of {', '.join(BROWSERS)}"
+        raise ValueError(f"{wanted}, or name a browser in the variable BROWSER")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         words = ["--headless", "--disable-gpu", "--no-first-run", "--remote-debugging-port=0"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
@@ -137,7 +137,7 @@ async def print_pdf(address: str, pdf: Path) -> None:
             async with asyncio.timeout(120):
                 pdf.write_bytes(await _printed(Path(profile, "DevToolsActivePort")))
         except (TimeoutError, OSError, KeyError) as error:
-            raise ValueError(f"{found} has not printed the slides: {error!r}") from error
+            raise ValueError(f"{found} could not print the slides: {error!r}") from error
         finally:
             job.kill()
             await job.wait()
@@ -145,7 +145,7 @@ async def print_pdf(address: str, pdf: Path) -> None:
 
 
 async def _printed(told: Path) -> bytes:
-    """Return the page of a browser as PDF; the browser has told its port in a file."""
+    """Return the page of a browser as PDF; the browser writes its port to the file `told`."""
     while not (told.exists() and told.read_text().count("\n")):
         await asyncio.sleep(0.1)
     port = told.read_text().split()[0]
@@ -166,11 +166,14 @@ async def _printed(told: Path) -> bytes:
 
 
 def open_votes(address: str) -> Phones | None:
-    """Let phones vote at an address; by default, at the address of this machine in its network."""
+    """Return the server for votes at an address, by default the address of this machine.
+
+    Return None if `address` is empty and this machine has no network.
+    """
     try:
         address = address or find_address()
     except OSError:
-        print("No network was found: the class votes by show of hands.", flush=True)
+        print("No network was found, so the class votes by show of hands.", flush=True)
         return None
     try:
         return Phones(address)
@@ -179,14 +182,14 @@ def open_votes(address: str) -> Phones | None:
 
 
 def main() -> None:
-    """Show a lesson from the command line, in the folder of the course."""
+    """Run the command ``course.py lecture`` in the folder of the course."""
     parser = argparse.ArgumentParser(prog="course.py lecture")
-    parser.add_argument("lesson", help="its number: 01")
-    parser.add_argument("--no-browser", action="store_true", help="print the address only")
-    parser.add_argument("--pdf", action="store_true", help="write the slides as PDF; show nothing")
-    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="of this machine")
+    parser.add_argument("lesson", help="number of the lesson, such as 01")
+    parser.add_argument("--no-browser", action="store_true", help="only print the address")
+    parser.add_argument("--pdf", action="store_true", help="only write the slides as PDF")
+    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="let phones vote")
     words = parser.parse_args()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a script ignores Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # even if a script ignores Ctrl-C
     try:
         path = find_lesson(words.lesson, Path("notebooks"))
         phones = None if words.votes is None or words.pdf else open_votes(words.votes)

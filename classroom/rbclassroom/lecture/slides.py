@@ -17,11 +17,11 @@ from PIL import Image
 from rbclassroom.course.notebooks import living, split_sheet
 
 BEHIND = ("Exercises", "Misprints", "References")
-"""Sections that are behind the end, where a key leads."""
+"""Sections whose slides come after the last slide; the key E leads to them."""
 ROWS = 4
-"""Rows of a long table, or works, on one slide."""
+"""The largest number of table rows, or of works, on one slide."""
 TOGETHER = 85
-"""The most words of two exercises on one slide."""
+"""The largest number of words in two exercises that share a slide."""
 _ITEM = re.compile(r"^- ((?:\*\*[A-Z]\*\*(?:, | and )?)+)(?: · |[,:.]? ?)(.*(?:\n .*)*)", re.M)
 _PICTURE = re.compile(r"!\[\]\(([^)]+)\)\n*")
 _LIVING = re.compile(r"rbcourseDisplay\.revive\(image, (\{.*\})\);\s*\}</script>", re.S)
@@ -40,8 +40,8 @@ class Slide:
     """The content of a slide, and the notes for the lecturer.
 
     The `parts` are Markdown texts; each part after the first one appears at a key press. A row of
-    the run sheet names the slide by one of its `keys`. A poll has `options`; its verdict also has
-    the `ideas` behind them and the `right` letter.
+    the run sheet names the slide by one of its `keys`. The slide of a poll has `options`. The slide
+    of its verdict also has the `ideas` behind the options, and the `right` letter.
     """
 
     title: str
@@ -58,7 +58,7 @@ class Slide:
 
     @property
     def words(self) -> int:
-        """The number of words of its text; a formula within a text counts as one word."""
+        """The number of words of the slide's text; a formula in a sentence counts as one word."""
         return words_of("\n\n".join(self.parts))
 
 
@@ -73,7 +73,7 @@ def words_of(text: str) -> int:
 
 @dataclass
 class Deck:
-    """The slides of a lesson: those of each section, those behind the end, and the run sheet."""
+    """The slides of a lesson by sections, the slides after the end, and the run sheet."""
 
     title: str
     sections: list[list[Slide]]
@@ -82,7 +82,7 @@ class Deck:
 
     @property
     def shown(self) -> list[Slide]:
-        """The slides up to the end."""
+        """The slides up to the end of the lecture."""
         return [slide for section in self.sections for slide in section]
 
 
@@ -94,9 +94,9 @@ class _Reader:
         self.sections: list[list[Slide]] = [[]]
         self.behind: list[Slide] = []
         self.section = self.title = ""
-        self.keys: set[str] = set()  # for the next slide
-        self.ahead: list[str] = []  # its notes
-        self.poll: Slide | None = None  # whose verdict is to come
+        self.keys: set[str] = set()  # keys of the next slide
+        self.ahead: list[str] = []  # notes for the next slide
+        self.poll: Slide | None = None  # the poll whose verdict comes next
         self.answer = ""
 
     @property
@@ -104,14 +104,14 @@ class _Reader:
         return self.section.startswith(BEHIND)
 
     def put(self, slide: Slide) -> None:
-        """Add a slide to its section."""
+        """Add a slide to the current section."""
         slide.keys |= self.keys
         slide.notes = [*self.ahead, *slide.notes]
         self.keys, self.ahead = set(), []
         (self.behind if self.after else self.sections[-1]).append(slide)
 
     def put_text(self, wish: str, own: Picture | None = None) -> None:
-        """Add the slides of a text; the picture of its cell goes to the last of them."""
+        """Add the slides of a text; the last one shows `own`, the picture of the cell."""
         texts = [text.strip() for text in re.split(r"^---$", wish, flags=re.M)]
         for text in texts:
             borrowed = [self.borrowed(name) for name in _PICTURE.findall(text)]
@@ -123,7 +123,7 @@ class _Reader:
                 self.put(Slide(self.title, "plain", parts, borrowed[0] if borrowed else None))
 
     def borrowed(self, name: str) -> Picture:
-        """Return the picture of a cell of this lesson, or of another one, ``lesson/cell``."""
+        """Return the picture of a cell of this lesson, or of another lesson by ``lesson/cell``."""
         lesson, _, cell = name.rpartition("/")
         cells = self.notebook.cells
         if lesson:
@@ -135,7 +135,7 @@ class _Reader:
         return found[0]
 
     def note(self, text: str, ahead: bool = False) -> None:
-        """Add a note for the lecturer to the next slide or to the last one."""
+        """Add a note for the lecturer to the last slide, or with `ahead` to the next one."""
         slides = self.sections[-1]
         if text.strip() and not self.after and (ahead or slides):
             (self.ahead if ahead else slides[-1].notes).append(text.strip())
@@ -160,7 +160,7 @@ class _Reader:
         deck = Deck(self.sections[0][0].title, self.sections, self.behind, sheet)
         self.keys, self.section = {"homework"}, ""
         self.sections.append([])
-        self.note("E leads to exercises, misprints and references, behind this slide.", ahead=True)
+        self.note("E leads to exercises, misprints and references, after this slide.", ahead=True)
         self.put(Slide("Questions?", "end", self.sections[0][0].parts))
         plan(deck.shown, sheet)
         return deck
@@ -179,7 +179,7 @@ class _Reader:
             )
         self.put_text(wish, picture_of(cell, self.root))
         if key == "explorer":
-            self.note("M plays the picture; R shows its numbers, which stay after the verdict.")
+            self.note("M plays the picture. R shows its numbers, which stay on after the verdict.")
 
     def read_text(self, cell: NotebookNode, wish: str) -> None:
         heading = re.match(r"(#+) (.*)\n*", cell.source)
@@ -195,12 +195,12 @@ class _Reader:
         else:
             if self.section == "Recap":
                 wish = wish or text
-            leads = wish or heading or "*Look for" in text  # to the slide that comes
+            leads = wish or heading or "*Look for" in text  # the note belongs to the next slide
             self.note(text, ahead=bool(leads))
             self.put_text(wish)
 
     def begins(self, level: int, words: str, text: str, wish: str) -> bool:
-        """Begin the part with this heading; return whether the rest of its cell must be read."""
+        """Begin the part with this heading; return True if its cell needs no further reading."""
         self.answer = words if words.startswith("Answer") else ""
         if level == 1:
             question = re.search(r"\*\*The question of this \w+\.\*\* (.*)", text)
@@ -236,7 +236,7 @@ class _Reader:
         self.put(self.poll)
 
     def put_answer(self, poll: Slide, text: str, wish: str) -> None:
-        """Read a cell of an answer: evidence, or the list of ideas, which becomes the verdict."""
+        """Read a cell of an answer; a cell with the list of ideas also makes the verdict."""
         listed = [*_ITEM.finditer(text)]
         outside = re.search(r"(?:^|[^-] )\*\*([A-Z])\*\*(.*(?:\n.+)*)", _ITEM.sub("", text), re.M)
         if outside and not poll.right:
@@ -244,7 +244,7 @@ class _Reader:
             said = re.sub(r"^( it is)?[:., ]+", "", outside[2].partition("*Look for")[0])
             if outside[0].startswith("**"):
                 poll.ideas[poll.right] = said.strip()
-        for item in [*listed, *_ITEM.finditer(wish)]:  # an author's words replace those before
+        for item in [*listed, *_ITEM.finditer(wish)]:  # `wish` replaces the text of the cell
             said = re.sub(r"^(is|are) ", "", item[2].strip())
             poll.ideas |= dict.fromkeys(re.findall("[A-Z]", item[1]), said)
         if listed:
@@ -260,7 +260,7 @@ class _Reader:
         self.put_text(wish)
 
     def put_behind(self, text: str) -> None:
-        """Add slides behind the end; a long table or list needs several."""
+        """Add slides after the end; a long table or list is split over several slides."""
         text = text.strip()
         if text.startswith("<small>") and "\n" not in text:
             return
@@ -277,7 +277,7 @@ class _Reader:
             self.put_exercise(before)
 
     def put_exercise(self, text: str) -> None:
-        """Add an exercise, beside the one before it if both are short."""
+        """Add an exercise; it shares a slide with the exercise before it if both are short."""
         if self.title != self.section:
             text = f"**{self.title}.** {text}"
         last = self.behind[-1] if self.behind else None
@@ -305,7 +305,7 @@ def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
     explorer = re.search(r"explorers\.(\w+)_explorer\(\)", cell.source)
     page = "".join(o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {}))
     if explorer and (root / "figures" / "explorers" / f"{explorer[1]}.html").exists():
-        page = living(explorer[1], root)  # recorded, so that it moves without Python
+        page = living(explorer[1], root)  # a recorded explorer moves without Python
     image = re.search(r'<img [^>]*?alt="([^"]*)"[^>]*?src="data:image/png;base64,([^"]+)"', page)
     if not image:
         return None
@@ -324,7 +324,7 @@ def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
 
 
 def margins(still: Image.Image) -> tuple[float, ...]:
-    """Return the white margins of a still: left, top, right and bottom, as shares."""
+    """Return the white margins of a still, left, top, right, bottom, as shares of its size."""
     grey = still.convert("L")
     box = grey.point([255 * (x < 245) for x in range(256)]).getbbox() or (0, 0, *still.size)
     sides = box[0], box[1], still.width - box[2], still.height - box[3]
@@ -333,7 +333,7 @@ def margins(still: Image.Image) -> tuple[float, ...]:
 
 
 def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
-    r"""Return the rows of a run sheet: minute, part, question and answer, text that may be skipped.
+    r"""Return the rows of a run sheet: minute, part, question with answer, parts to skip.
 
     Examples
     --------
@@ -345,9 +345,9 @@ def rows_of(sheet: str) -> list[tuple[int, str, str, str]]:
 
 
 def named_in(slides: list[Slide], part: str) -> list[int]:
-    """Return the first slide of each name in a part of the run sheet, ``poll 1, explorer``.
+    """Return the number of the first slide for each name in `part`, such as ``poll 1, explorer``.
 
-    Other names are for the lecturer.
+    Names without a slide are left out; they are notes for the lecturer.
     """
     found = []
     for name in re.split(r"[,;] | and ", part.lower()):
@@ -362,7 +362,8 @@ def named_in(slides: list[Slide], part: str) -> list[int]:
 def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> list[int]:
     """Return the slide at which each row of a run sheet begins: the first slide that it names.
 
-    Homework is on the last slide; in a lesson of two lectures, also on the last slide of the first.
+    Homework belongs to the last slide. In a lesson of two lectures, it also belongs to the last
+    slide of the first lecture.
     """
     starts: list[int] = []
     later = [i for i, row in enumerate(rows[1:], 1) if row[0] < rows[i - 1][0]]
@@ -374,15 +375,16 @@ def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> lis
         start, *_ = [*named_in(slides, part), -1]
         if start < max([0, *starts[-1:]]):
             where = "no slide" if start < 0 else "a slide before that of the row above"
-            raise ValueError(f"run sheet, minute {minute}: {where} for {part!r}")
+            raise ValueError(f"run sheet, minute {minute}: {part!r} names {where}")
         starts.append(start)
     return starts
 
 
 def plan(slides: list[Slide], sheet: str) -> None:
-    """Give each slide its row of the run sheet, and its share of the time.
+    """Give each slide its row of the run sheet and its share of the time.
 
-    The question of a row is asked at the last slide that it names, and only after the vote.
+    The question of a row is asked at the last slide that the row names, but never before its vote
+    has ended.
     """
     rows = rows_of(sheet)
     starts = starts_of(slides, rows)
@@ -391,7 +393,7 @@ def plan(slides: list[Slide], sheet: str) -> None:
         end = minute + 1 if last else rows[i + 1][0]
         end = end if end >= minute else minute + 2  # the next row begins another lecture
         span = slides[starts[i] : len(slides) if last else max(starts[i + 1], starts[i] + 1)]
-        late = f" · late? skip {skip}" if skip else ""
+        late = f" · if late, skip {skip}" if skip else ""
         for slide in span:
             slide.seconds = 60 * (end - minute) / len(span)
             slide.notes.insert(0, f"*Minute {minute}–{end}* · {part}{late}")

@@ -14,14 +14,15 @@ from tornado.web import Application, HTTPError, RequestHandler
 TEMPLATES = Path(__file__).with_name("static")
 PORT = 8000
 MOST = 500
-"""How many phones, and how many connections at once, there may be."""
+"""The largest number of phones, and of connections at the same time."""
 
 
 class Ballot:
-    """The current vote: it is opened, takes votes, is closed, and then counted.
+    """The current vote on a poll, which is opened, closed and then counted.
 
-    For the vote that was opened last, `key` is a random name, `poll` the poll, and `options` the
-    text of each letter as HTML. It takes votes while it is `open`; then `counts` has their numbers.
+    `key`, `poll` and `options` belong to the vote that was opened last: a random name, the name of
+    its poll, and the text of each letter as HTML. Phones can vote while `open` is true. After the
+    vote, `counts` has the number of votes for each letter.
     """
 
     def __init__(self) -> None:
@@ -32,11 +33,11 @@ class Ballot:
         self.counts: Counter[str] = Counter()
 
     def begin(self, poll: str, options: list[str]) -> None:
-        """Open a vote on a poll; earlier counts are deleted."""
+        """Open a vote on a poll; its counts will replace the earlier ones."""
         if self.open:
             raise ValueError(f"The vote on {self.poll} is open; close it first.")
         if not 2 <= len(options) <= 26:
-            raise ValueError(f"A poll has 2 to 26 options, not {len(options)}.")
+            raise ValueError(f"options: 2 to 26 options are wanted, got {len(options)}")
         self.key = secrets.token_hex(8)
         self.poll = poll
         self.options = dict(zip(string.ascii_uppercase, options, strict=False))
@@ -45,17 +46,17 @@ class Ballot:
     def admit(self) -> str:
         """Return a random name for a phone, which is valid until the vote is closed."""
         if len(self._votes) == MOST:
-            raise ValueError(f"{MOST} phones are here already.")
+            raise ValueError(f"{MOST} phones have already joined.")
         phone = secrets.token_hex(16)
         self._votes[phone] = ""
         return phone
 
     def knows(self, phone: str) -> bool:
-        """Return whether this is the name of a phone in this vote."""
+        """Return whether `phone` is the name of a phone in this vote."""
         return phone in self._votes
 
     def vote(self, phone: str, letter: str) -> None:
-        """Take the vote of a phone that was admitted; it replaces an earlier vote of the phone."""
+        """Record the vote of an admitted phone; it replaces an earlier vote of the phone."""
         if letter not in self.options:
             raise ValueError(f"The options are {', '.join(self.options)}.")
         if not self.knows(phone):
@@ -67,36 +68,36 @@ class Ballot:
         return self._votes.get(phone, "")
 
     def close(self) -> None:
-        """Close the vote if it is open, count it, and delete the single votes."""
+        """If the vote is open, close it, count it, and delete the votes of the single phones."""
         if self.open:
             self.counts = Counter(filter(None, self._votes.values()))
             self._votes.clear()
             self.open = False
 
     def state(self) -> dict[str, Any]:
-        """Return the number of votes, and the counts when the vote is closed."""
+        """Return the poll, whether it is open, the number of votes, and if closed the counts."""
         counts = [] if self.open else [self.counts[letter] for letter in self.options]
         voters = sum(map(bool, self._votes.values())) if self.open else sum(counts)
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
 
 
 class WithBallot(RequestHandler):
-    """A handler that is made with a ballot."""
+    """A handler that has a ballot."""
 
     def initialize(self, ballot: Ballot) -> None:
-        """Keep the ballot."""
+        """Store the ballot."""
         self.ballot = ballot
 
 
 class Phone(WithBallot):
     """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
 
-    A cookie with a random number, which is new for each vote, identifies a phone. When the vote is
+    A random number in a cookie identifies a phone. Each vote has new cookies. When the vote is
     closed, the page shows the counts.
     """
 
     def set_default_headers(self) -> None:
-        """Restrict the page to this server; forbid storing and framing."""
+        """Restrict the page to content of this server; forbid browsers to store or frame it."""
         here = "default-src 'self' 'unsafe-inline'; form-action 'self'; frame-ancestors 'none'"
         self.set_header("Content-Security-Policy", here)
         self.set_header("Cache-Control", "no-store")
@@ -104,11 +105,11 @@ class Phone(WithBallot):
 
     @property
     def phone(self) -> str:
-        """The name of the phone in this vote, if it has one."""
+        """The name of the phone in this vote, or ``""`` if it has none."""
         return self.get_cookie(f"vote-{self.ballot.key}", "") or ""
 
     def get(self) -> None:
-        """Show the options, or the message that no vote is open."""
+        """Show the options of an open vote, the last result, or that no vote is open."""
         ballot = self.ballot
         if ballot.open and not ballot.knows(self.phone):
             try:
@@ -119,7 +120,7 @@ class Phone(WithBallot):
         self.render("phone.html", ballot=ballot, choice=ballot.vote_of(self.phone))
 
     def post(self) -> None:
-        """Take a vote, unless it comes too late, and show the page again."""
+        """Record a vote, unless it comes too late, and show the page again."""
         if self.ballot.knows(self.phone):
             try:
                 self.ballot.vote(self.phone, self.get_body_argument("choice"))
@@ -129,10 +130,10 @@ class Phone(WithBallot):
 
 
 class State(WithBallot):
-    """The vote that is open; a page that was made for another vote reloads itself."""
+    """The handler that tells which vote is open, so that pages of earlier votes reload."""
 
     def get(self) -> None:
-        """Answer with the key of the vote, or with nothing if the vote is closed."""
+        """Answer with the key of the vote, or with an empty text if the vote is closed."""
         self.finish(self.ballot.key if self.ballot.open else "")
 
 
@@ -147,7 +148,10 @@ class _Server(HTTPServer):
 
 
 def find_address() -> str:
-    """Return the address of this machine in its network, or raise an OSError; nothing is sent."""
+    """Return the address of this machine in its network, without sending anything.
+
+    Raise OSError if the machine has no network.
+    """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.connect(("192.0.2.1", 9))  # an address that is reserved for documentation
         address: str = probe.getsockname()[0]
@@ -155,7 +159,7 @@ def find_address() -> str:
 
 
 class Phones:
-    """The port at which phones vote, at one IPv4 address of this machine.
+    """The server for the votes of phones, at one IPv4 address of this machine.
 
     The port is 8000, or another one if 8000 is in use. `url` is the address of the page, and
     `ballot` has the votes.

@@ -1,1 +1,1 @@
-"""Python in the pages of the book: readers run cells of lessons and solve problem sets."""
+"""Python in the pages of the book, for cells of lessons and for problem sets."""

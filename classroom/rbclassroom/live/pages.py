@@ -1,4 +1,4 @@
-"""Marks in the pages of the book: cells that can be run, answers and tests of problem sets."""
+"""Mark the cells of lessons that can be run, and the answers and tests of problem sets."""
 
 import html
 import re
@@ -28,7 +28,7 @@ def left_out() -> dict[str, dict[str, str]]:
 def cells_of(notebook: NotebookNode) -> list[dict[str, str]]:
     """Return the code of a lesson in its order, without the explorers, which need Jupyter.
 
-    Code without an output belongs to the code that follows it, as in the pages.
+    Code without output is joined with the code that follows it, as in the pages.
     """
     found, last = list[dict[str, str]](), None
     for cell in notebook.cells:

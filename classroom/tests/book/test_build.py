@@ -103,12 +103,12 @@ def test_a_repository_must_be_an_owner_and_a_name(name, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["build", "--repository", name])
     with pytest.raises(SystemExit):
         build.main()
-    assert "owner/name wanted" in capsys.readouterr().err
+    assert "owner/name is wanted" in capsys.readouterr().err
 
 
 def test_a_folder_that_is_not_a_book_is_left_alone(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(ValueError, match="is not a book that was made here"):
+    with pytest.raises(ValueError, match="is not a book made by this command"):
         build.build(ROOT, tmp_path)
     assert (tmp_path / "mine.txt").read_text() == "mine"
 

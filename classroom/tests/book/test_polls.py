@@ -46,7 +46,7 @@ def test_each_option_has_its_own_line_and_the_right_one_agrees_with_the_slides(
 def test_a_poll_whose_answer_leaves_an_option_out_is_an_error():
     question = "### Poll 2\n\nWhich?\n\n- **A** · one\n- **B** · two"
     for answer, match in (
-        ("It is **A**.", "Poll 2: the answer has no line on B"),
+        ("It is **A**.", "Poll 2: the answer does not explain B"),
         ("- **A** is one.\n- **B** is two.", "no paragraph"),
     ):
         cells = [new_markdown_cell(text) for text in (question, "### Answer to poll 2", answer)]

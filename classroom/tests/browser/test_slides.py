@@ -125,9 +125,9 @@ def test_keys_change_the_display_and_the_dark_scheme_is_never_automatic(context)
         page.keyboard.press("?")
         help_ = page.locator(".r-overlay-help")
         for words in (
-            "Take a vote",
+            "Open or close a vote",
             "Dark or light",
-            "Behind the end",
+            "After the end",
             "Readouts",
             "Slide overview",
         ):

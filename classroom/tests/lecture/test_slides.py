@@ -189,7 +189,7 @@ def test_each_row_of_the_run_sheet_begins_at_its_slide_with_its_share_of_the_tim
     deck = tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=sheet)
     seconds = [slide.seconds for slide in deck.shown]
     assert seconds == [120, 200, 200, 200, 30, 30]
-    assert deck.shown[1].notes[0] == "*Minute 2–12* · poll 1, a vote · late? skip the second"
+    assert deck.shown[1].notes[0] == "*Minute 2–12* · poll 1, a vote · if late, skip the second"
     assert deck.shown[0].notes[:2] == ["*Minute 0–2* · question", "**Ask:** Ask."]
     crib = pages.crib_page(deck)
     assert re.findall(r"<td>(\d+)</td>\s*<td>(\d+)</td>", crib) == [
@@ -199,7 +199,7 @@ def test_each_row_of_the_run_sheet_begins_at_its_slide_with_its_share_of_the_tim
     ]
     assert "Poll 1: B" in crib
     for bad, why in {
-        "| 0 | a dance | | |\n": "no slide for 'a dance'",
+        "| 0 | a dance | | |\n": "'a dance' names no slide",
         "| 0 | recap | | |\n| 1 | poll 1 | | |\n": "before that of the row above",
     }.items():
         with pytest.raises(ValueError, match=why):

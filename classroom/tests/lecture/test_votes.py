@@ -26,11 +26,11 @@ def test_a_lesson_is_found_by_its_number(tmp_path, monkeypatch):
     path = lesson_at(tmp_path)
     assert find_lesson("01", path.parent) == find_lesson("1", path.parent) == path
     for number in ("2", "11", "plane", ""):
-        with pytest.raises(ValueError, match=f"no lesson {number}; there are: 01"):
+        with pytest.raises(ValueError, match=f"no lesson {number}; the lessons are: 01"):
             find_lesson(number, path.parent)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["lecture", "7"])
-    with pytest.raises(SystemExit, match=r"^There is no lesson 7; there are: 01\.$"):
+    with pytest.raises(SystemExit, match=r"^There is no lesson 7; the lessons are: 01\.$"):
         main()
 
 

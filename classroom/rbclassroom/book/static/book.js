@@ -2,7 +2,7 @@
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
 
-  // An option of a poll shows its own line and hides the others.
+  // An option of a poll shows its own explanation and hides the others.
   for (const poll of all(".poll")) {
     const buttons = all("button", poll), line = (button) => button.closest("li").querySelector(".idea");
     for (const button of buttons) {
@@ -38,7 +38,7 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Formulas that are too wide are made smaller, to 80 % at least; wider ones scroll, also by keys.
+  // Formulas that are too wide shrink, down to 80 %. Formulas that are still too wide scroll, also by keys.
   const fit = () => {
     for (const formula of all('mjx-container[display="true"]')) {
       formula.style.fontSize = "";
@@ -55,13 +55,13 @@ addEventListener("DOMContentLoaded", () => {
   };
   addEventListener("load", () => Promise.resolve(window.MathJax?.startup?.promise).then(join).then(fit));
   addEventListener("resize", fit);
-  addEventListener("toggle", fit, { capture: true }); // something folded is open now
+  addEventListener("toggle", fit, { capture: true }); // a folded element was opened or closed
 
-  // The list of pages is scrolled to the current page.
+  // Scroll the list of pages to the current page.
   const current = all(".sidebar-tree .current-page").at(-1), list = document.querySelector(".sidebar-scroll");
   if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
 
-  // The panels of a wide still, in a column and of equal size; CSS shows them on phones.
+  // Add the panels of a wide still in a column, all at the same scale; CSS shows them on phones.
   for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
     const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
     const shares = ends.slice(1).map((end, k) => end - ends[k]), [wide, high] = still.style.aspectRatio.split("/").map(Number);
@@ -76,17 +76,18 @@ addEventListener("DOMContentLoaded", () => {
     still.after(panels);
   }
 
-  // "drag to turn" disappears when the reader drags.
+  // The hint "drag to turn" disappears when the reader touches the picture.
   addEventListener("pointerdown", ({ target }) => target.closest("figure")?.classList.add("touched"));
 
-  // The picture of the start page plays once when it is visible; "more" hides all controls except its slider.
+  // The picture of the start page plays once when it becomes visible. Its controls, except the slider, are
+  // folded under "More".
   const hero = document.querySelector("figure.hero");
   const ready = new MutationObserver(() => {
     const canvas = hero.querySelector("canvas"), slider = all("input", hero).at(-1);
     if (!canvas || !slider) return;
     ready.disconnect();
     const panel = slider.parentNode.parentNode, more = document.createElement("details");
-    more.innerHTML = "<summary>More: turn it, change it, numbers</summary>";
+    more.innerHTML = "<summary>More: turn the picture, change it, see its numbers</summary>";
     more.append(...[...panel.children].filter((child) => child !== slider.parentNode), ...all("figcaption", hero));
     panel.append(more);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) return;
@@ -96,10 +97,10 @@ addEventListener("DOMContentLoaded", () => {
       seen.disconnect();
       button.click();
       const end = () => {
-        if (button.textContent === "▶") return; // somebody has paused it
+        if (button.textContent === "▶") return; // the reader has paused the picture
         if (slider.value !== slider.max) return requestAnimationFrame(end);
         button.click();
-        slider.value = slider.max / 2; // where the cubes differ
+        slider.value = slider.max / 2; // the cubes differ at this time
         slider.dispatchEvent(new Event("input", { bubbles: true }));
       };
       end();
@@ -108,7 +109,7 @@ addEventListener("DOMContentLoaded", () => {
   });
   if (hero) ready.observe(hero, { childList: true, subtree: true });
 
-  // Excerpts below the results of a search, from the words of all pages.
+  // Show an excerpt below each search result, from the words of all pages.
   const results = document.querySelector("#search-results");
   if (!results) return;
   const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/).filter(Boolean);

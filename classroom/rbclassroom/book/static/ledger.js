@@ -1,4 +1,5 @@
-// The filter of the ledger shows the rows whose name it is, or else the rows that contain it, or else the rows that contain all its words.
+// Show the rows of the ledger whose name equals the filter. If there are none, show the rows with a cell that
+// contains the filter; if there are none either, show the rows that contain all its words.
 addEventListener("DOMContentLoaded", () => {
   const filter = document.getElementById("filter"), found = document.getElementById("found");
   const plain = (text) => text.toLowerCase().replace(/\bfigures?\b/g, "fig.").replace(/\s+/g, " ").trim();

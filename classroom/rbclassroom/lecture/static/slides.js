@@ -21,11 +21,11 @@ const fit = (figure) => {
   const sides = [top * high, right * width, bottom * high, left * width].map((side) => `${side}px`);
   seen.style.margin = sides.map((side) => `-${side}`).join(" ");
   seen.style.clipPath = `inset(${sides.join(" ")} round 14px)`;
-  seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene turns out of its margins
+  seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// A slide without pictures has larger text if it fits. Text that is too long is made smaller, to 80 %
-// at least, and a formula that is wider than its column to 62 % at least.
+// A slide without pictures has larger text if the text fits. Text that is too long shrinks, down to 80 %.
+// A formula that is wider than its column shrinks, down to 62 %.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
   const formulas = all("mjx-container[display=true]", section);
@@ -41,11 +41,11 @@ const settle = (section) => {
   for (set(size); over() && size > 36; size = size > 45 ? 45 : size - 1) set(size > 45 ? 45 : size - 1);
 };
 
-// A picture becomes interactive when its slide is the next one; on paper, pictures are stills.
+// Pictures of the current and of the next slide become interactive; on paper, pictures are stills.
 const revive = async (section) => {
   for (const script of section ? all("figure > script[type]", section) : []) {
     const figure = script.parentElement, image = figure.querySelector("img"), own = JSON.parse(script.text);
-    const data = window.rbcourseStates?.[own] ?? own; // the book has them in files
+    const data = window.rbcourseStates?.[own] ?? own; // the book keeps the data in files
     for (const each of all("script", figure)) each.remove();
     figure.dataset.ratio = data.size[0] / data.size[1];
     await rbcourseDisplay.revive(image, data);
@@ -57,16 +57,16 @@ const revive = async (section) => {
 
 const keys = {
   D: ["Dark or light", () => document.documentElement.classList.toggle("dark")],
-  E: ["Behind the end: exercises, references", () => {
+  E: ["After the end: exercises, references", () => {
     const end = all(".slides > section").length - 1, { h, v } = Reveal.getIndices();
     Reveal.slide(end, h === end && v === 0 ? 1 : 0);
   }],
   M: ["Move: play or pause a picture", () => Reveal.getCurrentSlide().querySelector("figure [aria-label='play or pause']")?.click()],
-  R: ["Readouts of a picture", () => all("figure:has(input)", Reveal.getCurrentSlide()).forEach((figure) => {
+  R: ["Readouts of a picture: show or hide", () => all("figure:has(input)", Reveal.getCurrentSlide()).forEach((figure) => {
     figure.classList.toggle("quiet");
     fit(figure);
   })],
-  T: ["Take a vote, or close it", () => {
+  T: ["Open or close a vote", () => {
     const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
     const options = all(".option > div", section).map((option) => {
       const copy = option.cloneNode(true);
@@ -99,7 +99,7 @@ const ask = async (body) => {
 
 const show = ({ currentSlide }) => {
   if (printing) return;
-  if (currentSlide.matches(".verdict")) { // readouts may be seen from now on
+  if (currentSlide.matches(".verdict")) { // show readouts from now on
     const before = all("section", currentSlide.parentElement);
     for (const section of before) section.dataset.told = "yes";
     for (const figure of before.flatMap((section) => all("figure.quiet", section))) figure.classList.remove("quiet");
@@ -113,18 +113,18 @@ const begin = async () => {
   await MathJax.startup.promise;
   await Promise.all([...document.fonts].map((font) => font.load()));
   await Promise.all(all("figure > img").map((image) => image.decode()));
-  document.body.classList.add("settling"); // all slides are laid out; Reveal hides all but one
+  document.body.classList.add("settling"); // lay out all slides; later Reveal hides all except one
   await MathJax.typesetPromise(sections);
   sections.forEach(settle);
   all("figure").forEach(fit);
-  all("aside mjx-assistive-mml").forEach((part) => part.remove()); // the speaker view lacks their style
+  all("aside mjx-assistive-mml").forEach((part) => part.remove()); // the speaker view has no style for these
   document.body.classList.remove("settling");
   await Reveal.initialize({
     width: 1920, height: 1080, margin: 0, minScale: 0.1, maxScale: 4, center: false, display: "flex",
     progress: false, controls: false, hash: true, slideNumber: "c/t", navigationMode: "linear",
     transition: "none", backgroundTransition: "none", pdfSeparateFragments: false, pdfMaxPagesPerSlide: 1,
     totalTime: 50 * 60, plugins: [RevealNotes],
-    keyboardCondition: (event) => !event?.target?.closest?.("figure"), // a slider has its own keys
+    keyboardCondition: (event) => !event?.target?.closest?.("figure"), // a slider uses keys itself
   });
   for (const [key, [description, act]] of Object.entries(keys)) {
     Reveal.addKeyBinding({ keyCode: key.charCodeAt(0), key, description }, act);
@@ -134,7 +134,7 @@ const begin = async () => {
   Reveal.on("resize", sharpen);
   Reveal.on("slidechanged", show);
   show({ currentSlide: Reveal.getCurrentSlide() });
-  // a remote control changes slides even after a slider was moved; some keyboards have "?" on another key
+  // A remote control changes slides even after a slider was moved. Some keyboards have "?" on another key.
   addEventListener("keydown", (event) => {
     const act = { PageDown: "next", PageUp: "prev", "?": "toggleHelp" }[event.key];
     if (!act || (event.key !== "?" && !event.target.closest?.("figure"))) return;

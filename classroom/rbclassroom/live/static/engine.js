@@ -1,17 +1,17 @@
-// The interface between the pages and Python: start, run and stop. Nothing is loaded before a start.
+// The interface between the pages and Python: start, run and stop. Nothing is loaded before the first start.
 window.rbcourseEngine = (() => {
   const folder = document.currentScript.src.replace(/[^/]*$/, "");
   const facts = FACTS;
   let draws = false, worker, started, hear, finish, leave, turn = Promise.resolve();
 
-  // The reason why Python cannot run here, or an empty text.
+  // Return the reason why Python cannot run here, or an empty text.
   function missing() {
-    if (location.protocol === "file:") return "This page was opened from a file. Python runs in it when a web server sends it, as on the web, or by: python3 course.py book --live --serve";
+    if (location.protocol === "file:") return "This page was opened from a file. Python runs only in a page from a web server. Open the book on the web, or serve it by: python3 course.py book --live --serve";
     const old = ["Worker", "WebAssembly", "DecompressionStream", "indexedDB"].find((name) => !window[name]);
     return old ? `This browser is too old to run Python: it has no ${old}.` : "";
   }
 
-  // Load Python once; show("loaded", bytes) shows how much has been loaded.
+  // Load Python once; show("loaded", bytes) reports the number of bytes loaded so far.
   function start(show) {
     if (!started) hear = show;
     started ??= new Promise((resolve, reject) => {
@@ -34,8 +34,8 @@ window.rbcourseEngine = (() => {
     return started;
   }
 
-  // Run a cell, { above, source, files }, when earlier cells are done. Return "done" or "stopped";
-  // its outputs are shown by show(kind, content), of the kinds text, html, hint, error and clear.
+  // Run a cell, { above, source, files }, when earlier runs are done. Return "done" or "stopped".
+  // show(kind, content) shows the outputs; the kinds are text, html, hint, error and clear.
   function run(cell, show) {
     draws ||= /\bplt\./.test(cell.source);
     const next = turn.then(() => start(show)).then((how) => how === "stopped" ? how : new Promise((resolve, reject) => {

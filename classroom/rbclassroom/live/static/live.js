@@ -1,4 +1,4 @@
-// Editors and outputs for the cells of lessons and for problem sets, whose answers are stored.
+// Editors and outputs for cells of lessons and for problem sets. The browser stores the answers to problems.
 addEventListener("DOMContentLoaded", () => {
   const engine = window.rbcourseEngine, about = engine.facts, megabytes = (bytes) => (bytes / 1e6).toFixed(1);
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
@@ -14,7 +14,7 @@ addEventListener("DOMContentLoaded", () => {
   const page = () => (data ??= fetch(`${engine.folder}pages/${name}.json`).then((answer) => answer.json())
     .catch((error) => { data = null; throw error; }));
 
-  // A text area, which becomes CodeMirror if the page can run code; edit(text) replaces its text.
+  // Make a text area, which becomes a CodeMirror editor if it has code to run; edit(text) replaces its text.
   function editor(text, label, changed, go) {
     const area = make("textarea", { value: text, ariaLabel: label, spellcheck: !go });
     const part = make("div", { className: "editor" }, area);
@@ -37,7 +37,7 @@ addEventListener("DOMContentLoaded", () => {
             keymap.of([...more.defaultKeymap, ...more.historyKeymap, more.indentWithTab]),
             more.history(), more.lineNumbers(), more.bracketMatching(), more.indentOnInput(), python(), EditorView.lineWrapping,
             more.indentUnit.of("    "), more.syntaxHighlighting(more.classHighlighter),
-            EditorView.contentAttributes.of({ "aria-label": `${label}; Escape, then Tab leaves it` }),
+            EditorView.contentAttributes.of({ "aria-label": `${label}; to leave it, press Escape, then Tab` }),
             EditorView.updateListener.of((update) => update.docChanged && changed(view.state.doc.toString())),
           ],
         }),
@@ -46,7 +46,7 @@ addEventListener("DOMContentLoaded", () => {
       if (focused) view.focus();
       return view;
     }
-    if (go) area.onfocus = () => upgrade().catch(() => {}); // the text area serves as well
+    if (go) area.onfocus = () => upgrade().catch(() => {}); // without CodeMirror the text area is used
     const edit = (now) => {
       if (view) view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: now } });
       else { area.value = now; grow(); }
@@ -55,7 +55,7 @@ addEventListener("DOMContentLoaded", () => {
     return { part, upgrade, edit };
   }
 
-  // The element that shows outputs.
+  // Make the element that shows outputs.
   function outputs() {
     const part = make("div", { className: "outputs", role: "status" });
     let text;
@@ -79,7 +79,7 @@ addEventListener("DOMContentLoaded", () => {
     return { part, show };
   }
 
-  // Insert HTML with unique names, and run its scripts.
+  // Return HTML as an element whose names are unique and whose scripts run.
   function revived(html) {
     count += 1;
     for (const [, id] of html.matchAll(/<img id="(\w+)"/g)) html = html.replaceAll(id, `${id}_${count}`);
@@ -88,15 +88,15 @@ addEventListener("DOMContentLoaded", () => {
     return part;
   }
 
-  // Run a cell and show its outputs below its editor; buttons show its state and stop it. Return whether
-// it ran without an error.
+  // Run a cell and show its outputs below its editor. The buttons show its state and can stop it. Return
+  // whether it ran without an error.
   async function perform(read, bar, shown, show) {
     const wrong = engine.missing(), [go, halt] = all("button", bar);
     show("clear");
     shown.classList.remove("stale");
     if (wrong) return show("error", wrong), false;
     let whole = true;
-    engine.start(show).catch(() => {}); // run tells
+    engine.start(show).catch(() => {}); // engine.run reports the error
     go.disabled = true;
     halt.hidden = false;
     show("loading", "Running …");
@@ -107,12 +107,12 @@ addEventListener("DOMContentLoaded", () => {
     };
     try {
       if ((await engine.run(await read(), first)) === "stopped") first("error", "Stopped.");
-      document.body.classList.add("python-is-there"); // buttons tell no size any more
+      document.body.classList.add("python-is-there"); // the buttons no longer show a size
     } catch (error) {
-      first("error", `Python has ended: ${error.message}. Run it again to start afresh.`);
+      first("error", `Python has ended: ${error.message}. Run the cell again to restart Python.`);
     }
     shown.querySelector(".loading")?.remove();
-    if (!shown.firstChild) show("text", "It ran; it has no output.");
+    if (!shown.firstChild) show("text", "The cell ran without output.");
     go.disabled = false;
     halt.hidden = true;
     return whole;
@@ -128,13 +128,13 @@ addEventListener("DOMContentLoaded", () => {
     if (told) return;
     told = true;
     part.before(make("details", { className: "differences" },
-      make("summary", { textContent: `Python ${about.python} in your browser: how it differs` }),
-      `Integers have 32 bits, so larger ones overflow; divisions by zero give no warning; there are no threads and no processes. NumPy is ${about.numpy}. `
-      + "A cell runs after the statements above it that it needs, as they stand on this page."));
+      make("summary", { textContent: `How Python ${about.python} in your browser differs` }),
+      `Integers have 32 bits, so larger ones overflow. Divisions by zero give no warning. Programs cannot start threads or processes. The version of NumPy is ${about.numpy}. `
+      + "Before a cell runs, Python runs the statements above that the cell needs, as this page shows them."));
   }
 
-  // Lessons: "Try it" turns a cell into an editor and runs it. The stored output stays.
-  const texts = new Map(); // of cells that have been edited
+  // Lessons: "Try it" turns a cell into an editor and runs it. The stored output is kept.
+  const texts = new Map(); // the texts of edited cells, by id
   for (const part of all(".cell[class*=tag_try-]")) {
     const id = /tag_try-([\w-]+)/.exec(part.className)[1], folded = part.querySelector("details");
     const start = button("Try it", async () => {
@@ -186,8 +186,8 @@ addEventListener("DOMContentLoaded", () => {
   const tell = (downloaded) => {
     const open = [...answers.values()].filter((answer) => answer.isOpen()).length;
     status.textContent = downloaded
-      ? `Your answers are in the file ${name}.ipynb that you downloaded, and in this browser.` + (open ? ` ${open} of ${answers.size} are empty, or not checked as right.` : "")
-      : "Your answers are kept in this browser, on this machine only, until you clear its data. Download them to hand them in or to move them.";
+      ? `Your answers are in the file ${name}.ipynb that you downloaded, and in this browser.` + (open ? ` ${open} of ${answers.size} answers are empty or have not passed the check.` : "")
+      : "Your answers are kept in this browser, on this machine only, until you clear its data. Download them to hand them in or to move them to another machine.";
   };
   const keep = async (id, text) => {
     try {
@@ -195,7 +195,7 @@ addEventListener("DOMContentLoaded", () => {
       await done((await kept()).put(false, key("downloaded")));
       tell(false);
     } catch {
-      status.textContent = "This browser keeps nothing, perhaps because the window is private. Download your answers before you close it.";
+      status.textContent = "This browser does not keep your answers, perhaps because the window is private. Download them before you close the window.";
     }
   };
   const changed = (id) => (text) => {
@@ -207,7 +207,7 @@ addEventListener("DOMContentLoaded", () => {
     keep(id, text);
     others?.postMessage([id, text]);
   };
-  const put = (id, text) => { // an answer that is kept already
+  const put = (id, text) => { // show an answer that is already stored
     const answer = answers.get(id);
     if (answer.text === text) return;
     answer.text = text;
@@ -235,7 +235,7 @@ addEventListener("DOMContentLoaded", () => {
     };
     const { part: edited, edit } = editor(stub, `Answer to ${heading}`, changed(id), words ? null : go);
     const reset = button("Reset", () => confirm("Delete this answer and begin again?") && edit(stub));
-    const bar = words ? make("div", { className: "bar" }, "Graded by a person. ", reset) : toolbar("Check", go, reset);
+    const bar = words ? make("div", { className: "bar" }, "A person grades this answer. ", reset) : toolbar("Check", go, reset);
     if (part.nextElementSibling?.matches(".cell:not([class*=tag_])")) bar.append("The picture appears here, too.");
     answers.set(id, { text: stub, stub, edit, shown, isOpen: () => words ? !answers.get(id).text.trim() : !shown.classList.contains("right") });
     part.classList.add("live");
@@ -245,10 +245,10 @@ addEventListener("DOMContentLoaded", () => {
       if (typeof text === "string") put(id, text);
       if (text === undefined || text !== right || answers.get(id).text !== text) return;
       shown.className = "outputs right";
-      show("text", "As it should be, when you checked it last.");
+      show("text", "This answer passed your last check.");
     }, () => {}));
   }
-  for (const part of all(".cell[class*=tag_test]")) part.hidden = true; // "Check" runs it
+  for (const part of all(".cell[class*=tag_test]")) part.hidden = true; // "Check" runs the test
 
   async function download() {
     const { notebook } = structuredClone(await page());
@@ -263,7 +263,7 @@ addEventListener("DOMContentLoaded", () => {
   }
   async function open(file) {
     const cells = JSON.parse(await file.text()).cells.filter((cell) => answers.has(cell.metadata.nbgrader?.grade_id));
-    if (!cells.length) throw new Error("it has no answer to this problem set");
+    if (!cells.length) throw new Error("it contains no answer to this problem set");
     if (!confirm(`Replace the answers on this page by those in ${file.name}?`)) return;
     for (const cell of cells) answers.get(cell.metadata.nbgrader.grade_id).edit([cell.source].flat().join(""));
   }

@@ -13,7 +13,7 @@ function tell(kind, content = "") {
   if (kind !== "text") self.postMessage([kind, content]);
 }
 
-// Downloaded bytes are counted, and compressed files are unpacked.
+// Count the downloaded bytes, and unpack compressed files.
 let loaded = 0, told = 0;
 const counter = () => new TransformStream({
   transform(chunk, out) {
@@ -68,7 +68,7 @@ async function start() {
   buffer("rbcourse.zip");
   const code = fetch(`${here}pyodide.asm.js`), kept = memory("readonly", (store) => store.get(facts.pyodide));
   importScripts(`${here}pyodide.js`);
-  importScripts(URL.createObjectURL(await (await code).blob())); // or Pyodide would load it unpacked
+  importScripts(URL.createObjectURL(await (await code).blob())); // otherwise Pyodide would load the file that is not packed
   const env = { HOME: "/home/pyodide", MPLBACKEND: "agg", RBCOURSE_FIGURES: "" }, image = await kept;
   const python = await loadPyodide({ indexURL: here, env, ...(image ? { _loadSnapshot: image } : { _makeSnapshot: true }) });
   if (!image) { const made = python.makeMemorySnapshot(); memory("readwrite", (store) => store.put(made, facts.pyodide)); }
@@ -80,7 +80,7 @@ async function start() {
 }
 const ready = start();
 ready.then(() => tell("ready"), async (error) => {
-  await memory("readwrite", (store) => store.clear()); // or what is damaged would stay
+  await memory("readwrite", (store) => store.clear()); // otherwise a damaged memory would stay
   tell("failed", String(error.message ?? error));
 });
 
