@@ -46,7 +46,7 @@ def find_lesson(number: str, folder: Path) -> Path:
 class _Here(RequestHandler):
     """A handler that answers only requests to the IP address of this machine, never to a host name.
 
-    Pages of other sites cannot send such requests.
+    This refuses other sites whose host names lead to this machine (DNS rebinding).
     """
 
     def prepare(self) -> None:
