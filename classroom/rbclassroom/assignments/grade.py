@@ -59,11 +59,13 @@ def grade(names: Iterable[str], assignments: Path, require_box: bool = False) ->
     jobs, tables = [job for name in chosen for job in _prepare(name, assignments)], []
     rows: dict[Job, Row] = {}
     for (name, student), row in _graded(jobs, assignments, not why):
-        said = [f"graded, {row['total']} of {row['maximum']}"] if "total" in row else []
-        said += [f"by hand: {row['by hand']}"] if row.get("by hand") else []
-        print(f"{name}, {student}:", "; ".join([*said, row["remarks"]]), flush=True)
+        said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
+        said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
+        print(f"{name}, {student}:", "; ".join(filter(None, [*said, row["remarks"]])), flush=True)
         start = {"student": student, "set": name, "boxed": "no" if why else "yes"}
         rows[name, student] = start | row
+        if row.get("late") == "" and f"{student}, {name}" in _perhaps_late(assignments):
+            rows[name, student]["late"] = "perhaps"
         own = [job for job in jobs if job[0] == name]
         if rows.keys() >= {*own}:
             lines = [rows[job] for job in own]
@@ -133,11 +135,8 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
 
     The reason is the second item of each pair.
     """
-    report = assignments / "submitted" / "report.csv"
-    if not report.exists():
-        return
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
-    for row in csv.DictReader(io.StringIO(report.read_text("utf-8-sig"), newline="")):
+    for row in _report(assignments):
         what, student = row["what"], row["what"].removesuffix(f", {name}")
         if row["list"] == "missing" and student != what and student not in students:
             yield student, "no file was collected"
@@ -145,6 +144,19 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
             named = {each for each in sets if each in what.casefold()}
             if name in named or not named:
                 yield what, f"not collected: {row['why']}"
+
+
+def _perhaps_late(assignments: Path) -> set[str]:
+    """Return the submissions, ``STUDENT, SET``, that `collect` listed as perhaps late."""
+    rows = (row for row in _report(assignments) if row["list"] == "late")
+    return {row["what"] for row in rows if row["why"].startswith("perhaps")}
+
+
+def _report(assignments: Path) -> list[dict[str, str]]:
+    """Return the rows of the report of `collect`."""
+    report = assignments / "submitted" / "report.csv"
+    text = report.read_text("utf-8-sig") if report.exists() else ""
+    return list(csv.DictReader(io.StringIO(text, newline="")))
 
 
 def course_config(name: str, assignments: Path) -> Config:
@@ -218,20 +230,40 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     done = run_step(GenerateFeedback, config)
     if done["success"]:
         page = folder / "feedback" / student / name / f"{name}.html"
-        page.write_text(_with_titles(page.read_text("utf-8"), graded), "utf-8")
+        with Gradebook(CourseDirectory(config=config).db_url) as gradebook:
+            to_do = _to_do(gradebook.find_submission_notebook(name, name, student).grades)
+        page.write_text(_with_titles(page.read_text("utf-8"), graded, to_do), "utf-8")
     else:
         remarks.append(f"no feedback was written: {last_line(done)}")
     return remarks
 
 
-def _with_titles(page: str, graded: Path) -> str:
-    """Return a page of feedback whose list has titles of problems in place of "Test cell"."""
-    cells, names = nbformat.read(graded, as_version=4).cells, {}
+def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
+    """Return a page of feedback whose list has titles of problems in place of "Test cell".
+
+    It says which answers, `to_do`, nobody has graded yet.
+    """
+    cells, names = nbformat.read(graded, as_version=4).cells, dict[str, str]()
     for at, cell in enumerate(cells):
         title = re.sub(r" \(\d+ points?\)$", "", locked_cells.title_of(cells, at))
-        names[grade_id(cell)] = f"{title}, {'in words' if is_answer(cell) else 'tests'}"
+        names[f"comment-{grade_id(cell)}"] = f"{title}, comment"
+        if locked_cells.marks_of(cell).get("grade"):
+            name = f"{title}, {'in words' if is_answer(cell) else 'tests'}"
+            same = sum(other.startswith(name) for other in names.values())
+            names[grade_id(cell)] = f"{name} {same + 1}" if same else name
     link = re.compile(r'(<a href="#([\w-]+)">)[^<]*(?=</a>)')
-    return link.sub(lambda m: m[1] + html.escape(names[m[2]]) if m[2] in names else m[0], page)
+    page = link.sub(lambda m: m[1] + html.escape(names[m[2]]) if m[2] in names else m[0], page)
+    for key in to_do:
+        page = re.sub(
+            rf'(<a href="#{key}">[^<]*</a>) \(Score: [^)]*\)', r"\1 (not graded yet)", page
+        )
+        page = re.sub(rf'(<a name="{key}">.*?)Score: [\d. /]+', r"\1Not graded yet ", page, 1, re.S)
+    return page
+
+
+def _to_do(grades: Iterable[Any]) -> list[str]:
+    """Return the names of the answers that are still to be graded by hand."""
+    return [g.name for g in grades if g.auto_score is None and g.manual_score is None]
 
 
 def _words(path: Path) -> dict[str, str]:
@@ -273,7 +305,7 @@ def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[
     if submission.score > submission.max_score + extra:
         total = f"{submission.score:g} of {submission.max_score:g}"
         raise ValueError(f"{student} has {total} points; look at the gradebook")
-    to_do = [g.name for g in grades if g.auto_score is None and g.manual_score is None]
+    to_do = _to_do(grades)
     late = submission.assignment.total_seconds_late
     return {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades} | {
         "automatic": f"{sum(grade.auto_score or 0 for grade in grades):g}",

@@ -157,8 +157,13 @@ def test_feedback_shows_points_and_failures_but_no_hidden_tests(course):
         assert "(Score:" in text
     assert "ps0 (Score: 3.0 / 6.0)" in course.feedback("good one")
     assert "False False" in course.feedback("nosy")
-    listed = re.findall(r'<li><a href="#[^"]+">([^<]*)</a> \(Score', course.page("good one"))
-    assert listed == ["A tiny set, tests", "A tiny set, tests", "A tiny set, in words"]
+    page = course.page("good one")
+    listed = re.findall(r'<li><a href="#[^"]+">([^<]*)</a> \(Score', page)
+    assert listed == ["A tiny set, tests", "A tiny set, tests 2"]
+    assert '">A tiny set, in words</a> (not graded yet)' in page
+    panel = page.partition('<a name="words-answer">')[2]
+    assert "Not graded yet" in panel
+    assert "Score" not in panel
     unseen = "but a hidden test fails"
     assert unseen in course.feedback("half right")
     assert unseen not in course.feedback("good one")
@@ -186,6 +191,8 @@ LISTED = [
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "tampers, ps0", "Ann Ames"),
     ("missing", "cid, ps1", "Cid Cole"),
+    ("late", "tampers, ps0", "perhaps: 2026-05-01 12:00:00 UTC may be the date of the download"),
+    ("late", "good one, ps0", "perhaps: 2026-05-01 12:00:00 UTC may be the date of the download"),
 ]
 
 
@@ -223,6 +230,8 @@ def test_grading_again_keeps_manual_scores_and_comments(again):
     row = rows["good one"]
     assert (row["words-answer"], row["automatic"], row["total"]) == ("2.5", "3", "5.5")
     assert row["by hand"] == row["remarks"] == ""
+    assert (row["late"], rows["tampers"]["late"]) == ("1.5 h", "perhaps")
+    assert '">A tiny set, in words</a> (Score: 2.5' in again.page("good one")
     assert "Well put." in again.feedback("good one")
     assert "Score: 5.5 / 6.0" in again.feedback("good one")
     assert rows["nosy"]["remarks"].startswith("refused: ps0.ipynb is empty")
