@@ -257,7 +257,8 @@ def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
         page = re.sub(
             rf'(<a href="#{key}">[^<]*</a>) \(Score: [^)]*\)', r"\1 (not graded yet)", page
         )
-        page = re.sub(rf'(<a name="{key}">.*?)Score: [\d. /]+', r"\1Not graded yet ", page, 1, re.S)
+        panel = re.compile(rf'(<a name="{key}">.*?)Score: [\d. /]+', re.DOTALL)
+        page = panel.sub(r"\1Not graded yet ", page, count=1)
     return page
 
 

@@ -82,8 +82,8 @@ def test_an_answered_set_is_run_and_written_without_nbgrader(hand_in):
     )
     assert (done.returncode, done.stderr) == (0, ""), done
     assert "running cell 9 of 9" in done.stdout
-    last = done.stdout.splitlines()[-1]
-    assert last.startswith("2 of 2 visible tests passed; hidden tests run in grading")
+    tests, last = done.stdout.splitlines()[-2:]
+    assert tests == "2 of 2 visible tests passed; hidden tests run in grading"
     assert last.endswith("ps0.ipynb")
     assert submitted(path).cells[-1].outputs[0].text == "é∞ 1\n"
     assert submitted(path).metadata.kernelspec.name == "python3"
@@ -185,6 +185,18 @@ def test_problems_without_an_answer_or_with_hidden_tests_only_are_not_counted(re
     cell(notebook, "square-test").execution_count = 1
     assert check._print_problems(notebook, notebook) == [True]
     assert "cell 6 has hidden tests only" in capsys.readouterr().out
+
+
+def test_a_failed_answer_that_calls_another_failed_answer_names_it(release, capsys):
+    """The first answer is wrong; the second one, which calls it, has no mistake of its own."""
+    notebook, original = (nbformat.reads(release, as_version=4) for _ in range(2))
+    cell(notebook, "square-answer").source = "def square(x):\n    return x"
+    cell(notebook, "half-answer").source = "half = square(0.7)"
+    for name in ("square-test", "half-test"):
+        cell(notebook, name).outputs = [new_output("error", ename="AssertionError", evalue="")]
+    assert check._print_problems(notebook, original) == [False, False]
+    said = capsys.readouterr().out
+    assert said.count("(It calls square: correct that first.)") == 1
 
 
 def without(name):
