@@ -207,7 +207,7 @@ def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
     named = [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", stem, re.IGNORECASE)]
     best = max(sets, key=lambda name: (shared[name], name in named))
     if not shared[best]:
-        return "", "its cells do not belong to a set"
+        return "", "it is not a notebook of a handout"
     return (
         best,
         "" if best in named or not named else f"its name is {named[0]}, its cells are of {best}",

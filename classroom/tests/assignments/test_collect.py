@@ -160,8 +160,8 @@ def test_sets_are_recognised_by_cells_and_names(course):
     rows = collected(course, given)
     assert [why for _, why in of("unmatched", rows)] == [
         "its name is ps1, its cells are of ps2",
-        "its cells do not belong to a set",
-        "its cells do not belong to a set",
+        "it is not a notebook of a handout",
+        "it is not a notebook of a handout",
         "its name does not contain a student",
     ]
     assert "no notebook" in of("refused", rows)[0][1]

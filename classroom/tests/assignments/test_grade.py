@@ -186,8 +186,8 @@ class Killed(ProcessPoolExecutor):
 
 LISTED = [
     ("refused", "Bob_1_assignsubmission_file_/ps0.ipynb", "it is empty"),
-    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "its cells do not belong to a set"),
-    ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "its cells do not belong to a set"),
+    ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "it is not a notebook of a handout"),
+    ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "it is not a notebook of a handout"),
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "tampers, ps0", "Ann Ames"),
     ("missing", "cid, ps1", "Cid Cole"),
@@ -250,7 +250,7 @@ def test_students_who_were_not_graded_or_not_collected_are_in_the_table(again):
         "half right": "refused: its process ended, or took too long",
         "stuck": f"refused: {HALF} cannot be stopped",
         LISTED[0][1]: "not collected: it is empty",
-        LISTED[1][1]: "not collected: its cells do not belong to a set",
+        LISTED[1][1]: "not collected: it is not a notebook of a handout",
         "cid": "no file was collected",
     }
 
