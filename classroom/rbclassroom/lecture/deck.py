@@ -58,7 +58,8 @@ def _words(slide: Slide) -> str:
     """Return the text of a slide as HTML; later parts and items of lists appear one by one."""
     first, *later = slide.parts or [""]
     parts = [marked(first), *(f'<div class="fragment">{marked(part)}</div>' for part in later)]
-    return "".join(parts).replace("<li>", '<li class="fragment">')
+    words = "".join(parts).replace("<li>", '<li class="fragment">')
+    return re.sub(r'(^\s*<[uo]l>\s*<li) class="fragment">', r"\1>", words)
 
 
 def _options(slide: Slide) -> str:

@@ -110,7 +110,8 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
         shown = f"{address}?token={token}" if phones else address
         print(f"{path.name} is shown at {shown}", flush=True)
         if Path(folder, "slides", f"{path.stem}_crib.html").exists():
-            print(f"Its crib sheet is at {address.replace('.html', '_crib.html')}", flush=True)
+            sheet = address.replace(".html", "_crib.html")
+            print(f"Run sheet and answers, for the lecturer only: {sheet}", flush=True)
         if phones:
             print(f"Phones vote at {phones.url}", flush=True)
         print("Press Ctrl-C to stop.", flush=True)
@@ -187,7 +188,8 @@ def main() -> None:
     parser.add_argument("lesson", help="number of the lesson, such as 01")
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
     parser.add_argument("--pdf", action="store_true", help="only write the slides as PDF")
-    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help="let phones vote")
+    votes = "let phones vote, at this machine's ADDRESS in their network"
+    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help=votes)
     words = parser.parse_args()
     signal.signal(signal.SIGINT, signal.default_int_handler)  # even if a script ignores Ctrl-C
     try:

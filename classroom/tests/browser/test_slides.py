@@ -218,6 +218,31 @@ def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck,
     speaker.close()
 
 
+def test_t_in_the_speaker_view_opens_the_vote(context, home):
+    with lecture(home, "--votes", "127.0.0.1") as address, watched(context) as page:
+        opened(page, address)
+        until(page, ".poll")
+        with context.expect_page() as found:
+            page.keyboard.press("s")
+        speaker = found.value
+        expect(speaker.locator(".speaker-controls-notes")).to_contain_text("Right: C.")
+        speaker.frame_locator("#current-slide iframe").locator("html[data-ready]").wait_for()
+        speaker.keyboard.press("t")
+        expect(page.locator("#vote svg")).to_be_visible()
+        speaker.close()
+        page.goto("about:blank")  # leave the page before the server ends
+
+
+def test_on_paper_each_title_is_above_its_text_and_picture(page):
+    opened(page, of(LESSONS[6]) + "?print-pdf")
+    pairs = page.evaluate(
+        """() => [...document.querySelectorAll(".pdf-page section:has(h2)")].map((section) =>
+          ["h2", ".body"].map((part) => section.querySelector(part).getBoundingClientRect()))"""
+    )
+    assert len(pairs) > 20
+    assert all(body["top"] >= title["bottom"] for title, body in pairs)
+
+
 def test_the_pdf_has_a_page_for_each_slide_and_contains_its_fonts(home):
     course, env = home
     words = [sys.executable, "-m", "rbclassroom.lecture.serve", "06", "--pdf"]

@@ -67,6 +67,7 @@ const keys = {
     fit(figure);
   })],
   T: ["Open or close a vote", () => {
+    if (window !== window.top) return window.top.opener?.Reveal.triggerKey(84); // in the speaker view
     const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
     const options = all(".option > div", section).map((option) => {
       const copy = option.cloneNode(true);
