@@ -212,7 +212,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     if boxed and sandbox.missing():
         raise Refused(f"the sandbox does not work any more: {sandbox.missing()}")
     config = course_config(name, folder)
-    if hasattr(signal, "alarm"):  # a second limit on the time of the two runs
+    if hasattr(signal, "alarm"):  # a further time limit, for both runs together
         signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
