@@ -6,6 +6,9 @@ The package exports the names for everyday use. Its modules have more: inner pro
 θ and f in `rbcourse.projected_line`, and the main algorithms as on the board in
 `rbcourse.textbook`.
 
+The line "Source" of a docstring has the equation: BK is Belta and Kumar (2002), RR the report by
+Samayamantula and Zou, and "beyond BK 12" an entry of docs/ledger.md, which is in neither text.
+
 The constants are `BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), the standard bases
 of the Lie algebras; `METRIC_SO3` and `METRIC_SE3`, the matrices of the metrics that the trace
 induces (BK (12), (14)); and `CLOSED_FORMS`, a dict of the functions that approximate the optimum in
