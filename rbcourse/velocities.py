@@ -1,19 +1,19 @@
 """Velocities at the poses of a path, from parabolas or splines with a continuous acceleration.
 
 A cubic leg of duration h joins R₀ to R₁ = R₀ Q. At its ends, the ambient cubic M(t) of BK 6 has
-M = R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities. With
-s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(Q ŵ) = B w,
+M = R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities.
+With s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(Q ŵ) = B w,
 
     h² w'(0) = 6 s − 4 h w₀ − 2 h B w₁,    h² w'(1) = −6 s + 2 h Bᵀ w₀ + 4 h w₁.
 
 The condition that w' is the same on both sides of each inner pose is a linear system for the
 velocities. It has symmetric elements (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]] and loads 6 s/h² at both ends
 of each leg. No singular value of B is larger than 1. So the system is diagonally dominant and
-positive definite, and it has exactly one solution, for any poses. For unit quaternions q = (cos ½θ, x) of Q,
-the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For a body with the
-weight W, K = Rᵀ M'' W has vee(K − Kᵀ) = τ = G w' + w × G w. So the torque is made continuous: G
-replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are those of Q W and −Qᵀ W. For the velocity
-of the origin in the body frame, B = Q.
+positive definite, and it has exactly one solution, for any poses. For unit quaternions
+q = (cos ½θ, x) of Q, the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For
+a body with the weight W, K = Rᵀ M'' W has vee(K − Kᵀ) = τ = G w' + w × G w. So the torque is made
+continuous: G replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are those of Q W and −Qᵀ W. For
+the velocity of the origin in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
@@ -250,8 +250,8 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
     acceleration jumps at the poses, and between random poses the motion costs 12 % more than the
     optimum, in the median, no matter how small the steps are. The `spline_velocities` have neither
-    drawback. If the poses are samples of a smooth motion, twice as many samples reduce the excess over
-    the optimum with the same velocities at both ends by a factor of 4.
+    drawback. If the poses are samples of a smooth motion, twice as many samples reduce the excess
+    over the optimum with the same velocities at both ends by a factor of 4.
 
     Parameters
     ----------
