@@ -211,7 +211,7 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
 
 
 def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
-    """Return costs, from costs for times from 0 to 1; for a chain, return the sum of its legs."""
+    """Return the costs of curves, from costs of legs over times from 0 to 1; sum a chain's legs."""
     with np.errstate(over="ignore"):
         costs = costs / legs.flat.duration**power
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]

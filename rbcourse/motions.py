@@ -110,7 +110,7 @@ class ProjectedMotion(RigidMotion):
 def rigid_motion(
     kind: type[Motion], rotation: Curve, *path: Array, centre: Array | None = None
 ) -> Motion:
-    """Return the motion with this rotation and path; velocities use the rotation's time."""
+    """Return the motion with this rotation and path; velocities are per unit of its time."""
     batch = np.broadcast_shapes(rotation.batch_shape, *(x.shape[:-1] for x in path))
     numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
     turning = rotation.take(np.broadcast_to(numbers, batch))

@@ -19,7 +19,7 @@ from rbcourse.so3 import hat, vee
 
 STEPS = 25
 EXACT = 3e-12  # bound on the residual and on the last Chebyshev coefficients of R
-SHARE = 0.03  # times EXACT: bound on the relative residual of p and last coefficients of k
+SHARE = 0.03  # times EXACT: bound on relative residual of p, last coefficients of k
 LONGEST_STEP = 0.5  # rad: no step turns a node by more than this
 ROUGH = 1e-2  # rad: after a step shorter than this, the method continues on more nodes
 FAILED, FINER, SOLVED = range(3)
@@ -405,7 +405,7 @@ class BallStationary:
         return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n, and the node numbers for 2, 4, 8 and 16 times as many intervals, up to 257."""
+        """Return n, and the numbers of nodes for 2, 4, 8, 16 times the intervals, up to 257."""
         return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16) if (n - 1) * times <= 256)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
@@ -424,9 +424,9 @@ class BallStationary:
 
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
-        The equation is solved for ĉ ε on the `coarse` nodes. The integrals smooth the
-        error so much that the right side, evaluated on all nodes, is as accurate as a solution on
-        all nodes. A change of the end values adds a term to d.
+        The equation is solved for ĉ ε on the `coarse` nodes. The integrals smooth the error so much
+        that the right side, evaluated on all nodes, is as accurate as a solution on all nodes. A
+        change of the end values adds a term to d.
         """
         R, c = unknowns
         stride = (R.shape[1] - 1) // (self.coarse - 1)
