@@ -35,7 +35,9 @@ def as_array(
     parts: Any = value if isinstance(value, list | tuple) else [value]
     ma = sys.modules.get("numpy.ma")  # if it is not loaded, no array is masked
     if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
-        raise ValueError(f"{name}: a masked array, whose mask would be lost; fill or compress it")
+        raise ValueError(
+            f"{name}: an array without a mask is wanted, got a masked array; fill or compress it"
+        )
     try:
         given = np.asarray(value)
     except ValueError as error:
@@ -91,8 +93,8 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        For the same reasons as in `as_symmetric`; or if a matrix is not positive definite or the
-        squares of its eigenvalues are not floating-point numbers. The message names the first such
+        For the same reasons as in `as_symmetric`; or if a matrix is not positive definite, or the
+        squares of its eigenvalues overflow or underflow. The message names the first such
         matrix.
     """
     G = as_symmetric(name, value, 3)
@@ -127,7 +129,7 @@ def as_time(
     """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
 
     A time that is outside the domain only by rounding, by 8 eps of the larger end, is replaced by
-    the nearer end. The end of the domain is one number, or an array that broadcasts with the times.
+    the nearer end. The end of the domain is a number, or an array that broadcasts with the times.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
     if not (np.all(times >= start) and np.all(times <= end)):
@@ -142,7 +144,7 @@ def as_time(
 
 
 def as_duration(name: str, value: ArrayLike) -> Array:
-    """Return durations of at least 1e-100; accelerations over shorter ones overflow."""
+    """Return durations of at least 1e-100; shorter ones would make accelerations overflow."""
     durations = as_finite(name, value)
     _check_all(durations >= 1e-100, name, durations, "a duration from 1e-100 up")
     return durations
@@ -182,7 +184,7 @@ def as_count(name: str, value: int) -> int:
 
 
 def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
-    """Return the shape of a batch, () for None, (n,) for n; raise ValueError if it is invalid."""
+    """Return the batch shape: () for None, (n,) for n; raise ValueError if it is invalid."""
     given: Any = () if size is None else size
     lengths = given if isinstance(given, tuple | list) else [given]
     try:
@@ -197,7 +199,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
 
 
 def as_generator(rng: Rng) -> np.random.Generator:
-    """Return a generator of random numbers; raise ValueError if `rng` does not give one."""
+    """Return a generator of random numbers; raise ValueError if `rng` does not define it."""
     try:
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
@@ -214,7 +216,7 @@ def check_order(order: int, most: int) -> int:
 
 
 def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
-    """Return the common batch shape of arrays, which are given with the numbers of their core axes.
+    """Return the common batch shape of arrays; each is given with its number of core axes.
 
     Raises
     ------

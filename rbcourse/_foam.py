@@ -2,16 +2,17 @@
 
 Let R be the nearest rotation to M, so that S = RᵀM is symmetric, with eigenvalues s₁ ≥ s₂ ≥ |s₃|.
 The cofactor matrix of R f(S) is R cof f(S) for every function f. So three matrices are products of
-R:
+R and a symmetric matrix:
 
-    cof M R times a matrix with the eigenvalues s₂s₃, s₃s₁, s₁s₂;
-    cof(λM + cof M) R times one with ζ (s₂ + s₃), ζ (s₃ + s₁), ζ (s₁ + s₂);
-    ζM + cof(λM + cof M) R times λζ I,
+    cof M is R times a matrix with the eigenvalues s₂s₃, s₃s₁, s₁s₂;
+    cof(λM + cof M) is R times a matrix with the eigenvalues ζ (s₂ + s₃), ζ (s₃ + s₁), ζ (s₁ + s₂);
+    ζM + cof(λM + cof M) is R times λζ I,
 
-where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁). Here s₁² is the largest root of x³ −
-‖M‖² x² + ‖cof M‖² x − det² = 0, computed by Viète's formula, and (s₂ + s₃)² = ‖M‖² − s₁² + 2
-det/s₁. With an error in λ or ζ, the result is R times another symmetric matrix near λζ I. One step
-of Newton's method for the polar factor, X ← (X + X⁻ᵀ)/2, squares its relative distance from λζ I.
+where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁). Here s₁² is the largest root of
+x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, computed by Viète's formula, and
+(s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁. With an error in λ or ζ, the result is R times another symmetric
+matrix near λζ I. One step of Newton's method for the polar factor, X ← (X + X⁻ᵀ)/2, squares the
+relative distance of this matrix from λζ I.
 
 Arrays have the shape (3, 3, N). For few matrices, the SVD is faster (see `rbcourse.projection`).
 """
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
 LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; smaller ζ lose digits, and are rare
-_BLOCK = 5128  # matrices that fit into the cache; rows of 4096 bytes would collide
+_BLOCK = 5128  # matrices that fit into the cache; rows of 4096 bytes would collide there
 
 
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:

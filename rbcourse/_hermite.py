@@ -22,11 +22,11 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
 
 
 def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
-    """Return `hermite` of a stack with these `stack_terms`; components are on the first axes.
+    """Return the values of `hermite` for a stack, from its `stack_terms`.
 
-    The terms have the shape (n + 1, ..., count). If t has the shape (T, count) or (T, 1), the
-    result has the shape (..., T, count). If `by_curve`, t has the shape (count, T) or (1, T), and
-    the result has the shape (..., count, T).
+    The components are on the first axes. The terms have the shape (n + 1, ..., count). If t has the
+    shape (T, count) or (T, 1), the result has the shape (..., T, count). If `by_curve`, t has the
+    shape (count, T) or (1, T), and the result has the shape (..., count, T).
     """
     weights = _weights(len(terms) - 1, t, order)
     if not by_curve:
@@ -45,7 +45,7 @@ def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
 
 
 def stack_terms(ends: Array) -> Array:
-    """Return the terms, shape (n + 1, ..., count), of a stack of ends of shape (count, n, ...)."""
+    """Return the terms, shape (n + 1, ..., count), of a stack of ends, shape (count, n, ...)."""
     terms = _terms(np.moveaxis(ends, 1, 0))
     return np.stack([np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in terms])
 
@@ -68,7 +68,7 @@ def _weights(count: int, t: Array, order: int) -> list[Array]:
 
 
 def _start_weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of x0, v0, a0, which up to signs are those of x1, v1, a1 at 1 − t."""
+    """Return the weights of x0, v0, a0; up to signs, x1, v1, a1 have these weights at 1 − t."""
     s = 1 - t
     match count, order:
         case 2, 0:

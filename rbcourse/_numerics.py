@@ -36,7 +36,7 @@ def cross(x: Array, y: Array, axis: int = -1) -> Array:
 
 
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
-    """Return matrices, or columns, over powers of two, with the largest entries in [0.5, 1)."""
+    """Return matrices, or columns, divided by powers of two: largest entries are in [0.5, 1)."""
     _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))
     return np.ldexp(matrix, -exponent)
 

@@ -15,8 +15,8 @@ from rbcourse._numerics import cross as cross_product
 
 Jet = list[Array]
 
-# Coefficients, the highest first, of the second derivative of sin(√s)/√s in s, of that of
-# arccos(x)² in (1 − x)/2, and of both third derivatives.
+# Coefficients of power series, the highest first: of the second derivatives of sin(√s)/√s, in s,
+# and of arccos(x)², in (1 − x)/2, and of both third derivatives.
 _SINC_BEND = [n * (n - 1) * (-1) ** n / math.factorial(2 * n + 1) for n in range(9, 1, -1)]
 _ANGLE_BEND = [k * math.prod(j / (j + 0.5) for j in range(1, k + 1)) for k in range(13, 0, -1)]
 _SINC_THIRD, _ANGLE_THIRD = np.polyder(_SINC_BEND), -np.polyder(_ANGLE_BEND) / 2
@@ -101,11 +101,10 @@ def rotation(q: Array) -> Array:
 
 
 def angular_velocity(q: Jet) -> Array:
-    """Return the last derivative that a jet gives: w for [q, q'], w' for [q, q', q''], then w''.
+    """Return w for a jet [q, q'], w' for [q, q', q''], and w'' if there is a third derivative.
 
-    q has any norm except 0, and the result is in the body frame. With n = ‖q‖², n w = 2 im(q̄ q'),
-    so
-    n w' + n' w = 2 im(q̄ q'') and n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
+    q has any norm except 0, and the result is in the body frame. With n = ‖q‖², n w = 2 im(q̄ q').
+    So n w' + n' w = 2 im(q̄ q'') and n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
     """
     n = _dot(q[0], q[0])
     w = 2 * _imaginary(q[0], q[1]) / n
@@ -173,10 +172,10 @@ def _over(x: Jet, y: Jet) -> Jet:
 
 
 def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
-    """Return c = cos √s, k = sin(√s)/√s and their derivatives by s, for small s from power series.
+    """Return c = cos √s, k = sin(√s)/√s and their derivatives with respect to s.
 
-    The equations c' = −k/2, 4 s k'' + 6 k' + k = 0 and 4 s k''' + 10 k'' + k' = 0 give the other
-    derivatives.
+    For small s, power series give k'' and k'''. The equations c' = −k/2, 4 s k'' + 6 k' + k = 0 and
+    4 s k''' + 10 k'' + k' = 0 give the other derivatives.
     """
     root = np.sqrt(s)
     tangent = np.tan(root / 2)  # tan is the fastest in NumPy
@@ -196,9 +195,10 @@ def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
 
 
 def _squared_angle(x: Array, order: int) -> list[Array]:
-    """Return h = arccos(x)² and its derivatives by x, near x = 1 from power series.
+    """Return h = arccos(x)² and its derivatives with respect to x.
 
-    They satisfy (1 − x²) h'' = 2 + x h' and (1 − x²) h''' = 3 x h'' + h'.
+    Near x = 1, power series give h'' and h'''. Elsewhere, (1 − x²) h'' = 2 + x h' and
+    (1 − x²) h''' = 3 x h'' + h' give them.
     """
     x = np.clip(x, -1.0, 1.0)
     angle, z = np.arccos(x), (1 - x) * (1 + x)

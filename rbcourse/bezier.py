@@ -44,13 +44,14 @@ def bezier_so3(
     Returns
     -------
     Bezier
-        A curve with the control points R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1. It meets all four ends.
+        A curve with the control points R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1. It meets all four
+        boundary conditions.
 
     Notes
     -----
     Singular set: the two inner control points a half-turn apart; `log_so3` then chooses the
     geodesic between them. By the triangle inequality, no other leg can become a half-turn. The
-    curve moves with its ends, and R1, R0, −w1, −w0 give the reversed curve.
+    curve does not depend on the choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
@@ -67,9 +68,9 @@ def bezier_long_so3(
 ) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
-    If the end velocities are large, it may cost less than `bezier_so3`. Moved and reversed ends and
-    singular set: as for `bezier_so3`. The set also contains ends with equal inner control points,
-    for which the two curves are the same.
+    If the end velocities are large, it may cost less than `bezier_so3`. Change of frames, reversal
+    and singular set: as for `bezier_so3`. The singular set also contains ends with equal inner
+    control points, for which the two curves are the same.
     Source: beyond BK 10.
 
     Parameters
@@ -80,7 +81,7 @@ def bezier_long_so3(
     Returns
     -------
     Bezier
-        A curve with the control points of `bezier_so3`. It meets all four ends.
+        A curve with the control points of `bezier_so3`. It meets all four boundary conditions.
 
     Examples
     --------
@@ -110,14 +111,14 @@ def cumulative_bezier_so3(
     Returns
     -------
     CumulativeBezier
-        The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ between them, and β₁ = 1 − (1 −
-        t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four ends.
+        The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ between them, and
+        β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four boundary conditions.
 
     Notes
     -----
     Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where `log_so3` chooses v₂. The
-    curve itself is smooth everywhere. The curve moves with its ends, but reversed ends give another
-    curve.
+    curve itself is smooth everywhere. It does not depend on the choice of frames, but the reversed
+    ends do not give the reversed curve.
 
     Examples
     --------
@@ -147,17 +148,18 @@ def corrected_bezier_so3(
     -------
     CorrectedBezier
         The curve R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B(t) of `bezier_so3` and δ(t) of
-        `bezier_deviation`. It meets all four ends.
+        `bezier_deviation`. It meets all four boundary conditions.
 
     Notes
     -----
     R_m = R0 exp(σ̂/2) is the rotation half-way. Of all logarithms of R0ᵀ R1, of any length, σ is
     the nearest to the sum of the three legs of the Bézier curve.
-    The curve is near-optimal for small excursions: for ends s times as large, the relative excess
-    over the optimum is about s⁸ times as large (s⁴ or s² for the other closed forms). δ is of third
-    order in the ends. Fast ends make δ large, and the curve may then cost more than the Bézier
-    curve (see docs/near_optimal.md). Singular set, moved and reversed ends: as for `bezier_so3`.
-    The set also contains ends for which two logarithms are equally near.
+    The curve is near-optimal for small excursions: for an excursion s times as large, the relative
+    excess over the optimum is about s⁸ times as large (s⁴ or s² for the other closed forms). δ is
+    of third order in the excursion. Large end velocities make δ large, and the curve may then cost
+    more than the Bézier curve (see docs/near_optimal.md). Singular set, change of frames and
+    reversal: as for `bezier_so3`. The singular set also contains ends for which two logarithms are
+    equally near.
 
     Examples
     --------
@@ -217,8 +219,8 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
     """Return the coefficients c₀, …, c₄ of the Bézier curve's deviation from the optimum.
 
     To third order, the deviation is the rotation vector δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴),
-    with u = 2t − 1; e and d are those of `seen_from_the_middle`. In the code, ``sed`` is σ × (e ×
-    d).
+    with u = 2t − 1; e and d are those of `seen_from_the_middle`. In the code, ``sed`` is
+    σ × (e × d).
     Source: beyond BK 10.
     """
     first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
@@ -286,7 +288,7 @@ def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
 class CorrectedBezier(Bezier):
     """The `Curve` of de Casteljau's construction minus its leading deviation from the optimum.
 
-    Relative to the rotation half-way, the correction by −δ is exp(−δ̂/2) on both sides.
+    In the frame of the rotation half-way, the curve is multiplied by exp(−δ̂/2) on both sides.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:

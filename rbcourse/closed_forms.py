@@ -1,4 +1,4 @@
-"""Other closed forms, with the boundary conditions of the projected cubic (BK section 1).
+"""Other closed forms, with the same boundary conditions as the projected cubic (BK section 1).
 
 Each curve is a fixed rotation times the rotation of a quaternion Q(t) of any norm. `CLOSED_FORMS`
 lists the closed forms for two rotations and two angular velocities that the course compares. Add a
@@ -56,13 +56,14 @@ def exponential_cubic_so3(
     -------
     ExponentialCubic
         The curve with σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
-        `right_jacobian_inverse_so3`. It meets all four ends.
+        `right_jacobian_inverse_so3`. It meets all four boundary conditions.
 
     Notes
     -----
     Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses σ(1). The curve itself is
     smooth everywhere. For velocities along the geodesic, it is the optimum among all curves that
-    turn by σ(1). The curve moves with its ends, but reversed ends give another curve.
+    turn by σ(1). The curve does not depend on the choice of frames, but the reversed ends do not
+    give the reversed curve.
 
     Examples
     --------
@@ -92,7 +93,8 @@ def exponential_cubic_long_so3(
     Returns
     -------
     ExponentialCubic
-        The curve with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1). It meets all four ends.
+        The curve with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1). It meets all four boundary
+        conditions.
 
     Examples
     --------
@@ -121,8 +123,8 @@ def quaternion_cubic_so3(
     Returns
     -------
     QuaternionCubic
-        A `Curve`, with ``margin``, that meets all four ends. The cubic has q' = q (0, w)/2 at its
-        ends. It ends at q1 or −q1, whichever is nearer to q0.
+        A `Curve`, with ``margin``, that meets all four boundary conditions. The cubic has
+        q' = q (0, w)/2 at its ends. It ends at q1 or −q1, whichever is nearer to q0.
 
     Notes
     -----
@@ -130,7 +132,7 @@ def quaternion_cubic_so3(
     and times at which the cubic is zero, where a call of the curve raises ValueError. Near a small
     ``margin``, the body turns by up to a full turn in a short time. The curve is then accurate to
     eps over ``margin``, and its derivatives to eps over the square and the cube of ``margin``. The
-    curve moves with its ends, and R1, R0, −w1, −w0 give the reversed curve.
+    curve does not depend on the choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
@@ -145,7 +147,7 @@ def quaternion_cubic_so3(
 def quaternion_cubic(
     ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
 ) -> QuaternionCubic:
-    """Return the quaternion cubic of checked ends, or if `long` is True the cubic to −q1."""
+    """Return the quaternion cubic of checked ends; if `long` is True, it turns the long way."""
     turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
     turn = np.where(np.expand_dims(long, -1), -turn, turn)
     return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
@@ -167,13 +169,13 @@ def cayley_cubic_so3(
     -------
     CayleyCubic
         A curve whose quaternion is (1, g) over its norm. The Cayley parameters of a turn by a about
-        the unit vector n are g = tan(a/2) n. Along a curve 2 g' = w + g × w + (g·w) g.
+        the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w + (g·w) g.
 
     Notes
     -----
-    Singular set: half-turns, which have no Cayley parameters. No curve ever turns by 180° from R0,
-    so near half-turns the curve is long, and the cost grows without bound. The curve moves with its
-    ends, but reversed ends give another curve.
+    Singular set: half-turns, which have no Cayley parameters. No such curve contains a half-turn
+    from R0, so near half-turns it is long, and its cost grows without bound. The curve does not
+    depend on the choice of frames, but the reversed ends do not give the reversed curve.
 
     Examples
     --------
@@ -214,22 +216,23 @@ def normal_cubic_so3(
     Returns
     -------
     NormalCubic
-        The curve R0 exp(ŷ) with y = x − ½ G⁻¹(x × G x). Here x(t) is the cubic with x(0) = 0, x'(0)
-        = w0 and the values of x(1) and x'(1) that give R1 and w1.
+        The curve R0 exp(ŷ) with y = x − ½ G⁻¹(x × G x). Here x(t) is the cubic with x(0) = 0,
+        x'(0) = w0 and the values of x(1) and x'(1) that give R1 and w1.
 
     Notes
     -----
     To second order, x is the Riemannian normal coordinate of R0 exp(ŷ), the initial velocity of the
     geodesic from R0. Zimmermann interpolates in normal coordinates; for the second-order map we
-    know no source. The curve is not a Riemannian cubic, which is the optimum. It is near-optimal
-    for small excursions: for ends s times as large, the relative excess over the optimum is about
-    s⁴ times as large. If G is a multiple of I, the curve is `exponential_cubic_so3`.
+    know no source. The curve is not the optimum, which is a Riemannian cubic. It is near-optimal
+    for small excursions: for an excursion s times as large, the relative excess over the optimum is
+    about s⁴ times as large. If G is a multiple of I, the curve is `exponential_cubic_so3`.
 
     Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses y(1); and ends for which x ↦
     y is singular at x(1). The latter raise ValueError, as do ends for which no x(1) is found. For
     y(1) up to π, the map is never singular for the moments 1, 2, 2.9. For thin bodies with three
     different moments, it is singular somewhere beyond about 2 rad about the middle axis. Near such
-    ends, the curve is long. The curve moves with its ends, but reversed ends give another curve.
+    ends, the curve is long. The curve does not depend on the choice of frames, but the reversed
+    ends do not give the reversed curve.
 
     Examples
     --------
@@ -281,8 +284,8 @@ def exponential_quintic_so3(
     Notes
     -----
     The curve is near-optimal for small excursions (see docs/near_optimal.md). From rest to rest, it
-    is the optimum (`minimum_jerk_so3`). Singular set and invariance: as for
-    `exponential_cubic_so3`.
+    is the optimum (`minimum_jerk_so3`). Singular set and change of frames: as
+    for `exponential_cubic_so3`.
 
     Examples
     --------
@@ -364,7 +367,7 @@ def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Arra
     size = 1 + np.abs(y).max(axis=-1) + np.abs(x - y).max(axis=-1)
     thin = np.linalg.cond(G)
     found = np.abs(miss).max(axis=-1) < 16 * EPS * thin * size + 1e-13 * size
-    _check_normal(~found, "x is not found for the goal, to rounding")
+    _check_normal(~found, "no x gives the goal to rounding")
     _check_normal(~(np.abs(np.linalg.det(by_x)) > 1e-9), "the map from x to y is singular")
     return x, by_x
 
@@ -400,7 +403,7 @@ def _cubic_from_the_goal(
 class QuaternionCubic(NormalizedCubic):
     """The `Curve` of the unit quaternions nearest to a cubic that joins two unit quaternions.
 
-    Its ``margin`` is the least norm of the cubic, and ``margin_time`` the time at which it is
+    Its ``margin`` is the least norm of the cubic, and ``margin_time`` is the time at which it is
     reached; both have the shape (...). If the margin is 0, the nearest unit quaternion is not
     unique.
     """

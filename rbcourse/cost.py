@@ -31,7 +31,7 @@ def acceleration_cost(
     *,
     rtol: float = 1e-10,
 ) -> Array:
-    """Return L_a, the integral of the squared acceleration in metric (12) or (14), or of a body.
+    """Return L_a, the integral of the squared acceleration in metric (12), (14) or a body's metric.
 
     Source: BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for
     other inertias beyond BK 1.
@@ -41,8 +41,8 @@ def acceleration_cost(
     curve : Curve
         A curve on SO(3) or SE(3), or a stack of curves.
     inertia : array_like, shape (..., 3, 3), optional
-        As for `minimum_acceleration_so3`, about the centre of mass: one for all curves, or one for
-        each.
+        As for `minimum_acceleration_so3`, about the centre of mass: one matrix for all curves, or
+        one for each curve.
     mass, centre : float above 0; array_like, shape (3,); optional
         The mass of the body, and its centre of mass in the body frame; for SE(3) only.
     rtol : float, optional
@@ -195,7 +195,7 @@ def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve is wanted, got {curve!r}")
     if on_so3 and curve.size != 3:
-        raise ValueError(f"curve: one on SO(3) is wanted, got {curve!r}")
+        raise ValueError(f"curve: a curve on SO(3) is wanted, got {curve!r}")
 
 
 def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
@@ -211,14 +211,14 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
 
 
 def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
-    """Return costs from those for times from 0 to 1; for a chain, the sum over its legs."""
+    """Return the costs of curves, from costs of legs over times from 0 to 1; sum a chain's legs."""
     with np.errstate(over="ignore"):
         costs = costs / legs.flat.duration**power
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
 
 
 def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float = 1e-10) -> Array:
-    """Return a functional of the rotations of a stack of curves, computed by `integral`."""
+    """Return the value of a functional for the rotation of each curve of a stack."""
 
     def density(some: Curve, t: Array, index: Index) -> Array:
         those = functional.take(index)
@@ -245,7 +245,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
     Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
     nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
     integrand at the times t, shape (T, K), for the K curves `some` with the numbers `index`.
-    Messages begin with `name`.
+    Error messages begin with `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")
@@ -273,7 +273,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
                 error[part] = np.abs(value[part] - rest)
         expected = cost + np.bincount(index, value, curve.count)
         coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN counts as coarse
-        lost = coarse & (width < 256 * EPS * (start + width))  # beyond the resolution of the times
+        lost = coarse & (width < 256 * EPS * (start + width))  # below the resolution of times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
         cost += np.bincount(index[~coarse], value[~coarse], curve.count)

@@ -38,7 +38,7 @@ class _Ends(NamedTuple):
 
 
 class Ends(_Ends):
-    """Boundary conditions at both ends: rotations and body velocities of one batch shape.
+    """Boundary conditions: rotations and angular velocities at both ends, with one batch shape.
 
     The class is a tuple, so a function that makes curves takes it as ``make(*ends)``.
     Source: BK 6.2.
@@ -100,7 +100,7 @@ def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
 
 
 class SingularTime(ValueError):
-    """The error for a time at which a curve is undefined; `curve` is its number in the stack."""
+    """The error raised at a time at which the curve number `curve` of a stack is undefined."""
 
     def __init__(
         self, time: float, curve: int, reason: str, batch_shape: tuple[int, ...] = ()
@@ -121,8 +121,8 @@ class Curve:
     R' = R hat_so3(w).
 
     On SE(3), ``c(t)`` is the pose A, ``c(t, 1)`` the twist S = (w, v), A' = A hat_se3(S), and
-    ``c(t, 2)`` the covariant acceleration in metric (14), (w', Rᵀ d''). That is *not* the
-    derivative of the twist: that is `twist_rate`, with v' = Rᵀ d'' − w × v.
+    ``c(t, 2)`` the covariant acceleration in metric (14), (w', Rᵀ d''). It is *not* the
+    derivative of the twist, which is `twist_rate`, with v' = Rᵀ d'' − w × v.
 
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``; on SE(3)
@@ -151,7 +151,7 @@ class Curve:
 
     @property
     def size(self) -> int:
-        """The size of its matrices: 3 on SO(3), 4 on SE(3)."""
+        """The size of the curve's matrices: 3 on SO(3), 4 on SE(3)."""
         return 3
 
     @property
@@ -215,8 +215,8 @@ class Curve:
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
         """Return each curve of the stack, or a derivative, at its own times, up to its duration.
 
-        `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or t.shape
-        + (3,), or with 4 and 6 on SE(3).
+        `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or
+        t.shape + (3,), or with 4 and 6 on SE(3).
         """
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
@@ -229,7 +229,7 @@ class Curve:
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
-        """Return one curve of the stack, or a smaller stack; the index is one for NumPy arrays."""
+        """Return one curve of the stack, or a smaller stack, by an index as for NumPy arrays."""
         if not self.batch_shape:
             raise TypeError("a single curve is not a stack and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
@@ -244,7 +244,7 @@ class Curve:
         return type(self).__name__
 
     def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these numbers in the flattened stack."""
+        """Return a stack of those curves that have these indices in the flattened stack."""
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         stacked = len(self.batch_shape)
         for name, value in parts.items():
@@ -260,7 +260,7 @@ class Curve:
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return all curves of a stack with one axis, for times from 0 to 1.
+        """Return all curves of a stack with one axis, or a derivative, for times from 0 to 1.
 
         Subclasses implement this method. `t` has the shape (T, count) or (T, 1). The result has the
         shape (T, count, 3, 3) or (T, count, 3), or with 4 and 6 on SE(3). SingularTime is raised if
@@ -269,7 +269,7 @@ class Curve:
         raise NotImplementedError
 
     def evaluate(self, t: Array, order: int) -> Array:
-        """Return all curves at the times t, shape (T, count) or (T, 1), by blocks of times."""
+        """Return all curves, or a derivative, at the times t, shape (T, count) or (T, 1)."""
         T, core = self.flat.duration, self._core(order)
         shares = t / (T[:1] if np.all(T[:1] == T) else T)
         values = np.empty((len(t), self.count, *core))
@@ -324,7 +324,7 @@ class QuaternionCurve(Curve):
         return values.swapaxes(0, 1) if by_curve else values
 
     def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
-        """Raise SingularTime if Q has no direction at one of the times."""
+        """Raise SingularTime if Q is 0 to rounding at one of the times."""
 
     @cached_property
     def _first(self) -> Array:
@@ -398,8 +398,8 @@ def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: 
 def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
     """Return the weighted sums of the terms of each curve of a stack.
 
-    `weights` has the shape (T, count, n) or (T, 1, n), `terms` (count, n, m), and the result (T,
-    count) + core.
+    `weights` has the shape (T, count, n) or (T, 1, n), `terms` has the shape (count, n, m), and the
+    result has the shape (T, count) + core.
     """
     sums = np.empty((len(weights), len(terms), terms.shape[-1]))
     np.matmul(np.swapaxes(weights, 0, 1), terms, out=np.swapaxes(sums, 0, 1))
@@ -460,8 +460,8 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     curve : Curve
         A curve or a stack of curves.
     duration : array_like, shape (...)
-        The new duration, at least 1e-100: one for all curves, or one for each. For a `chain`, it
-        must not vanish by rounding when it is added to the first time.
+        The new duration, at least 1e-100: one for all curves, or one for each curve. For a `chain`,
+        it must not vanish by rounding when it is added to the first time.
 
     Returns
     -------
@@ -513,7 +513,7 @@ def check_defined(
 
 
 def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
-    """Return breakpoints, `graded` near small margins; raise RuntimeError if one is below 1e-6."""
+    """Return points `graded` near small margins; raise RuntimeError for a margin below 1e-6."""
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
         raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
@@ -522,7 +522,7 @@ def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
 
 
 def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Return breakpoints in [0, 1], refined near the times from 1/32 down to the widths."""
+    """Return breakpoints in [0, 1], at distances from 1/32 down to `widths` from the times."""
     cuts = [points]
     for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))

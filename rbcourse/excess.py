@@ -1,6 +1,6 @@
-"""How far above the optimum a curve is: its leading term by the ends, and an estimate by the curve.
+"""The excess of a curve over the optimum: its leading term from the ends, and an estimate.
 
-For small excursions; `rbclassroom.surveys.atlas` has large ones.
+Both hold for small excursions; `rbclassroom.surveys.atlas` treats large ones.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from rbcourse.paths import smooth_parts
 from rbcourse.so3 import hat, log_so3
 
 _NODES, _BUMPS = 33, 12
-_TOGETHER = 64  # curves whose systems are made together, in the cache
-_SMOOTH = 1e-6  # of w', what its last two Chebyshev coefficients may be
+_TOGETHER = 64  # curves whose systems are made together in the cache
+_SMOOTH = 1e-6  # times √∫ ‖w'‖² dt: bound on the last two Chebyshev coefficients of w'
 SPEED_LIMIT = 2.5
-"""In rad over the whole time: for a curve that turns as fast there is no estimate."""
+"""In rad per duration: no estimate is given for a curve that turns at this speed or faster."""
 
 
 def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Array:
@@ -36,26 +36,26 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     Parameters
     ----------
     name : str
-        One of `CLOSED_FORMS`, but not "corrected_bezier_so3".
+        One of `CLOSED_FORMS`, except "corrected_bezier_so3".
     R0, R1, w0, w1
         As for `projected_cubic_so3`.
 
     Returns
     -------
     ndarray, shape (...)
-        E/(12 ‖e‖² + ‖d‖²), which cost over optimum, minus 1, approaches for small data. With
-        σ = log_so3(R0ᵀ R1), e and d are the mean less σ, and the difference, of the two end
-        velocities, carried parallel to the rotation half-way. E is a polynomial of degree six in
-        σ, e and d, of degree four for "cumulative_bezier_so3". NaN where e and d are 0: there the
-        optimum costs nothing.
+        E/(12 ‖e‖² + ‖d‖²), the leading term of the excess for small ends. Let σ = log_so3(R0ᵀ R1),
+        and transport both end velocities parallel to the rotation half-way. Then e is their mean
+        minus σ, and d is their difference. E is a polynomial in σ, e and d, of degree six, or of
+        degree four for "cumulative_bezier_so3". If e and d are 0, the optimum costs nothing, and
+        the result is NaN.
 
     Notes
     -----
-    Domain: small excursions. The relative error falls with the square of their size, for
-    "cumulative" with the size. With ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ < 1 it was at most 14 % on random
-    problems, except for "cumulative". It can be larger where E is much smaller than is usual for
-    such data, as for velocities along σ.
-    Singular set: R0 and R1 a half-turn apart, where σ is what `log_so3` chooses.
+    Domain: small excursions. The relative error decreases as the square of their size, or for
+    "cumulative_bezier_so3" as the size. With ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ < 1, it was at most 14 % on
+    random problems for all other forms. It can be larger if E is much smaller than usual for ends
+    of this size, for example if the velocities are along σ.
+    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses σ.
 
     Examples
     --------
@@ -75,13 +75,13 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     powers, coefficients = forms[name]
     E = np.prod(inner[..., None, :] ** powers, axis=-1) @ coefficients
     optimum = 12 * inner[..., 1] + inner[..., 2]
-    E = np.maximum(E, 0)  # but for rounding it is not negative
+    E = np.maximum(E, 0)  # it is negative only by rounding
     return np.divide(E, optimum, out=np.full_like(E, np.nan), where=optimum > 0)[()]
 
 
 @lru_cache
 def _forms() -> dict[str, tuple[Array, Array]]:
-    """Return the polynomials E: in each term the powers of the six inner products, and a factor."""
+    """Return the polynomials E: for each term, the powers of six inner products, and a factor."""
     path = os.path.join(os.path.dirname(__file__), "leading_excess.csv")
     with open(path, encoding="utf-8") as file:
         head, over, *rows = csv.reader(file)
@@ -95,38 +95,40 @@ def _forms() -> dict[str, tuple[Array, Array]]:
 
 
 def excess_estimate(curve: Curve) -> Array:
-    """Return about how far above the optimum with the same ends a curve is, without solving.
+    """Return an estimate of a curve's excess over the optimum, without solving for the optimum.
 
     Source: beyond BK 11; BK (19).
 
     Parameters
     ----------
     curve : Curve
-        On SO(3), or a stack of them; smooth.
+        A smooth curve on SO(3), or a stack of such curves.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        About cost over optimum, minus 1. A `chain`, whose velocity must not jump (RuntimeError), is
-        compared with the best legs that have the same velocities at its poses. NaN where a curve
-        turns at `SPEED_LIMIT` or faster at some time, costs more than about twice the optimum, is
-        not smooth enough for 33 nodes, costs nothing, or is NaN itself.
+        An estimate of the cost over the cost of the optimum, minus 1. A `chain` is compared with
+        the optimal legs that have the same velocities at its poses; if its velocity jumps,
+        RuntimeError is raised. The estimate is NaN for a curve that turns at `SPEED_LIMIT` or
+        faster at some time, costs more than about twice the optimum, is not smooth enough for 33
+        nodes, costs nothing, or is NaN itself.
 
     Notes
     -----
-    Domain: ‖w‖ < 2.5 rad over the whole time, and an excess of at most 1. On random problems the
-    estimates of closed forms were within 1.4 % of the excess, those of quintics with random end
-    accelerations within 6 %; up to ‖w‖ = 1 within 0.03 % and 1.2 %, for an excess of at least 1e-8.
-    The costs of smaller ones are not known with enough digits. An excess below 1e-22 is lost in
-    rounding.
+    Domain: ‖w‖ < 2.5 rad per duration, and an excess of at most 1. On random problems, the
+    estimates were within 1.4 % of the excess for closed forms, and within 6 % for quintics with
+    random end accelerations. Up to ‖w‖ = 1, they were within 0.03 % and 1.2 %, for an excess of at
+    least 1e-8. For a smaller excess, the costs are not known with enough digits. An excess below
+    1e-22 is lost in rounding.
 
-    For a small η with η = η' = 0 at both ends the curve R exp(η̂) costs, to second order,
-    J − 2 g · η + η · H η: with x = η' + w × η
+    Let J = ∫ ‖w'‖² dt. For a small η with η = η' = 0 at both ends, the curve R exp(η̂) has, to
+    second order, J − 2 g · η + η · H η in place of J. With x = η' + w × η,
 
         g · η = −∫ w' · x' dt,    η · H η = ∫ ‖x'‖² − w' · (η × x)' dt.
 
-    The least value, over polynomials η, is g · H⁻¹ g below J. This is the decrement of a step of
-    Newton's method; to leading order it is ∫ ‖δ''‖², with δ the deviation from the optimum.
+    The least value over polynomials η is J − g · H⁻¹ g. The difference g · H⁻¹ g is the decrement
+    of a step of Newton's method. To leading order, it is ∫ ‖δ''‖² dt, where δ is the deviation from
+    the optimum.
 
     Examples
     --------
@@ -152,7 +154,7 @@ def excess_estimate(curve: Curve) -> Array:
 
 
 def _decrement(w: Array, a: Array) -> Array:
-    """Return g · H⁻¹ g from w and w' at the nodes, shape (N, n, 3); NaN where H is not positive."""
+    """Return g · H⁻¹ g from w and w' at the nodes, (N, n, 3); NaN if H is not positive definite."""
     eta, rate, bend = (on_each_axis(x, np.eye(3)) for x in polynomials(_BUMPS, 2, _NODES)[:3])
     W, A = hat(w), hat(a)
     x, x_rate = rate + W @ eta, bend + A @ eta + W @ rate

@@ -47,7 +47,7 @@ class RigidMotion(Curve):
     centre: Array
 
     def values(self, t: Array, order: int) -> Array:
-        """Return (R, d), or the velocity or acceleration of R together with Rᵀ times that of d."""
+        """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d''), where d is the origin's position."""
         by_curve = len(t) > self.count  # put the longer axis last
         d = hermite_stack(self._terms, t.T if by_curve else t, order, by_curve=by_curve)
         d = d.T if by_curve else np.moveaxis(d, 0, -1)
@@ -62,7 +62,7 @@ class RigidMotion(Curve):
         return values
 
     def _arm(self, t: Array, order: int, turning: Array) -> Array | float:
-        """Return R r, w × r or w' × r + w × (w × r), the centre's motion relative to the origin."""
+        """Return R r, w × r or w' × r + w × (w × r): the centre's motion relative to the origin."""
         r = self.centre
         if not r.any():
             return 0.0
@@ -110,7 +110,7 @@ class ProjectedMotion(RigidMotion):
 def rigid_motion(
     kind: type[Motion], rotation: Curve, *path: Array, centre: Array | None = None
 ) -> Motion:
-    """Return the motion of a rotation and a path; velocities are per unit of the rotation time."""
+    """Return the motion with this rotation and path; velocities are per unit of its time."""
     batch = np.broadcast_shapes(rotation.batch_shape, *(x.shape[:-1] for x in path))
     numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
     turning = rotation.take(np.broadcast_to(numbers, batch))
@@ -214,7 +214,7 @@ def minimum_acceleration_se3(
     """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic path.
 
     Of all motions with these ends, it has the least `acceleration_cost` with the same `inertia`,
-    `mass` and `centre`, provided that the rotation that was found has the least.
+    `mass` and `centre`, provided that its rotation has the least cost.
     Source: BK 6.3; for bodies beyond BK 9.
 
     Parameters
@@ -233,7 +233,7 @@ def minimum_acceleration_se3(
     -------
     RigidMotion
         Its ``rotation`` is `minimum_acceleration_so3`, with the same error and warning. Its
-        ``path``, that of the centre of mass, is a cubic.
+        ``path`` is a cubic, the path of the centre of mass.
 
     Notes
     -----
@@ -261,7 +261,7 @@ def minimum_acceleration_se3(
 
 
 def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
-    """Return the screw motion from A0 to A1: a motion about one axis with a constant twist.
+    """Return the screw motion from A0 to A1: a motion about one fixed axis with a constant twist.
 
     Its covariant acceleration is (0, ω × v). Every point of the body moves on a helix about the
     axis (see `screw_from_pose`). A screw motion is a geodesic of the indefinite metric (10), not of
@@ -345,10 +345,10 @@ def screw_from_pose(A: ArrayLike) -> Screw:
 
     Notes
     -----
-    Singular set: half-turns, which have two screws (`log_so3` chooses the axis), and no turn, where
-    no axis is distinguished. A turn by less than 8 eps counts as a pure slide. Near no turn, axis,
-    slide and pitch have a relative error of a few eps over the angle. The point is then far away,
-    and its error is a few eps ‖d‖ over the square of the angle.
+    Singular set: half-turns, which have two screws (`log_so3` chooses the axis), and poses without
+    a turn, which have no unique axis. A turn by less than 8 eps counts as a pure slide. For small
+    angles, axis, slide and pitch have a relative error of a few eps over the angle. The point is
+    then far away, and its error is a few eps ‖d‖ over the square of the angle.
 
     Examples
     --------
@@ -374,8 +374,8 @@ class Screw(NamedTuple):
     Attributes
     ----------
     axis : ndarray, shape (..., 3)
-        The unit direction of the axis. It is that of the slide if there is no turn, and 0 if there
-        is no motion.
+        The unit vector along the axis. Without a turn, it is the direction of the slide; without a
+        motion, it is 0.
     point : ndarray, shape (..., 3)
         The point of the axis nearest to the origin, in m; 0 if there is no turn.
     angle, slide : ndarray, shape (...)

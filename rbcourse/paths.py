@@ -55,13 +55,13 @@ def chain(
         As for `bessel_velocities`.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists or angular velocities at the poses. By default they are the `spline_velocities`, with
-        0 at both ends and where two successive poses are equal to rounding.
+        velocity 0 at both ends and where two successive poses are equal to rounding.
     leg : callable, optional
         The function that makes the legs, from this package or your own. It returns a stack of
         two-point curves, and is called once for all legs. Its arguments are the keyword
         ``duration`` and others among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1 (d0_dot and
         d1_dot in the fixed frame). A function for rotations can also join poses: the origin then
-        moves on the polynomial with as many boundary conditions. The default is
+        moves on the polynomial with the same number of boundary conditions. The default is
         `projected_cubic_so3`, or for poses `projected_cubic_se3`.
 
     Returns
@@ -74,8 +74,8 @@ def chain(
     ------
     ValueError
         For the same reasons as in `bessel_velocities`; if `velocities` are given, but `leg` takes
-        none; or if `leg` needs other arguments, rejects these, or misses the next pose by more than
-        1e-6. The message names the first place. Other errors, and warnings, are those of `leg`.
+        none; or if `leg` needs other arguments, raises ValueError, or misses the next pose by more
+        than 1e-6. The message names the first place. Warnings and other errors are those of `leg`.
 
     Notes
     -----
@@ -83,15 +83,16 @@ def chain(
     `screw_se3` and `projected_line_so3`. It is C² with the default legs and velocities, except at
     inner poses where it rests, and with `projected_quintic_so3`, `exponential_quintic_so3` and
     `minimum_jerk_so3`. It is C¹ (the acceleration jumps) with all other legs, which take
-    velocities. For projected legs, this holds to a few eps of the largest ‖w‖ and of ‖w‖² + ‖w'‖.
+    velocities. At the joints of projected legs, velocities agree to a few eps of the largest ‖w‖,
+    and accelerations to a few eps of ‖w‖² + ‖w'‖.
     The accelerations a0, a1 are those of the default chain, even if velocities are given, but they
     are 0 at both ends and where the curve rests.
-    Rest at both ends costs more than the natural ends of `projected_spline_se3`. Compared with
-    `minimum_acceleration_spline_se3` with the same ends, legs that turn by 60° cost 5 % more, and
-    legs that turn by 90° cost a third more. The legs of `quaternion_spline_so3` cost 0.4 % and 2 %
-    more.
-    Singular set: that of the legs, and half-turns between neighbours, which raise ValueError. For a
-    larger turn, insert a pose.
+    Rest at both ends costs more than the natural ends of `projected_spline_se3`. If each leg turns
+    by 60°, a chain costs 5 % more than `minimum_acceleration_spline_se3` with the same ends, and if
+    each leg turns by 90°, a third more. With legs of `quaternion_spline_so3`, it costs 0.4 % and
+    2 % more.
+    Singular set: that of the legs, and half-turns between successive poses, which raise ValueError.
+    For a larger turn, insert a pose.
 
     Examples
     --------
@@ -124,7 +125,7 @@ def chain(
         )
     legs = _made(leg, {name: ends[name] for name in wanted}, np.diff(times))
     if moves and "A0" not in wanted:
-        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # highest that legs take
+        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # highest given order
         path = [poses[:, :3, 3], d_dot, d_bend][: 1 + order]
         legs = rigid_motion(RigidMotion, legs, *(x for pair in path for x in (pair[:-1], pair[1:])))
     _check_arrival(legs, poses)
@@ -160,8 +161,8 @@ def projected_spline_so3(
     -----
     For two rotations and given velocities, the result is the projected cubic. If the rotations are
     moved, the spline moves with them; if the times are reversed, the spline is reversed. Its
-    relative excess over the optimum, `minimum_acceleration_spline_so3`, is about 0.05 θ⁴, with the
-    angle θ of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
+    relative excess over the optimum, `minimum_acceleration_spline_so3`, is about 0.05 θ⁴, where θ
+    is the angle of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
     `quaternion_spline_so3` is 16 times smaller. For rotations about one axis by (0, θ, 0), at
     equally spaced times and with natural ends, the excess is 20711/180180 θ⁴.
     Singular set: that of the legs.
@@ -211,9 +212,9 @@ def projected_spline_se3(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "n
 def quaternion_spline_so3(
     times: ArrayLike, rotations: ArrayLike, ends: PathEnds = "natural"
 ) -> Chain:
-    """Return normalised cubics of quaternions through many rotations, twice differentiable.
+    """Return a twice differentiable chain of normalised quaternion cubics through many rotations.
 
-    Of all closed forms in this package, this is the nearest to `minimum_acceleration_spline_so3`.
+    Among the closed forms of this package, it is the nearest to `minimum_acceleration_spline_so3`.
     Source: beyond BK 13, beyond BK 14.
 
     Parameters
@@ -230,9 +231,9 @@ def quaternion_spline_so3(
 
     Notes
     -----
-    The relative excess over the optimum is about 0.003 θ⁴, with the angle θ of a leg in rad. Each
-    leg turns the short way. If the rotations are moved, the spline moves with them; if the times
-    are reversed, the spline is reversed.
+    The relative excess over the optimum is about 0.003 θ⁴, where θ is the angle of a leg in rad.
+    Each leg turns the short way. If the rotations are moved, the spline moves with them; if the
+    times are reversed, the spline is reversed.
     Singular set: that of the legs.
 
     Examples
@@ -259,7 +260,7 @@ class Chain(Curve):
     times : ndarray, shape (N,)
         The times at which the chain passes through its poses.
     velocities : ndarray, shape (N, 3) or (N, 6), or None
-        Its velocities at the poses, or None if the legs take no velocities.
+        The velocities at the poses, or None if the legs take no velocities.
     legs : Curve
         The stack of the N − 1 legs.
     """
@@ -270,7 +271,7 @@ class Chain(Curve):
 
     @property
     def size(self) -> int:
-        """The size of its matrices: 3 on SO(3), 4 on SE(3)."""
+        """The size of the curve's matrices: 3 on SO(3), 4 on SE(3)."""
         return self.legs.size
 
     @property
@@ -280,7 +281,7 @@ class Chain(Curve):
 
     @property
     def breakpoints(self) -> Array:
-        """The ends of panels for a quadrature, with the joints, as fractions of the duration."""
+        """The ends of panels for a quadrature, and the joints, as fractions of the duration."""
         T = self.legs.duration
         inside = self.legs.breakpoints * T[:, None]
         return np.unique((np.append(0.0, np.cumsum(T[:-1]))[:, None] + inside) / np.sum(T))
@@ -294,7 +295,7 @@ class Chain(Curve):
         share = float(duration) / (end - start)
         if start + float(duration) == start:
             raise ValueError(
-                f"duration is {duration}: it vanishes by rounding beside the first time, {start}"
+                f"duration is {duration}: it vanishes by rounding when added to the time {start}"
             )
         times = start + share * (self.times - start)
         times[-1] = start + duration
@@ -307,16 +308,16 @@ class Chain(Curve):
         )
 
     def jumps(self, order: int) -> Array:
-        """Return the jumps at the inner poses of the curve or a derivative, shape (N − 2, ...).
+        """Return the jumps of the curve, or of a derivative, at the inner poses, (N − 2, ...).
 
-        They are the values after the poses minus those before; `order` is from 0 to 3, or on SE(3)
-        from 0 to 2.
+        A jump is the value after a pose minus the value before it; `order` is from 0 to 3, or on
+        SE(3) from 0 to 2.
         """
         starts, ends = _at_ends(self.legs, self.legs._check_order(order))
         return starts[1:] - ends[:-1]
 
     def evaluate(self, t: Array, order: int) -> Array:
-        """Return the values at the times t, shape (T, 1), from each leg at its own times."""
+        """Return the values at the times t, shape (T, 1), each from the leg at this time."""
         times = t[:, 0]
         values = np.empty((len(t), 1, *self._core(order)))
         if np.any(times[1:] < times[:-1]):
@@ -349,7 +350,7 @@ class Chain(Curve):
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
         for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
-            if k == 2:  # or of a velocity that changes within a leg
+            if k == 2:  # also relative to the velocity over the shortest duration
                 sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
             for half in (slice(3), slice(3, None)):  # the rotation in rad and the translation in m
                 jump = jumps[:, half].max(initial=0)
@@ -358,10 +359,10 @@ class Chain(Curve):
 
 
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Divide successive runs of rows, with these lengths, into parts of one length.
+    """Divide successive runs of rows, `counts` rows each, into parts of equal length.
 
-    Return the run and the rows of each part, shapes (parts,) and (parts, length). Parts are filled
-    up by repeating the last row.
+    Return the run of each part, shape (parts,), and its rows, shape (parts, length). Shorter parts
+    are filled up by repeating their last row.
     """
     mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
     length, ends = max(1, min(int(counts.max()), 2 * mean)), np.cumsum(counts)
@@ -408,7 +409,7 @@ def _arguments(leg: Leg) -> list[str]:
 
 
 def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
-    """Return the stack of legs; issue its warnings at the line that calls `chain`."""
+    """Return the stack of legs; its warnings show the line that calls `chain`."""
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
             legs = leg(**ends, duration=duration)
@@ -441,7 +442,7 @@ def _check_arrival(legs: Curve, poses: Array) -> None:
 
 
 def _rotated(poses: Array, v: Array) -> Array:
-    """Return vectors of the body frames as vectors of the fixed frame."""
+    """Return vectors in the fixed frame, from their components in the body frames."""
     return matvec(poses[:, :3, :3], v) if v.size else v
 
 

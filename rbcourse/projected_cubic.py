@@ -36,9 +36,9 @@ class ProjectedPolynomial(Curve):
         M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1), for times from 0 to 1. With a
         weight, all of them are multiplied by W.
     margin, margin_time : ndarray, shape (...)
-        The least value over t of the sum of the two smallest eigenvalues of RᵀM, with the
-        projection R of M, and its time. If the margin is 0, the nearest rotation is not unique. A
-        small margin indicates a poor cubic; a large one does not guarantee a good cubic (see
+        The least value over t of the sum of the two smallest eigenvalues of RᵀM, where R is the
+        projection of M, and its time. If the margin is 0, the nearest rotation is not unique. A
+        small margin indicates a poor curve, but a large margin does not guarantee a good curve (see
         docs/near_optimal.md).
     """
 
@@ -77,7 +77,7 @@ class ProjectedPolynomial(Curve):
         return least_over_time(lambda t: gap(hermite(ends, t[..., None, None])), self.batch_shape)
 
     def may_jump(self) -> bool:
-        """Return whether the gap may vanish between 9 sample times, and then also between 65."""
+        """Return whether the gap may vanish between 9 sample times and, if so, also between 65."""
         may = np.ones(self.count, bool)
         ends = np.moveaxis(self.take(np.arange(self.count)).ends, 1, 0)
         for count in (9, 65):
@@ -112,7 +112,7 @@ def projected_cubic_so3(
     -------
     ProjectedPolynomial
         A `Curve`, with ``margin``: the nearest rotations to the cubic M(t) with the values R and
-        first derivatives R ŵ at both ends. It meets all four ends exactly.
+        first derivatives R ŵ at both ends. It meets all four boundary conditions exactly.
 
     See Also
     --------
@@ -121,13 +121,14 @@ def projected_cubic_so3(
     Notes
     -----
     Singular set: times at which the two smallest eigenvalues of RᵀM sum to 0. The curve jumps at
-    such a time, and a call raises ValueError there; on both sides the curve is correct. A
+    such a time, and a call raises ValueError there; before and after, the curve is correct. A
     ``margin`` below 1e-6 gives a RuntimeWarning that names the time. Near a small ``margin``, the
     curve turns by up to π in a time of about ``margin`` over the speed of M. The curve is accurate
     to a few eps ‖M‖ over the sum at that time, and its derivatives to a few eps over the square and
     the cube of the sum.
-    The curve moves with its ends: for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 it is L R(t) Q. The optimum is
-    `minimum_acceleration_so3`. For the inertia of a body see `weighted_cubic_so3`.
+    The curve does not depend on the choice of frames: for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 it is
+    L R(t) Q. The optimum is `minimum_acceleration_so3`. For the inertia of a body, see
+    `weighted_cubic_so3`.
 
     Examples
     --------
@@ -163,17 +164,17 @@ def weighted_cubic_so3(
     Returns
     -------
     ProjectedPolynomial
-        `project_so_weighted` of the cubic of `projected_cubic_so3`, with the weight W of
-        `weight_from_inertia`. It meets all four ends. The ``margin`` is that of M W, with W scaled
-        to trace 3.
+        The projection, by `project_so_weighted`, of the cubic of `projected_cubic_so3`, with the
+        weight W of `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is
+        that of M W, with W scaled to trace 3.
 
     Notes
     -----
-    The curve is near-optimal for small excursions: for ends s times as large, the relative excess
-    over the optimum is about s⁴ times as large (s² times for `projected_cubic_so3`). For large
-    excursions, the excess may be large. `normal_cubic_so3` is a closed form for any inertia. If G
-    is a multiple of I, the curve is `projected_cubic_so3`. Singular set, warning and moved ends
-    (with Qᵀ G Q): as for `projected_cubic_so3`, with M W for M.
+    The curve is near-optimal for small excursions: for an excursion s times as large, the relative
+    excess over the optimum is about s⁴ times as large (s² times for `projected_cubic_so3`). For
+    large excursions, the excess may be large. `normal_cubic_so3` is a closed form for any inertia.
+    If G is a multiple of I, the curve is `projected_cubic_so3`. Singular set, warning and change of
+    frames (which maps G to Qᵀ G Q): as for `projected_cubic_so3`, with M W in place of M.
 
     Examples
     --------
@@ -214,15 +215,16 @@ def projected_quintic_so3(
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`, with ``margin``: the nearest rotations to the quintic M(t) with R, R ŵ and R (ŵ²
-        + â) as values, first and second derivatives at both ends. It meets all six ends exactly.
+        A `Curve`, with ``margin``: the nearest rotations to the quintic M(t) with R, R ŵ and
+        R (ŵ² + â) as values, first and second derivatives at both ends. It meets all six boundary
+        conditions exactly.
 
     Notes
     -----
     In general, this curve is not near the curve of least jerk, `minimum_jerk_so3`. From rest to
     rest, it costs 1.17 times the optimum for a turn by 60°, and 11.6 times for 120°.
-    `exponential_quintic_so3` is near the optimum. Singular set and invariance: as for
-    `projected_cubic_so3`.
+    `exponential_quintic_so3` is near the optimum. Singular set and change of frames: as
+    for `projected_cubic_so3`.
 
     Examples
     --------
@@ -247,7 +249,7 @@ def ends_of_quintic(
     a1: ArrayLike,
     duration: ArrayLike,
 ) -> tuple[Ends, Array, Array, Array]:
-    """Return `Ends`, a0 and a1 for times from 0 to 1, and the duration, of one batch shape."""
+    """Return `Ends`, a0 and a1 for times from 0 to 1, and the duration, with one batch shape."""
     ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     ends, T = ends.broadcast_to(batch).over(duration)

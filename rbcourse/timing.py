@@ -1,17 +1,17 @@
 """The fastest timing of a path under limits on speeds, accelerations, torque and force.
 
-The timing s(t) moves the body along a path c(s). Let x = s'² and u = s'' = ½ dx/ds. With V =
-c(s, 1) = (ω, v) and A = c(s, 2) = (α, β), the motion has the velocity V s' and the acceleration V u
-+ A x in the body frame. The torque is G ω u + (G α + ω × G ω) x. The acceleration of the point r of
-the body is (v + ω × r) u + (β + α × r + ω × (ω × r)) x. The force on a mass m there is m times this
-acceleration, minus m Rᵀ g. So a limit on a speed is x ≤ X(s), and every other limit is ‖a u + b x +
-k‖ ≤ 1.
+The timing s(t) moves the body along a path c(s). Let x = s'² and u = s'' = ½ dx/ds. With
+V = c(s, 1) = (ω, v) and A = c(s, 2) = (α, β), the motion has the velocity V s' and the acceleration
+V u + A x in the body frame. The torque is G ω u + (G α + ω × G ω) x. The acceleration of the point
+r of the body is (v + ω × r) u + (β + α × r + ω × (ω × r)) x. The force on a mass m at this point is
+m times this acceleration, minus m Rᵀ g. So a limit on a speed is x ≤ X(s), and every other limit is
+‖a u + b x + k‖ ≤ 1.
 
 The path is divided into cells of length h. In a cell, u is constant, x changes linearly from x_i to
-y = x_i+1, and u = (y − x_i)/2h. A limit holds at both ends of the cell, with the a, b, k of the
-cell's side, since they may jump: ‖p x_i + q y + k‖ ≤ 1 with p = b − a/2h, q = a/2h at the start,
-and p = −a/2h, q = b + a/2h at the end. These limits are ellipses, or strips, in the plane of x_i
-and y.
+y = x_i+1, and u = (y − x_i)/2h. Each limit is imposed at both ends of the cell. Since a, b and k
+may jump between cells, their values inside the cell are used. The limit is ‖p x_i + q y + k‖ ≤ 1,
+with p = b − a/2h, q = a/2h at the start, and p = −a/2h, q = b + a/2h at the end. These limits are
+ellipses, or strips, in the plane of x_i and y.
 
 The algorithm makes two passes. The backward pass finds the largest x_i from which the end can be
 reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. The limits of a
@@ -19,15 +19,15 @@ cell are convex, so if some timing satisfies the limits on the cells, the passes
 motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
 
 Near the top of an ellipse, x_i grows only if y decreases. TOPP-RA chooses the largest x_i, which is
-not the best choice there, since a small gain of x_i causes a large loss of y. Both have nearly the
-same weight in the time, so `_tops` maximises x_i + y. On 80 random paths, the time is at most 1e-5
-above the optimum on the same cells, which was computed by a cone program.
+not the best choice there, since a small gain of x_i causes a large loss of y. The time depends
+nearly equally on x_i and y, so `_tops` maximises x_i + y. On 80 random paths, the time is at most
+1e-5 above the optimum on the same cells, which was computed by a cone program.
 
 Pham and Pham (TOPP-RA, IEEE Transactions on Robotics 34, 2018) find reachable and controllable sets
 of joints by two passes of linear programs. Nguyen and Pham (Journal of Guidance, Control, and
-Dynamics, 2016) time rotations with bounds on angular velocities, accelerations or torques. Of both
-papers, only the abstract or introduction was read for this module. Limits on norms for poses were
-not found elsewhere.
+Dynamics, 2016) time rotations with bounds on angular velocities, accelerations or torques. For this
+module, only the abstracts or introductions of both papers were read. We found no other method with
+limits on norms for poses.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _INSIDE = np.linspace(0, 1, 6)[:, None, None]
 _BETWEEN = np.linalg.solve(
     np.vander(np.linspace(0, 1, 6)).T, np.vander(np.linspace(0, 1, 121), 6).T
 ).T
-"""The matrix that interpolates values at six points of a cell, by their polynomial, at 121."""
+"""The matrix that maps values at six points of a cell to their polynomial at 121 points."""
 _SPEEDS = "angular_speed", "speed"
 _BENDS = "angular_acceleration", "acceleration", "torque", "force"
 Row = tuple[str, Array, Array, Array]
@@ -85,17 +85,17 @@ def fastest(
         matter.
     angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
         The largest norms of ω, of the velocity of the point `centre` of the body, of ω', and of the
-        acceleration of this point. Three numbers are the largest magnitudes of the components in
-        the body frame. For rotations, only ω, ω' and the torque can be limited.
-    torque, force : likewise
+        acceleration of this point. Three numbers limit the magnitudes of the components in the body
+        frame instead. For rotations, only ω, ω' and the torque can be limited.
+    torque, force : float or array_like, shape (3,)
         The largest norms of G ω' + ω × G ω, and of `mass` times the acceleration of `centre`, minus
-        its weight. At least one limit on an acceleration, the torque or the force is required.
+        the weight. At least one limit on an acceleration, the torque or the force is required.
     inertia : array_like, shape (3, 3), optional
         G, about the centre of mass; required for a limit on the torque.
     mass, centre, gravity : float; array_like, shape (3,); optional
-        For a force, these are the mass, the centre of mass in the body frame, and the acceleration
-        of free fall in the fixed frame. Without a force, `centre` may be any point, such as the tip
-        of a tool.
+        For a limit on the force, these are the mass, the centre of mass in the body frame, and the
+        acceleration of free fall in the fixed frame. Without such a limit, `centre` may be any
+        point, such as the tip of a tool.
     rates : (float, float), optional
         The values of s' at both ends: 0 is rest, and 1 is the velocity of the curve itself. A rate
         has no effect at an end where the curve rests.
@@ -167,7 +167,7 @@ def fastest(
 
 
 def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
-    """Return the largest share of each limit that a curve uses, and the time of its use.
+    """Return the largest share of each limit that a curve uses, and the time when it does so.
 
     Source: beyond BK 16.
 
@@ -181,9 +181,9 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
     Returns
     -------
     dict of str to (float, float)
-        The share, and the first time at which it is reached to a millionth. The curve is evaluated
-        at 20,001 times and on both sides of the joints of a chain; a limit may be exceeded between
-        these times.
+        The share, and the first time at which it is reached to within a millionth. The curve is
+        evaluated at 20,001 times and on both sides of the joints of a chain; a limit may be
+        exceeded between these times.
 
     Examples
     --------
@@ -233,7 +233,7 @@ class Timed(Curve):
 
     @property
     def size(self) -> int:
-        """The size of its matrices: 3 on SO(3), 4 on SE(3)."""
+        """The size of the curve's matrices: 3 on SO(3), 4 on SE(3)."""
         return self.curve.size
 
     def lasting(self, duration: Array) -> Self:
@@ -322,7 +322,10 @@ def _limits(
 
 
 class _Grid(NamedTuple):
-    """Grid points, (N + 1,); V, A, R at six points of each cell, (6, N, ...); stops with x = 0."""
+    """The grid points, shape (N + 1,), and V, A, R at six points of each cell, shape (6, N, ...).
+
+    `stops` contains the numbers of the grid points at which x = 0.
+    """
 
     s: Array
     V: Array
@@ -332,7 +335,10 @@ class _Grid(NamedTuple):
 
 
 def _sampled(curve: Curve, finer: int) -> _Grid:
-    """Return a grid with equally many cells in each leg, smaller near ends with c' = c'' = 0."""
+    """Return a grid with the same number of cells on each leg.
+
+    The cells are smaller near ends with c' = c'' = 0.
+    """
     legs = (curve.legs if isinstance(curve, Chain) else curve).flat
     knots = curve.times if isinstance(curve, Chain) else np.append(0.0, legs.duration)
     L, h, halves = legs.count, legs.duration, (curve.size - 2, 3)
@@ -438,7 +444,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
 
 
 def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
-    """Return A, …, F, (6, N, limits), of A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0."""
+    """Return A, …, F of limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0, (6, N, limits)."""
     made = []
     for a, b, k in rows:
         q = a / (2 * h[:, None])
@@ -449,12 +455,12 @@ def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
 
 
 def _tops(Q: Array, caps: Array) -> Array:
-    """Return for each cell the y up to which x + y rises, where x is the largest allowed value.
+    """Return, for each cell, the y up to which x + y increases, if x is the largest value allowed.
 
-    The y is found by bisection, at first of the exponent.
+    This y is found by bisection of its logarithm.
     """
     A, B, C, D, E, F = Q
-    free = A == 0  # the limit is on y alone
+    free = A == 0  # the limit concerns only y
     low, high = np.full((len(A), 1), 1e-60), np.minimum(caps[1:], 1e60)[:, None]
     for _ in range(50):
         y = np.sqrt(low * high)

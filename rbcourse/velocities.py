@@ -1,24 +1,24 @@
-"""Velocities at the poses of a path, from splines with a continuous acceleration or parabolas.
+"""Velocities at the poses of a path, from parabolas or splines with a continuous acceleration.
 
-A cubic leg of duration h joins R₀ to R₁ = R₀ Q. At its ends, the ambient cubic M(t) of BK 6 has M =
-R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities. With
-s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(Q ŵ) = B w,
+A cubic leg of duration h joins R₀ to R₁ = R₀ Q. At its ends, the ambient cubic M(t) of BK 6 has
+M = R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities.
+With s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(Q ŵ) = B w,
 
     h² w'(0) = 6 s − 4 h w₀ − 2 h B w₁,    h² w'(1) = −6 s + 2 h Bᵀ w₀ + 4 h w₁.
 
 The condition that w' is the same on both sides of each inner pose is a linear system for the
 velocities. It has symmetric elements (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]] and loads 6 s/h² at both ends
 of each leg. No singular value of B is larger than 1. So the system is diagonally dominant and
-positive definite, and it has one solution for all poses. For unit quaternions q = (cos ½θ, x) of Q,
-the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For a body with the
-weight W, K = Rᵀ M'' W has vee(K − Kᵀ) = τ = G w' + w × G w. The torque is then continuous, G
-replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are those of Q W and −Qᵀ W. For the path of
-the origin, in the body frame, B = Q.
+positive definite, and it has exactly one solution, for any poses. For unit quaternions
+q = (cos ½θ, x) of Q, the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For
+a body with the weight W, K = Rᵀ M'' W has vee(K − Kᵀ) = τ = G w' + w × G w. So the torque is made
+continuous: G replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are those of Q W and −Qᵀ W. For
+the velocity of the origin in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
-`RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. A linear
-system for the velocities was not found in the literature.
+`RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. We found no
+linear system for the velocities in the literature.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ def spline_velocities(
     -----
     If the poses are moved, the velocities move with them; if the times are reversed, the velocities
     are those of the reversed path. For rotations about one axis by small angles, they are those of
-    SciPy's ``CubicSpline``. Singular set: poses a half-turn apart, to 1e-6, raise ValueError, since
-    no leg joins them.
+    SciPy's ``CubicSpline``. Singular set: successive poses that are a half-turn apart to
+    within 1e-6 raise ValueError, since no leg joins them.
 
     Examples
     --------
@@ -113,7 +113,7 @@ class KnotSystem(NamedTuple):
     b1: Array
 
     def solve(self, fixed: NDArray[np.bool_], given: Array, periodic: bool = False) -> Array:
-        """Return the x, shape (N, m), that minimises the function; x is `given` where `fixed`.
+        """Return the x, shape (N, m), that minimises the function, with x = `given` if `fixed`.
 
         If `periodic`, x is the same at the first and the last knot. LinAlgError is raised if H is
         not positive definite.
@@ -197,7 +197,7 @@ def _skew(X: Array) -> Array:
 
 
 def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], Array]:
-    """Return at which of `count` poses velocities are given, and the velocities, or 0."""
+    """Return a mask of the poses with given velocities, and these velocities, 0 elsewhere."""
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "periodic"):
@@ -219,7 +219,7 @@ def is_periodic(ends: PathEnds) -> bool:
 def resting_spline(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
     """Return w, d', w' and d'' at the poses; for rotations, d' and d'' have no components.
 
-    They are 0 at both ends and where two successive poses are equal to rounding.
+    All of them are 0 at both ends and where two successive poses are equal to rounding.
     """
     change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
     same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
@@ -250,8 +250,8 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
     acceleration jumps at the poses, and between random poses the motion costs 12 % more than the
     optimum, in the median, no matter how small the steps are. The `spline_velocities` have neither
-    drawback. On samples of a smooth motion, the excess over the optimum with the same velocities at
-    both ends falls by a factor of 4 for twice as many samples.
+    drawback. If the poses are samples of a smooth motion, twice as many samples reduce the excess
+    over the optimum with the same velocities at both ends by a factor of 4.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     origin is in R³. The parabola of the rotation is in exponential coordinates about the middle
     pose, so that the velocities move with the poses. The first and the last velocity are those of
     the neighbours' parabolas. For two poses, the velocity is constant.
-    Singular set: neighbours a half-turn apart, to 1e-6, raise ValueError.
+    Singular set: neighbours that are a half-turn apart to within 1e-6 raise ValueError.
 
     Examples
     --------
@@ -305,7 +305,7 @@ def _slopes_of_parabolas(h: Array, slopes: Array) -> Array:
 def checked_path(
     times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> tuple[Array, Array, Array | None]:
-    """Return `check_path` of two poses or more; neighbours must not be a half-turn apart."""
+    """Return a checked path of two poses or more; neighbours must not be a half-turn apart."""
     times, poses, velocities = check_path(times, poses, velocities)
     if len(times) < 2:
         raise ValueError("times, poses: two or more are wanted, got 1")

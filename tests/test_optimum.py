@@ -300,7 +300,9 @@ def test_a_guess_is_followed_and_a_guess_that_is_not_a_curve_on_so3_is_refused()
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
     motion = rb.geodesic_se3(np.eye(4), np.eye(4))
     for guess in (I3, motion, rb.chain([1, 2], [I3] * 2)):
-        with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) from t = 0 on is wanted"):
+        with pytest.raises(
+            ValueError, match=r"^guess: a Curve on SO\(3\) that starts at t = 0 is wanted"
+        ):
             rb.stationary_so3(guess)
 
 

@@ -243,7 +243,7 @@ UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
         (rb.retime, (np.sin, 1), "curve: a Curve is wanted, got"),
         (rb.retime, (UNEVEN[0], 0), "duration is 0.0, a duration from 1e-100"),
         (rb.retime, (UNEVEN[0], [1, 2]), "duration: one, or one for each curve"),
-        (rb.retime, (LATE, 1e-9), "duration is 1e-09: it vanishes by rounding beside"),
+        (rb.retime, (LATE, 1e-9), "duration is 1e-09: it vanishes by rounding when added"),
     ],
 )
 def test_bad_paths_velocities_times_and_durations_are_refused(function, arguments, message):

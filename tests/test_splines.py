@@ -373,7 +373,7 @@ def test_bad_ends_are_refused(name, ends, message):
 
 @pytest.mark.parametrize("long", [[True], 1, ["yes", "no"]])
 def test_bad_choices_of_the_long_way_are_refused(long):
-    with pytest.raises(ValueError, match=r"^long: a bool for each of 2 legs wanted, got"):
+    with pytest.raises(ValueError, match=r"^long: a bool for each of 2 legs is wanted, got"):
         rb.minimum_acceleration_spline_so3(*path(3, 50, 16), long=long)
 
 

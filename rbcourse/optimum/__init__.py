@@ -1,4 +1,4 @@
-"""The optima on SO(3): least acceleration, BK (19), of balls and bodies, least torque and jerk."""
+"""Optima on SO(3): least acceleration, BK (19), of a ball or any body; least torque; least jerk."""
 
 from __future__ import annotations
 
@@ -53,10 +53,10 @@ def minimum_acceleration_so3(
     Returns
     -------
     Optimum
-        A `Curve` that meets all four ends, with the least ∫ 2 ‖w'‖² dt that was found; ``c`` is the
-        constant R w''. With an inertia, it has the least ∫ τᵀ G⁻¹ τ dt that was found, with the
-        torque τ = G w' + w × G w; ``c`` is then the constant R p of `Optimum.costate`. The
-        attributes report how the curve was found.
+        A `Curve` that meets all four boundary conditions, with the least ∫ 2 ‖w'‖² dt that was
+        found; ``c`` is the constant R w''. With an inertia, it has the least ∫ τᵀ G⁻¹ τ dt that was
+        found, with the torque τ = G w' + w × G w; ``c`` is then the constant R p of
+        `Optimum.costate`. The attributes report how the curve was found.
 
     Raises
     ------
@@ -66,9 +66,9 @@ def minimum_acceleration_so3(
     Warns
     -----
     RuntimeWarning
-        For a stack, if this happens for some problems, whose curves are then NaN. Also if a
-        starting curve costs less than the curve that is returned. In both cases, ``converged`` is
-        False for the problem.
+        If Newton's method does not converge for some problems of a stack; their curves are then
+        NaN. Also if a starting curve costs less than the curve that is returned. In both cases,
+        ``converged`` is False for the problem.
 
     See Also
     --------
@@ -77,17 +77,17 @@ def minimum_acceleration_so3(
 
     Notes
     -----
-    Singular set: none is known in closed form. Equation (19) is necessary, not sufficient, and has
-    several solutions. If two costs have a relative difference below 1e-9, rounding does not affect
-    which of the two curves is returned.
+    Singular set: none is known in closed form. Equation (19) is a necessary condition, not a
+    sufficient one, and has several solutions. If two costs have a relative difference below 1e-9,
+    rounding does not affect which of the two curves is returned.
 
-    The starting curves turn each way round, with additional full turns if ‖w0‖ + ‖w1‖ > 6π. For a
-    body, the optimum of the ball and curves between free motions are starting curves, too.
-    Gauss–Newton steps lower their costs; then Newton's method solves R p = c from the cheapest
-    ones. The result is stationary. It is not proven that no curve costs less (tests on random
-    problems: docs/near_optimal.md). Problems of very thin rods may not converge. If the end
-    velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)) with a cubic p and a logarithm
-    σ of R0ᵀR1, which is not always the shortest.
+    The starting curves turn the short way and the long way, with additional full turns if
+    ‖w0‖ + ‖w1‖ > 6π. For a body, the optimum of the ball and curves between free motions are
+    starting curves, too. Gauss–Newton steps lower their costs; then Newton's method solves R p = c
+    from the cheapest ones. The result is stationary. It is not proven that no curve costs less
+    (docs/near_optimal.md reports tests on random problems). For very thin rods, the method may not
+    converge. If the end velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where p
+    is a cubic and σ is a logarithm of R0ᵀR1, not always the shortest one.
 
     Examples
     --------
@@ -129,16 +129,16 @@ def minimum_torque_so3(
     Returns
     -------
     Optimum
-        A `Curve` that meets all four ends, with the least ∫ ‖τ‖² dt that was found, where
-        τ = G w' + w × G w is the torque; ``c`` is the constant R p of `Optimum.costate`.
+        A `Curve` that meets all four boundary conditions, with the least ∫ ‖τ‖² dt that was found,
+        where τ = G w' + w × G w is the torque; ``c`` is the constant R p of `Optimum.costate`.
 
     Notes
     -----
-    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. Problems of thin
-    rods often do not converge. A turn about a principal axis is stationary. About the axis of the
-    largest moment it may be a saddle; a curve that leaves the axis then costs less. The search
-    tries such curves, too. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c; see
-    `rbcourse.textbook.minimum_torque_so3`.
+    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. For thin rods,
+    the method often does not converge. A turn about a principal axis is stationary. A turn about
+    the axis of the largest moment may be a saddle; a curve that leaves the axis then costs less.
+    The search tries such curves, too. With J = R G Rᵀ and H = R G w, the equation is
+    J H'' + H' × H = c; see `rbcourse.textbook.minimum_torque_so3`.
 
     Examples
     --------
@@ -174,8 +174,9 @@ def minimum_jerk_so3(
     Returns
     -------
     Optimum
-        A `Curve` that meets all six ends. It has the least integral of the squared covariant jerk,
-        ∫ 2 ‖w'' + ½ w × w'‖² dt, that was found; ``c`` is the constant R p of `Optimum.costate`.
+        A `Curve` that meets all six boundary conditions. It has the least integral of the squared
+        covariant jerk, ∫ 2 ‖w'' + ½ w × w'‖² dt, that was found; ``c`` is the constant R p of
+        `Optimum.costate`.
 
     Notes
     -----
@@ -209,8 +210,9 @@ def stationary_so3(guess: Curve) -> Optimum:
     Returns
     -------
     Optimum
-        A `Curve` with the rotations and velocities of the guess at both ends and constant R w''. It
-        may not be the cheapest one. It is NaN where no curve is found (see ``converged``).
+        A `Curve` along which R w'' is constant, with the rotations and velocities of the guess at
+        both ends. It may not be the cheapest such curve. If no curve is found, it is NaN (see
+        ``converged``).
 
     Examples
     --------
@@ -221,7 +223,7 @@ def stationary_so3(guess: Curve) -> Optimum:
     (True, True)
     """
     if not isinstance(guess, Curve) or guess.size != 3 or guess.domain[0] != 0:
-        raise ValueError(f"guess: a Curve on SO(3) from t = 0 on is wanted, got {guess!r}")
+        raise ValueError(f"guess: a Curve on SO(3) that starts at t = 0 is wanted, got {guess!r}")
     unit = retime(guess, 1.0)
     (R0, R1), (w0, w1) = (unit([0, 1], order) for order in (0, 1))
     if not np.isfinite([w0, w1]).all():
@@ -234,10 +236,10 @@ def stationary_so3(guess: Curve) -> Optimum:
 
 
 class ConvergenceError(RuntimeError):
-    """The error that no curve was found; `residual` is the error after `iterations` steps."""
+    """The error raised if no curve is found, with the `residual` after `iterations` steps."""
 
     def __init__(self, residual: float, iterations: int) -> None:
-        reason = "the ends may be too fast, or the inertia too uneven"
+        reason = "the end velocities may be too large, or the principal moments too different"
         if residual < EXACT:
             reason = "only a saddle was found"
         super().__init__(
@@ -247,13 +249,13 @@ class ConvergenceError(RuntimeError):
         self.iterations = iterations
 
     def __reduce__(self) -> tuple[type, tuple[float, int]]:
-        """Return what pickle needs; by default, the only argument would be the message."""
+        """Return the class and its arguments for pickle, whose default passes only the message."""
         return type(self), (self.residual, self.iterations)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Optimum(Curve):
-    """A `Curve` on SO(3), or a stack, along which R p is constant, as Chebyshev series.
+    """A `Curve` on SO(3) along which R p is constant, or a stack of them, as Chebyshev series.
 
     Source: beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
 
@@ -262,19 +264,20 @@ class Optimum(Curve):
     functional : Functional
         The functional that defines the cost and p.
     converged : bool, or ndarray of bool, shape (...)
-        Whether a solution was found, and no curve that was tried costs less. If no solution was
-        found, the curve, `c` and the cost are NaN.
+        Whether a solution was found that costs no more than any other curve that was tried. If no
+        solution was found, the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
-        The constant R p in the fixed frame. Without an inertia, p is w'', half of the p of 2 I.
+        The constant R p in the fixed frame. Without an inertia, p is w''; with the inertia
+        2 I, p is 2 w''.
     cost, residual : float or ndarray, shape (...)
         The `acceleration_cost`, `torque_cost` or `jerk_cost`, and the largest error of the
         equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for times from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
-        The number of steps of the solver, and of nodes that represent the curve.
+        The number of steps of the solver, and the number of nodes that represent the curve.
     """
 
     functional: Functional
-    series: Array  # for the entries of R, w, w', …, in columns; shape (..., most nodes, columns)
+    series: Array  # coefficients of R, w, w', …, one entry a column; (..., most nodes, columns)
     constant: Array  # c for times from 0 to 1
     found: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
 
@@ -290,7 +293,7 @@ class Optimum(Curve):
 
     @property
     def converged(self) -> Any:
-        """Whether a solution was found, and no curve that was tried costs less."""
+        """Whether a solution was found that costs no more than any other curve that was tried."""
         return self._told(self.found["converged"])
 
     @property
@@ -312,12 +315,12 @@ class Optimum(Curve):
         return values if self.batch_shape else values.item()
 
     def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these numbers in the flattened stack."""
+        """Return a stack of those curves that have these indices in the flattened stack."""
         functional = self.functional.take(np.reshape(index, -1))
         return replace(super().take(index), functional=functional)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return the sums of the series; R is made orthogonal to rounding."""
+        """Return R or a derivative at the times t; R is orthogonal to rounding."""
         columns = slice(9) if order == 0 else slice(6 + 3 * order, 9 + 3 * order)
         terms = self.series[..., columns]
         weights = chebyshev(t, terms.shape[1])
@@ -326,9 +329,9 @@ class Optimum(Curve):
         return orthogonal(weighted_sums(weights, terms, 3, 3))
 
     def costate(self, t: ArrayLike) -> Array:
-        """Return p in the body frame at times of any shape, shape t.shape + (..., 3).
+        """Return p in the body frame at times of any shape.
 
-        R p is the constant `c`.
+        The result has the shape t.shape + (..., 3), and R p is the constant `c`.
         """
         times = as_time(t, 0, self.domain)
         orders = range(1, self.functional.ends + 2)
@@ -362,7 +365,7 @@ def optimum_of(
     solutions: Sequence[Solution | Failure],
     duration: Array,
 ) -> Optimum:
-    """Return the curves of solutions, with the batch shape of their durations."""
+    """Return the solutions as a stack of curves, with the batch shape of the durations."""
     batch = duration.shape
     found, c = np.zeros(len(solutions), _FOUND), np.full((len(solutions), 3), np.nan)
     for i, one in enumerate(solutions):
@@ -404,7 +407,7 @@ def _warn_if_not_converged(curve: Optimum) -> None:
     lost = np.isnan(curve.cost)
     _warn(curve, lost, "did not converge", "their curves are NaN")
     beaten = ~np.asarray(curve.converged) & ~lost
-    _warn(curve, beaten, "may not have their optimum", "a curve that was tried costs less")
+    _warn(curve, beaten, "may not have reached their optimum", "a curve that was tried costs less")
 
 
 def _warn(curve: Optimum, some: Array, what: str, why: str) -> None:

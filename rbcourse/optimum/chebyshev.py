@@ -15,8 +15,8 @@ from rbcourse._numerics import Array
 class Grid(NamedTuple):
     """Nodes, and matrices that act on values at the nodes.
 
-    `derivative`, and `integral` from 0, give values at the nodes; `series` gives the Chebyshev
-    coefficients.
+    `derivative` and `integral` give the derivative, and the integral from 0, at the nodes; `series`
+    gives the Chebyshev coefficients.
     """
 
     t: Array
@@ -28,10 +28,10 @@ class Grid(NamedTuple):
 class Primitives(NamedTuple):
     """Matrices that give x, x', … x⁽ᵐ⁾ from k = x⁽ᵐ⁾ at the nodes and the m end values of x.
 
-    At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k, without derivatives of k. Here x is the
-    m-fold integral of k plus the polynomial of least degree that corrects the ends. The matrices
-    `series_from_ends` and `series_from_k` give the Chebyshev coefficients of x⁽ⁱ⁾ in the same way.
-    `fit` gives a smooth k for an x with zero ends.
+    At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k; no derivative of k is needed. Here x is
+    the m-fold integral of k plus the polynomial of least degree that corrects the ends. The
+    matrices `series_from_ends` and `series_from_k` give the Chebyshev coefficients of x⁽ⁱ⁾ in the
+    same way. The matrix `fit` maps an x whose end values are 0 to a smooth k.
     """
 
     from_ends: list[Array]
@@ -50,7 +50,7 @@ def chebyshev(t: Array, count: int) -> Array:
 
 @lru_cache
 def grid(n: int) -> Grid:
-    """Return the grid of n nodes, with the same bits for any number of BLAS threads."""
+    """Return the grid of n nodes; its bits do not depend on the number of BLAS threads."""
     from numpy.polynomial.chebyshev import chebder, chebint
 
     k = np.arange(n)
@@ -64,7 +64,7 @@ def grid(n: int) -> Grid:
 
 
 def _product(A: Array, B: Array) -> Array:
-    """Return A B without BLAS, whose sums depend on its number of threads."""
+    """Return A B, computed without BLAS, whose rounding depends on its number of threads."""
     return np.einsum("ij,jk->ik", A, B)
 
 
@@ -115,6 +115,6 @@ def along(matrix: Array, values: Array) -> Array:
 
 
 def tails(values: Array) -> Array:
-    """Return the larger of the last two Chebyshev coefficients, an estimate of the truncation."""
+    """Return the larger of the last two Chebyshev coefficients, which estimates the truncation."""
     last = np.abs(along(grid(values.shape[1]).series[-2:], values))
     return last.max(axis=tuple(range(1, last.ndim)))

@@ -1,7 +1,7 @@
-"""Solution of R p = c for the whole curve at once: Newton's method at Chebyshev nodes.
+"""Newton's method for R p = c, with the values at all Chebyshev nodes of a curve as unknowns.
 
-`Stationary` is the equation for any functional. `BallStationary` is the equation for a ball, R w''
-= c, which has fewer unknowns and faster steps.
+`Stationary` is the equation for any functional. `BallStationary` is the equation R w'' = c for a
+ball, which has fewer unknowns and faster steps.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from rbcourse.optimum.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
 STEPS = 25
-EXACT = 3e-12  # largest residual of the equations, and last Chebyshev coefficients of R
-SHARE = 0.03  # times EXACT: largest relative residual of p, and last coefficients of k
-LONGEST_STEP = 0.5  # rad: a step turns no node by more
-ROUGH = 1e-2  # rad: after a shorter step, the method continues on more nodes
+EXACT = 3e-12  # bound on the residual and on the last Chebyshev coefficients of R
+SHARE = 0.03  # times EXACT: bound on relative residual of p, last coefficients of k
+LONGEST_STEP = 0.5  # rad: no step turns a node by more than this
+ROUGH = 1e-2  # rad: after a step shorter than this, the method continues on more nodes
 FAILED, FINER, SOLVED = range(3)
 Arrays: TypeAlias = tuple[Array, ...]
 
 
 class Solution(NamedTuple):
-    """A solution: R and the highest derivative k of w at the nodes, c = R p, ∫ ‖u‖² dt.
+    """A solution: R and the highest derivative k of w at the nodes, c = R p, the cost ∫ ‖u‖² dt.
 
-    `beaten` is True if a curve costs less from which Newton's method did not reach a solution.
+    `beaten` is True if some curve costs less, but Newton's method reached no solution from it.
     """
 
     R: Array
@@ -42,7 +42,7 @@ class Solution(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """A failed solution: the residual, and the number of steps."""
+    """The report of a failure: the last residual and the number of steps."""
 
     residual: float
     iterations: int
@@ -54,12 +54,12 @@ def cost_of(one: Solution | Failure) -> float:
 
 
 class Equations(Protocol):
-    """The equations R' = R ŵ and R p = c for a stack; the unknowns are R at n nodes, and others."""
+    """The equations R' = R ŵ and R p = c for a stack; unknowns are R at n nodes, c, and maybe k."""
 
     R0: Array
     R1: Array
     ends: Array  # w0, w1 (and a0, a1), shape (N, m, 3)
-    together: int  # number of problems solved together, which fit into the cache
+    together: int  # number of problems that are solved together in the cache
 
     def take(self, index: Any) -> Self:
         """Return the equations of some of the problems."""
@@ -68,7 +68,7 @@ class Equations(Protocol):
         """Return initial values of the other unknowns, from rotations of shape (N, n, 3, 3)."""
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return the increasing numbers of nodes on which to solve, from n on."""
+        """Return the numbers of nodes to use in turn; they increase from n."""
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest error of each problem, and the data for a step."""
@@ -76,7 +76,8 @@ class Equations(Protocol):
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns of the nodes, in the fixed frame, and the changes of the other unknowns.
 
-        The last axis has those of a step, and if `by_ends` those of a unit of each end value.
+        On the last axis, the first column is a Newton step. If `by_ends`, the other columns are the
+        responses to a unit change of each end value.
         """
 
     def bend(self, unknowns: Arrays) -> Array:
@@ -86,30 +87,30 @@ class Equations(Protocol):
         """Return the changes of k that belong to the `responses`."""
 
     def tails(self, unknowns: Arrays) -> Array:
-        """Return the last Chebyshev coefficients, which estimate the truncation."""
+        """Return the last Chebyshev coefficients, which estimate the truncation error."""
 
     def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
         """Return k, c and the cost."""
 
 
 def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
-    """Solve a stack by Newton's method, from rotations at nodes, shape (N, n, 3, 3).
+    """Solve a stack of problems by Newton's method, from rotations R at nodes, (N, n, 3, 3).
 
     The method works on these nodes until the steps are short, and then on more nodes until the last
-    Chebyshev coefficients have decayed. A problem that is singular or overflows is a `Failure`.
+    Chebyshev coefficients have decayed. A problem that is singular or overflows gives a `Failure`.
     """
     parts = blocks(len(R), equations.together)
     return [one for part in parts for one in _attempt(equations.take(part), R[part])]
 
 
 def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
-    """Return the solutions of `relax`, with linear systems on the nodes of R."""
+    """Return the solutions of `relax` for balls, with linear systems on the nodes of R."""
     parts = equations.R0, equations.R1, equations.ends
     return relax(BallStationary(*parts, R.shape[1]), R)
 
 
 def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
-    """Solve a stack; if this fails, solve each problem alone, and return failures."""
+    """Solve a stack; if this raises an error, solve each problem alone, or return a failure."""
     try:
         return _relax(equations, R)
     except (FloatingPointError, np.linalg.LinAlgError, ValueError):
@@ -150,7 +151,7 @@ def _with_ends(equations: Equations, R: Array) -> Array:
 
 
 def _on_nodes(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
-    """Return the unknowns on n nodes; c does not depend on the nodes."""
+    """Return the unknowns interpolated to n nodes; c does not depend on the nodes."""
     R, *others = unknowns
     up = interpolation(R.shape[1], n)
     R = _with_ends(equations, orthogonal(along(up, R)))
@@ -158,7 +159,7 @@ def _on_nodes(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
 
 
 class Iterate(NamedTuple):
-    """The result of Newton's method on some nodes: solved, failed, or in need of more nodes."""
+    """The result of Newton's method on one set of nodes, with a verdict for each problem."""
 
     unknowns: Arrays
     left: Array
@@ -167,7 +168,7 @@ class Iterate(NamedTuple):
 
 
 def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
-    """Improve the unknowns by steps that turn no node by more than half a rad."""
+    """Improve the unknowns by Newton steps that turn no node by more than 0.5 rad."""
     unknowns = tuple(x.copy() for x in unknowns)
     R, *others = unknowns
     left, size = np.full((2, len(R)), np.inf)
@@ -200,7 +201,7 @@ def _newton(equations: Equations, unknowns: Arrays, rough: bool) -> Iterate:
 def _verdicts(tail: Array, left: Array, before: Array, size: Array) -> NDArray[np.intp]:
     """Return SOLVED, FINER or FAILED for each problem, after a step of the given size.
 
-    A problem is solved if the residual and the last coefficients are small. It needs finer nodes if
+    A problem is solved if the residual and the last coefficients are small. It needs more nodes if
     the last coefficients dominate, or if rounding stops the iteration.
     """
     stalled = (size < 1e-6) & (left > before / 2)
@@ -226,7 +227,7 @@ def in_body(R: Array, c: Array) -> Array:
 
 
 def rates_at_nodes(ends: Array, k: Array) -> list[Array]:
-    """Return w, w', … up to the highest derivative k, at the nodes, from k and the ends of w."""
+    """Return w, w', … up to the highest derivative k at the nodes, from k and the end values."""
     by = primitives(k.shape[1], ends.shape[1])
     return [E @ ends + K @ k for E, K in zip(by.from_ends, by.from_k, strict=True)]
 
@@ -238,9 +239,9 @@ def kinematic_error(R0: Array, R: Array, w: Array) -> tuple[Array, Array]:
 
 
 def mending_turns(R: Array, E: Array, W: Array) -> Array:
-    """Return d, for which the turns ε = d + ∫ R δw dt correct E to first order; w changes by δw.
+    """Return d such that the turns ε = d + ∫ R δw dt correct E to first order if w changes by δw.
 
-    Since the turns ε, in the fixed frame, also change R ŵ, d = vee(E Rᵀ + ∫ E ŵ Rᵀ dt).
+    The turns ε are in the fixed frame. They also change R ŵ, so d = vee(E Rᵀ + ∫ E ŵ Rᵀ dt).
     """
     Rt = np.ascontiguousarray(R.mT)  # faster to multiply
     return vee(E @ Rt + along(grid(R.shape[1]).integral, E @ W @ Rt))
@@ -258,7 +259,7 @@ def costs(functional: Functional, ends: Array, k: Array) -> Array:
 class Stationary:
     """The equation R p = c for any functional; the unknowns are R and k = w⁽ᵐ⁾ at nodes, and c.
 
-    `ends` contains w0 and w1, and for the jerk a0 and a1, shape (N, m, 3).
+    `ends` contains w0 and w1, and for the jerk also a0 and a1; its shape is (N, m, 3).
 
     Source: beyond BK 2.
     """
@@ -287,7 +288,10 @@ class Stationary:
         return n, *(more for more in (25, 33, 49, 65, 97, 129) if more > n)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
-        """Return the largest entry of R0 + ∫ R ŵ − R, or of p − Rᵀc over the size of k and p."""
+        """Return the largest error of each problem, and the data for a step.
+
+        The errors are those of R = R0 + ∫ R ŵ dt, and of p = Rᵀc relative to the size of k and p.
+        """
         R, k, c = unknowns
         rates = rates_at_nodes(self.ends, k)
         E, W = kinematic_error(self.R0, R, rates[0])
@@ -300,13 +304,13 @@ class Stationary:
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the changes of k and c.
 
-        Let Kᵢ be the integrals that give w, w', … from k, and Pᵢ the derivatives of p by these
-        rates:
+        Let Kᵢ be the integrals that give w, w', … from k, and Pᵢ the derivatives of p with respect
+        to these rates. Then
 
             p + Σ Pᵢ Kᵢ δk = Rᵀ(c + ĉ ε + δc),    ε = d + ∫ R K₀ δk dt,    ε(1) = 0.
 
-        With the second equation substituted into the first, these are 3 n + 3 equations for δk and
-        δc. A change of the end values adds terms to d and p.
+        If the second equation is substituted into the first, 3 n + 3 equations for δk and δc
+        remain. A change of the end values adds terms to d and p.
         """
         (R, _, c), (E, W, lacking, *rates) = unknowns, parts
         count, n = R.shape[:2]
@@ -345,7 +349,7 @@ class Stationary:
         return responses[1]
 
     def tails(self, unknowns: Arrays) -> Array:
-        """Return the last coefficients of R, or of k over its size."""
+        """Return the last coefficients of R, or those of k relative to k if they are larger."""
         R, k, _ = unknowns
         return np.maximum(tails(R), tails(k) / (SHARE * (1 + np.abs(k).max(axis=(1, 2)))))
 
@@ -356,13 +360,13 @@ class Stationary:
 
 
 def _by_ends(from_ends: Array, matrices: Array) -> Array:
-    """Return matrices (N, n, 3, 3) times the rates of a unit of each end value, (N, n, 3, 3 m)."""
+    """Return matrices (N, n, 3, 3) times the rates due to each unit end value, (N, n, 3, 3 m)."""
     products = matrices[..., None, :] * from_ends[:, None, :, None]
     return products.reshape(*products.shape[:3], -1)
 
 
 def _turns_by_ends(R: Array, from_ends: Array) -> Array:
-    """Return ∫ R δw dt at the nodes for a unit of each end value."""
+    """Return ∫ R δw dt at the nodes for a unit change of each end value."""
     return along(grid(R.shape[1]).integral, _by_ends(from_ends, R))
 
 
@@ -377,8 +381,8 @@ def _integrals(R: Array, K: Array) -> Array:
 class BallStationary:
     """The equation R w'' = c; the unknowns are R at the nodes and c, and w'' = Rᵀc gives w.
 
-    The linear systems are solved on `coarse` nodes, those of the first rotations. This is 1.3 times
-    as fast as `Stationary` for one problem, and 2.5 times as fast for stacks of 300.
+    The linear systems are solved on a fixed number of nodes, `coarse`. This is 1.3 times as fast as
+    `Stationary` for one problem, and 2.5 times as fast for stacks of 300.
 
     Source: BK (19).
     """
@@ -401,7 +405,7 @@ class BallStationary:
         return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n and the numbers with 2, 4, 8 and 16 times as many intervals, up to 257 nodes."""
+        """Return n, and the numbers of nodes for 2, 4, 8, 16 times the intervals, up to 257."""
         return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16) if (n - 1) * times <= 256)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
@@ -420,9 +424,9 @@ class BallStationary:
 
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
-        The equation is solved for ĉ ε on the `coarse` nodes. The integrals are so smoothing that
-        the right side, evaluated on all nodes, is as accurate as a solution on all nodes. A change
-        of the end values adds a term to d.
+        The equation is solved for ĉ ε on the `coarse` nodes. The integrals smooth the error so much
+        that the right side, evaluated on all nodes, is as accurate as a solution on all nodes. A
+        change of the end values adds a term to d.
         """
         R, c = unknowns
         stride = (R.shape[1] - 1) // (self.coarse - 1)
@@ -461,7 +465,7 @@ class BallStationary:
 
 
 def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
-    """Return ĉ ε at the nodes for each d, and for each unit of δc.
+    """Return ĉ ε at the nodes for each column of d, and for a unit of each component of δc.
 
     Only the two components of ε perpendicular to c matter. They solve one linear system for each
     problem.
@@ -480,7 +484,7 @@ def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
 
 
 def _across(c: Array) -> tuple[Array, Array]:
-    """Return two unit vectors perpendicular to c as rows, (N, 2, 3), and c × both as columns.
+    """Return two unit vectors perpendicular to c as rows, (N, 2, 3), and c × each as columns.
 
     The vectors are rows of the Householder reflection that maps c to the third axis.
     """
@@ -494,5 +498,5 @@ def _across(c: Array) -> tuple[Array, Array]:
 
 @lru_cache
 def _for_each_entry(n: int) -> Array:
-    """Return the Kronecker product of the matrix that integrates twice and 2 × 2 ones."""
+    """Return the Kronecker product of the twofold integral and a 2 × 2 matrix of ones."""
     return np.kron(primitives(n, 2).from_k[0], np.ones((2, 2)))

@@ -1,4 +1,4 @@
-"""The functionals that optima on SO(3) minimise, and the p for which R p is constant.
+"""The functionals that optima on SO(3) minimise, and the costate p, for which R p is constant.
 
 Each functional is a number times ∫ ‖u‖² dt, where u is a function of w, w' and, for the jerk, w''.
 Vary a curve R(t) to R exp(η̂), where η is a small function of time. Then w changes by
@@ -6,14 +6,14 @@ Vary a curve R(t) to R exp(η̂), where η is a small function of time. Then w c
 
     ½ δ ∫ L dt = ± ∫ p · δw dt,    p = ±½ (∂L/∂w − d/dt ∂L/∂w' + d²/dt² ∂L/∂w''),
 
-where η and its derivatives vanish at both ends as far as end values are given. The integral is
+where η = η' = 0 at both ends, and for the jerk also η'' = 0. The integral is
 ±∫ (−p' − w × p) · η dt. It is 0 for every η if p' + w × p = 0. Since (R p)' = R (p' + w × p), a
 curve is stationary if and only if
 
     R p = c    is constant.
 
-This is Noether's theorem: a rotation of the fixed frame does not change the cost. p is called the
-costate.
+This is Noether's theorem: R p is conserved, since a rotation of the fixed frame does not change the
+cost.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from rbcourse.so3 import hat
 
 
 class Functional(Protocol):
-    """A number times ∫ ‖u‖² dt, for a stack of problems, with its derivatives.
+    """A number times ∫ ‖u‖² dt, for a stack of problems, with the derivatives of u and p.
 
-    The rates w, w', … have the shape (N, n, 3), for N problems and n times. Derivatives by the
-    rates are lists of 3 × 3 matrices, shape (N, n, 3, 3); the first is the derivative by w.
+    The rates w, w', … have the shape (N, n, 3), for N problems and n times. Derivatives with
+    respect to the rates are lists of 3 × 3 matrices, shape (N, n, 3, 3); the first one is the
+    derivative with respect to w.
 
     Attributes
     ----------
@@ -68,7 +69,7 @@ class Functional(Protocol):
         """The function of w, w', … that returns the momenta, and their derivatives.
 
         The momenta have the shape (N, n, 3), or for the jerk (N, n, 6). If the end values of an
-        optimum change, ∫ ‖u‖² dt changes by [momenta · change] from 0 to 1.
+        optimum change, ∫ ‖u‖² dt changes by momenta · change at t = 1, minus the same at t = 0.
         """
 
     @property
@@ -92,7 +93,7 @@ class BallAcceleration:
     needs: tuple[int, ...] = (2,)
 
     def take(self, index: Any) -> Self:
-        """Return itself: it is the same for all problems."""
+        """Return the functional itself, which is the same for all problems."""
         return self
 
     def deviation(self, *rates: Array) -> Array:
@@ -100,12 +101,12 @@ class BallAcceleration:
         return rates[-1]
 
     def deviation_by(self, w: Array, a: Array) -> list[Array]:
-        """Return the derivatives of w' by w and w'."""
+        """Return the derivatives of w' with respect to w and w'."""
         zero = np.zeros((*w.shape, 3))
         return [zero, zero + np.eye(3)]
 
     def momenta(self, w: Array, a: Array) -> tuple[Array, list[Array]]:
-        """Return 2 w'."""
+        """Return 2 w' and its derivatives."""
         return 2 * a, [2 * x for x in self.deviation_by(w, a)]
 
     def p(self, w: Array, a: Array, b: Array) -> Array:
@@ -113,7 +114,7 @@ class BallAcceleration:
         return b
 
     def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
-        """Return the derivatives of w'' by w, w' and w''."""
+        """Return the derivatives of w'' with respect to w, w' and w''."""
         return [*self.deviation_by(w, a)[:1] * 2, *self.deviation_by(w, a)[1:]]
 
 
@@ -165,23 +166,23 @@ class Effort:
         return matvec(G, a) + cross(w, matvec(G, w))
 
     def deviation(self, w: Array, a: Array) -> Array:
-        """Return a root of M times the torque."""
+        """Return u, a square root of M times the torque."""
         return matvec(self.root[:, None], self.torque(w, a))
 
     def deviation_by(self, w: Array, a: Array) -> list[Array]:
-        """Return the derivatives of the deviation by w and w'."""
+        """Return the derivatives of the deviation with respect to w and w'."""
         G, root = self.G[:, None], self.root[:, None]
         T0 = hat(w) @ G - hat(matvec(G, w))
         return [root @ T0, np.broadcast_to(root @ G, T0.shape)]
 
     def momenta(self, w: Array, a: Array) -> tuple[Array, list[Array]]:
-        """Return 2 G M τ."""
+        """Return 2 G M τ and its derivatives."""
         pull = 2 * (self.root @ self.G).mT[:, None]
         by = [pull @ x for x in self.deviation_by(w, a)]
         return matvec(pull, self.deviation(w, a)), by
 
     def p(self, w: Array, a: Array, b: Array) -> Array:
-        """Return G (v' + w × v) − h × v, v = M τ."""
+        """Return G (v' + w × v) − h × v, with v = M τ and h = G w."""
         G, M = self.G[:, None], self.M[:, None]
         h, h_rate = matvec(G, w), matvec(G, a)
         torque_rate = matvec(G, b) + cross(a, h) + cross(w, h_rate)
@@ -189,10 +190,10 @@ class Effort:
         return matvec(G, v_rate + cross(w, v)) - cross(h, v)
 
     def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
-        """Return the derivatives of p by w, w' and w''."""
+        """Return the derivatives of p with respect to w, w' and w''."""
         G, M = self.G[:, None], self.M[:, None]
         W, H = hat(w), hat(matvec(G, w))
-        T0, T1 = W @ G - H, hat(a) @ G - hat(matvec(G, a))  # the derivatives of τ and of τ' by w
+        T0, T1 = W @ G - H, hat(a) @ G - hat(matvec(G, a))  # derivatives of τ, τ' with respect to w
         V, GM, QM = hat(matvec(M, self.torque(w, a))), G @ M, (G @ W - H) @ M
         by_w = GM @ T1 + QM @ T0 - G @ V + V @ G
         return [by_w, GM @ T0 + QM @ G, np.broadcast_to(GM @ G, W.shape)]
@@ -212,7 +213,7 @@ class Jerk:
     needs: tuple[int, ...] = (1, 2, 3)
 
     def take(self, index: Any) -> Self:
-        """Return itself: it is the same for all problems."""
+        """Return the functional itself, which is the same for all problems."""
         return self
 
     def deviation(self, w: Array, a: Array, b: Array) -> Array:
@@ -220,12 +221,12 @@ class Jerk:
         return b + cross(w, a) / 2
 
     def deviation_by(self, w: Array, a: Array, b: Array) -> list[Array]:
-        """Return the derivatives of j by w, w' and w''."""
+        """Return the derivatives of j with respect to w, w' and w''."""
         W = hat(w)
         return [-hat(a) / 2, W / 2, np.broadcast_to(np.eye(3), W.shape)]
 
     def momenta(self, w: Array, a: Array, b: Array, d: Array) -> tuple[Array, list[Array]]:
-        """Return −2 j' − w × j, which belongs to w, and 2 j, which belongs to w'."""
+        """Return −2 j' − w × j for the change of w, and 2 j for w', with their derivatives."""
         j, j_rate = self.deviation(w, a, b), d + cross(w, b) / 2
         W, one = hat(w), np.broadcast_to(np.eye(3), (*w.shape, 3))
         by_j = [-hat(a) / 2, W / 2, one, 0 * one]
@@ -242,7 +243,7 @@ class Jerk:
         return j_bend + cross(w, j_rate) / 2 + cross(a, j)
 
     def p_by(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> list[Array]:
-        """Return the derivatives of p by w and its four derivatives."""
+        """Return the derivatives of p with respect to w and its four derivatives."""
         W, A, B, D = hat(w), hat(a), hat(b), hat(d)
         J, J_rate = B + hat(cross(w, a)) / 2, D + hat(cross(w, b)) / 2
         return [

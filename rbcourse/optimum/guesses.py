@@ -14,33 +14,34 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-LONGEST = 100.0  # rad: if the legs of a start are longer, no more full turns are tried
-SHARES = np.array([1.0, 0.25, 3.0])  # of a step that lowers the cost: the best of these is used
+LONGEST = 100.0  # rad: if the legs of a curve are longer, no more full turns are tried
+SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
-_TOGETHER = 32  # curves that are lowered together, which fit into the cache
+_TOGETHER = 32  # curves that take their steps together in the cache
 
 
 def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.intp], Array]:
-    """Return the numbers of problems, and curves with their ends at n nodes.
+    """Return, for each starting curve, the number of its problem, and the curve at n nodes.
 
-    Let v turn from the Bézier control point C₁ = R0 exp(ŵ0/3) to the other one, R1 exp(−ŵ1/3), the
-    short way or the other way round. Both v with k additional full turns are included if the legs
-    ŵ0/3 and ŵ1/3, plus the `bend` by the accelerations, are together longer than 2k − 1 full turns.
+    Let v turn from the Bézier control point C₁ = R0 exp(ŵ0/3) to the control point R1 exp(−ŵ1/3),
+    the short way or the long way. Both v are also used with k additional full turns if the lengths
+    ‖w0‖/3 and ‖w1‖/3 and the `bend` due to the accelerations sum to 2k − 1 full turns or more.
     With β = 3t² − 2t³, the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
 
-    has the given ends. It moves with the ends, and R1, R0, −w1, −w0 give the reversed curve.
+    has the given ends. It does not depend on the choice of frames, and R1, R0, −w1, −w0 give the
+    reversed curve.
     """
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
     C1 = ends.R0 @ ahead
     v = log_so3(C1.mT @ ends.R1 @ back)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    # rounding must not choose one of two turns by π
+    # rounding must not choose between two turns by π
     other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
     v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
-    along_v = v + 1e-9 * (first + last)  # with a direction even if v is 0
+    along_v = v + 1e-9 * (first + last)  # it has a direction even if v is 0
     full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
     length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
     problem, turns = [], []
@@ -56,7 +57,7 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
 
 
 def leading_sign(v: Array) -> Array:
-    """Return the sign of the largest component of v; of equal components, the first one is used."""
+    """Return the sign of the largest component of v, or of the first one if several are equal."""
     size = np.abs(v)
     largest = np.argmax(size > (1 - SAME) * size.max(axis=-1, keepdims=True), axis=-1)
     return np.sign(np.take_along_axis(v, largest[..., None], axis=-1))
@@ -139,16 +140,16 @@ def _continuous_log(R: Array) -> Array:
 
 
 def _bounded(w: Array) -> Array:
-    """Return velocities clipped against overflow; problems with faster ones are not solved."""
+    """Return velocities clipped to ±1e6 to avoid overflow; faster problems are not solved."""
     return np.clip(w, -1e6, 1e6)
 
 
 def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
     """Return the curves R with a full turn added about each principal axis of G, both ways.
 
-    With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes, the new curves are R exp(±2π β
-    ê), six for each curve, in six concatenated stacks. A full turn about the axis of a small moment
-    may lower the cost.
+    With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes, the new curves are
+    R exp(±2π β ê), six for each curve, in six concatenated stacks. A full turn about the axis of a
+    small moment may lower the cost.
     """
     t = grid(R.shape[1]).t[:, None]
     axes = np.moveaxis(np.linalg.eigh(G)[1], -1, 0)[:, :, None]
@@ -158,7 +159,7 @@ def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
 
 
 def with_ends(R: Array, ends: Array) -> Array:
-    """Return the curves R exp(η̂) with w0 and w1, or w0, w1, a0 and a1, at their ends.
+    """Return the curves R times factors exp(η̂) that correct w0 and w1, or w0, w1, a0 and a1.
 
     Δw₀ and Δw₁ are the differences between the given velocities and those of the polynomials
     through R at the nodes. A fast curve that is sampled at too few nodes has such differences. The
@@ -176,13 +177,13 @@ def with_ends(R: Array, ends: Array) -> Array:
 
 
 def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> tuple[Array, Array]:
-    """Return curves with the same ends after Gauss–Newton steps, and their costs.
+    """Return cheaper curves with the same ends, by Gauss–Newton steps, and their costs.
 
     For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation
     changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
     the integral of the squared new deviation, among all polynomials tᵐ (1 − t)ᵐ p(t), where p has
-    half as many coefficients as there are nodes. A quarter of η, or three times η, is used if it is
-    better. The steps end when one of them lowers the cost by a share below `worthwhile`.
+    half as many coefficients as there are nodes. A quarter of η, or three times η, is used if it
+    costs less. The steps end when a step lowers the cost by less than the share `worthwhile`.
     """
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
@@ -197,7 +198,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Take the best of one step, its multiples by `SHARES`, and no step."""
+    """Return the cheapest of R and of the curves after a step times each of `SHARES`."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))
@@ -208,7 +209,7 @@ def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]
 
 
 def _best_change(functional: Functional, R: Array) -> Array:
-    """Return η of a step at the nodes."""
+    """Return the η of a Gauss–Newton step at the nodes."""
     order, bumps = functional.ends // 2 + 1, R.shape[1] // 2
     nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order)
     rates = rates_of(R, order)
@@ -221,7 +222,7 @@ def _best_change(functional: Functional, R: Array) -> Array:
 
 
 def by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
-    """Return D₀, D₁, … of `lowered`, from the derivatives of u by w, w', ….
+    """Return D₀, D₁, … of `lowered`, from the derivatives of u with respect to w, w', ….
 
     By Leibniz's rule δw⁽ⁱ⁾ = η⁽ⁱ⁺¹⁾ + Σ (i over j) w⁽ⁱ⁻ʲ⁾ × η⁽ʲ⁾.
     """

@@ -1,4 +1,4 @@
-"""The search for the cheapest curve: starting curves for Newton's method, and further searches."""
+"""The search for the cheapest curve, by Newton's method from many starting curves (starts)."""
 
 from __future__ import annotations
 
@@ -49,39 +49,39 @@ NOTHING = Failure(np.inf, 0)
 class Limits:
     """The parameters of the search. Ratios are costs over the lowest cost; angles are in rad.
 
-    A pair (steps, share) limits the lowering of curves: to this number of steps, each of which
-    lowers the cost by at least this share.
+    A pair (steps, share) limits the Gauss–Newton steps that lower a cost: at most this number of
+    steps is made, and they end when a step lowers the cost by less than this share.
     """
 
-    nodes: int = 17  # of starting curves, and of the linear systems of a ball
-    nodes_for_turns: int = 25  # for bodies, if full turns are added
+    nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
+    nodes_for_turns: int = 25  # for bodies, if full turns are added to the curves
     nodes_for_jerk: int = 29  # the jerk has higher derivatives
-    nodes_for_all_starts: int = 33  # for all starts, if one costs less than all solutions
+    nodes_for_all_starts: int = 33  # if a start costs less than all solutions
     nodes_for_very_fast: int = 65
-    followed: float = 1.1  # lowered starts that cost up to this ratio are followed
-    same_entries: float = 0.1  # of starts whose entries of R differ by less, only the cheapest
-    fast: float = 24.0  # if ‖w0‖ + ‖w1‖ is larger, all starts are followed, lowered or not
-    very_fast: float = 80.0  # if it is larger than this, `nodes_for_very_fast` are used
-    known_cost: float = 1.01  # largest ratio of a cost to the cost of a start at its nodes
+    followed: float = 1.1  # Newton's method is used from starts that cost up to this ratio
+    same_entries: float = 0.1  # starts with entries of R that differ by less count as equal
+    fast: float = 24.0  # if ‖w0‖ + ‖w1‖ is larger, all starts are tried
+    very_fast: float = 80.0  # if ‖w0‖ + ‖w1‖ is larger, `nodes_for_very_fast` is used
+    known_cost: float = 1.01  # largest accepted ratio of a solution's cost to a start's cost
     one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
-    flat: float = 0.1  # if a smaller share of w is perpendicular to one axis, curves are bent
-    bend: float = 0.5  # the size of this bend
+    flat: float = 0.1  # curves are bent if the part of w off one axis is a smaller share
+    bend: float = 0.5  # rad: the size of this bend
     turned: float = 3.0  # full turns are added to curves that cost up to this ratio
-    turned_again: float = 1.2  # and then to the new curves that cost up to this ratio
-    worth_a_turn: float = 0.3  # only if the cheapest costs more than this share of a full turn
-    promising_turn: float = 1.5  # curves with an added turn that cost more are dropped early
+    turned_again: float = 1.2  # full turns are then added to new curves up to this ratio
+    worth_a_turn: float = 0.3  # turns are added if the least cost is a larger share of a turn's
+    promising_turn: float = 1.5  # curves with an added turn that cost more are dropped soon
     starts: tuple[int, float] = (40, 5e-4)
     new_turns: tuple[int, float] = (3, 5e-4)
     on_more_nodes: tuple[int, float] = (40, 1e-4)
-    bent: tuple[int, float] = (40, 1e-6)  # for bent curves, where two curves diverge
-    last: tuple[int, float] = (200, 0.0)  # if no other lowering suffices
+    bent: tuple[int, float] = (40, 1e-6)  # for bent curves, which may start near a saddle
+    last: tuple[int, float] = (200, 0.0)  # if the steps of the other pairs do not suffice
 
 
 LIMITS = Limits()
 
 
 class Task(NamedTuple):
-    """A stack of problems with one batch axis, and how to solve them.
+    """A stack of problems with one batch axis, and the functions that solve them.
 
     If the functional is an `Effort`, the search also adds full turns to the starts. It also bends
     solutions that turn about one axis, which may be saddles.
@@ -90,7 +90,7 @@ class Task(NamedTuple):
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
-    # from the numbers of some problems and n: numbers of problems, and curves for them at n nodes
+    # takes numbers of problems and n; returns, for each start, its problem and the curve at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = LIMITS.nodes  # of starting curves
@@ -112,12 +112,12 @@ def ball(given: Ends) -> Task:
 
 
 def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Return the solutions from one start for problems in which the other way round costs more.
+    """Return the solutions of problems with small σ, w0 and w1, by number, from one start each.
 
     If the entries of σ, w0 and w1 are below ½, their norms are below 1. The optimum then costs
-    about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve the other way round with such ends has a length of
-    at least 2π − 1 and costs at least 12 (2π − 2)² > 200. This does not prove that only one curve
-    of the short way is stationary, but no other one was found.
+    about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve that turns the long way between such ends has a
+    length of at least 2π − 1 and costs at least 12 (2π − 2)² > 200. This does not prove that only
+    one curve that turns the short way is stationary, but no second one was found.
     """
     largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
     slow = np.flatnonzero(largest < LIMITS.one_start)
@@ -163,7 +163,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
 def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     """Return the problems of minimum jerk."""
     ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-    # about one axis, the cheapest of all turns is by (w0 + w1)/2 + (a0 − a1)/12
+    # the cheapest of all turns about one axis is by (w0 + w1)/2 + (a0 − a1)/12
     bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
     def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
@@ -175,9 +175,9 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
 
 
 def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
-    """Return the ends with one batch axis, the nearest rotations, and the end values (N, m, 3)."""
+    """Return the ends with one batch axis and exact rotations, and the end values (N, m, 3)."""
     ends = given.flat()
-    R0, R1 = (nearest(R)[0] for R in ends[:2])  # with R of few digits, R p = c would not converge
+    R0, R1 = (nearest(R)[0] for R in ends[:2])  # Newton's method fails if R has few digits
     return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
 
 
@@ -187,10 +187,11 @@ def _on_nodes(R: Array, n: int) -> Array:
 
 
 def cheapest(task: Task) -> list[Solution | Failure]:
-    """Return the cheapest solutions from the starts that cost little when lowered, or from all.
+    """Return the cheapest solution of each problem, from its cheapest starts or from all.
 
-    All starts are followed if no solution is found, or if the solution costs more than a start,
-    lowered or not. If even this does not suffice, the starts are lowered further.
+    Gauss–Newton steps first lower the costs of the starts. All starts are tried if no solution is
+    found, or if the solution costs more than a start, before or after these steps. If even this
+    does not suffice, more steps are made.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _searched(task)
@@ -227,7 +228,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
 def _with_more_turns(
     task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
 ) -> tuple[Numbers, Array, Array]:
-    """Lower the cheapest curves on more nodes, also with a full turn added about a principal axis.
+    """Lower the costs of the cheapest curves on more nodes, also after adding full turns.
 
     The cheapest motion may turn once or twice more about the axis of a small moment. From rest to
     rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No turn
@@ -269,10 +270,10 @@ def _with_more_turns(
 def _leave_the_axis(
     task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
 ) -> None:
-    """Bend solutions that turn nearly about one axis to four sides; follow cheaper curves.
+    """Bend solutions that turn nearly about one axis to four sides, and solve from cheaper curves.
 
-    Such a solution may be a saddle: all starts, and the steps that lower them, keep to the axis,
-    although a curve that leaves the axis costs less.
+    Such a solution may be a saddle: all starts turn about the axis, and no step leaves it, although
+    a curve that leaves the axis costs less.
     """
     order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
     problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
@@ -296,7 +297,7 @@ def _across(w: Array, G: Array) -> Array:
     """Return four directions perpendicular to the approximate axis of w (n, 3), shape (4, 3).
 
     They are the directions in which w deviates from its axis. If w does not deviate, the inertia
-    determines them, and for equal moments the order of the axes.
+    determines them; if the moments are equal, too, the order of the axes does.
     """
     leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
     axes = np.linalg.svd(leans, full_matrices=False)[2][1:]
@@ -312,7 +313,7 @@ def _follow_on(
     n: int,
     found: list[Solution | Failure],
 ) -> None:
-    """Follow more starts of some problems on n nodes, which give more accurate costs."""
+    """Solve some problems from more starts on n nodes, which give more accurate costs."""
     mine = np.isin(problem, index)
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, index, n)
@@ -343,7 +344,7 @@ def _least(count: int, problem: Numbers, cost: Array) -> Array:
 
 
 def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
-    """Return which starts are close, at all nodes, to a cheaper start of the same problem."""
+    """Tell which starts are close, at all nodes, to a cheaper start of the same problem."""
     order, repeated = np.lexsort((cost, problem)), np.zeros(len(problem), bool)
     number, R = problem[order], R[order]
     for after in range(1, np.bincount(problem, minlength=1).max()):
@@ -353,15 +354,15 @@ def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
 
 
 def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
-    """Return the numbers of problems, and starting curves for them."""
+    """Return, for each starting curve, the number of its problem, and the curve."""
     problem, R = task.starts(index, n)
     return index[problem], R
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Store the solutions that these curves lead to in `found` if they cost less.
+    """Solve the problems from these curves, and store solutions that cost less in `found`.
 
-    Of solutions with the same cost the first one is kept, so that rounding does not decide.
+    If two solutions have the same cost, the first one is kept, so that rounding does not decide.
     """
     for i, one in zip(problem, task.solver(task.equations.take(problem), R), strict=True):
         if found[i] is NOTHING or cost_of(one) < (1 - SAME) * cost_of(found[i]):

@@ -1,24 +1,27 @@
-"""The second variation of the cost along an optimum of two poses, and a proof that it is positive.
+"""The second variation of the cost of an optimum between two poses, and proof of its positivity.
 
-Vary R(t) to R exp(s η̂), with η = 0 at both ends, with as many derivatives as are given there. With
-x = η' + w × η and ε = R η, so that ε' = R x, and R p = c, the second derivative of the cost by s is
+Vary R(t) to R exp(s η̂), where η vanishes at both ends, with η' and for the jerk also η''. Let
+x = η' + w × η and ε = R η, so that ε' = R x. Since R p = c, the second derivative of the cost with
+respect to s is
 
     ½ δ² ∫ L dt = ± ∫ δp · x + c · (ε' × ε) dt,    δp = Σ Pᵢ x⁽ⁱ⁾,  Pᵢ = ∂p/∂w⁽ⁱ⁾,
 
-where ± is − for the acceleration and the torque, + for the jerk. It is the integral of
-L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾, with a constant positive M, plus terms with fewer derivatives. The x that
-occur vanish at both ends, with k − 1 derivatives, and ∫ R x dt = 0. If the integral is at least a
-positive multiple of ∫ L(x, x) dt for all of them, the curve is a strict local minimum.
+where ± is − for the acceleration and the torque, and + for the jerk. It is the integral of
+L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾, with a constant positive definite M, plus terms with fewer derivatives.
+Each such x vanishes at both ends, with its first k − 1 derivatives, and ∫ R x dt = 0. If the second
+derivative is at least a positive multiple of ∫ L(x, x) dt for every such x, the curve is a strict
+local minimum.
 
-Three steps prove that, up to rounding, quadrature and the error of the computed curve. (1) A
-penalty, `_PENALTY` ‖∫ R x dt‖², is added, and the form is required to be positive without the last
-condition. ε is then the primitive of R x with ε(1) = −ε(0), so that the form is symmetric.
-(2) x is split into x₁, with x₁⁽ᵏ⁾ a polynomial of a degree below J, and x₂, with x₂⁽ᵏ⁾ orthogonal
-to these. Legendre polynomials make a matrix Q of the form for x₁. For x₂, where each integration
-divides the norm by at least 2J − 1, 2J − 3, …, the terms with fewer derivatives are at most a share
-γ of ∫ L(x₂, x₂) dt. (3) The mixed terms are ∫ x₂⁽ᵏ⁾ · F x₁ dt, and only that part of F x₁ counts
-that is orthogonal to polynomials: with its products E the form is positive if γ < 1 and
-Q − E/(1 − γ) is positive definite.
+Three steps prove this, up to rounding, quadrature and the error of the computed curve. (1) A
+penalty, `_PENALTY` ‖∫ R x dt‖², is added, and the form must be positive also for x that violate
+∫ R x dt = 0. Then ε is the primitive of R x with ε(1) = −ε(0), so that the form is symmetric.
+(2) x is split into x₁ and x₂, where x₁⁽ᵏ⁾ is a polynomial of a degree below J, and x₂⁽ᵏ⁾ is
+orthogonal to such polynomials. In a basis of Legendre polynomials, the form for x₁ is a matrix Q.
+Successive integrations of x₂⁽ᵏ⁾ divide its norm by at least 2J − 1, 2J − 3, …, so the terms with
+fewer derivatives are at most a share γ of ∫ L(x₂, x₂) dt. (3) The mixed terms are
+∫ x₂⁽ᵏ⁾ · F x₁ dt, and only the part of F x₁ orthogonal to the polynomials contributes. Let E be the
+matrix of the inner products of these parts. The form is positive if γ < 1 and Q − E/(1 − γ) is
+positive definite.
 """
 
 from __future__ import annotations
@@ -33,17 +36,17 @@ from rbcourse.optimum import Optimum
 from rbcourse.optimum.chebyshev import Grid, grid
 from rbcourse.so3 import hat
 
-_PENALTY = 1e4  # over ‖c‖ + 1
-_CLEAR = 1e-6  # an eigenvalue that is smaller may be 0 but for rounding
+_PENALTY = 1e4  # it is multiplied by (‖c‖ + 1) ‖M‖
+_CLEAR = 1e-6  # a smaller eigenvalue may differ from 0 only by rounding
 _DEGREES = 24, 48, 96
 
 
 @lru_cache
 def polynomials(m: int, k: int, nodes: int) -> list[Array]:
-    """Return m polynomials with k zeros at 0 and at 1, and 2 k derivatives, at Chebyshev nodes.
+    """Return m polynomials with k-fold zeros at 0 and 1, and their first 2 k derivatives, at nodes.
 
-    Each has the shape (nodes, m). The k-th derivatives are the normalised Legendre polynomials of
-    the degrees k, k + 1, …
+    Each array has the shape (nodes, m), for Chebyshev nodes. The k-th derivatives are the
+    normalised Legendre polynomials of the degrees k, k + 1, …
     """
     from numpy.polynomial.legendre import legder, legint, legval
 
@@ -71,7 +74,7 @@ def _is_positive(curve: Optimum) -> bool:
 def least_eigenvalues(curve: Optimum, m: int) -> tuple[float, float]:
     """Return the least eigenvalues of Q and of Q − E/(1 − γ), with m polynomials for each axis.
 
-    Of a stack of one curve; −∞ for the second one if γ is 1 or more.
+    The curve is a stack of one. The second value is −∞ if γ is 1 or more.
     """
     functional, k = curve.functional, curve.functional.ends // 2
     sign, J = (-1) ** k, m + k
@@ -82,7 +85,7 @@ def least_eigenvalues(curve: Optimum, m: int) -> tuple[float, float]:
     c = matvec(R, functional.p(*rates))[0].mean(axis=0)
     R, M, size = R[0], P[-1][0], float(np.linalg.norm(c))
 
-    root = np.linalg.inv(np.linalg.cholesky(M)).T  # x = root y: L(x, x) = ‖y⁽ᵏ⁾‖²
+    root = np.linalg.inv(np.linalg.cholesky(M)).T  # with x = root y, L(x, x) = ‖y⁽ᵏ⁾‖²
     x = [on_each_axis(values, root) for values in polynomials(m, k, len(t))]
     rate = R @ x[0]
     total = np.tensordot(weights, rate, axes=1)
@@ -107,21 +110,21 @@ def least_eigenvalues(curve: Optimum, m: int) -> tuple[float, float]:
 
 
 def _share(P: list[Array], c: float, nodes: Grid, J: int) -> float:
-    """Return γ: how large terms with fewer derivatives can be, as a share of ∫ ‖y₂⁽ᵏ⁾‖² dt."""
+    """Return γ, a bound on the terms with fewer derivatives, as a share of ∫ ‖y₂⁽ᵏ⁾‖² dt."""
     k = len(P) // 2
     norms = [_largest(Pi) for Pi in P]
     # ‖y₂⁽ⁱ⁾‖ is at most size[k − i] ‖y₂⁽ᵏ⁾‖, and ‖ε‖ at most ‖x₂‖/π
     size = np.cumprod([1.0, *(1 / (2 * J - 1 - 2 * i) for i in range(k))])
     share = size[k] ** 2 * c / np.pi
     share += sum(norms[i] * size[k] * size[k - i] for i in range(k + 1))
-    if k == 2:  # by parts: ∫ y · P₃ y⁽³⁾ = −∫ (P₃ᵀ y)' · y''
+    if k == 2:  # integration by parts: ∫ y · P₃ y⁽³⁾ = −∫ (P₃ᵀ y)' · y''
         slopes = np.tensordot(nodes.derivative, P[3], axes=1)
         share += norms[3] * size[1] + _largest(slopes) * size[2]
     return float(share)
 
 
 def _largest(matrices: Array) -> float:
-    """Return the largest norm of matrices."""
+    """Return the largest spectral norm of the matrices."""
     return float(np.linalg.norm(matrices, 2, axis=(-2, -1)).max())
 
 

@@ -1,4 +1,4 @@
-"""The optimum by shooting: finding initial values for which the motion reaches its end.
+"""The optimum by shooting: a search for initial values from which the motion reaches its end.
 
 `rbcourse.optimum.minimum_acceleration_so3` is faster and more robust.
 """
@@ -44,8 +44,8 @@ def shoot_minimum_acceleration_so3(
     Returns
     -------
     Optimum
-        The optimum, with the errors, warnings and singular set of `minimum_acceleration_so3`. The
-        curve is the same to about 1e-11 if both functions find the same solution of (19).
+        The optimum, with the errors, warnings and singular set of `minimum_acceleration_so3`. If
+        both functions find the same solution of (19), their curves agree to about 1e-11.
 
     Notes
     -----
@@ -70,7 +70,7 @@ def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:
 
 
 def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
-    """Improve the aim (w'(0), b) by Newton steps that move the end by at most half a unit."""
+    """Improve the aim, the pair (w'(0), b), by Newton steps that move the end by at most 0.5."""
     try:
         aim = _first_aim(equations, start)
         for iteration in range(STEPS):
@@ -85,7 +85,7 @@ def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
 
 
 def _solution(equations: BallStationary, aim: Array, iterations: int) -> Solution | Failure:
-    """Return the curve of an aim that hits, or a failure if it violates the equations."""
+    """Return the curve that reaches its end, or a failure if it violates the equations."""
     R, w, _ = _shot(equations, aim, grid(NODES).t)
     c = equations.R0[0] @ (aim[3:] - np.cross(w[0], aim[:3]))
     residual = float(equations.errors((R[None], c[None]))[0][0])
@@ -105,14 +105,17 @@ def _first_aim(equations: BallStationary, start: Array) -> Array:
 
 
 def _miss(equations: BallStationary, aim: Array) -> tuple[Array, Array]:
-    """Return the errors of R(1) and w(1), and their derivatives by the aim near the goal."""
+    """Return the errors of R(1) and w(1), and their derivatives with respect to the aim.
+
+    The derivatives are accurate near the goal, where R(1) is close to R1.
+    """
     R, w, sensitivity = (values[-1] for values in _shot(equations, aim, np.ones(1)))
     turn = log_so3(equations.R1[0].T @ R)
     return np.concatenate([turn, w - equations.ends[0, 1]]), sensitivity[:6]
 
 
 def _shot(equations: BallStationary, aim: Array, t: Array) -> tuple[Array, Array, Array]:
-    """Return R, w and the sensitivity of (turn, w, w') to the aim, at the times t."""
+    """Return R, w and the derivatives of (turn, w, w') with respect to the aim, at the times t."""
     from scipy.integrate import solve_ivp
 
     sensitivity = np.eye(9, 6, -6)
@@ -127,7 +130,7 @@ def _shot(equations: BallStationary, aim: Array, t: Array) -> tuple[Array, Array
 
 
 def _flow(_: float, state: Array, b: Array) -> Array:
-    """Return R' = R ŵ, w', w'' = b − w × w', and the linearisation of the three."""
+    """Return the rates of R, w and w', with w'' = b − w × w', and of their derivatives."""
     R, w, acceleration = state[:9].reshape(3, 3), state[9:12], state[12:15]
     turn, dw, da = state[15:].reshape(3, 3, 6)
     W = hat_so3(w)  # if the motion overflows, a ValueError ends the attempt

@@ -1,13 +1,15 @@
-"""Optima through many poses: all legs at once, by Newton's method on the values at the poses.
+"""Optima through many poses: Newton's method solves for all legs together.
 
-Vary a curve R(t) to R exp(η̂), with η = 0 at the poses. On each leg R p = c as for two poses, see
-`rbcourse.optimum.functionals`. The rest of the variation of ∫ ‖u‖² dt is, at each end of each
-leg, the product of the momenta and the change of the end values: for a ball 4 w' · δw. So at an
-optimum the momenta are the same on both sides of each inner pose, and 0 at natural ends.
+Vary a curve R(t) to R exp(η̂), with η = 0 at the poses. On each leg of an optimum, R p = c, as
+between two poses (see `rbcourse.optimum.functionals`). The variation of ∫ ‖u‖² dt is then a sum
+over the ends of the legs, of the product of the momenta and the change of the end values: for a
+ball 4 w' · δw. So at an optimum the momenta are the same on both sides of each inner pose, and 0 at
+natural ends.
 
-In a step of Newton's method each leg is solved to first order for a unit of each of its end values
-(`collocation`). The changes of its momenta are a symmetric element of the system for the values at
-the poses, `rbcourse.velocities.KnotSystem`, whose matrix is the second derivative of the cost.
+In a step of Newton's method, each leg is linearised, and its response to a unit change of each of
+its end values is computed (`collocation`). The changes of its momenta form a symmetric element of
+the linear system for the values at the poses, a `rbcourse.velocities.KnotSystem`. The matrix of
+this system is the second derivative of the cost.
 
 If that matrix is positive definite, and each leg is a strict local minimum among the curves with
 its ends (`second_variation`), the whole spline is a strict local minimum.
@@ -61,14 +63,15 @@ from rbcourse.velocities import (
 )
 
 NODES = 17, 25, 33, 49, 65, 97, 129
-LOWERED = 33  # nodes that carry a curve that is lowered
+LOWERED = 33  # nodes of curves whose costs are lowered
 STEPS = 20
 BUMPS, DESCENT_STEPS = 8, 150
 DESCENTS = 1e-2, 1e-4, 1e-6
-FLAT = 1e-9  # as a share of the diagonal: an eigenvalue that is smaller may be 0
-ASIDE = np.array([0.4, 0.6, 0.8])  # how far in the middle of a leg, in rad
-"""Where Newton's method finds no minimum, its start is lowered until a step takes less than this
-share of the cost away; one after the other."""
+"""Shares of the cost. If Newton's method finds no minimum, Gauss–Newton steps lower the cost of its
+start until a step lowers it by less than the first share. Newton's method is then tried again. If
+it fails again, the next share is used."""
+FLAT = 1e-9  # as a share of the diagonal: smaller eigenvalues may be 0
+ASIDE = np.array([0.4, 0.6, 0.8])  # rad: displacement from the axis in the middle of a leg
 
 
 def minimum_acceleration_spline_so3(
@@ -81,7 +84,8 @@ def minimum_acceleration_spline_so3(
 ) -> OptimalChain:
     """Return the curve of least acceleration through many rotations, of a ball or of any body.
 
-    A local minimum, found from legs that turn the short way, or the way that is asked for.
+    The curve is a local minimum. Each leg of its starting curve turns the short way, or the long
+    way if this is requested.
     Source: BK (18); beyond BK 12, beyond BK 15.
 
     Parameters
@@ -91,14 +95,15 @@ def minimum_acceleration_spline_so3(
     inertia : array_like, shape (3, 3), optional
         As for `minimum_acceleration_so3`.
     long : array_like of bool, shape (N − 1,), optional
-        Which legs start from a turn the other way round, by 2π minus the angle between the two
-        rotations.
+        Whether each leg of the starting curve turns the long way, by 2π minus the angle between its
+        two rotations.
 
     Returns
     -------
     OptimalChain
         A `Chain` of `Optimum` legs with the least `acceleration_cost` that Newton's method finds
-        from `quaternion_spline_so3`. w' is continuous, for a body the torque; 0 at natural ends.
+        from `quaternion_spline_so3`. For a ball, w' is continuous, and 0 at natural ends. For a
+        body, this holds for the torque.
 
     Raises
     ------
@@ -107,11 +112,12 @@ def minimum_acceleration_spline_so3(
 
     Notes
     -----
-    With given velocities at both ends a curve of least acceleration exists. With natural or
-    periodic ends it need not: rotations by 0, 1 and 0.3 rad about one axis at 0, 1 and 1 + √2 have
-    the cost 5.6; with more full turns for the legs it becomes as small as one likes. The result is
-    a local minimum. A leg that is short beside its neighbours may spin: put poses
-    between. Singular set: rotations a half-turn apart are refused.
+    If velocities are given at both ends, a curve of least acceleration exists. With natural or
+    periodic ends, it may not exist. For example, the result through rotations by 0, 1 and 0.3 rad
+    about one axis at the times 0, 1 and 1 + √2 costs 5.6, but curves with more full turns on the
+    legs have costs as small as you like. The result is a local minimum. A leg that is much shorter
+    than its neighbours may spin; to prevent this, insert poses. Singular set: neighbouring
+    rotations a half-turn apart raise ValueError.
 
     Examples
     --------
@@ -135,7 +141,7 @@ def minimum_torque_spline_so3(
     inertia: ArrayLike,
     long: ArrayLike = False,
 ) -> OptimalChain:
-    """Return the curve through many rotations that takes a body there with least squared torque.
+    """Return the curve through many rotations that moves a body with the least squared torque.
 
     Source: beyond BK 4, beyond BK 12.
 
@@ -147,7 +153,8 @@ def minimum_torque_spline_so3(
     Returns
     -------
     OptimalChain
-        With the least `torque_cost`; the torque is continuous, and 0 at natural ends.
+        The chain with the least `torque_cost` that was found. The torque is continuous, and 0 at
+        natural ends.
 
     Notes
     -----
@@ -176,13 +183,14 @@ def minimum_jerk_spline_so3(
     times, rotations, long
         As for `minimum_acceleration_spline_so3`.
     ends : {"natural", "periodic"} or pair of array_like, optional
-        As there; velocities are followed by accelerations: arrays of shape (6,).
+        As for `minimum_acceleration_spline_so3`, but each array has the shape (6,): the velocity,
+        followed by the acceleration.
 
     Returns
     -------
     OptimalChain
-        With the least `jerk_cost`; w, w', w'' and w''' are continuous, and at natural ends the
-        covariant jerk and its rate are 0.
+        The chain with the least `jerk_cost` that was found. w, w', w'' and w''' are continuous. At
+        natural ends, the covariant jerk and its derivative are 0.
 
     Notes
     -----
@@ -224,8 +232,8 @@ def minimum_acceleration_spline_se3(
     Returns
     -------
     OptimalChain
-        Of `RigidMotion` legs: the rotation is `minimum_acceleration_spline_so3`, and the centre of
-        mass moves on a cubic spline.
+        A chain of `RigidMotion` legs. Its rotation is `minimum_acceleration_spline_so3`, and the
+        centre of mass moves on a cubic spline.
 
     Notes
     -----
@@ -271,18 +279,18 @@ def minimum_acceleration_spline_se3(
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class OptimalChain(Chain):
-    """A `Chain` of optimal legs that is optimal as a whole, or stationary.
+    """A `Chain` of optimal legs that is optimal, or at least stationary, as a whole.
 
     Attributes
     ----------
     cost : float
         The `acceleration_cost`, `torque_cost` or `jerk_cost`.
     definite : bool
-        Whether the second derivative of the cost by the values at the poses is positive definite.
-        It is not if a family of curves has the same cost, as for a body that is symmetric about
-        the axis of all rotations.
+        Whether the second derivative of the cost with respect to the values at the poses is
+        positive definite. It is not positive definite if a family of curves has the same cost, for
+        example for a body that is symmetric about the axis of all rotations.
     certified : bool
-        `is_local_minimum` of the chain.
+        The result of `is_local_minimum` for the chain.
     """
 
     cost: float
@@ -296,7 +304,7 @@ class OptimalChain(Chain):
 
     @property
     def c(self) -> Array:
-        """R p of each leg, constant, fixed frame, shape (N − 1, 3)."""
+        """The constant R p of each leg in the fixed frame, shape (N − 1, 3)."""
         return self.rotation.c
 
     @property
@@ -306,17 +314,17 @@ class OptimalChain(Chain):
 
     @property
     def iterations(self) -> int:
-        """How many steps Newton's method took."""
+        """The number of steps of Newton's method."""
         return int(np.max(self.rotation.iterations))
 
     @property
     def converged(self) -> bool:
-        """Whether a solution was found: always, or there is an error."""
+        """Whether a solution was found: always True, since a failure raises ConvergenceError."""
         return bool(np.all(self.rotation.converged))
 
     @property
     def certified(self) -> bool:
-        """Whether it is proven to be a strict local minimum."""
+        """Whether the chain is proven to be a strict local minimum."""
         return bool(is_local_minimum(self))
 
     def lasting(self, duration: Array) -> Self:
@@ -335,27 +343,27 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
     Parameters
     ----------
     curve : Optimum, OptimalChain or RigidMotion
-        From one of the functions ``minimum_…``, or from `stationary_so3`; or a stack of them.
+        A result of one of the functions ``minimum_…`` or of `stationary_so3`; it may be a stack.
 
     Returns
     -------
     ndarray of bool, shape curve.batch_shape
-        Whether all curves nearby with the same ends (through the same poses) cost more. False for
-        a saddle, where a curve is NaN, and where neither could be shown.
+        Whether all nearby curves with the same ends, and through the same poses, cost more. It is
+        False for a saddle, for a curve that is NaN, and if the proof does not succeed.
 
     Notes
     -----
-    R p = c makes a curve stationary, not a minimum. This function shows that the second
-    variation is positive: it computes the form on polynomials, and bounds the rest, see
-    `rbcourse.optimum.second_variation`. That is a proof up to rounding, quadrature and the
-    error of the computed curve. It does not exclude curves far away that cost less. An
-    eigenvalue below 1e-6, as a share of the leading term, counts as 0. For the acceleration of
-    a ball ‖c‖ < 2π³, for the time from 0 to 1, is sufficient (docs/near_optimal.md).
+    If R p is constant, a curve is stationary, but it may not be a minimum. This function shows that
+    the second variation is positive: it computes this quadratic form on polynomials and bounds the
+    rest (see `rbcourse.optimum.second_variation`). That is a proof up to rounding, quadrature and
+    the error of the computed curve. It does not exclude distant curves that cost less. An
+    eigenvalue below 1e-6, as a share of the leading term, counts as 0. For the acceleration of a
+    ball over the time from 0 to 1, ‖c‖ < 2π³ is a sufficient condition (docs/near_optimal.md).
 
     Examples
     --------
-    The upright turn of a book, from rest to rest, has the least torque up to about 107.9°. From
-    there on, curves that leave the axis cost less:
+    The turn of a book about the axis of its largest moment, from rest to rest, has the least torque
+    up to about 107.9°. Beyond this angle, curves that leave the axis cost less:
 
     >>> from rbcourse import exp_so3, minimum_torque_so3
     >>> book, rest = np.diag([1.0, 2.22, 3.18]), [0, 0, 0]
@@ -373,7 +381,7 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
 
 
 class _Problem(NamedTuple):
-    """Rotations, durations of mean 1, the values given at the rotations, and the functional."""
+    """The data of a spline: rotations, durations scaled to mean 1, given values, and functional."""
 
     R: Array
     h: Array
@@ -384,47 +392,47 @@ class _Problem(NamedTuple):
 
     @property
     def scale(self) -> Array:
-        """The powers of h for values at the rotations, in the time of a leg, (N, 3 m/2)."""
+        """The powers of h that convert values at the rotations to unit time, (N, 3 m/2)."""
         orders = np.arange(1, 1 + self.functional.ends // 2)
         return np.repeat(self.h[:, None] ** orders, 3, axis=1)
 
     @property
     def weight(self) -> Array:
-        """What ∫ ‖u‖² dt of a leg in its own time counts in the cost."""
+        """The factor in the cost of each leg's ∫ ‖u‖² dt for times from 0 to 1."""
         weight: Array = self.functional.scale * self.h ** -(self.functional.ends + 1.0)
         return weight
 
     def cost(self, R: Array) -> float:
-        """Return the cost of curves given by R at the nodes."""
+        """Return the cost of the curve given by R at the nodes of all legs."""
         return float(np.sum(cost_at_nodes(self.functional, R) * self.weight))
 
     def ends_of_legs(self, knots: Array) -> Array:
-        """Return w0, w1 (and a0, a1) of the legs, each in its own time, shape (N, m, 3)."""
+        """Return w0, w1 (and a0, a1) of the legs for times from 0 to 1, (N, m, 3)."""
         both = np.stack([self.scale * knots[:-1], self.scale * knots[1:]], axis=1)
         parts = both.reshape(len(both), 2, -1, 3).swapaxes(1, 2)
         return parts.reshape(len(both), -1, 3)
 
     def equations(self, ends: Array, n: int) -> BallStationary | Stationary:
-        """Return R p = c for the legs, on n nodes."""
+        """Return the equations R p = c of the legs, for n nodes."""
         parts = self.R[:-1], self.R[1:], ends
         if isinstance(self.functional, BallAcceleration):
             return BallStationary(*parts, coarse=9 if n < 33 else 17)
         return Stationary(self.functional, *parts)
 
     def on_nodes(self, R: Array, n: int) -> Array:
-        """Return rotations at nodes on n nodes, the given ones at the ends of the legs."""
+        """Return rotations interpolated to n nodes, with the given ones at the ends of the legs."""
         return self.with_ends(along(interpolation(R.shape[1], n), R))
 
     def with_ends(self, R: Array) -> Array:
-        """Return rotations without their rounding, the given ones at the ends of the legs."""
+        """Return rotations, orthogonal to rounding, with the given ones at the ends of the legs."""
         R = orthogonal(R)
         R[:, 0], R[:, -1] = self.R[:-1], self.R[1:]
         return R
 
     def solve(self, system: KnotSystem) -> Array:
-        """Return changes of the values at the rotations.
+        """Return the changes of the values at the rotations that solve a system.
 
-        A system that is not positive definite is shifted until it is.
+        If the matrix is not positive definite, a diagonal matrix is added until it is.
         """
         sizes = np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0)
         for shift in (0.0, *(4.0**k for k in range(-3, 10))):
@@ -435,7 +443,7 @@ class _Problem(NamedTuple):
         raise np.linalg.LinAlgError("the system of a step is singular")
 
     def least_sign(self, system: KnotSystem) -> int:
-        """Return the sign of the least eigenvalue of a system; 0 where it may be 0."""
+        """Return the sign of the least eigenvalue of a system, or 0 if it may be 0."""
         sizes = np.diag(np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0))
         for sign, shift in (1, -FLAT), (0, FLAT):
             moved = system._replace(A=system.A + shift * sizes, D=system.D + shift * sizes)
@@ -453,7 +461,7 @@ class _Curve(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """What Newton's method found: solutions of the legs, and the sign of the least eigenvalue."""
+    """The result of Newton's method: solutions of the legs, and the least eigenvalue's sign."""
 
     curve: _Curve
     legs: list[Solution]
@@ -468,7 +476,7 @@ def _spline(
     T, R, size = np.diff(times), nearest(R)[0], 6 if what == "jerk" else 3
     unit, way = T.mean(), np.asarray(long)
     if way.dtype != bool or way.shape not in ((), T.shape):
-        raise ValueError(f"long: a bool for each of {len(T)} legs wanted, got {long!r}")
+        raise ValueError(f"long: a bool for each of {len(T)} legs is wanted, got {long!r}")
     fixed, given = as_ends(ends, len(R), size)
     given = given * np.repeat(unit ** np.arange(1, 1 + size // 3), 3)
     periodic = is_periodic(ends)
@@ -508,17 +516,17 @@ def _quaternion_spline(problem: _Problem, long: NDArray[np.bool_]) -> _Curve:
 
 
 def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
-    """Return a minimum: by Newton's method, and where that fails from lower curves.
+    """Return a minimum by Newton's method, and if this fails from starts of lower cost.
 
-    No step leaves the axis of a curve that turns about one axis only. For a body, curves that leave
-    it can cost less, so another search begins away from it.
+    If a curve turns about one axis only, no step leaves this axis. For a body, curves that leave
+    the axis can cost less, so another search starts from a curve off the axis.
     """
     found = _searched(problem, start, lower=False)
     if isinstance(problem.functional, Effort) and (
         isinstance(found, Failure) or _is_about_one_axis(found.curve.R)
     ):
         t = grid(start.R.shape[1]).t[:, None]
-        sides = ASIDE * (-1.0) ** np.arange(len(start.R))[:, None, None]  # to one, to the other
+        sides = ASIDE * (-1.0) ** np.arange(len(start.R))[:, None, None]  # alternating
         aside = start._replace(R=start.R @ exp_so3(16 * t**2 * (1 - t) ** 2 * sides))
         other = _searched(problem, aside, lower=True)
         if isinstance(other, _Found) and (
@@ -529,15 +537,16 @@ def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
 
 
 def _is_about_one_axis(R: Array) -> bool:
-    """Tell whether all rotations of a curve, after the first one, are about one axis."""
+    """Tell whether all rotations of a curve, relative to the first one, are about one axis."""
     v = log_so3(R[0, 0].T @ R).reshape(-1, 3)
     return bool(np.linalg.svd(v, compute_uv=False)[1] < 1e-6 * np.linalg.norm(v))
 
 
 def _searched(problem: _Problem, start: _Curve, *, lower: bool) -> _Found | Failure:
-    """Return a minimum by Newton's method from a curve, or from lower curves.
+    """Return a minimum by Newton's method from a curve, or from curves of lower cost.
 
-    It costs no more than its start; the start of a jerk does not have all values at its ends.
+    The minimum must not cost more than its start. This is not required for the jerk, since its
+    start does not have all given end values.
     """
     found: _Found | Failure = Failure(np.inf, 0)
     bound = problem.cost(start.R) if problem.functional.ends == 2 else np.inf
@@ -555,7 +564,7 @@ def _searched(problem: _Problem, start: _Curve, *, lower: bool) -> _Found | Fail
 
 
 def _newton(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
-    """Return what Newton's method finds from a curve."""
+    """Return the result of Newton's method from a curve; an overflow is a failure."""
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
             return _iterated(problem, start, n)
@@ -568,7 +577,7 @@ def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
     legs = problem.equations(problem.ends_of_legs(knots), n)
     unknowns: Arrays = R, *legs.first(R)
     for step in range(STEPS):
-        while True:  # on more nodes where these do not carry the curve
+        while True:  # use more nodes if these do not resolve the curve
             legs = problem.equations(problem.ends_of_legs(knots), n)
             left, parts = legs.errors(unknowns)
             tail = legs.tails(unknowns).max()
@@ -602,13 +611,13 @@ def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
 
 
 def _momenta(problem: _Problem, legs: Equations, unknowns: Arrays) -> tuple[Array, list[Array]]:
-    """Return the momenta at both ends of the legs, in their own times, and their derivatives."""
+    """Return the momenta at both ends of the legs, for times from 0 to 1, and derivatives."""
     rates = rates_at_nodes(legs.ends, legs.bend(unknowns))[: problem.functional.ends]
     return problem.functional.momenta(*(x[:, [0, -1]] for x in rates))
 
 
 def _balanced(problem: _Problem, legs: Equations, unknowns: Arrays) -> bool:
-    """Tell whether the momenta are the same on both sides of each pose where none is given."""
+    """Tell whether the momenta are equal on both sides of each pose without given values."""
     weight = problem.weight[:, None] * problem.scale
     found = weight[:, None] * _momenta(problem, legs, unknowns)[0]
     jump = np.zeros_like(problem.given)
@@ -624,7 +633,7 @@ def _balanced(problem: _Problem, legs: Equations, unknowns: Arrays) -> bool:
 def _linearised(
     problem: _Problem, legs: Equations, unknowns: Arrays, parts: Arrays
 ) -> tuple[KnotSystem, Arrays]:
-    """Return the system of a step, and how the unknowns of the legs respond."""
+    """Return the linear system of a Newton step, and the responses of the legs' unknowns."""
     m, count = problem.functional.ends, len(problem.h)
     made = []
     for some in blocks(count, legs.together):
@@ -638,7 +647,7 @@ def _linearised(
         rate = along(K[[0, -1]], bends)
         rate[..., 1:] += np.kron(E[[0, -1]][:, None], np.eye(3)).reshape(2, 3, 3 * m)
         change += D @ rate
-    # by the values at the two rotations: (leg, end, momentum, rotation, value)
+    # with respect to values at both rotations: (leg, end, momentum, rotation, value)
     by_knots = change[..., 1:].reshape(count, 2, -1, m // 2, 2, 3).swapaxes(3, 4)
     by_knots = by_knots.reshape(count, 2, -1, 2, 3 * (m // 2)) * problem.scale[:, None, None, None]
     weight = (problem.weight[:, None] * problem.scale)[:, None]
@@ -649,12 +658,12 @@ def _linearised(
 
 
 def _lowered(problem: _Problem, start: _Curve, worthwhile: float) -> tuple[_Curve, float]:
-    """Return a curve after steps of Gauss and Newton, whose cost never rises, and the cost.
+    """Return a curve after Gauss–Newton steps that never raise the cost, and the cost.
 
-    For R exp(η̂), η = 0 at the poses, u changes to first order by D₀ η + D₁ η' + D₂ η'', see
-    `guesses.lowered`. A step takes the η for which the integral of its square is least, of cubics
-    with any η' at the poses and `BUMPS` polynomials t² (1 − t)² p(t) more for each leg. These are
-    eliminated leg by leg.
+    For R exp(η̂) with η = 0 at the poses, u changes to first order by D₀ η + D₁ η' + D₂ η'' (see
+    `guesses.lowered`). A step uses the η that minimises the integral of the squared new u. On each
+    leg, η is a cubic with any η' at the poses, plus a sum of `BUMPS` polynomials t² (1 − t)² p(t).
+    The coefficients of the latter are eliminated leg by leg.
     """
     functional, h, R = problem.functional, problem.h[:, None], start.R
     cost, count, n = problem.cost(R), len(h), R.shape[1]
@@ -692,7 +701,7 @@ def _lowered(problem: _Problem, start: _Curve, worthwhile: float) -> tuple[_Curv
 
 @lru_cache
 def _shapes(n: int) -> list[Array]:
-    """Return η at the nodes, and two derivatives: cubics of η' = 1 at an end, and bumps."""
+    """Return cubics with η' = 1 at one end, and bumps, at the nodes, and two derivatives."""
     nodes = grid(n)
     t = nodes.t[:, None]
     cubics = t * (1 - t) ** 2, -(t**2) * (1 - t)
