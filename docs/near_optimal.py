@@ -1,8 +1,9 @@
-"""Derive every number of near_optimal.md, exactly, and write the table of the package.
+"""Derive every number of near_optimal.md exactly, and write the table of the package.
 
-A problem is three vectors: sigma, the turn from R0 to R1; and of the parallel end velocities u0 and
-u1 the mean less sigma, e, and the difference, d = u1 - u0. What is of third order in them is a sum
-of sigma, e and d with polynomials in t and in their inner products: a list of three.
+Three vectors describe a problem: sigma is the rotation vector from R0 to R1; d = u1 - u0 is the
+difference of the parallel end velocities u0 and u1, and e is their mean minus sigma. A term of
+third order is a linear combination of sigma, e and d. Its three coefficients are polynomials in t
+and in the inner products of sigma, e and d, and the code stores them as a list.
 """
 
 import csv
@@ -20,7 +21,7 @@ TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
 u0, u1 = [one, one, -one / 2], [one, one, one / 2]
-# Hermite's cubics: their values and rates at 0 and 1 are 0, but for one that is 1
+# Hermite's cubics: of their values and rates at 0 and 1, one is 1 and the others are 0
 TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
 
 
@@ -45,7 +46,7 @@ def triple(a, b, c):
 
 
 def rate(x, order=1):
-    """Return a derivative by t."""
+    """Return a derivative with respect to t."""
     for _ in range(order):
         x = [part.diff(t) for part in x]
     return x
@@ -79,12 +80,12 @@ def clamped(load, end_rate):
 
 
 CUBIC = add(times(TO_GOAL, sigma), times(FIRST_RATE, u0), times(LAST_RATE, u1))
-# in the coordinate y, R = R0 exp(y), the parallel velocity is y' + y (y y')/24 + ...
+# in the coordinate y of R = R0 exp(y), the parallel velocity is y' + y x (y x y')/24 + ...
 END_RATE = times(QQ(-1, 24), triple(sigma, sigma, u1))
 
 
 def optimum():
-    """Return the best curve, third order: w''' + w x w'' = 0 for R = R0 exp(y)."""
+    """Return the third-order term of the optimum: w''' + w x w'' = 0 for R = R0 exp(y)."""
     x, v, a, j = (rate(CUBIC, k) for k in range(4))
     load = add(
         times(QQ(-1, 2), triple(a, x, a)),
@@ -95,12 +96,15 @@ def optimum():
 
 
 def exponential():
-    """Return the cubic with the same end rate."""
+    """Return the third-order term of the exponential cubic, which has the same end rate."""
     return times(LAST_RATE, END_RATE)
 
 
 def geodesic(a, b, share):
-    """From exp(a) to exp(b): first and third order. Each point is a pair of these."""
+    """Return the point of the geodesic from exp(a) to exp(b) after a share of its length.
+
+    Each point is a pair: its terms of first and of third order.
+    """
     (a1, a3), (b1, b3) = a, b
     way = add(b1, times(-1, a1))
     bend = triple(way, a1, b1)
@@ -110,7 +114,7 @@ def geodesic(a, b, share):
 
 
 def bezier():
-    """Return the construction of de Casteljau, by geodesics."""
+    """Return the third-order term of Bézier's curve, by de Casteljau's construction."""
     last = times(QQ(-1, 3), u1)  # from R1 back to the third point
     back = add(
         times(QQ(-1, 24), triple(sigma, sigma, last)), times(QQ(-1, 12), triple(last, sigma, last))
@@ -123,7 +127,10 @@ def bezier():
 
 
 def quaternion():
-    """Return the direction of a cubic from (1, 0) to (cos, sin), rates half the velocities."""
+    """Return the third-order term of the quaternion cubic.
+
+    It is the direction of a cubic from (1, 0) to (cos, sin); its rates are half the velocities.
+    """
     real = -TO_GOAL * ss / 8 - LAST_RATE * dot(sigma, u1) / 4
     imaginary = add(
         times(-TO_GOAL * ss / 48, sigma), times(-LAST_RATE * dot(sigma, u1) / 16, sigma)
@@ -134,7 +141,10 @@ def quaternion():
 
 
 def cayley():
-    """Return the curve of a cubic in g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...)."""
+    """Return the third-order term of Cayley's curve.
+
+    It is a cubic in the coordinates g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...).
+    """
     goal = times(ss / 24, sigma)
     end = add(END_RATE, times(ss / 12, u1), times(dot(sigma, u1) / 6, sigma))
     g = times(QQ(1, 2), CUBIC)
@@ -143,7 +153,10 @@ def cayley():
 
 
 def projection():
-    """Return the nearest rotation to I + skew + symmetric + skew, first to third order."""
+    """Return the third-order term of the nearest rotation to a cubic of matrices.
+
+    The cubic is I + skew + symmetric + skew; these parts are of first, second and third order.
+    """
     skew = add(
         times(-TO_GOAL * ss / 6, sigma),
         times(-LAST_RATE * ss / 8, u1),
@@ -151,7 +164,7 @@ def projection():
     )
 
     def stretched(a, b, v):
-        """(tr S - S) v for S = (a b + b a)/2, a and b with hats."""
+        """Return (tr S - S) v for S = (A B + B A)/2; A and B are the hats of a and b."""
         return add(times(-dot(a, b), v), times(-dot(b, v) / 2, a), times(-dot(a, v) / 2, b))
 
     turned = add(
@@ -162,8 +175,8 @@ def projection():
 
 
 def cumulative_energy():
-    """Return the same of second order, for the cumulative curve."""
-    # what differs from the optimum, in the basis sigma x e, sigma x d, e x d
+    """Return the energy of the second-order deviation of the cumulative curve."""
+    # the deviation y from the optimum, in the basis sigma x e, sigma x d, e x d
     first, last = times(QQ(1, 3), u0), times(QQ(1, 3), u1)
     middle = add(sigma, times(-1, first), times(-1, last))
     shares = 1 - (1 - t) ** 3, TO_GOAL, t**3
@@ -172,8 +185,8 @@ def cumulative_energy():
         pairs = (0, 1), (0, 2), (1, 2)
         return [a[i] * b[j] - a[j] * b[i] for i, j in pairs]
 
-    # body velocities: w1 = u1 - sigma x u1/2, so the last turn has a part of second order, and
-    # the middle one that of exp(-first) exp(sigma) exp(-last)
+    # The body velocity at the end is w1 = u1 - sigma x u1/2, so the last turn has a part of second
+    # order. The middle turn has the second-order part of exp(-first) exp(sigma) exp(-last).
     of_last = times(QQ(-1, 2), cross(sigma, last))
     of_middle = add(
         times(QQ(-1, 2), cross(first, sigma)),
@@ -198,7 +211,7 @@ def cumulative_energy():
 
 
 def deviations():
-    """Return what each closed form is away from the optimum, of third order."""
+    """Return the third-order deviation of each closed form from the optimum."""
     best = times(-1, optimum())
     curves = {
         "projected_cubic_so3": projection(),
@@ -217,11 +230,13 @@ def forms():
 
 
 def of_splines():
-    """Return the excess over θ⁴ of three splines: (0, θ, 0) about an axis, natural, even times.
+    """Return the leading excess of three splines, divided by θ⁴.
 
-    Of the projected matrix spline, the projected spline and the quaternion spline, all to leading
-    order. With σ = θ p + θ³ r on a leg, p the cubic spline, it is the integral of r''² over that of
-    p''². The tangent of σ is y/x: cosine and sine are splines of their own, or cubics of each leg.
+    The splines pass through the angles 0, θ and 0 about one axis at equally spaced times, with
+    natural ends. They are the projected matrix spline, the projected spline and the quaternion
+    spline. On a leg σ = θ p + θ³ r, where p is the cubic spline, and the result is the integral of
+    r''² divided by the integral of p''². The tangent of σ is y/x. In the first spline x and y are
+    splines themselves; in the second they are cubics on each leg.
     """
     p = (3 * t - t**3) / 2
     matrix = -p / 6 + p * p / 2 - p**3 / 3
@@ -232,7 +247,7 @@ def of_splines():
 
 
 def write(table=TABLE):
-    """Write the table: powers of the inner products, and whole numbers over a denominator."""
+    """Write the table: powers of the inner products, and integers over a common denominator."""
     found = forms()
     over = {way: lcm(*(int(c.denominator) for c in form.coeffs())) for way, form in found.items()}
     powers = sorted({term for form in found.values() for term in form.monoms()}, reverse=True)
