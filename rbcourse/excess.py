@@ -38,7 +38,7 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     name : str
         One of `CLOSED_FORMS`, except "corrected_bezier_so3".
     R0, R1, w0, w1
-        As for `projected_cubic_so3`.
+        As for `projected_cubic_so3`, for the duration 1: multiply the velocities by the duration.
 
     Returns
     -------
@@ -111,15 +111,16 @@ def excess_estimate(curve: Curve) -> Array:
         the optimal legs that have the same velocities at its poses; if its velocity jumps,
         RuntimeError is raised. The estimate is NaN for a curve that turns at `SPEED_LIMIT` or
         faster at some time, costs more than about twice the optimum, is not smooth enough for 33
-        nodes, costs nothing, or is NaN itself.
+        nodes, costs nothing, or is NaN itself, or if H (see the notes) is not positive definite.
 
     Notes
     -----
-    Domain: ‖w‖ < 2.5 rad per duration, and an excess of at most 1. On random problems, the
-    estimates were within 1.4 % of the excess for closed forms, and within 6 % for quintics with
-    random end accelerations. Up to ‖w‖ = 1, they were within 0.03 % and 1.2 %, for an excess of at
-    least 1e-8. For a smaller excess, the costs are not known with enough digits. An excess below
-    1e-22 is lost in rounding.
+    Domain: ‖w‖ times the duration below 2.5 rad at all times, and an excess of at most 1. On random
+    problems with an excess of at least 1e-8, the estimates were within 1.4 % of the excess for
+    closed forms, and within 6 % for quintics with random end accelerations. If ‖w‖ < 1 at all
+    times, these figures were 0.03 % and 1.2 %. For a smaller excess, the costs are not known with
+    enough digits. An excess below 1e-22 is lost in rounding. From ‖w‖ = 3π/4 on, the optimum may
+    turn the other way round; the estimate is then the excess over the stationary curve nearby.
 
     Let J = ∫ ‖w'‖² dt. For a small η with η = η' = 0 at both ends, the curve R exp(η̂) has, to
     second order, J − 2 g · η + η · H η in place of J. With x = η' + w × η,

@@ -45,7 +45,7 @@ def chain(
     *,
     leg: Leg | None = None,
 ) -> Chain:
-    """Return a curve through given poses at given times, composed of two-point curves.
+    """Return a curve through poses at given times, by default at rest at both ends.
 
     Source: BK 6, BK 6.3.
 

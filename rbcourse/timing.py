@@ -260,7 +260,7 @@ class Timed(Curve):
 
     def values(self, t: Array, order: int) -> Array:
         """Raise RuntimeError, since costs are integrals of smooth curves."""
-        raise RuntimeError("cost: the acceleration of a Timed curve jumps between its cells")
+        raise RuntimeError("curve: a Timed curve has no cost here, as its acceleration jumps")
 
     @property
     def flat(self) -> Self:

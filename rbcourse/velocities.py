@@ -62,7 +62,8 @@ def spline_velocities(
     ends : {"natural", "periodic"} or pair of array_like, optional
         "natural": the acceleration is 0 at both ends. "periodic": velocity and acceleration in the
         body frame are the same at both ends; the poses there may differ. A pair gives the first and
-        the last velocity, of shape (6,) or (3,). None in a pair means a natural end.
+        the last velocity: twists (ω, v) of the origin in the body frame, shape (6,), or ω, shape
+        (3,). None in a pair means a natural end.
     inertia : array_like, shape (3, 3), optional
         The inertia of a body, as for `weighted_cubic_so3`. The torque is then continuous, and
         "natural" means zero torque at the ends. The default is 2 I.

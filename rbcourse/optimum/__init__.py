@@ -74,6 +74,7 @@ def minimum_acceleration_so3(
     --------
     rbcourse.textbook.minimum_acceleration_so3 : The equation, solved by SciPy's `solve_bvp`.
     shoot_minimum_acceleration_so3 : The same optimum by shooting.
+    corrected_bezier_so3, excess_estimate : A formula near the optimum, and how near a curve is.
 
     Notes
     -----
@@ -84,7 +85,8 @@ def minimum_acceleration_so3(
     The starting curves turn the short way and the long way, with additional full turns if
     ‖w0‖ + ‖w1‖ > 6π. For a body, the optimum of the ball and curves between free motions are
     starting curves, too. Gauss–Newton steps lower their costs; then Newton's method solves R p = c
-    from the cheapest ones. The result is stationary. It is not proven that no curve costs less
+    from the cheapest ones. The result is stationary, and `is_local_minimum` tells whether it is
+    proven to be a local minimum. It is not proven that no other curve costs less
     (docs/near_optimal.md reports tests on random problems). For very thin rods, the method may not
     converge. If the end velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where p
     is a cubic and σ is a logarithm of R0ᵀR1, not always the shortest one.

@@ -84,8 +84,7 @@ def minimum_acceleration_spline_so3(
 ) -> OptimalChain:
     """Return the curve of least acceleration through many rotations, of a ball or of any body.
 
-    The curve is a local minimum. Each leg of its starting curve turns the short way, or the long
-    way if this is requested.
+    Each leg of the starting curve turns the short way, or the long way if this is requested.
     Source: BK (18); beyond BK 12, beyond BK 15.
 
     Parameters
@@ -115,8 +114,9 @@ def minimum_acceleration_spline_so3(
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
     periodic ends, it may not exist. For example, the result through rotations by 0, 1 and 0.3 rad
     about one axis at the times 0, 1 and 1 + √2 costs 5.6, but curves with more full turns on the
-    legs have costs as small as you like. The result is a local minimum. A leg that is much shorter
-    than its neighbours may spin; to prevent this, insert poses. Singular set: neighbouring
+    legs have costs as small as you like. The result is proven to be a local minimum if it is
+    `certified`; for bodies, a leg can be a saddle. A leg that is much shorter than its neighbours
+    may spin; to prevent this, insert poses. Singular set: neighbouring
     rotations a half-turn apart raise ValueError.
 
     Examples
