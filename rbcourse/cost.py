@@ -68,9 +68,9 @@ def acceleration_cost(
 
     Notes
     -----
-    A curve does not remember the body for which it was made: give the same inertia, mass and
-    centre again. G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ its square. Free motions have
-    the cost 0. On SE(3), the sum, and any ratio of sums, depends on the unit of length unless
+    A curve does not remember the body for which it was made: give the same inertia, mass and centre
+    again. G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ its square. Free motions
+    have the cost 0. On SE(3), the sum, and any ratio of sums, depends on the unit of length unless
     inertia and mass are those of a body; see `acceleration_cost_parts`.
 
     Examples
