@@ -70,7 +70,7 @@ def _least(a: list[Array], b: list[Array]) -> Array:
 
 
 def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
-    """Return limit curves over s, the constant rate for `even` seconds in all, and the fastest rate.
+    """Return limit curves over s, the constant rate for `even` seconds, and the fastest rate.
 
     Rates above twice the largest rate of the fastest timing are replaced by NaN.
     """
