@@ -131,7 +131,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     tip, lengths = as_finite("tip", tip, 2), _lengths(lengths, 2)
     size = 2.0 ** np.frexp(lengths.max())[1]  # so that the unit of length does not matter
     (a, b), r = lengths / size, np.hypot(tip[..., 0], tip[..., 1]) / size
-    slack = 4 * EPS * (a + b)  # the rounding of a tip that was computed
+    slack = 4 * EPS * (a + b)  # for the rounding errors of a computed tip
     out = (r > a + b + slack) | (r < abs(a - b) - slack)
     if out.any():
         reach = f"{abs(a - b) * size:.15g} to {(a + b) * size:.15g} m from the base"
@@ -147,7 +147,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
 
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
-    """Return the path (1 − t) start + t goal of joint angles at even times t; full turns count.
+    """Return the path (1 − t) start + t goal of joint angles, t equally spaced, with full turns.
 
     Source: RR 4.1, RR (20), RR (21), with errata 19.
 
@@ -174,7 +174,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
 
 
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
-    """Return the start and the joint angles after each command of a plan; turns add up.
+    """Return the start and the joint angles after each command of a plan; turns are summed.
 
     Source: RR 4.2, RR (22), RR (23), with errata 20.
 

@@ -68,7 +68,7 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
 
     At all points ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. To a few eps times the condition
     number of G, the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and Γ with its first
-    index lowered by G is antisymmetric in i and k. Γ is *not* symmetric in j and k. It follows from
+    index lowered by G is antisymmetric in i and k. Γ is *not* symmetric in j and k. Γ follows from
     Koszul's formula,
     2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
     Source: BK 2.4, BK (8).
@@ -168,8 +168,8 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     The equations A' = A hat(v), v'_i = −Γ_ijk v_j v_k, which on SO(3) are Euler's equations, are
     solved by an eighth-order Runge–Kutta method with a relative tolerance of 3e-14. The N members
     of a batch share the tolerance, so the error of a single member may be up to √N times larger.
-    Closed forms are `screw_se3` for the metric (10), and `geodesic_so3` and `geodesic_se3`, from
-    end to end, for (12) and (14).
+    `screw_se3` is a closed form for the metric (10), and `geodesic_so3` and `geodesic_se3` are
+    closed forms, between given ends, for (12) and (14).
 
     Examples
     --------

@@ -87,7 +87,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
 
 
 def axis_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1), 0 for w = 0.
+    """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1); both are 0 if w is.
 
     ValueError is raised if the norm overflows.
     """
@@ -103,7 +103,7 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same vector.
 
-    The angle is in [0, π] to rounding, and the result accurate to a few eps. Singular set:
+    The angle is in [0, π] to rounding, and the result is accurate to a few eps. Singular set:
     half-turns, where `canonical_quaternion` chooses the axis.
     Source: BK 2.5, RR 2.2.
 
@@ -154,7 +154,7 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
 
 
 def zyx_from_matrix(R: ArrayLike) -> Array:
-    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), as `zyx_from_quaternion`.
+    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), like `zyx_from_quaternion`.
 
     Source: RR 2.1, RR (7), RR (8).
 
@@ -206,7 +206,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
 
     Singular set: gimbal lock, β = ±π/2 to 16 eps. Only α − γ (for β = −π/2, only α + γ) is
     determined then, and γ = 0 is returned. Near gimbal lock, α and γ are accurate to eps over the
-    distance, but α ∓ γ to eps.
+    distance from it, but α ∓ γ is accurate to eps.
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
 

@@ -47,7 +47,7 @@ VELOCITIES = {
 }
 """The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
-_TOLERANCE = 1e-3  # of the norm of a quaternion in a file: some programs write four decimals
+_TOLERANCE = 1e-3  # for norms of quaternions in files: some programs write four decimals
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -182,7 +182,7 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     >>> [(velocity.tolist(), duration) for velocity, duration in load_plan(path, "body")]
     [([0.5, 0.0, 0.1], 2.0), ([0.0, 0.5, 0.0], 1.0)]
     """
-    commands = as_plan(plan, "n")  # the first command tells the number of joints
+    commands = as_plan(plan, "n")  # the first command determines the number of joints
     names = _velocities(kind, commands[0][0].size if commands else 0)
     rows = [[*velocity, duration] for velocity, duration in as_plan(commands, len(names))]
     write_csv(file, [*names, DURATION], rows)
@@ -225,7 +225,7 @@ def _is_tum(file: File) -> bool:
 
 
 def _csv_rows(file: File) -> tuple[bool, Rows]:
-    """Return whether a CSV file has positions, and its rows."""
+    """Return whether a CSV file has positions, and return its rows."""
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
     kind = next((kind for kind, names in HEADERS.items() if names == header), None)
@@ -240,7 +240,7 @@ def _csv_rows(file: File) -> tuple[bool, Rows]:
 
 
 def _tum_rows(file: File) -> tuple[bool, Rows]:
-    """Return True, since a TUM file has positions, and its rows in the order of a CSV file."""
+    """Return True, because a TUM file has positions; also return its rows in the order of CSV."""
     lines = ((place, line.split()) for place, line in text_lines(file))
     rows = (
         _row(place, TUM, cells) for place, cells in lines if cells and not cells[0].startswith("#")

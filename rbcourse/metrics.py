@@ -327,7 +327,7 @@ def weight_from_inertia(G: ArrayLike) -> Array:
 
 
 def weight_of(name: str, G: Array) -> Array:
-    """Return `weight_from_inertia` of symmetric matrices; errors begin with `name`."""
+    """Return `weight_from_inertia` of symmetric matrices; error messages begin with `name`."""
     moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
     refused = slack < -16 * EPS * np.abs(moments).max(axis=-1)
@@ -341,7 +341,7 @@ def weight_of(name: str, G: Array) -> Array:
 
 
 def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
-    """Return matrices of SO(3) or SE(3), and the dimension of the group, from their size."""
+    """Return matrices of SO(3) or SE(3), and the dimension of the group, found from their size."""
     A = as_finite(name, value, "n", "n")
     if A.shape[-1] not in (3, 4):
         raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) is wanted, got {A.shape}")

@@ -1,9 +1,9 @@
 """Rigid bodies in the plane: poses (x, y, theta), the group SE(2), plans and paths.
 
 Poses are in m, m and rad, in the frame of the world unless a docstring says otherwise. Angles count
-full turns: theta and theta + 2π are the same orientation, but after another turn. A twist is
-(vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A path is an
-array with one row for each state.
+full turns: theta and theta + 2π are the same orientation, but the latter has one turn more. A twist
+is (vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A path is
+an array with one row for each state.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices, −π ≤ theta ≤ π.
 
     The angle is that of the rotation nearest to the upper left block. Singular set: blocks [[a, b],
-    [b, −a]], to which no rotation is nearest; theta is then 0. At θ = ±π, rounding decides the
-    sign.
+    [b, −a]], to which all rotations are equally near; theta is then 0. At θ = ±π, rounding decides
+    the sign.
     Source: RR 3.1.
 
     Parameters
@@ -94,7 +94,7 @@ def planar_from_matrix(A: ArrayLike) -> Array:
 
 
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
-    """Return the pose `step`, given in the body frame of `pose`, in the world frame.
+    """Convert the pose `step` from the body frame of `pose` to the world frame.
 
     Source: RR 3.2.
 
@@ -176,7 +176,7 @@ def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist that reaches a pose from (0, 0, 0) in unit time, −π ≤ omega ≤ π.
 
     Singular set: half-turns, which two twists reach. theta = π gives omega = π, and −π gives −π. If
-    full turns are added to these angles, rounding decides.
+    full turns are added to these angles, rounding decides the sign.
     Source: RR 3.1.
 
     Parameters
@@ -203,11 +203,11 @@ def log_planar(pose: ArrayLike) -> Array:
 def interpolate_planar(
     start: ArrayLike, goal: ArrayLike, steps: int = 10, *, shortest: bool = False
 ) -> Array:
-    """Return the path (1 − t) start + t goal of poses (x, y, theta) at even times t in [0, 1].
+    """Return the path (1 − t) start + t goal of poses (x, y, theta), t equally spaced in [0, 1].
 
-    The path depends on the choice of the body point at (x, y).
+    The path depends on the point of the body that has the position (x, y).
     Singular set of `shortest`: angles that differ by half a turn. If the given angles differ by π
-    or −π, the turn is this difference; otherwise rounding decides.
+    or −π, the turn is this difference; otherwise rounding decides its sign.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Parameters
@@ -241,7 +241,7 @@ def interpolate_planar(
 
 
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
-    """Return the start and the poses (x, y, theta) after each command of a plan; turns add up.
+    """Return the start and the poses (x, y, theta) after each command of a plan; turns are summed.
 
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
@@ -316,7 +316,7 @@ def as_states(path: ArrayLike) -> Array:
 
 
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
-    """Return (1 − t) start + t goal at steps + 1 even times; equal entries are kept exactly."""
+    """Return (1 − t) start + t goal for steps + 1 equally spaced t; equal entries are exact."""
     t = np.linspace(0, 1, as_count("steps", steps) + 1)
     batch = check_broadcast(start=(start, 1), goal=(goal, 1))
     t = t.reshape(-1, *[1] * (len(batch) + 1))
@@ -324,7 +324,7 @@ def interpolate(start: Array, goal: Array, steps: int) -> Array:
 
 
 def propagate(start: Array, plan: Plan, move: Callable[[Array, Array], Array] = np.add) -> Array:
-    """Return the states from `start` on, time first, by ``move(state, velocity * duration)``."""
+    """Return the start and the states after each ``move(state, velocity * duration)``."""
     path = [start]
     for i, (velocity, duration) in enumerate(as_plan(plan, start.shape[-1])):
         try:

@@ -50,7 +50,7 @@ class ProjectedLine(AlongGeodesic):
     """
 
     timing: Progress
-    number: NDArray[np.intp]  # of each curve in the stack that the timing is for
+    number: NDArray[np.intp]  # the index of each curve in the stack for which the timing is given
     timed: tuple[int, ...]  # the shape of this stack
 
     @property
@@ -107,7 +107,7 @@ class ProjectedLine(AlongGeodesic):
 
     @property
     def breakpoints(self) -> Array:
-        """The `Curve.breakpoints`, refined near a small margin."""
+        """The `Curve.breakpoints`, with more of them near t = 1/2 if the margin is small."""
         return near_margins(super().breakpoints, 0.5, self.margin)
 
 
@@ -136,9 +136,9 @@ def projected_line_so3(
     Notes
     -----
     Singular set: R0 and R1 a half-turn apart. At f(t) = 1/2, the projection then jumps from R0 to
-    R1, and a call of the curve raises ValueError. The ``margin`` is 0 to a few eps; a margin below
-    1e-6 gives a RuntimeWarning. The projection is accurate to eps over the sum of the two smallest
-    eigenvalues of RᵀM, which ``margin`` bounds from below. A call of the curve also raises
+    R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a few eps;
+    below 1e-6 there is a RuntimeWarning. The projection is accurate to eps over the sum of the two
+    smallest eigenvalues of RᵀM, which ``margin`` bounds from below. A call of the curve also raises
     ValueError if `f` returns non-finite values or another shape.
 
     Examples
@@ -236,8 +236,8 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return the position on the line for a projection of constant speed, or a derivative.
 
-    It is the inverse of `theta`: theta(f(t)) = t. Rounding of f changes this by up to eps · 2
-    tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
+    It is the inverse of `theta`: theta(f(t)) = t. The rounding of f changes theta(f(t)) by up to
+    eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
 
     For the angle 0, the limit f(t) = t is returned. The angle π is singular: f is 0 at t = 0, 1 at
     t = 1, and 1/2 at all times in between. Since `numpy.pi` is less than π by 1.2e-16, f' is about

@@ -189,7 +189,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     for j in range(n):
         earlier, q = Q[..., :j], Q[..., j]
         size = np.linalg.norm(q, axis=-1)
-        for _ in range(2):  # the second pass removes what rounding left
+        for _ in range(2):  # the second pass removes the rounding errors of the first
             q -= (earlier @ (np.swapaxes(earlier, -1, -2) @ q[..., None]))[..., 0]
         rest = np.linalg.norm(q, axis=-1)
         dependent = rest <= 4 * n * EPS * size
@@ -297,7 +297,7 @@ def project_se(B: ArrayLike) -> Array:
 
 
 def warn_if_nearly_singular(margin: Array, time: Array | float, name: str = "t") -> None:
-    """Warn of the first curve of a stack with a margin below 1e-6, and name the time."""
+    """Warn if a margin is below 1e-6; name the first such curve of a stack and the time."""
     low = np.argwhere(np.asarray(margin) < 1e-6)
     if len(low):
         first = tuple(low[0])

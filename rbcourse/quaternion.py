@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z): points of the unit sphere in R⁴; q and −q are one rotation."""
+"""Unit quaternions (w, x, y, z): points of the unit sphere in R⁴; q and −q give one rotation."""
 
 from __future__ import annotations
 
@@ -155,9 +155,9 @@ def project_quaternion(q: ArrayLike) -> Array:
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return q or −q, whichever has w ≥ 0: a unique unit quaternion for each rotation.
 
-    Singular set: half-turns, w = 0 to 4 eps. The quaternion whose component of largest magnitude is
-    positive is returned, with w = 0. If several components are largest, to 1e-8, the first of them
-    is made positive.
+    Singular set: half-turns, where w = 0 to 4 eps. Of q and −q, the one whose component of largest
+    magnitude is positive is then returned, with w = 0. If several components are largest, to 1e-8,
+    the first of them is made positive.
     Source: BK Remark 7.
 
     Parameters
@@ -217,7 +217,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
-    The angular speed is constant. Singular set: q0 · q1 = 0, to 4 eps, a half-turn. Of the two
+    The angular speed is constant. Singular set: half-turns, where q0 · q1 = 0 to 4 eps. Of the two
     shortest arcs, the arc to the given q1 is returned.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
@@ -255,7 +255,7 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
 
     If `slerp` turns by the angle a about an axis, this function turns by 2π − a about the opposite
-    axis. Of q1 and −q1, it ends at the one at which `slerp` does not end. Singular set: q0 and q1
+    axis. If `slerp` ends at q1, this function ends at −q1, and vice versa. Singular set: q0 and q1
     are the same rotation, to 4 eps; ValueError is raised. Near this set, the axis is accurate to
     eps over ‖q1 − q0‖.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.

@@ -196,8 +196,8 @@ def visualize(
 ) -> tuple[Figure, Animation]:
     """Show the images of v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) under `steps` random rotations.
 
-    The rotations are those of `random_quaternion`, with v ↦ q v q⁻¹, if `quaternion` is True, and
-    else those of `random_rotation_matrix`. Return a figure and an animation as `visualize_rotation`
+    If `quaternion` is True, the rotations v ↦ q v q⁻¹ are those of `random_quaternion`, otherwise
+    those of `random_rotation_matrix`. Return a figure and an animation as `visualize_rotation`
     does.
     Source: RR 2.2, RR Fig. 4, RR Fig. 5.
 

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
-_BLOCK = 6136  # draws whose arrays fit into the cache together; arrays of 6144 would collide
+_BLOCK = 6136  # draws at a time: their arrays fit into the cache; arrays of 6144 would collide
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
@@ -145,9 +145,9 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
 
 
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return rotations R_z(α) R_y(β) R_x(γ) of angles uniform on [0, 2π); they are not uniform.
+    """Return R_z(α) R_y(β) R_x(γ) for angles uniform on [0, 2π); the rotations are not uniform.
 
-    The mean E tr² is 7/8; for uniform rotations, it is 1.
+    The mean E tr² of the squared trace is 7/8; for uniform rotations, it is 1.
     Source: RR 2.1, RR (7), RR (8).
 
     Parameters
@@ -168,7 +168,7 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
 
 
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
-    """Return quaternions q_z(γ) q_y(β) q_x(α) of angles uniform on [0, 2π); they are not uniform.
+    """Return q_z(γ) q_y(β) q_x(α) for angles uniform on [0, 2π); the quaternions are not uniform.
 
     The rotations have the distribution of `sample_rotation_naive`, but the first random angle turns
     about x, not about z.
@@ -201,7 +201,7 @@ def _in_blocks(
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return draws of a kernel, which writes entries, (…, m), from uniform numbers, (3, m)."""
+    """Return draws of a kernel; it computes entries, (…, m), from uniform numbers, (3, m)."""
     shape, generator = as_size(size), as_generator(rng)
     draws = np.empty((math.prod(shape), math.prod(core)))
     width = min(len(draws), _BLOCK)
@@ -310,13 +310,13 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
             The largest distance of the angle's distribution from `angle_law`, with Kolmogorov's
             distribution.
         image of e₁, image of e₃
-            χ² of the first and of the last column, on 20 cells of the sphere of equal area, 4 in
-            height by 5 in longitude. For large n, its distribution is χ² with 19 degrees of
+            χ² of the first and of the last column, on 20 cells of the sphere that have equal areas,
+            4 in height by 5 in longitude. For large n, its distribution is χ² with 19 degrees of
             freedom.
         angle to next, angle to half
-            The statistic of angle for the turns from each even draw to the next, and from each draw
-            of the first half to its partner in the second half. They detect draws that depend on
-            each other.
+            The statistic of the row "angle" for the turns from each draw with an even index to the
+            next draw, and from each draw of the first half to its partner in the second half. Both
+            detect draws that depend on each other.
 
     Examples
     --------

@@ -309,7 +309,7 @@ def check_path(
         raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) is wanted, got {poses.shape}")
     if len(times) != len(poses):
         raise ValueError(
-            f"times, poses: as many of each are wanted, got {len(times)} and {len(poses)}"
+            f"times, poses: equal numbers are wanted, got {len(times)} and {len(poses)}"
         )
     late = np.flatnonzero(times[1:] <= times[:-1])
     if len(late):

@@ -108,8 +108,8 @@ def log_so3(R: ArrayLike) -> Array:
     """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, to rounding.
 
     The result is accurate to a few eps. Singular set: half-turns, to 8 eps in the angle, where w
-    and −w are equally short. The vector whose component of largest magnitude is positive is
-    returned (see `canonical_quaternion`).
+    and −w are equally short. Of these two, the one whose component of largest magnitude is positive
+    is returned (see `canonical_quaternion`).
     Source: BK 2.5.
 
     Parameters
@@ -181,7 +181,7 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`: w' = J⁻¹ times the body angular velocity.
 
     Singular set: ‖w‖ = 2π, 4π, …, where J has no inverse, and the result is finite and huge. Near
-    this set, the entries grow like 1 over the distance.
+    this set, the entries grow like 1 over the distance from it.
     Source: BK 2.5.
 
     Parameters
@@ -205,6 +205,6 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
 
 
 def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n̂ and a of w = a n; a has two more axes, to multiply matrices."""
+    """Return n̂ and a of w = a n; a has two axes of length 1 at the end, to multiply matrices."""
     axis, angle = axis_and_angle(w)
     return hat(axis), angle[..., None]

@@ -1,7 +1,7 @@
-"""Textbook versions of the fast functions, as on the board: short and slow; read them first.
+"""Textbook versions of the fast functions, short and slow, as on the board; read them first.
 
 Each function has the name, units, frames and singular set of its fast counterpart. It returns the
-same result to rounding, or for an optimum to a tolerance. Arguments are not checked. R0, R1 have
+same result, to rounding or, for an optimum, to a tolerance. Arguments are not checked. R0, R1 have
 the shape (3, 3), and w0, w1 (3,). The times t have the shape (N,), R (N, 3, 3), w and w' (N, 3).
 """
 
@@ -112,7 +112,7 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
 
     x0, x1, v0, v1 have the same shape. The result, the coefficients of 1, t, t², t³, has the shape
-    (4, ...). Of all curves with these ends, the cubic has the least ∫ ‖x''‖² dt.
+    (4, ...). Of all curves with these boundary conditions, the cubic has the least ∫ ‖x''‖² dt.
     Source: BK 6.2.
 
     Examples
@@ -151,9 +151,9 @@ def minimum_torque_so3(
     """Return R and w of the body's motion of least torque at the times t, by SciPy's `solve_bvp`.
 
     The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
-    with p = G (τ' + w × τ) − G w × τ, for an unknown c. ‖σ‖ must be below 2π. If the solver fails,
-    a RuntimeError names the reason. The solver may find a stationary curve that is not the
-    cheapest.
+    with p = G (τ' + w × τ) − G w × τ, for an unknown constant c. ‖σ‖ must be below 2π. If the
+    solver fails, a RuntimeError names the reason. The solver may find a stationary curve that is
+    not the cheapest.
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
 
     Examples
@@ -290,7 +290,7 @@ def spline_velocities(times: Array, R: Array) -> Array:
 def minimum_acceleration_spline_so3(
     times: Array, R: Array, ends: tuple[Array, Array] | None = None, tol: float = 1e-10
 ) -> tuple[Array, Array]:
-    """Return w and w' of the optimum through the rotations R, at these, by SciPy's `solve_bvp`.
+    """Return w and w' at the rotations R for the optimum through them, by SciPy's `solve_bvp`.
 
     All legs are solved together, each with its own time from 0 to 1. The equations are those of
     `minimum_acceleration_so3`. At the inner rotations, w and w' are continuous. At both ends, w is
@@ -336,7 +336,7 @@ def minimum_acceleration_spline_so3(
 
 
 def fastest(turn: Array, inertia: Array, torque: float, cells: int) -> tuple[Array, Array]:
-    """Return the fractions of a turn and the fastest times to reach them with bounded torque.
+    """Return the fractions of a turn and the least times to reach them with bounded torque.
 
     Let σ be the rotation vector `turn` and R = exp(σ̂ s). In a cell of length h, x = s'² changes
     linearly, and u = s'' = (x_i+1 − x_i)/2h. The torque G σ u + (σ × G σ) x has perpendicular

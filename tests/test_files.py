@@ -166,7 +166,7 @@ REFUSED = [
         rb.write_path,
         "a.csv",
         ([0], POSES[:2]),
-        "times, poses: as many of each are wanted, got 1 and 2",
+        "times, poses: equal numbers are wanted, got 1 and 2",
     ),
     (rb.write_path, "a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is not a pose \(project_se gives"),
     (rb.write_path, "a.csv", (TWO, POSES[:2, :2]), "poses: shape"),

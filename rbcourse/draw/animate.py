@@ -97,7 +97,7 @@ def save_animation(
     seconds: float = 4.0,
     still: int = -1,
 ) -> Animation:
-    """Save an animation as GIF, its still frame as PNG and PDF, and its numbers as CSV; close it.
+    """Save an animation as GIF, its still as PNG and PDF, its numbers as CSV; close the figure.
 
     The files go to the folder of `save_figure`. The same input gives the same bytes.
     """
@@ -125,8 +125,8 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     """Return pictures with a common palette: the 96 most frequent colours of eight of them.
 
-    Pillow looks up colours by the first 6 bits of each channel, as if the other bits were 0. Of the
-    colours that agree in these bits, the most frequent one represents all.
+    Pillow looks up colours by the first 6 bits of each channel, as if the other bits were 0. Among
+    the colours that agree in these bits, the most frequent one represents all of them.
     """
     width, height = pictures[0].size
     some = Image.new("RGB", (width, 8 * height))

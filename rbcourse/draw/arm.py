@@ -29,9 +29,9 @@ def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
 
 
 def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
-    """Draw an arm with its joint angles q, shape (n,), and the frames at the centres of its links.
+    """Draw an arm at joint angles q, shape (n,), and the frames at the centres of its links.
 
-    Return the artists of the links, and then the two axes of each link (RR 4).
+    Return the artists of the links, and then those of the two axes of each frame (RR 4).
     """
     joints, headings = _joints(q, lengths), np.append(0, np.cumsum(q))
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.75)
@@ -55,8 +55,8 @@ def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
 def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     """Draw an arm, and at its tip the columns of the Jacobian as arrows.
 
-    Return the artists of the links, and then an arrow for each joint. The arrows are half as long
-    as the tip moves per radian (RR 4).
+    Return the artists of the links, and then an arrow for each joint. An arrow is half as long as
+    the distance that the tip moves per radian of the joint (RR 4).
     """
     show_reach(ax, lengths)
     joints = _joints(q, lengths)

@@ -16,7 +16,7 @@ from rbcourse.draw.space import Faces
 
 
 def pose_table(first: Table, poses: Array) -> Table:
-    """Return a table of poses: given first columns, such as the times, positions and matrices.
+    """Return a table of poses: the given columns, such as times, then positions and matrices.
 
     Examples
     --------
@@ -71,10 +71,11 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
 def draw_cube_motion(
     ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
 ) -> list[Any]:
-    """Draw a cube of edge `side` in m at each pose, and in front of them stars at its centres.
+    """Draw a cube at each pose, and in front of the cubes stars at their centres.
 
-    Cubes at the poses `compared` are drawn behind as blue outlines. Return the artists of the
-    cubes, and then the stars (BK Fig. 5).
+    The edges of the cubes have the length `side` in m. Further cubes, at the poses `compared`, are
+    drawn behind these as blue outlines. Return the artists of the cubes, and then the stars (BK
+    Fig. 5).
     """
     for pose in compared:
         draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["z"], zorder=-1)
@@ -93,7 +94,7 @@ def draw_centre_path(ax: Any, places: Array) -> Any:
 def set_space(
     ax: Any, places: Array, side: float, view: tuple[float, float] = (18, -22), zoom: float = 1.0
 ) -> None:
-    """Fit the axes to a cube at these positions, shape (times, 3), and draw the room around it.
+    """Fit the axes to a cube at these positions, shape (times, 3), and draw a floor and axes.
 
     `view` is the elevation and the azimuth in degrees.
     """
@@ -106,7 +107,7 @@ def set_space(
 def set_turning(ax: Any, reach: float) -> None:
     """Fit the axes to a body that turns about the origin and reaches `reach` in m from it.
 
-    Draw the axes of the room, with their names, in a pale colour.
+    Draw the axes of the fixed frame, with their names, in a pale colour.
     """
     for name, room in zip("xyz", reach * np.eye(3), strict=True):
         ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
@@ -116,7 +117,7 @@ def set_turning(ax: Any, reach: float) -> None:
 
 
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor between two corners, with a line at each number of `draw_room`."""
+    """Draw a floor between two corners, with a line at each number on its axes in `draw_room`."""
     pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
     for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
         ax.plot([x, x], [low[1], high[1]], low[2], **pale)
@@ -131,7 +132,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
     """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
-    # the start of each axis, and the offset of its numbers, which are also below the floor's axes
+    # the start of each axis, and the offset of its numbers: beside it, and for x and y also below
     azimuth = np.radians(ax.azim)
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
@@ -147,7 +148,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # beyond the numbers, between the last two, far from the other axes
+        else:  # beyond the numbers, in the last of the largest gaps between them
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
@@ -171,15 +172,15 @@ def describe_cube_motion(poses: Array) -> str:
 
 
 def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
-    """Draw the paths of the origin in up to three motions, and the frame at the start and the ends.
+    """Draw the paths of a frame's origin in up to three motions, and the frame at their ends.
 
-    The motions begin at the same pose, where the axes of the frame have letters. Return a line for
+    The motions begin at the same pose. There, letters mark the axes of the frame. Return a line for
     each motion (BK 2.6).
     """
     looks: list[dict[str, Any]] = [
         {"color": COLOURS["optimum"], "ls": "-", "lw": 2},
         {"color": COLOURS["screw"], "ls": "--", "lw": 2.5},
-        {"color": COLOURS["reference"], "ls": ":", "lw": 4, "zorder": 1},  # seen below others
+        {"color": COLOURS["reference"], "ls": ":", "lw": 4, "zorder": 1},  # seen below the others
     ]
     lines = [
         ax.plot(*poses[:, :3, 3].T, label=name, **look)[0]
@@ -215,11 +216,12 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
 def moving_boxes(
     axes: Sequence[Any], motions: Mapping[str, Array], edges: float | Array
 ) -> Callable[[int], list[Any]]:
-    """Draw boxes at the start of motions with equally many poses, each on its own axes.
+    """Draw a box at the start of each motion, on axes of its own; return a function that moves all.
 
-    `edges` are the lengths of the edges of a box, or the edge of a cube, in m. Boxes that stay at
-    the origin are drawn larger, with the axes of the room in place of a floor. Return
-    ``update(i)``, which moves all boxes to pose i of their motions and returns their artists.
+    The motions have the same number of poses. `edges` are the lengths of the edges of a box, or the
+    edge of a cube, in m. Boxes that stay at the origin are drawn larger, with the axes of the fixed
+    frame in place of a floor. Return ``update(i)``, which moves all boxes to pose i of their
+    motions and returns their artists.
     """
     ways = list(motions.values())
     boxes = [draw_box(ax, poses[0], edges) for ax, poses in zip(axes, ways, strict=True)]

@@ -1,6 +1,6 @@
 // Draw what display.py has kept, over the picture of what does not move.
 const rbcourseDisplay = {
-  // The states in the bytes, each as an array of numbers.
+  // Return the states in the bytes, each as an array of numbers.
   split(bytes) {
     const { buffer } = bytes.slice(), [count] = new Uint32Array(buffer, 0, 1);
     const sizes = new Uint32Array(buffer, 4, count), numbers = new Int16Array(buffer, 4 * (count + 1));
@@ -8,14 +8,14 @@ const rbcourseDisplay = {
     return [...sizes].map((size) => numbers.subarray(end, (end += size)));
   },
 
-  // The bytes that were deflated and written as base64.
+  // Return the bytes that were deflated and encoded as base64.
   async inflate(text) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
   },
 
-  // The drawings of a state: styles, and runs of positions in pixels, [x, y] or in space [x, y, z].
+  // Return the drawings of a state: styles, and runs of positions in pixels, [x, y], or [x, y, z] in space.
   decode(state, styles) {
     const found = [];
     for (let i = 0; i < state.length; ) {
@@ -74,7 +74,7 @@ const rbcourseDisplay = {
     }
   },
 
-  // The texts of a state, [[name, text], ...], and its notice, as HTML.
+  // Return the texts of a state, [[name, text], ...], and its notice, as HTML.
   table(said, notice) {
     const part = document.createElement("div"), table = document.createElement("table");
     table.style = "line-height: 1.35";
@@ -89,7 +89,7 @@ const rbcourseDisplay = {
     return part.innerHTML;
   },
 
-  // Describe the drawing to screen readers: when they ask, and when nothing has moved for a while.
+  // Describe the drawing to screen readers, when they ask for it and when nothing has moved for a while.
   tell(canvas, said) {
     const text = canvas.seen ? `${said} ${canvas.seen}` : said, news = canvas.said === said ? canvas.seen : text;
     const style = "position: absolute; top: 0; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%)";

@@ -25,11 +25,11 @@ _SCENE, _DISPLAY = (
     for name in ("scene", "display")
 )
 ENGINE = _SCENE + _DISPLAY
-"""The JavaScript ``rbcourseDisplay``, which draws records of `Display`, and ``rbcourseScene``."""
+"""The JavaScript ``rbcourseScene`` and ``rbcourseDisplay``, which draws records of `Display`."""
 PARTS = 8
-"""The parts of a pixel in which positions are counted; display.js divides by this number."""
+"""The number of parts of a pixel; positions are counted in parts, and display.js divides by it."""
 FAR = 16000
-"""The largest coordinate, in parts of a pixel; the difference of two is still an int16."""
+"""The largest coordinate, in parts of a pixel; differences of coordinates are still int16."""
 
 _FIGURE = Template("""\
 <figure><img id="$name" width="$width" style="max-width: 100%" alt="$alt" src="$still"/>$caption
@@ -52,14 +52,14 @@ class Display(RendererBase):
     size : tuple of int
         Width and height in pixels.
     styles : dict of tuple to int
-        The numbers of the styles. A style has the fill colour, the colour of the line, its width,
-        its dashes, its ends and corners, the clip rectangle, and the marker, as polygons as in
-        `record`. Missing parts are None or empty. Lengths are in pixels, except those of the
-        marker. The style of a piece in space also has the number of its room, its kind, and its
-        zorder.
+        The number of each style. A style has the fill colour, the colour of the line, its width,
+        its dashes, its ends and corners, the clip rectangle, and the marker, whose polygons are
+        written as in `record`. Missing parts are None or empty. Lengths are in pixels, except those
+        of the marker. The style of a piece in space also has the number of its `Space`, its kind,
+        and its zorder.
     rooms : list of dict
-        For each `Space` of the figure, the ``origin``, the image of its middle in pixels from the
-        upper left, and the ``view``, azimuth and elevation in degrees.
+        For each `Space` of the figure: ``origin`` (where its centre appears, in pixels from the
+        upper left corner) and ``view`` (azimuth and elevation, in degrees).
     """
 
     def __init__(self, fig: Figure) -> None:
@@ -84,7 +84,8 @@ class Display(RendererBase):
         the positions of the points in parts of a pixel from the upper left, each as the difference
         from the previous one. A negative number of points means that the polygon is filled together
         with the previous one, for example as a hole. If the style has a marker, the marker is drawn
-        at the points. All visible artists in a `Space` are drawn, too, with positions in the room.
+        at the points. All visible artists in a `Space` are recorded, too, with their positions in
+        space.
         """
         self._drawn = [np.zeros(0, np.int16)]
         for room, scene in enumerate(scenes(self._fig)):
@@ -97,7 +98,7 @@ class Display(RendererBase):
 
     def _keep_piece(self, room: int, piece: Piece) -> None:
         if piece.kind == "face" and not normal_of(np.round(PARTS * piece.places)).any():
-            piece = piece.edge  # the face has no area in whole numbers
+            piece = piece.edge  # the face has no area after rounding
         polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
         marker = _marker(outline for outlines in polygons for outline in outlines)
         look = *self._style(piece.gc, piece.fill)[:-1], marker, room, piece.kind, piece.zorder
@@ -116,7 +117,7 @@ class Display(RendererBase):
         clip = None if rgbFace is not None else (-400, -400, self.width + 400, self.height + 400)
         simple = path.should_simplify and rgbFace is None
         clean = path.cleaned(transform, remove_nans=True, clip=clip, simplify=simple, curves=True)
-        clean = type(path)(clean.vertices[:-1], clean.codes[:-1])  # the last vertex is a stop
+        clean = type(path)(clean.vertices[:-1], clean.codes[:-1])  # the last vertex is a stop code
         for i, points in enumerate(clean.to_polygons(closed_only=False)):
             number = -len(points) if i and rgbFace is not None else len(points)
             self._keep(self._style(gc, rgbFace), number, points * [1, -1] + [0, self.height])
@@ -204,12 +205,14 @@ class Player:
     states : sequence of ndarray
         One state for each combination of the controls. The last control changes fastest.
     controls : sequence of dict
-        For each control its ``label``, its ``values`` as texts, and the number of its ``first``
-        value. The last control plays. Without controls, there is one state, which can be turned.
+        For each control, its ``label``, its ``values`` as texts, and the index of its ``first``
+        value. The play button moves the last control. Without controls, there is one state, whose
+        view can be turned.
     milliseconds : int, optional
         The time from one state to the next while the figure plays.
     texts : sequence, optional
-        For each state, the texts to be shown: pairs of texts, a notice, and all texts as one line.
+        For each state, the texts to be shown: pairs of a name and a text, a notice, and all texts
+        as one line.
     """
 
     name: str

@@ -16,7 +16,7 @@ from rbcourse.planar import compose_planar
 
 _OUTLINE = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]]) / 4
 _NOSE = np.array([[0.8, -1, 0], [2, 0, 0], [0.8, 1, 0]]) / 4
-"""A body of length 1 and width 1/2 that heads along its x axis, and the mark on its front."""
+"""The outline of a rectangle of length 1 and width 1/2, and the mark on its front, at +x."""
 _FILL = "#D6E6F2"
 
 
@@ -117,9 +117,10 @@ def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
 
 
 def extent_of(path: Array) -> float:
-    """Return the larger extent of a path; it is 0 if below 1e-12 of its distance or of a metre.
+    """Return the larger of a path's extents in x and y, or 0 if it is due to rounding.
 
-    A smaller extent is due to rounding: the body stays on the spot or comes back to it.
+    An extent below 1e-12 of the largest coordinate, or below 1e-12 m, is due to rounding: the body
+    stays on the spot or comes back to it.
     """
     places = path[:, :2]
     extent = float(np.ptp(places, axis=0).max())

@@ -73,11 +73,11 @@ class Picture:
     Parameters
     ----------
     name : str
-        The name of its files without the extension.
+        The name of the figure's files without the extension.
     alt : str
         The alternative text, which describes the figure.
     png : bytes
-        The picture, with a higher resolution than shown, which is sharp on fine and on large
+        The picture, with a higher resolution than shown, so that it is sharp on fine and on large
         screens.
     width : int
         The displayed width in pixels.

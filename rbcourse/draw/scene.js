@@ -1,7 +1,7 @@
 // What is in space, seen from any side, as space.py draws it from one. A piece is a face, a line, a mark
 // or a ball: { kind, zorder, style, places }; places are [x, y, z, along the line] in pixels of the room.
 const rbcourseScene = {
-  // Unit vectors to the right, upwards and to the eye, for an azimuth and an elevation in degrees.
+  // Return unit vectors to the right, upwards and to the eye, for an azimuth and an elevation in degrees.
   sight([azimuth, elevation]) {
     const [a, e] = [azimuth, elevation].map((angle) => (angle * Math.PI) / 180);
     const [ca, sa, ce, se] = [Math.cos(a), Math.sin(a), Math.cos(e), Math.sin(e)];
@@ -10,10 +10,10 @@ const rbcourseScene = {
 
   dot: (p, q) => p[0] * q[0] + p[1] * q[1] + p[2] * q[2],
 
-  // Depths as whole numbers, so that rounding does not determine their order. The intervals begin at 0.7.
+  // Return a depth as a whole number, so that rounding errors do not determine the order. The limits are at 0.7.
   pixels: (depth) => Math.floor(depth + 0.3),
 
-  // The unit normal of a whole face.
+  // Return the unit normal of a whole face.
   normal(places) {
     const [o, ...others] = places, n = [0, 0, 0];
     const spokes = others.map((p) => p.map((x, i) => x - o[i]));
@@ -25,10 +25,11 @@ const rbcourseScene = {
     return n.map((x) => x / size);
   },
 
-  // The overlap, in pixels, of the parts of a cut opaque piece, which hides the background.
+  // The overlap, in pixels, of the parts of a cut opaque piece; it hides the gap between them.
   overlap: 0.9,
 
-  // Pass to `put` the parts above a plane (1), which continue below it by the overlap, in it (0), and below (-1).
+  // Pass to `put` the parts above a plane (1), in it (0), and below it (-1). The parts above the plane are
+  // extended below it by the overlap.
   cut(piece, height, put) {
     const { places, kind, style: [fill, stroke, , dashes] } = piece, heights = places.map(height);
     const overlap = (fill ?? stroke ?? "").endsWith("ff") && !dashes.length ? rbcourseScene.overlap : 0;
@@ -60,7 +61,7 @@ const rbcourseScene = {
     for (const t of [-1, 1]) for (const run of parts[t]) if (run.length >= least) put(t, { ...piece, places: run });
   },
 
-  // The face whose plane cuts the fewest faces and lines.
+  // Return the face whose plane cuts the fewest faces and lines.
   wall(pieces, eye) {
     const { dot } = rbcourseScene, whole = pieces.filter(({ kind }) => kind === "face" || kind === "line");
     const walls = pieces.filter(({ kind }) => kind === "face" || kind === "ball");
@@ -74,8 +75,8 @@ const rbcourseScene = {
     return walls[cuts.indexOf(Math.min(...cuts))];
   },
 
-  // Pieces from the farthest to the nearest, cut where they pass through faces: first the pieces behind the plane
-  // of a face, then faces in it, then pieces over them or on the side of the eye; the same on both sides.
+  // Return pieces from the farthest to the nearest, cut where they pass through faces: first the pieces behind the
+  // plane of a face, then faces in it, then pieces over them or on the side of the eye. Each side is ordered likewise.
   order(pieces, eye) {
     const { dot, cut, pixels, wall: first } = rbcourseScene, drawn = [], todo = [[false, pieces]];
     const mean = ({ places }) => pixels(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
@@ -100,7 +101,7 @@ const rbcourseScene = {
     return drawn;
   },
 
-  // The drawings on the screen: styles, positions [x, y], and the distance along the line at which they begin.
+  // Return the drawings on the screen: styles, positions [x, y], and the distance along the line at the first one.
   seen(pieces, { origin }, view) {
     const { dot, order, sight, normal, pixels } = rbcourseScene, { right, up, eye } = sight(view);
     const flat = (p) => [origin[0] + dot(p, right), origin[1] - dot(p, up)];
@@ -133,7 +134,7 @@ const rbcourseScene = {
     });
   },
 
-  // Make a canvas turn by a pointer, keys and buttons, which are returned; all rooms turn together.
+  // Let a pointer, keys and buttons turn the view of a canvas; return the buttons. All scenes turn together.
   turn(canvas, rooms, redraw) {
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
     const row = make("div", { className: "rbcourse-view" }), said = make("output", { ariaLive: "off" });

@@ -13,11 +13,11 @@ from matplotlib.path import Path
 from rbcourse import Array
 
 OVER = 10
-"""Pieces with at least this zorder are seen through all others."""
+"""Pieces with at least this zorder are drawn in front of all others."""
 NEAR = 0.2
 """A piece whose distance from a plane is less than this, in pixels, lies in the plane."""
 OVERLAP = 0.55
-"""The overlap, in points, of the parts of a cut opaque piece, which hides the background."""
+"""The overlap, in points, of the parts of a cut opaque piece; it hides the gap between them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Piece:
         "ball", a mark with a plane that separates the other pieces.
     places : ndarray, shape (n, 3) or (n, 4)
         The positions relative to the middle of the axes, in pixels. For lines, the fourth number is
-        the visible length along the line, for dashes.
+        the visible length along the line, which places the dashes.
     gc : GraphicsContextBase
         The look of the piece.
     fill : tuple of float, optional
@@ -64,9 +64,8 @@ class Piece:
     def cut(self, height: Array, overlap: float = 0.0) -> "list[tuple[int, Piece]]":
         """Return the parts above a plane (1), in it (0), and below (-1).
 
-        `height` has the heights of the positions over the plane, shape (n,). The parts above the
-        plane continue below it by the overlap, in pixels, unless the piece is transparent or
-        dashed.
+        `height` has the heights of the positions over the plane, shape (n,). Pieces above the plane
+        are extended below it by `overlap` pixels, except for transparent or dashed ones.
         """
         side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
         if self.marker:
@@ -82,7 +81,7 @@ class Piece:
                 if s in (t, 0):
                     parts[t][-1].append(p)
                 elif not closed and parts[t][-1]:
-                    parts[t].append([])  # the line leaves this side in a point of the plane
+                    parts[t].append([])  # the line leaves this side at a point in the plane
             j = (i + 1) % len(side)
             if s * side[j] < 0 and (closed or j):
                 q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)
@@ -104,8 +103,8 @@ class Piece:
 def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces in the order in which they are drawn; `eye` is the direction to the eye.
 
-    The parts of a cut piece overlap by this number of pixels (see `Piece.cut`). Each face becomes
-    two pieces: its filling, and its edge, which is not drawn where the face is cut.
+    The parts of a cut piece overlap by `overlap` pixels (see `Piece.cut`). Each face becomes two
+    pieces: its filling, and its edge, which is not drawn where the face is cut.
     """
     parts = [part for piece in pieces for part in _filling_and_edge(piece)]
     hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
@@ -116,15 +115,16 @@ def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
     """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
     The plane of a face has the eye on one of its sides. Pieces on the other side are drawn first,
-    then pieces in the plane in the order of zorder, and then pieces on the side of the eye. On both
-    sides, this continues with the next face. A piece in the plane and over the faces there, such as
-    an edge, is drawn with the pieces on the side of the eye, so that the next faces do not cover
-    half of it. The first face is the one whose plane cuts the fewest faces and lines. Pieces that
-    no face separates are drawn in the order of zorder, then of their mean depth in `whole_pixels`,
-    and then in the given order. `eye` is the direction to the eye, shape (3,).
+    then pieces in the plane in the order of zorder, and then pieces on the side of the eye. The
+    pieces on each side are ordered in the same way by their next face. A piece in the plane that
+    covers the faces there, such as an edge, is drawn with the pieces on the side of the eye, so
+    that the next faces do not cover half of it. The first face is the one whose plane cuts the
+    fewest faces and lines. Pieces that no face separates are drawn in the order of zorder, then of
+    their mean depth in `whole_pixels`, and then in the given order. `eye` is the direction to the
+    eye, shape (3,).
     """
     drawn: list[Piece] = []
-    todo = [(False, pieces)]  # (whether the pieces are in order, pieces); the next is last
+    todo = [(False, pieces)]  # (whether in order, pieces); the last pair is next
     while todo:
         ready, group = todo.pop()
         wall = _wall(group, eye)
@@ -165,9 +165,9 @@ def _wall(group: list[Piece], eye: Array) -> Piece | None:
 
 
 def whole_pixels(depth: Any) -> Any:
-    """Return depths as whole numbers, so that rounding does not determine their order.
+    """Return depths as whole numbers, so that rounding errors do not determine their order.
 
-    The intervals begin at 0.7 pixels, since depths in symmetric scenes are rarely there.
+    The limits between them are at 0.7 pixels, since depths in symmetric scenes are rarely there.
     """
     return np.floor(depth + 0.3)
 

@@ -166,7 +166,7 @@ class Scene(Artist):
         overlap = renderer.points_to_pixels(OVERLAP)
         for piece in in_sight(self.pieces(renderer), sight.eye, overlap):
             if piece.text:
-                if piece.text not in written:  # all lines of its text at once
+                if piece.text not in written:  # draws all lines of its text together
                     piece.text.draw(renderer)
                 written.add(piece.text)
                 continue
@@ -365,7 +365,7 @@ def _strokes(artist: Line3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
 
 
 def _marked(every: Any) -> Any:
-    """Return an index of the points of a line that have a marker."""
+    """Return an index that selects the points of a line that have a marker."""
     if isinstance(every, Integral):
         return slice(None, None, int(every))
     if every is None or isinstance(every, list | slice):

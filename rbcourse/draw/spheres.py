@@ -11,7 +11,7 @@ from rbcourse.draw.scene import OVER
 from rbcourse.draw.space import Ball
 
 Images = Mapping[str, tuple[Array, Array]]
-"""For each sample of n rotations, the images of v0 and of v1, both of shape (n, 3)."""
+"""The images of v0 and of v1, both of shape (n, 3), for each sample of n rotations."""
 
 ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
 EYE = np.array(

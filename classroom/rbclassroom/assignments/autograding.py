@@ -1,4 +1,4 @@
-"""nbgrader preprocessors that restore cells, run in a sandbox, and make feedback without secrets.
+"""nbgrader steps that restore cells, run code in a sandbox, and make feedback without secrets.
 
 `configure` enters them into the configuration of nbgrader, so that they also work in nbgrader's own
 commands and in the formgrader.

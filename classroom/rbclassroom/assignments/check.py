@@ -130,7 +130,7 @@ def _error(cell: NotebookNode) -> str:
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
-    hint = lines[-1] and errors[-1].ename == "NotYet"  # its text needs no name of an error
+    hint = lines[-1] and errors[-1].ename == "NotYet"  # its text is complete by itself
     return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
 
 

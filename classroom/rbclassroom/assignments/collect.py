@@ -2,7 +2,8 @@
 
 The names of the files are set by mod/assign/classes/downloader.php of Moodle and by
 lib/content_zipper.rb of Canvas. The date of a file is often the date of the download. A date that
-is not after the due date shows that the file was in time; a later date shows nothing.
+is not after the due date shows that the file was in time; a later date does not show that it was
+late.
 """
 
 import contextlib

@@ -38,7 +38,7 @@ LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast
 
 
 def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
-    """Return the index of the cell, the line and the action where code overrides names of tests."""
+    """Return the cell index, the line and the action of all code that overrides names of tests."""
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
@@ -55,7 +55,7 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
 
 
 def _parsed(source: str) -> ast.Module:
-    """Return the syntax tree of the code; an empty tree if it is not Python and so cannot run."""
+    """Return the syntax tree of the code, or an empty tree if it is not Python and cannot run."""
     for text in (HARMLESS.sub("pass", TIMED.sub("", source)), source):
         try:
             tree = ast.parse(TransformerManager().transform_cell(text))
@@ -82,7 +82,7 @@ def _root(node: ast.AST) -> str:
 
 
 def _rebound(node: ast.AST, local: bool) -> list[str]:
-    """Return the names that a node binds in the notebook, without those of customary imports."""
+    """Return the names that a node binds in the notebook, except those of customary imports."""
     match node:
         case ast.Global(names=names):
             return names

@@ -33,7 +33,7 @@ from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.tables import update
 
-WORKERS = 2  # number of students that are graded at once
+WORKERS = 2  # number of students that are graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
 Job = tuple[str, str]  # the names of a set and of a student
@@ -100,7 +100,7 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
 
 
 def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[Job, Row]]:
-    """Grade several submissions at once, but one per student at a time; yield the row of each."""
+    """Grade submissions in parallel, but one per student at a time; yield the row of each."""
     course, todo = CourseDirectory(config=course_config(jobs[0][0], assignments)), list(jobs)
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY,))
@@ -131,9 +131,9 @@ def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[J
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
-    """Yield files that `collect` could not use, which may be of this set, and missing students.
+    """Yield files, perhaps of this set, that `collect` could not use, and students without files.
 
-    The reason is the second item of each pair.
+    Each is yielded together with the reason.
     """
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
     for row in _report(assignments):
@@ -241,7 +241,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
 def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
     """Return a page of feedback whose list has titles of problems in place of "Test cell".
 
-    It says which answers, `to_do`, nobody has graded yet.
+    The page also marks the answers `to_do`, which nobody has graded yet.
     """
     cells, names = nbformat.read(graded, as_version=4).cells, dict[str, str]()
     for at, cell in enumerate(cells):
@@ -294,7 +294,7 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
 
 def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[str]]) -> Row:
     """Return the row of a student in the table."""
-    if error := work.exception():  # grading of the others goes on
+    if error := work.exception():  # the other submissions are still graded
         _withdraw(gradebook, root, name, student)
         why = str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
         why = "its process ended, or took too long" if isinstance(error, BrokenExecutor) else why

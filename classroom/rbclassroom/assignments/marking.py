@@ -2,7 +2,8 @@
 
 A correct function is accepted. For any other function, `NotYet` is raised with one hint. The data
 of a problem are numbers: inputs, right answers, and the results of functions that make a known
-mistake. If a student's function agrees with a mistake on each input, it gets the hint.
+mistake. If a student's function agrees with a mistake on each input, the student gets the hint of
+this mistake.
 """
 
 import copy
@@ -84,7 +85,7 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            trials = zip(given, *mistake.results, strict=True)  # inputs may match different ones
+            trials = zip(given, *mistake.results, strict=True)  # each input may match another one
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""

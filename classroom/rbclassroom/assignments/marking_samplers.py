@@ -60,7 +60,7 @@ class Sampler:
 
     def _hint(self, rows: Rows) -> str:
         """Return the hint of the mistake with the nearest distributions, or "" if none is near."""
-        near, hint = 2.0, ""  # in units of the bound: samples of the same distribution are nearer
+        near, hint = 2.0, ""  # in units of the bound; samples of one distribution are nearer
         for mistake in self.mistakes:
             for result in mistake.results:
                 pairs = zip(rows.items(), result, strict=True)
@@ -181,7 +181,7 @@ LAWS: dict[str, dict[str, Any]] = {
     "quaternion": {
         "shape": (4,),
         "fault": _quaternion_fault,
-        "uniforms": lambda q: _rotation_rows(matrix_from_quaternion(q)),  # q and −q give one R
+        "uniforms": lambda q: _rotation_rows(matrix_from_quaternion(q)),  # q and −q give the same R
     },
 }
 """The shape, the fault and the uniforms of a `Sampler`, for each kind of draws."""

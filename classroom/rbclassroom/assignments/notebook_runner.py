@@ -23,7 +23,8 @@ class BoundedClient(NotebookClient):
     """A client for a notebook whose cells may loop, print without end, or end their kernel.
 
     The kernel keeps its files in `folder`, which has to be set before the start. `slow` has the
-    indices of the cells that took too long, and `cut` of those whose output is not complete.
+    indices of the cells that took too long, and `cut` has those of the cells whose output is
+    incomplete.
     """
 
     timeout = Integer(CELL_SECONDS, help="the time limit of a cell in seconds").tag(config=True)

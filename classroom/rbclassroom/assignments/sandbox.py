@@ -83,7 +83,7 @@ def environment(folder: Path) -> dict[str, str]:
 
 
 def box(folder: Path, seconds: int) -> list[str]:
-    """Return the words that begin a command in the sandbox, which can write only to a folder."""
+    """Return the beginning of a command that runs in the sandbox and can write only to `folder`."""
     packages = (path for package in (rbcourse, rbclassroom) for path in package.__path__)
     python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
@@ -116,7 +116,7 @@ def box(folder: Path, seconds: int) -> list[str]:
 
 
 def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
-    """Let a manager start its kernel in the sandbox for some seconds, with files in the folder."""
+    """Let a manager start its kernel in the sandbox for `seconds`, with its files in the folder."""
     spec = manager.kernel_spec
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()

@@ -62,7 +62,7 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             # a name that the function imports is not among its globals
             found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
         elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
-            # the code does not show whose attribute a name is: all that the module has are checked
+            # the code does not show whose attribute a name is, so each module is searched
             found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
         elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:
             yield f"{own}.{name}"

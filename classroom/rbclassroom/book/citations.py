@@ -37,10 +37,10 @@ def names(bibliography: str) -> dict[str, str]:
 
 
 def with_citations(text: str, known: Mapping[str, str], here: set[str], elsewhere: str) -> str:
-    """Return a text whose citations are links, and whose list of works has the targets of links.
+    """Return a text whose citations are links, and whose list of works has their targets.
 
-    Works whose keys are in `here` are in the list of this page. Citations of other works lead to
-    the page `elsewhere`.
+    `here` has the keys of the list on this page; every other citation links to the page
+    `elsewhere`.
     """
 
     def put(match: re.Match[str]) -> str:

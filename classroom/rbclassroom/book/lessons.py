@@ -133,8 +133,8 @@ def with_picture_files(
 def cuts_of(still: Image.Image) -> list[float]:
     """Return the places between panels at which a wide still can be cut, as shares of its width.
 
-    Each cut is in the middle of blank columns, near a cut of the still into equal parts. The width
-    of these parts is at most 1.5 times their height.
+    Each cut is in the middle of blank columns, near a limit between equal parts of the still. The
+    width of these parts is at most 1.5 times their height.
     """
     width, height = still.size
     if width < 1.8 * height:
@@ -205,7 +205,7 @@ def with_lead(text: str, picture: str) -> str:
 
 
 def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells with the imports, the code before the first section, moved to the end."""
+    """Return cells in a new order: the imports, which precede the first section, come last."""
     first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
     imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
     others = [cell for cell in cells if not any(cell is each for each in imports)]

@@ -61,7 +61,7 @@ def _documented(tree: ast.Module) -> list[str]:
 
 
 def shown_code(root: Path) -> list[str]:
-    """Return the files whose code has a page; tests that answer problems have no page."""
+    """Return the files whose code has a page; tests with answers to problems have none."""
     packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]

@@ -3,8 +3,8 @@
 Results agree under the following conditions. Texts have the same bytes. Numbers in a table differ
 by at most 1e-12 of the largest number in their column, or by 2 units of their eleventh digit. In a
 picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. A living
-picture is drawn by a browser from whole numbers. It has the same polygons in the same styles, and
-no coordinate differs by more than one unit, 1/8 of a pixel.
+picture is drawn by a browser from whole numbers. Two of them agree if they have the same polygons
+in the same styles, and no coordinate differs by more than one unit, 1/8 of a pixel.
 """
 
 import base64
@@ -46,7 +46,7 @@ def _checksum(picture: re.Match[str]) -> str:
 
 
 def reconciled_notebook(stored: str, again: str) -> str:
-    """Return a notebook that was run again, with the stored pictures where these agree."""
+    """Return a notebook that was run again; stored pictures replace new ones that agree."""
     if stored == again:
         return again
     notebook = nbformat.reads(again, as_version=4)
@@ -63,7 +63,7 @@ def reconciled_notebook(stored: str, again: str) -> str:
 
 
 def reconciled(stored: str, again: str) -> str:
-    """Return a page that was made again, with the stored pictures where these agree."""
+    """Return a page that was made again; stored pictures replace new ones that agree."""
     kept = [match[0] for match in PICTURE.finditer(stored)]
     if len(kept) != len(PICTURE.findall(again)):
         return again
@@ -98,8 +98,8 @@ def same_living_pictures(one: dict[str, Any], other: dict[str, Any]) -> bool:
 def _contents(data: dict[str, Any]) -> tuple[list[Any], NDArray[np.float64]]:
     """Return the exact parts of a living picture, and coordinates that may differ by 1.
 
-    The unit of coordinates is 1/8 of a pixel. For the centres of rooms and for views it is 0.015,
-    because these numbers have two decimals.
+    The unit of coordinates is 1/8 of a pixel. For the centres and views of scenes, the unit is
+    0.015, because these numbers have two decimals.
     """
     styles, texts = json.loads(_inflated(data["known"]))
     rest = data | dict.fromkeys(("states", "known", "background", "rooms"))

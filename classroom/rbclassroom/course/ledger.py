@@ -127,7 +127,7 @@ def render(found: dict[str, Entry]) -> str:
         rows = []
         for key in keys:
             places = dict.fromkeys(map(_place, found[key].functions))
-            modules = sorted(places, key=lambda name: name.startswith("_"))  # private ones last
+            modules = sorted(places, key=lambda name: name.startswith("_"))  # private names last
             lessons = dict.fromkeys(lesson[:2] for lesson in found[key].lessons)
             rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
         parts.append(f"## {title}\n\n{_table(('', 'what', 'modules', 'lessons'), rows)}")

@@ -167,9 +167,9 @@ def _with_numbered_ids(ran: list[Any]) -> list[Any]:
 def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
     """Execute lessons, then rewrite the stored outputs and figures that have changed.
 
-    By default all lessons run; with `names`, those whose names begin with one of these. Results
-    that agree up to the rounding of processors are not rewritten. If a lesson fails, no file is
-    rewritten. If all lessons run, figures that none of them draws are removed.
+    By default all lessons run; if `names` are given, only lessons whose names begin with one of
+    them. Results that agree up to the rounding of processors are not rewritten. If a lesson fails,
+    no file is rewritten. If all lessons run, figures that none of them draws are removed.
     """
     every = lesson_paths(lessons)
     if not every:
@@ -204,9 +204,9 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
 def copy_lessons(lessons: Path, work: Path) -> None:
     """Copy the lessons as trusted notebooks to a folder to work in, and keep changed copies.
 
-    A lesson without a copy is copied. If a lesson has changed since it was copied, the new version
-    replaces a copy with unchanged cells, even if they were run. It is stored beside a copy with
-    changed cells.
+    A lesson without a copy is copied. If a lesson has changed since it was copied, its new version
+    replaces a copy whose cells are unchanged, even if they were run. A copy with changed cells is
+    kept, and the new version is stored beside it.
     """
     work.mkdir(exist_ok=True)
     record = work / ".copied.json"

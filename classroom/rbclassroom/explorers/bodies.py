@@ -27,9 +27,10 @@ _COSTS = {"acceleration": rb.acceleration_cost, "torque": rb.torque_cost}
 def body_explorer() -> Explorer:
     """Return an explorer of a book of 1 kg that is turned from rest to rest in 1 s.
 
-    It shows three motions: the optimum for a ball, the motion of least acceleration, and that of
-    least torque. Its controls are the axis of the displacement, ``about``, the ``turn`` in degrees,
-    the ``thickness`` of the book in cm, and the time ``t``, which plays (beyond BK 3, beyond BK 4).
+    It shows three motions: the optimum for a ball, the motion of least acceleration, and the motion
+    of least torque. Its controls are the axis of the displacement, ``about``, the ``turn`` in
+    degrees, the ``thickness`` of the book in cm, and the time ``t``, which the play button moves
+    (beyond BK 3, beyond BK 4).
     """
     artists: dict[str, Any] = {}
     with new_figure() as fig:

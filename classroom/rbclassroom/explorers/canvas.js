@@ -11,7 +11,7 @@ export default {
     URL.revokeObjectURL(back.src);
     el.append(canvas);
 
-    // The states of one version, by their numbers. They are stale once another control moves.
+    // The states of one version, by their indices. They become invalid when another control moves.
     let known = new Map(), version, stale = false, shown, noted = "";
     let waiting = false, place = null, near = false, timer, late, panel = null;
     const text = "Python does not answer: wait, or run this cell again.";

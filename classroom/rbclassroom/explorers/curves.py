@@ -27,8 +27,8 @@ def theta_explorer() -> Explorer:
     """Return an explorer of the straight line between two rotations and its projection, θ(t).
 
     The left picture shows the circle of the rotations between the two ends, with the chord; the
-    right one shows θ over time. The controls are the ``angle`` a in degrees, and the time ``t``,
-    which plays (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
+    right one shows θ against time. The controls are the ``angle`` a in degrees, and the time ``t``,
+    which the play button moves (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
@@ -77,11 +77,11 @@ def theta_explorer() -> Explorer:
 
 
 def screw_explorer() -> Explorer:
-    """Return an explorer of two motions from the room's frame to a pose: geodesic and screw.
+    """Return an explorer of two motions from the fixed frame to a pose: geodesic and screw.
 
     The controls are the ``angle`` of the turn, the ``tilt`` of its axis from z towards x, both in
-    degrees, the position ``x`` and ``z`` of the goal in m, and the time ``t``, which plays (BK 2.6,
-    BK (10), BK (14)).
+    degrees, the position ``x`` and ``z`` of the goal in m, and the time ``t``, which the play
+    button moves (BK 2.6, BK (10), BK (14)).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.5)
@@ -132,10 +132,10 @@ def screw_explorer() -> Explorer:
 def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
-    Its three axes stick out of it on both sides, and one end of each has a number. Its angular
-    momentum is vertical and constant. The controls are the ``axis`` of the spin, the angle ``off``
-    this axis in degrees, and the time ``t`` in s, which plays, and starts again when another axis
-    is chosen (BK (8), BK 2.4).
+    The three axes stick out of the book on both sides, and one end of each has a number. The
+    angular momentum is vertical and constant. The controls are the ``axis`` of the spin, the angle
+    ``off`` between the spin and this axis in degrees, and the time ``t`` in s, which the play
+    button moves. The time starts again when another axis is chosen (BK (8), BK 2.4).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)
@@ -183,8 +183,8 @@ def flip_explorer() -> Explorer:
 def _spins() -> tuple[rb.Array, rb.Array]:
     """Return orientations and angular velocities by time, axis, and angle off this axis.
 
-    All motions are integrated at once, before a slider moves: to integrate even one of them takes
-    too long while a slider moves.
+    All motions are integrated in advance, because integrating one of them while a slider moves
+    would take too long.
     """
     tilt = np.radians(np.arange(0, _OFF_MOST + _OFF_STEP / 2, _OFF_STEP))[:, None]
     main = np.eye(3)[:, None]

@@ -31,11 +31,11 @@ _STYLES: Any = ["default", "rbcourse.rbcourse", dict.fromkeys(_SIZED, LABELS)]
 class Canvas(anywidget.AnyWidget):
     """The picture in the browser, which draws the states that Python sends; see canvas.js.
 
-    ``made`` never changes. A ``run`` has consecutive states of the control that plays. All runs of
-    one version have the same values of the other controls, and the first run may have a notice
-    (after a click, for example). The browser sends a message with the ``index`` of a missing state,
-    or with the ``place`` of a click. A place consists of the distance from the left as a fraction
-    of the width, and the distance from the top as a fraction of the height.
+    ``made`` never changes. A ``run`` has consecutive states of the control that the play button
+    moves. All runs of one version have the same values of the other controls, and the first run may
+    have a notice (after a click, for example). The browser sends a message with the ``index`` of a
+    missing state, or with the ``place`` of a click. A place consists of the distance from the left
+    as a fraction of the width, and the distance from the top as a fraction of the height.
     """
 
     _esm = ENGINE + Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
@@ -161,7 +161,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     def draw(self, shown: Sequence[Any] | None, zoom: float = 1) -> bytes:
         """Return these artists as a PNG over the background, with `zoom` times the resolution.
 
-        If `shown` is None, the rooms in space, which the reader can turn, are left out.
+        If `shown` is None, the scenes in space, which the reader can turn, are left out.
         """
         with plt.style.context(_STYLES):
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
@@ -223,7 +223,7 @@ def new_figure() -> Iterator[Figure]:
 
 
 def new_space(fig: Figure, place: tuple[float, float, float, float], reach: float) -> Any:
-    """Add axes for bodies that turn about the origin, with pale lines for the axes of the room."""
+    """Add axes for bodies that turn about the origin, with pale lines for the fixed axes."""
     ax: Any = fig.add_axes(place, projection="space")
     for room in reach * np.eye(3):
         ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=1.5, zorder=0)

@@ -26,10 +26,10 @@ def minimum_acceleration_explorer() -> Explorer:
     """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
 
     Both curves run from I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the
-    cost is that of `acceleration_cost`. The box follows the optimum, its pink outline the closed
-    form. The controls are the ``rival``, which is the closed form, the ``size`` s, the time ``t``,
-    and ``k`` in rad per unit time, which plays (BK 1, BK (18), BK (19), BK (21), BK 6.2, BK Fig.
-    4).
+    cost is that of `acceleration_cost`. The box follows the optimum, and its pink outline follows
+    the closed form. The controls are the ``rival`` (the closed form), the ``size`` s, the time
+    ``t``, and ``k`` in rad per unit time, which the play button moves (BK 1, BK (18), BK (19), BK
+    (21), BK 6.2, BK Fig. 4).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.46, 0.69))
@@ -73,12 +73,12 @@ def minimum_acceleration_explorer() -> Explorer:
 
 
 def cube_explorer() -> Explorer:
-    """Return an explorer of Figure 5: a cube moves by the optimum, another by the projection.
+    """Return an explorer of Figure 5: one cube follows the optimum, another the projection.
 
     The boundary conditions are those of the paper, except for three that can be changed; the goal
-    is pale. The controls are the ``turn``, as a fraction of the paper's, ``spin``, the last
-    component of ω(1) in rad per unit time, ``rise``, the last component of the final velocity in m
-    per unit time, and the time ``t``, which plays (BK 6.3, BK (14), BK Fig. 5).
+    is pale. The controls are the ``turn``, as a fraction of the paper's; ``spin``, the last
+    component of ω(1) in rad per unit time; ``rise``, the last component of the final velocity in m
+    per unit time; and the time ``t``, which the play button moves (BK 6.3, BK (14), BK Fig. 5).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}

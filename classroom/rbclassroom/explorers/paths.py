@@ -39,11 +39,11 @@ def spline_explorer() -> Explorer:
     """Return an explorer of two curves through four rotations, with their accelerations over time.
 
     Both curves are projected cubics: on the left with the velocities of parabolas, on the right
-    with those of the spline. On each sphere of directions a line is the path of the first body
-    axis, a short stroke the third axis, and dots are the given orientations. Below it, a line shows
-    ‖ω′‖ up to the present time. The controls are the ``ends``, "natural" or "at rest", the
-    ``pitch`` of the third orientation in degrees, its time ``third`` in s, and the time ``t`` in s,
-    which plays (beyond BK 12, beyond BK 13).
+    with those of the spline. On each sphere of directions, a line is the path of the first body
+    axis, a short stroke shows the third axis, and dots are the given orientations. Below each
+    sphere, a line shows ‖ω′‖ up to the present time. The controls are the ``ends`` ("natural" or
+    "at rest"), the ``pitch`` of the third orientation in degrees, its time ``third`` in s, and the
+    time ``t`` in s, which the play button moves (beyond BK 12, beyond BK 13).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -114,9 +114,9 @@ def chain_explorer() -> Explorer:
     """Return an explorer of a box that moves through four poses.
 
     The controls are the ``curve``, the ``duration`` of the motion in s, and the time ``t`` as a
-    fraction of the duration, which plays. The curve consists of geodesics, or of projected cubics
-    with the velocities of parabolas or of the spline, or it is the optimum. Except for the
-    geodesics, it is at rest at both ends (BK 6.3, beyond BK 14).
+    fraction of the duration, which the play button moves. The curve consists of geodesics, or of
+    projected cubics with the velocities of parabolas or of the spline, or it is the optimum. Except
+    for the geodesics, the curve is at rest at both ends (BK 6.3, beyond BK 14).
     """
     with new_figure() as fig:
         space = new_space(fig, (-0.06, -0.1, 0.74, 1.2), 2.15)

@@ -26,11 +26,11 @@ _START = np.radians([-20.0, 110.0])
 
 
 def planar_explorer() -> Explorer:
-    """Return an explorer of a plan, whose velocities are in the world's frame or in the body's.
+    """Return an explorer of a plan, with velocities in the world frame or in the body frame.
 
     The plan has two commands of two seconds each. The controls are their velocities in m/s and
-    degrees/s, ``vx1 vy1 omega1`` and ``vx2 vy2 omega2``, and the time ``t`` in s, which plays (RR
-    3.2, RR (17), RR (18), RR (19)).
+    degrees/s, ``vx1 vy1 omega1`` and ``vx2 vy2 omega2``, and the time ``t`` in s, which the play
+    button moves (RR 3.2, RR (17), RR (18), RR (19)).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.87, 0.7))
@@ -71,9 +71,9 @@ def planar_explorer() -> Explorer:
 def arm_explorer() -> Explorer:
     """Return an explorer of the two-link arm: set its angles, or click on a goal for its hand.
 
-    A pale arm shows the start, from which both motors run evenly. The controls are the goal
-    ``theta0`` and ``theta1``, in degrees, and the time ``t`` in [0, 1], which plays. If you set a
-    goal, the arm is shown at the goal (RR 4, RR 4.1, RR (20), RR (21)).
+    A pale arm shows the start, from which both motors run at constant speeds. The controls are the
+    goal ``theta0`` and ``theta1``, in degrees, and the time ``t`` in [0, 1], which the play button
+    moves. If you set a goal, the arm is shown at the goal (RR 4, RR 4.1, RR (20), RR (21)).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.63, 0.81))

@@ -61,9 +61,9 @@ def record(
 ) -> Player:
     """Return an explorer as a figure that moves without Python and has exactly these states.
 
-    `moved` contains values of controls, including their present values. Every `stride`-th step of
-    the control that plays is recorded, including the present step. The other controls keep their
-    present values.
+    `moved` has the values of some controls that are recorded, including their present values. Every
+    `stride`-th step of the control that plays is recorded, too, including the present step. The
+    other controls keep their present values.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
     label = {each: control.description for each, control in explorer.controls.items()}

@@ -22,10 +22,10 @@ _BINS = np.linspace(-1, 1, 21)
 def rotation_explorer() -> Explorer:
     """Return an explorer of orientations: three angles, and other representations.
 
-    The picture shows a box with its axes. Dashed lines are the axes of the three turns: the room's
-    z, the y axis after the first turn, and the body's own x. A dotted line is the axis of the
-    single turn that replaces them. The controls are ``alpha beta gamma``, the ZYX angles in
-    degrees; ``beta`` plays (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
+    The picture shows a box with its axes. Dashed lines are the axes of the three turns: the fixed z
+    axis, the y axis after the first turn, and the body's own x axis. A dotted line is the axis of
+    the single turn that replaces them. The controls are ``alpha beta gamma``, the ZYX angles in
+    degrees; the play button moves ``beta`` (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.3)
@@ -75,7 +75,7 @@ def projection_explorer() -> Explorer:
 
     Grey lines are the columns of I + pull · E, full lines those of the nearest rotation, and dashed
     lines those of Gram–Schmidt. The controls are the entries ``e12``, ``e23`` and ``e33`` of E, and
-    the factor ``pull``, which plays (BK 4, BK Prop. 2, RR 1.4).
+    the factor ``pull``, which the play button moves (BK 4, BK Prop. 2, RR 1.4).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.2)
@@ -128,8 +128,8 @@ def random_explorer() -> Explorer:
     """Return an explorer of random rotations: the images of e₁, and tests of uniformity.
 
     The controls are the ``sampler``, "three angles" or "uniform", the ``number`` of rotations,
-    which plays, and the ``seed``. The rotations are always the first of the same 2000 for this seed
-    (RR 2, RR 2.1, RR 2.2).
+    which the play button moves, and the ``seed``. For each seed, the rotations are always the first
+    of the same 2000 (RR 2, RR 2.1, RR 2.2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="space")

@@ -21,11 +21,11 @@ _IN_USE = 0.995
 def timing_explorer() -> Explorer:
     """Return an explorer of the fastest timing of a path within limits.
 
-    The right picture is the phase plane: the rate of the path parameter s over s, with a pose at
+    The right picture is the phase plane: the rate of the path parameter s against s, with a pose at
     each integer s. No timing may lie above the limit curves; a grey line shows the whole path at
     one rate. The box moves with the fastest timing. The controls are the largest allowed
-    ``angular_speed``, ``speed`` and ``acceleration`` of its centre, and ``t``, the time as a
-    fraction of the duration, which plays (beyond BK 16).
+    ``angular_speed`` of the box, the largest ``speed`` and ``acceleration`` of its centre, and
+    ``t``, the time as a fraction of the duration, which the play button moves (beyond BK 16).
     """
     path = rb.projected_spline_se3(np.arange(4.0), POSES)
     with new_figure() as fig:

@@ -47,7 +47,7 @@ def describe_angles(data: Table) -> str:
 def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> None:
     """Draw a box with its frame in orientations R, shape (n, 3, 3), each on its own axes.
 
-    The names become titles; pale lines are the axes of the room (RR 2.1).
+    The names become titles; pale lines are the axes of the fixed frame (RR 2.1).
     """
     for ax, name, turned in zip(axes, names, R, strict=True):
         pose = pose_from_components(turned, np.zeros(3))

@@ -26,10 +26,10 @@ _COLOURS = {"nearest rotation": COLOURS["projection"], "Gram–Schmidt": COLOURS
 def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> Table:
     """Multiply a matrix repeatedly in single precision, and return its distance from SO(3).
 
-    `ways` has for each name the factor, shape (3, 3), and the function that repairs the matrix
+    For each name, `ways` has the factor, shape (3, 3), and the function that repairs the matrix
     after every 100 products, or None. The table has the defect ‖RᵀR − I‖ of each name, before the
-    repair, at up to 60 numbers of steps. These are evenly spread on a logarithmic scale, and those
-    above 100 are multiples of 100 (RR 1.4).
+    repair, at up to 60 numbers of steps. These numbers are equally spaced on a logarithmic scale,
+    and those above 100 are multiples of 100 (RR 1.4).
     """
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))
@@ -50,7 +50,7 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
 
 
 def draw_drift(ax: Axes, data: Table) -> None:
-    """Draw the defects of a `drift_table` over the number of products."""
+    """Draw the defects of a `drift_table` against the number of products."""
     (_, steps), *ways = named(" [1]", data).items()
     looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
     for (name, defect), (colour, dash) in zip(ways, looks, strict=True):
@@ -78,9 +78,10 @@ def column_table(matrices: Mapping[str, Array]) -> Table:
 def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     """Draw the columns of 2 × 2 matrices as arrows, each matrix on its own axes.
 
-    The first matrix is the given one. Its arrows are repeated in grey behind those of the others,
-    and a dotted line joins the two tips of each column. The titles state the Frobenius distance,
-    which is the root of the sum of the squares of the two lines (BK Prop. 2, RR 1.4).
+    The first matrix is the given one. Its arrows are repeated in grey behind those of the other
+    matrices, and a dotted line joins the two tips of each column. The titles state the Frobenius
+    distance, which is the root of the sum of the squares of the lengths of the two lines (BK Prop.
+    2, RR 1.4).
     """
     given = next(iter(matrices.values()))
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
@@ -180,7 +181,7 @@ def frame_table(M: Array, angles: ArrayLike) -> Table:
 
 
 def draw_frames(ax: Axes, data: Table) -> None:
-    """Draw the angles of a `frame_table` over the angle of the frame (BK Prop. 3)."""
+    """Draw the angles of a `frame_table` against the angle of the frame (BK Prop. 3)."""
     (_, frame), *found = named(" [rad]", data).items()
     frame = np.degrees(frame)
     for (name, angle), dash in zip(found, ("-", "--"), strict=True):

@@ -92,7 +92,7 @@ def _course(path: Array) -> tuple[int, bool]:
     """Return the axis that a path goes round, and whether it passes close to the middle axis.
 
     A path goes round an axis if its component along this axis keeps its sign. If there are several
-    such axes, it is the one whose component remains farthest from 0.
+    such axes, the one whose component remains farthest from 0 is returned.
     """
     keeps_sign = path.min(axis=0) * path.max(axis=0) > 0
     nearest, farthest = np.abs(path).min(axis=0), np.abs(path).max(axis=0)
@@ -102,10 +102,10 @@ def _course(path: Array) -> tuple[int, bool]:
 def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
     """Draw a book with a pin along its middle axis, and return the function that turns the book.
 
-    R contains its orientations at the times t. In these the angular momentum is vertical; a line
-    through the centre of the book shows its direction. `edges` are the edges along the axes of the
-    book, in m; the pin is along the second. ``update(i)`` turns the book to orientation i and
-    returns the artists that move.
+    R contains its orientations at the times t. In these orientations, the angular momentum is
+    vertical; a line through the centre of the book shows its direction. `edges` are the edges along
+    the axes of the book, in m; the pin is along the second. ``update(i)`` turns the book to
+    orientation i and returns the artists that move.
     """
     poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
@@ -145,7 +145,7 @@ CARRIED = {
     "parallel": ("path", 0.5),
     "constant in the body": ("z", 1.0),
 }
-"""The colours of three arrows on a turning body, and the fractions of the turn they follow."""
+"""The colours of three arrows on a turning body, and their turns as fractions of its turn."""
 
 
 def carried_table(turned: Array) -> dict[str, Array]:

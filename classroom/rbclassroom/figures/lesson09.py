@@ -86,7 +86,7 @@ def describe_coordinates(data: Table) -> str:
 
 
 def draw_excess(ax: Axes, data: Table) -> None:
-    """Draw the excess of curves over the size of the excursion, on logarithmic axes."""
+    """Draw the excess of curves against the size of the excursion, on logarithmic axes."""
     scale, families = np.asarray(data["scale [1]"]), named(" excess [1]", data)
     looks = [("x", "o-"), ("y", "s--"), ("z", "^-."), ("projection", "d:")]
     for (name, excess), (look, mark) in zip(families.items(), looks, strict=False):

@@ -102,7 +102,7 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
 
 
 def draw_normal(axes: Sequence[Axes], data: Table) -> None:
-    """Draw free motions and straight lines of a `normal_table`, each coordinates on own axes."""
+    """Draw motions and lines of a `normal_table`; each kind of coordinates has its own axes."""
     lines, *kinds = _by_kind(data).items()
     for ax, (kind, motions) in zip(axes, kinds, strict=True):
         for k, line in enumerate(lines[1]):

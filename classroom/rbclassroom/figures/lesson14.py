@@ -44,13 +44,13 @@ _TURNS: list[dict[str, Any]] = [
 def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
     """Return the speeds (order 1) or the accelerations (order 2) of a motion over time.
 
-    They are the norms of the two halves of ``motion(t, order)``, at evenly spaced times in s.
+    They are the norms of the two halves of ``motion(t, order)``, at equally spaced times in s.
     `motion` must be a single motion on SE(3).
     """
     t = np.linspace(*motion.domain, samples)
     rates = motion(t, order)
     if rates.shape != (samples, 6):
-        raise ValueError("motion: a single curve on SE(3) wanted")
+        raise ValueError("motion: a single curve on SE(3) is wanted")
     norms = np.linalg.norm(np.split(rates, 2, axis=-1), axis=-1)
     return {_TIME: t, **dict(zip(RATES[order], norms, strict=True))}
 
@@ -95,7 +95,7 @@ def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
 
 
 def acceleration_table(curves: Mapping[str, Curve], component: int) -> Table:
-    """Return one component of ω' of curves on SO(3) at 401 evenly spaced times."""
+    """Return one component of ω' of curves on SO(3) at 401 equally spaced times."""
     t = np.linspace(*next(iter(curves.values())).domain, 401)
     return {_TIME: t} | {f"{name} [rad/s²]": c(t, 2)[:, component] for name, c in curves.items()}
 
@@ -126,7 +126,7 @@ def describe_accelerations(data: Table, knots: ArrayLike) -> str:
 
 
 def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
-    """Return natural cubic splines through three angles, with additional whole turns.
+    """Return natural cubic splines through three angles, to which whole turns are added.
 
     The "bend" of a spline is its difference from the straight line between its ends.
     """

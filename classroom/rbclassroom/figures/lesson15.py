@@ -60,7 +60,7 @@ def _least(a: list[Array], b: list[Array]) -> Array:
     aa, ab, bb = (np.sum(x * y, axis=-1) for x, y in ((A, A), (A, B), (B, B)))
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = list(-ab / aa)
-        for i, j in combinations(range(len(aa)), 2):  # two limits are equal
+        for i, j in combinations(range(len(aa)), 2):  # the norms of two limits are equal
             p, q, r = (x[i] - x[j] for x in (aa, ab, bb))
             root = np.sqrt(q * q - p * r)
             trials += [(-q + root) / p, (-q - root) / p]
@@ -70,7 +70,7 @@ def _least(a: list[Array], b: list[Array]) -> Array:
 
 
 def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
-    """Return the limit curves over s, the constant rate for `even` seconds, and the fastest rate.
+    """Return limit curves over s, the constant rate for `even` seconds, and the fastest rate.
 
     Rates above twice the largest rate of the fastest timing are replaced by NaN.
     """

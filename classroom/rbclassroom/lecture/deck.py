@@ -18,7 +18,7 @@ STATIC = Path(__file__).with_name("static")
 WIDE = 1.9
 """A picture whose ratio of width to height exceeds this value is shown below its text."""
 IDEA = 26
-"""The largest number of words in an idea behind an option, unless one sentence has more."""
+"""The largest number of words in an idea behind an option, unless its first sentence has more."""
 _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # keys of works, which only the book shows
 _LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to files of the course
 _TOGETHER = {  # patterns of text that must stay on one line

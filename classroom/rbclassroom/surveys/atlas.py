@@ -1,4 +1,4 @@
-"""The atlas: a survey of the ends and bodies for which a closed form is near the optimum."""
+"""The atlas: a survey of the problems and bodies for which a closed form is near the optimum."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CELLS = 10
 FASTEST = 9.0
 """The largest √(‖w0‖² + ‖w1‖²) of the atlas, in rad per unit time."""
 FAMILIES = "along", "across"
-"""Directions of the end velocities in lesson 12: along the axis of the displacement, or across."""
+"""Directions of the end velocities in lesson 12: along the displacement's axis, or across it."""
 
 NEAR_ZERO = 1e-4
 """Excesses are not computed if the optimum costs less than this share of ‖σ‖² + ‖w0‖² + ‖w1‖²."""
@@ -122,9 +122,9 @@ def _as_count(name: str, value: int) -> int:
 def starts() -> dict[str, Maker]:
     """Return initial guesses of Newton's method, to see how the result depends on the guess.
 
-    They are the exponential cubic the long way round, and all closed forms except two. From the
-    Cayley cubic, if it is far from the optimum, the method seldom converges. The corrected Bézier
-    curve leads to the same result as the Bézier curve.
+    They are the exponential cubic the long way round, and all closed forms except two. If the
+    Cayley cubic is far from the optimum, the method seldom converges from this guess. The corrected
+    Bézier curve leads to the same result as the Bézier curve.
     """
     return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
         "long way round": rb.exponential_cubic_long_so3
@@ -154,7 +154,7 @@ def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
 def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> NDArray[np.bool_]:
     """Tell which optima have a cost that is too small for ratios of costs.
 
-    The cost is compared with ‖σ‖² + ‖w0‖² + ‖w1‖², in which ‖x‖² stands for ½ xᵀ G x. For a ball,
+    The cost is compared with ‖σ‖² + ‖w0‖² + ‖w1‖², where ‖x‖² denotes ½ xᵀ G x. For a ball,
     G = 2 I.
     """
     half = np.eye(3) if inertia is None else np.asarray(inertia) / 2
@@ -195,7 +195,7 @@ def cell_table(
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
-    """Return the smallest number that is at least as large as `share` of those in the last axis.
+    """Return the least number that is at least as large as `share` of the entries of the last axis.
 
     NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 

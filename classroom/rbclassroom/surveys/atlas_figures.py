@@ -1,4 +1,4 @@
-"""Figures of the atlas: heat maps, quantiles over the excursion, and excess over the margin."""
+"""Figures of the atlas: heat maps, and excess against excursion and against margin."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -151,7 +151,7 @@ def _shares(excess: Array, levels: Sequence[float]) -> str:
 
 
 def draw_growth(ax: Axes, data: Table) -> None:
-    """Draw, on logarithmic axes, the excess of each closed form over the excursion.
+    """Draw, on logarithmic axes, the excess of each closed form against the excursion.
 
     The medians have marks; the 90 % quantiles are thin dashed lines (BK 1, BK 7).
     """
@@ -190,7 +190,7 @@ def _medians(data: Table) -> dict[str, Array]:
 
 
 def draw_margins(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the excess over the margin: projections on the left, quaternion cubics on the right.
+    """Draw the excess against the margin: projections on the left, quaternion cubics on the right.
 
     In both panels, problems of the first family in the column "family" are dots, and those of up to
     two others are large black marks. A line of slope −3 runs beside the projections.
@@ -234,7 +234,7 @@ def _margins(data: Table, way: str) -> tuple[Array, Array]:
 
 
 def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the deviations of closed forms from the optimum near a geodesic, in a panel for d and e.
+    """Draw the deviations of closed forms from the optimum near a geodesic, in panels for d and e.
 
     `data` has the time, and columns "NAME d [1]" and "NAME e [1]" for each form (beyond BK 10).
     """

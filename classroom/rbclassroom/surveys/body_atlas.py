@@ -40,7 +40,7 @@ CURVES = (*CLOSED_FORMS, "two Béziers", "three", "ball's optimum")
 long way round. "three" is the cheapest of these two and "normal". "ball's optimum" is the
 optimum for a ball, which is not a closed form."""
 DOMAINS = {"small": 2, "medium": 5, "all": CELLS}
-"""The number of steps, from 0, of displacement and end velocity that belong to each domain."""
+"""For each domain, the number of steps of displacement and end velocity, counted from 0."""
 SEEDS = 31, 32, 33
 DRAWS = 200
 """The seeds of the problems, and the number of problems in each of the 10 × 10 cells; the maps use
@@ -106,13 +106,13 @@ def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
     """Return quantiles and shares of the excess, with 95 % intervals, for each domain and curve.
 
     The columns are the median, the 90 % quantile, the share of the problems with an excess below a
-    tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. Among equals the
-    first is the cheapest, and for other curves this share is NaN. Each value has the ends of its
-    interval, "low" and "high". Intervals of quantiles end at numbers of the sample, from the
-    binomial distribution, or are NaN if the sample is too small. Intervals of shares are those of
-    Clopper and Pearson. Both hold for independent problems; for a sample with the same number of
-    problems in each cell they are too long rather than too short. All values are rounded to four
-    digits. Problems with a NaN do not count.
+    tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. If several are
+    equally cheap, the first counts as the cheapest. For curves that are not closed forms, this
+    share is NaN. Each value has the ends of its interval, "low" and "high". Intervals of quantiles
+    end at numbers of the sample, from the binomial distribution, or are NaN if the sample is too
+    small. Intervals of shares are those of Clopper and Pearson. Both kinds hold for independent
+    problems; for a sample with the same number of problems in each cell, the intervals are too long
+    rather than too short. All values are rounded to four digits. Problems with a NaN do not count.
     """
     cheapest = np.argmin([excess[curve] for curve in CLOSED_FORMS], axis=0)
     known = ~np.isnan([excess[curve] for curve in CURVES]).any(axis=0)

@@ -68,7 +68,7 @@ def survey(
         The costs ∫ τᵀ G⁻¹ τ dt, for a ball ∫ 2 ‖w'‖² dt, of the "optimum" and of each of the ways.
         The cost of an optimum that is not found is NaN. The relative error is at most 1e-5, mostly
         1e-8. The chunks do not depend on the number of workers, and each is computed with one BLAS
-        thread, so the number of workers does not change a single bit.
+        thread, so the number of workers does not change a single bit of the results.
 
     Raises
     ------
@@ -194,11 +194,11 @@ def _of_chunk(measures: Measures, first: int, chunk: Ends) -> Array:
 
 @contextmanager
 def processes(workers: int | None = None) -> Iterator[Executor]:
-    """Give an executor of `workers` processes on this machine, by default one per processor.
+    """Yield an executor of `workers` processes on this machine, by default one per processor.
 
-    The processes are new and share nothing with the threads of a notebook. They end with the block,
-    and if this process is killed. If an error or Ctrl-C ends the block, chunks that have not begun
-    are not computed.
+    The processes are new and share nothing with the threads of a notebook. They end when the
+    ``with`` block ends or this process is killed. If an error or Ctrl-C ends the block, chunks that
+    have not begun are not computed.
     """
     from concurrent.futures import ProcessPoolExecutor  # missing in the Python of web pages
 
@@ -210,7 +210,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _end_with_parent() -> None:
-    """Leave Ctrl-C to the parent, and end if it is killed, which the queue of work cannot show."""
+    """Leave Ctrl-C to the parent, and end when the parent is killed: the queue cannot show this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None

@@ -268,7 +268,7 @@ def test_profiles_agree_with_the_motion():
             assert d == pytest.approx(np.linalg.norm(after - 2 * now + before) / h**2, abs=1e-5)
             w_dot = (smooth(t + h, 1) - smooth(t - h, 1))[:3] / (2 * h)
             assert w == pytest.approx(np.linalg.norm(w_dot), abs=1e-6)
-    with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) wanted"):
+    with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) is wanted"):
         lesson14.profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)
 
 
