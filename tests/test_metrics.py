@@ -63,8 +63,8 @@ def test_the_trace_induces_metrics_of_so3_and_se3_that_are_twice_the_energy_of_a
 @pytest.mark.source("BK (1)", "BK (4)", "BK (5)", "BK (6)", "BK (7)", "BK 2.2", "BK 2.3")
 @pytest.mark.parametrize(("group", "left", "x", "y", "basis"), [ON_SO3, ON_SE3])
 def test_left_invariant_fields_and_metrics_agree_with_their_definitions(group, left, x, y, basis):
-    """A field is its components times the moved basis. A change of frame does not change a
-    metric."""
+    """A field is the sum of its components times the moved basis vectors. A change of frame does
+    not change a metric."""
     X, Y = metrics.tangent_from_components(group, x), metrics.tangent_from_components(group, y)
     assert_close(X, np.einsum("bi,bjk,ikl->bjl", x, group, basis))
     assert_close(metrics.components_from_tangent(group, X), x)

@@ -47,7 +47,8 @@ def test_exp_and_log_agree_with_mpmath_and_are_inverse():
 
 
 def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
-    """About the axis, (1 − cos a)/a and (sin a)/a vanish, and n̂² + I is n nᵀ."""
+    """For huge angles a, (1 − cos a)/a and (sin a)/a vanish in the Jacobian, and n̂² + I is n
+    nᵀ."""
     n = awkward.UNIT_AXES[3]
     for length in (1e16, 1e154, 1e160, 1.7e308):
         R, J = rb.exp_so3(length * n), rb.right_jacobian_so3(length * n)

@@ -21,7 +21,7 @@ def axes():
 
 
 def off(box, pose, in_body):
-    """Return the largest distance of the corners of a box from those of a box in this pose."""
+    """Return the largest distance of a corner of a drawn box from its place in this pose."""
     return np.abs(box.corners - (in_body @ pose[:3, :3].T + pose[:3, 3])).max()
 
 
@@ -104,8 +104,8 @@ def test_letters_of_a_frame_are_beyond_its_arrows(axes):
         assert beyond @ direction > 1.1
 
 
-def test_descriptions_state_numbers():
-    # the maximum is at 1/3; of the six times, the largest value is at 0.4
+def test_descriptions_state_the_drawn_numbers():
+    # the maximum is at 1/3, but at the six given times the largest value is at 0.4
     bump = 4 * TIMES * (1 - TIMES) ** 2
     turns = rb.exp_so3(np.radians(50) * np.outer(bump, [0, 0.6, 0.8]))
     tilted = rb.pose_from_components(turns, [0, 0, 0])
