@@ -53,7 +53,7 @@ def wrong(grade_id, source):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """Return a course in which two sets were graded, the first one also wrong and untouched.
+    """Return a course in which two sets were graded; the first also with wrong and no answers.
 
     A different student solves each set, so that all can be graded in one run.
     """

@@ -272,7 +272,7 @@ def plain(tex):
 
 
 def pieces(formula):
-    """Return the parts of a formula that is a chain or one of several; else, return the formula."""
+    """Return the parts of a formula between its signs "=", gaps and line breaks."""
     return [part for part in re.split(r"\\q?quad|=|\\\\", formula) if part.strip()]
 
 
