@@ -1,8 +1,9 @@
-"""Derive every number of near_optimal.md, exactly, and write the table of the package.
+"""Derive every number of near_optimal.md exactly, and write the table of the package.
 
-A problem is three vectors: sigma, the turn from R0 to R1; and of the parallel end velocities u0 and
-u1 the mean less sigma, e, and the difference, d = u1 - u0. What is of third order in them is a sum
-of sigma, e and d with polynomials in t and in their inner products: a list of three.
+A problem is given by three vectors. sigma is the rotation vector of the turn from R0 to R1. With
+the parallel end velocities u0 and u1, e is (u0 + u1)/2 - sigma, and d is u1 - u0. A vector of third
+order in them is a combination of sigma, e and d, and is stored as the list of its three
+coefficients, which are polynomials in t and in the inner products.
 """
 
 import csv
@@ -20,7 +21,7 @@ TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
 u0, u1 = [one, one, -one / 2], [one, one, one / 2]
-# Hermite's cubics: their values and rates at 0 and 1 are 0, but for one that is 1
+# Hermite's cubics: one value or rate at 0 or 1 is 1, and the others are 0
 TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
 
 
@@ -45,14 +46,14 @@ def triple(a, b, c):
 
 
 def rate(x, order=1):
-    """Return a derivative by t."""
+    """Return a derivative with respect to t."""
     for _ in range(order):
         x = [part.diff(t) for part in x]
     return x
 
 
 def integral(p):
-    """Return the polynomial with this derivative, 0 at t = 0."""
+    """Return the polynomial that has this derivative and is 0 at t = 0."""
     return RING.from_dict({(k[0] + 1, *k[1:]): c / (k[0] + 1) for k, c in p.terms()})
 
 
@@ -84,7 +85,7 @@ END_RATE = times(QQ(-1, 24), triple(sigma, sigma, u1))
 
 
 def optimum():
-    """Return the best curve, third order: w''' + w x w'' = 0 for R = R0 exp(y)."""
+    """Return the third order of the optimum: w''' + w x w'' = 0 for R = R0 exp(y)."""
     x, v, a, j = (rate(CUBIC, k) for k in range(4))
     load = add(
         times(QQ(-1, 2), triple(a, x, a)),
@@ -95,12 +96,12 @@ def optimum():
 
 
 def exponential():
-    """Return the cubic with the same end rate."""
+    """Return the third order of the cubic in y with the wanted end rates."""
     return times(LAST_RATE, END_RATE)
 
 
 def geodesic(a, b, share):
-    """From exp(a) to exp(b): first and third order. Each point is a pair of these."""
+    """Return a point between exp(a) and exp(b); points are pairs of a first and a third order."""
     (a1, a3), (b1, b3) = a, b
     way = add(b1, times(-1, a1))
     bend = triple(way, a1, b1)
@@ -110,7 +111,7 @@ def geodesic(a, b, share):
 
 
 def bezier():
-    """Return the construction of de Casteljau, by geodesics."""
+    """Return the third order of de Casteljau's construction by geodesics."""
     last = times(QQ(-1, 3), u1)  # from R1 back to the third point
     back = add(
         times(QQ(-1, 24), triple(sigma, sigma, last)), times(QQ(-1, 12), triple(last, sigma, last))
@@ -123,7 +124,7 @@ def bezier():
 
 
 def quaternion():
-    """Return the direction of a cubic from (1, 0) to (cos, sin), rates half the velocities."""
+    """Return the third order for the cubic of quaternions, whose rates are half the velocities."""
     real = -TO_GOAL * ss / 8 - LAST_RATE * dot(sigma, u1) / 4
     imaginary = add(
         times(-TO_GOAL * ss / 48, sigma), times(-LAST_RATE * dot(sigma, u1) / 16, sigma)
@@ -134,7 +135,7 @@ def quaternion():
 
 
 def cayley():
-    """Return the curve of a cubic in g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...)."""
+    """Return the third order for a cubic in g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...)."""
     goal = times(ss / 24, sigma)
     end = add(END_RATE, times(ss / 12, u1), times(dot(sigma, u1) / 6, sigma))
     g = times(QQ(1, 2), CUBIC)
@@ -143,7 +144,7 @@ def cayley():
 
 
 def projection():
-    """Return the nearest rotation to I + skew + symmetric + skew, first to third order."""
+    """Return the third order of the projection of I + skew + symmetric + skew, in rising order."""
     skew = add(
         times(-TO_GOAL * ss / 6, sigma),
         times(-LAST_RATE * ss / 8, u1),
@@ -151,7 +152,7 @@ def projection():
     )
 
     def stretched(a, b, v):
-        """(tr S - S) v for S = (a b + b a)/2, a and b with hats."""
+        """Return (tr S - S) v for S = (a b + b a)/2, where a and b are hat matrices."""
         return add(times(-dot(a, b), v), times(-dot(b, v) / 2, a), times(-dot(a, v) / 2, b))
 
     turned = add(
@@ -162,8 +163,8 @@ def projection():
 
 
 def cumulative_energy():
-    """Return the same of second order, for the cumulative curve."""
-    # what differs from the optimum, in the basis sigma x e, sigma x d, e x d
+    """Return the energy of the deviation of the cumulative curve, which is of second order."""
+    # the deviation from the optimum is written in the basis sigma x e, sigma x d, e x d
     first, last = times(QQ(1, 3), u0), times(QQ(1, 3), u1)
     middle = add(sigma, times(-1, first), times(-1, last))
     shares = 1 - (1 - t) ** 3, TO_GOAL, t**3
@@ -172,8 +173,8 @@ def cumulative_energy():
         pairs = (0, 1), (0, 2), (1, 2)
         return [a[i] * b[j] - a[j] * b[i] for i, j in pairs]
 
-    # body velocities: w1 = u1 - sigma x u1/2, so the last turn has a part of second order, and
-    # the middle one that of exp(-first) exp(sigma) exp(-last)
+    # In the body frame w1 = u1 - sigma x u1/2, so the last turn has a part of second order. The
+    # part of the middle turn is the second order of log(exp(-first) exp(sigma) exp(-last)).
     of_last = times(QQ(-1, 2), cross(sigma, last))
     of_middle = add(
         times(QQ(-1, 2), cross(first, sigma)),
@@ -198,7 +199,7 @@ def cumulative_energy():
 
 
 def deviations():
-    """Return what each closed form is away from the optimum, of third order."""
+    """Return the deviation of each closed form from the optimum, to third order."""
     best = times(-1, optimum())
     curves = {
         "projected_cubic_so3": projection(),
@@ -217,11 +218,13 @@ def forms():
 
 
 def of_splines():
-    """Return the excess over θ⁴ of three splines: (0, θ, 0) about an axis, natural, even times.
+    """Return excess / θ⁴ for three natural splines through angles 0, θ, 0 at equally spaced times.
 
-    Of the projected matrix spline, the projected spline and the quaternion spline, all to leading
-    order. With σ = θ p + θ³ r on a leg, p the cubic spline, it is the integral of r''² over that of
-    p''². The tangent of σ is y/x: cosine and sine are splines of their own, or cubics of each leg.
+    The splines turn about one axis: the projected matrix spline, the projected spline and the
+    quaternion spline, all to leading order. On a leg σ = θ p + θ³ r, where p is the cubic spline,
+    and the ratio is ∫ r''² / ∫ p''². The tangent of σ is y/x, where x and y replace cosine and
+    sine. For the matrix spline, x and y are splines themselves; otherwise, they are a cubic on each
+    leg.
     """
     p = (3 * t - t**3) / 2
     matrix = -p / 6 + p * p / 2 - p**3 / 3
@@ -232,7 +235,7 @@ def of_splines():
 
 
 def write(table=TABLE):
-    """Write the table: powers of the inner products, and whole numbers over a denominator."""
+    """Write the table: powers of the inner products, and integers over a common denominator."""
     found = forms()
     over = {way: lcm(*(int(c.denominator) for c in form.coeffs())) for way, form in found.items()}
     powers = sorted({term for form in found.values() for term in form.monoms()}, reverse=True)

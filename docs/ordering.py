@@ -1,14 +1,14 @@
-"""Prove the Proposition of near_optimal.md in rational arithmetic: one closed form costs more.
+"""Prove the Proposition of near_optimal.md, which orders closed forms by cost, in rationals.
 
-Its leading excess E is a polynomial in the inner products of sigma, e and d, see near_optimal.py.
-For each pair of closed forms, with the c of ordering.csv,
+The leading excess E of a closed form is a polynomial in the inner products of sigma, e and d, see
+near_optimal.py. For each pair of closed forms and its c in ordering.csv,
 
     E_worse - c E_better = sum_kl M_kl V_k . V_l + share volume^2,
 
-where volume is sigma . (e x d), share >= 0 and M is positive definite. The V are the products of
-an inner product and one of sigma, e and d, except ss sigma. So the difference is positive unless e
-and d are 0. Products V_k . V_l are monomials, and several pairs have the same one: all but one of
-their entries of M are free. ordering.csv has the free ones.
+where volume is sigma . (e x d), share >= 0 and M is positive definite. Each V is the product of an
+inner product and one of the vectors sigma, e and d; ss sigma is left out. So the difference is
+positive unless e and d are 0. The products V_k . V_l are monomials. If several pairs have the same
+monomial, all but one of their entries of M are free. ordering.csv has the free entries.
 """
 
 import csv
@@ -33,7 +33,7 @@ near = _load()
 VOLUME = ss * ee * dd + 2 * se * sd * ed - ss * ed**2 - ee * sd**2 - dd * se**2
 
 
-# the V by name: "se d" is se times d; those with an even number of d first
+# the names of the V: "se d" is se times d; names with an even number of d come first
 VECTORS = [f"{inner} {vector}" for inner in near.NAMES for vector in "sed"]
 VECTORS = sorted((name for name in VECTORS if name != "ss s"), key=lambda x: x.count("d") % 2)
 
@@ -46,7 +46,7 @@ def product(a, b):
 
 
 def entries():
-    """Return the pairs of V, the upper triangle of M, by their product."""
+    """Return the pairs of V, for the upper triangle of M, grouped by their product."""
     found = {}
     for i, a in enumerate(VECTORS):
         for b in VECTORS[i:]:
@@ -55,7 +55,7 @@ def entries():
 
 
 def matrix(form, free):
-    """Return the M of a form: free entries, and for each monomial a first one that follows."""
+    """Return the M of a form: the first entry of each monomial follows from the free ones."""
     upper = {}
     for monomial, pairs in entries().items():
         rest = form.coeff(monomial)
@@ -83,7 +83,7 @@ def is_positive(upper):
 
 
 def read(table=TABLE):
-    """Return c, the share and the free entries of M, by worse and better form."""
+    """Return c, the share and the free entries of M for each pair (worse, better) of forms."""
     with open(table, newline="", encoding="utf-8") as file:
         (_, *worse), (_, *better), (_, *ratio), (_, *share), *rows = csv.reader(file)
     free = [{} for _ in worse]
@@ -95,7 +95,7 @@ def read(table=TABLE):
 
 
 def verify(table=TABLE):
-    """Return for each pair a c such that E_worse >= c E_better, or raise a ValueError."""
+    """Return, for each pair, a number c with E_worse >= c E_better, or raise a ValueError."""
     form, proven = near.forms(), {}
     for (worse, better), (ratio, share, free) in read(table).items():
         left = form[worse] - near.QQ(ratio) * form[better]
