@@ -293,7 +293,8 @@ def stationary(functional, ends, curve, tol=1e-9):
     def in_body(q, c):
         w, v = q[0], q[1:]
         c = c[:, None] + 0 * v
-        turned = c + 2 * cross(v, cross(v, c) - w * c)  # turned by the conjugate of q / ‖q‖
+        # the vector c, turned by the conjugate of q / ‖q‖
+        turned = c + 2 * cross(v, cross(v, c) - w * c)
         return turned + (1 / np.sum(q * q, axis=0) - 1) * (turned - c)
 
     def spin(q, w):

@@ -135,7 +135,7 @@ def test_the_motion_of_a_free_body_satisfies_eulers_solution(a, c):
 
 
 @pytest.mark.source("BK (8)", "errata 13")
-def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
+def test_the_printed_geodesic_equation_is_not_the_equation_of_the_free_body():
     """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the symbols Γ of the frame with
     ä of coordinates instead of ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
@@ -180,7 +180,7 @@ def test_bi_invariant_geodesics_are_one_parameter_subgroups_and_metric_14_gives_
     assert np.abs(A - exp(TIMES[:, None, None] * v0)).max() < tolerance
 
 
-def test_geodesics_are_followed_at_times_in_any_order_and_in_large_batches():
+def test_geodesics_are_integrated_to_times_in_any_order_and_in_large_batches():
     start, spin = rb.exp_so3([1, 2, 3]), [0.3, 2, -1]
     t = np.array([[2.0, -1, 0], [2, 0.5, -3]])
     R, w = rb.geodesic_flow(INERTIA, start, spin, t)
@@ -227,7 +227,7 @@ def test_velocities_may_grow_in_an_indefinite_metric_but_the_momentum_is_conserv
     assert np.all(off < 1e-10 * speeds * np.linalg.norm(rb.adjoint_se3(A), axis=(-2, -1)))
 
 
-def test_a_start_near_the_group_is_projected_on_it():
+def test_a_start_near_the_group_is_projected_onto_the_group():
     start = rb.exp_so3([1, 2, 3]) + 1e-3
     R, _ = rb.geodesic_flow(INERTIA, start, [0.3, 2, -1], TIMES)
     assert np.abs(R[0] - rb.project_so(start)).max() < 4 * EPS

@@ -79,7 +79,7 @@ def test_geodesics_cost_nothing_and_screw_motions_have_a_cost():
 
 @pytest.mark.parametrize("margin", [2e-3, 1e-3, 1e-4, 1e-5, 3e-6])
 def test_the_cost_of_sharp_turns_is_integrated(margin):
-    """Nearly all of the cost arises within a fraction of the time that is half the margin.
+    """Nearly all of the cost arises within a share of the time that is half the margin.
 
     The line is tested alone and as a leg of a chain. The breakpoints are close together where the
     cost arises.

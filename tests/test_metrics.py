@@ -20,7 +20,7 @@ def assert_close(value, wanted, units=400):
 
 
 @pytest.mark.source("BK (11)", "BK (13)", "BK Prop. 1", "BK 3.1", "BK 3.2")
-def test_the_trace_metric_is_a_sum_of_products_and_invariant_under_rotations_but_not_a_shear():
+def test_the_trace_metric_is_a_sum_of_products_invariant_under_rotations_but_not_under_a_shear():
     for inner, n in ((metrics.inner_gl, 4), (metrics.inner_ga, 4), (metrics.inner_gl, 1)):
         X, Y = RNG.normal(size=(2, 5, n, n))
         by_definition = [np.trace(x.T @ y) for x, y in zip(X, Y, strict=True)]

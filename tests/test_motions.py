@@ -80,7 +80,7 @@ def test_the_centre_of_mass_of_a_body_follows_a_cubic():
 
 
 @pytest.mark.source("BK 2.6", "errata 15")
-def test_each_definition_holds_for_screws_and_not_for_geodesics():
+def test_each_definition_of_a_screw_motion_holds_for_screws_and_not_for_geodesics():
     """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, and A' is a left-invariant field.
     The printed definitions lack the dot, and hold for every curve."""
     found, inside = [], TIMES[1:-1]

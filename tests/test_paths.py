@@ -96,7 +96,7 @@ def test_a_chain_rests_between_equal_neighbouring_poses(leg):
 
 
 @pytest.mark.parametrize("ratio", [1, 100, 1e4])
-def test_uneven_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(ratio):
+def test_uneven_time_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(ratio):
     """Check rates to eps of ‖w‖ and ‖w‖² + ‖w'‖ at the poses, just before them, and in the joints.
 
     The reference has 60 digits. The bound is the rounding error of M, even if M is large, over the

@@ -109,7 +109,7 @@ def test_the_margin_is_the_least_gap():
 @pytest.mark.parametrize("k", [40, 45, 50, 50.05, 55])
 @pytest.mark.parametrize("k1", [5, 40])
 def test_a_jump_between_the_sampled_times_is_found(k, k1):
-    """Jumps about one axis are at and off the midpoints between 65 sampled times, and between 129.
+    """The curves jump at and off the midpoints between 65 sampled times, and between 129 of them.
 
     The cubic is then a complex number z with z(0) = 1, z'(0) = i k0, z(1) = exp(ia) and z'(1) = i
     k1 exp(ia). With Hermite's basis, z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0

@@ -166,7 +166,7 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
 
 @pytest.mark.source("BK 5", "BK Prop. 4", "BK Prop. 5", "RR 1.6", "errata 16")
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_the_nearest_pose_is_the_nearest_and_keeps_the_translation(n):
+def test_the_projected_pose_is_the_nearest_one_and_keeps_the_translation(n):
     """The projection is invariant under poses on the left, but only under rotations on the right.
 
     tr(AᵀA) is n + 1 + dᵀd. The paper prints 4 + dᵀd.

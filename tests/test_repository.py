@@ -383,7 +383,7 @@ def test_every_task_is_listed_in_the_readme_or_in_contributing():
 
 
 def test_the_tests_that_contributing_names_exist():
-    """A row of the table of promises has a test, or says how to look."""
+    """Each row of the table of promises names a test, or a check by hand."""
     named = re.findall(r"`([\w/]+\.py)::(\w+)`", read("CONTRIBUTING.md"))
     assert len(named) > 25
     for file, test in named:

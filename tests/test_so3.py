@@ -76,7 +76,7 @@ def test_the_printed_exponential_at_R_has_its_vector_outside_the_exponent():
 
 
 @pytest.mark.source("BK 2.5", "BK (1)")
-def test_the_jacobian_is_its_integral_maps_rates_to_velocities_and_has_an_inverse():
+def test_the_jacobian_equals_its_integral_maps_rates_to_velocities_and_has_an_inverse():
     """The inverse is huge near a full turn."""
     vectors = VECTORS[np.linalg.norm(VECTORS, axis=1) > 1e-13][::23]
     for w in [*vectors, [4, -3, 2]]:

@@ -331,7 +331,7 @@ def test_the_certificate_needs_a_definite_system_and_legs_that_are_minima():
 
 @pytest.mark.parametrize("degrees", [120, 150])
 @pytest.mark.parametrize(("name", "power"), [("of a body", 1), ("torque", 2)])
-def test_a_body_leaves_the_axis_of_its_poses_where_that_costs_less(name, power, degrees):
+def test_a_body_leaves_the_axis_of_its_poses_if_this_costs_less(name, power, degrees):
     """The poses turn there and back about axis 3, from rest to rest. The cubics about this axis are
     stationary."""
     rest, angle = np.zeros(3), np.radians(degrees)
@@ -342,7 +342,7 @@ def test_a_body_leaves_the_axis_of_its_poses_where_that_costs_less(name, power, 
     assert c.cost < 0.9999 * 2 * 12 * angle**2 * BOOK[2, 2] ** power
 
 
-def test_a_family_of_curves_of_one_cost_is_not_called_definite():
+def test_a_family_of_curves_of_equal_cost_is_not_reported_as_definite():
     """For a plate, each curve that leaves its axis can be turned about this axis at the same
     cost."""
     rest, plate = np.zeros(3), np.diag([1, 1, 1.9])

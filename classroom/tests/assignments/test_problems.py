@@ -72,7 +72,7 @@ def no_figure_stays():
 
 
 @problems
-def test_the_reference_passes_even_if_it_returns_lists_and_the_stub_fails(name, slug):
+def test_the_reference_answer_passes_even_as_lists_and_the_empty_answer_fails(name, slug):
     """The type of an answer that passes the visible tests must not make the hidden ones fail."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
@@ -150,7 +150,7 @@ def test_the_examples_in_the_questions_are_right():
 
 
 @sets
-def test_a_set_has_its_parts(name):
+def test_a_set_has_all_its_parts(name):
     notebook = SETS[name]
     texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
     numbers = re.findall(r"^## Problem (\d) · .* \(\d+ points\)$", "\n".join(texts), re.MULTILINE)

@@ -85,8 +85,7 @@ def test_intervals_are_binomial_for_quantiles_and_clopper_pearson_for_shares(exc
         x, n = np.sort(excess[curve][inside]), inside.sum()
         assert table["problems [1]"][k] == n
         for name, share in (("median", 0.5), ("90 %", 0.9)):
-            # for each number, the probability that at most so many of n values are below the
-            # quantile
+            # entry k is the probability that at most k of the n values are below the quantile
             fewer = binom.cdf(np.arange(n), n, share)
             ends = x[np.sum(fewer <= 0.025) - 1], np.quantile(x, share), x[np.sum(fewer < 0.975)]
             found = [table[f"{name}{end} [1]"][k] for end in (" low", "", " high")]
