@@ -27,7 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 UV = os.environ.get("UV") or shutil.which("uv")
-LISTS = {  # lists of exact versions; an environment needs its list and all lists before it
+LISTS = {  # lists of exact versions; an environment needs its own list and all lists before it
     "lessons": "environment.txt",
     "teach": "classroom/environment-teach.txt",
     "book": "classroom/environment-book.txt",
@@ -54,7 +54,7 @@ TASKS = {  # environment, commands (the last one takes the further arguments), a
     "lint": ("test", ["ruff check", "ruff format --check", "mypy"], "check style and types"),
     "lock": ("test", ["rbclassroom.course.lock"], "write the lists of exact versions"),
 }
-PATHS = "check", "collect"  # tasks with a path, relative to the folder of the terminal
+PATHS = "check", "collect"  # tasks with a path, which is relative to the folder of the terminal
 PLAIN = "ledger", "atlas", "bench"  # tasks without further arguments
 
 
@@ -81,7 +81,8 @@ def main():
     set_up(environment)
     if "pytest" in commands[-1]:  # each worker uses one processor, so it has one thread
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process compiles
+        # otherwise each process compiles all modules again
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for command in commands:
         run(*command.split(), *(words if command is commands[-1] else []))
 
@@ -115,7 +116,8 @@ def set_up(environment):
         print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
         install(*[word for name in missing for word in ("-r", LISTS[name])])
         if "lessons" in missing:
-            patiently(python(), "-c", "import matplotlib.pyplot")  # this looks for fonts once
+            # the first import searches for fonts
+            patiently(python(), "-c", "import matplotlib.pyplot")
         write_stamp(dict(found, **{name: wanted[name] for name in missing}))
         print(" done.", flush=True)
 
@@ -139,7 +141,8 @@ def create(found):
     except OSError as error:
         sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
-    write_stamp({"unfinished": True})  # written first, so that the next call sees an interruption
+    # this is written first, so that the next call notices an interruption
+    write_stamp({"unfinished": True})
     print("Making .venv", end=" ", flush=True)
     if UV:
         how = "--seed", "--allow-existing", "--python", sys.executable
@@ -174,7 +177,8 @@ def settings_of_pip(*pip):
         "cert": "SSL_CERT_FILE",
     }
     listed = subprocess.run(pip + ("config", "list"), stdout=subprocess.PIPE, text=True).stdout
-    settings = {"UV_INDEX_STRATEGY": "unsafe-best-match"}  # all indexes are equal, as for pip
+    # all indexes have the same rank, as for pip
+    settings = {"UV_INDEX_STRATEGY": "unsafe-best-match"}
     for key, _, value in (line.partition("=") for line in listed.splitlines()):
         name = names.get(key.rpartition(".")[2])
         if name:
@@ -190,7 +194,7 @@ def python():
 def patiently(*command, **settings):
     """Run a command and print a dot every two seconds; if it fails, raise the end of its output.
 
-    uv uses the certificates of the system, as pip does, because networks of schools have their own.
+    Like pip, uv uses the certificates of the system, because networks of schools have their own.
     """
     uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
     environment = dict(dict(uv, **settings), **dict(os.environ, PIP_USER="0"))

@@ -1,1 +1,1 @@
-"""Compare times of the package with those of others on the same tasks: `course.py bench`."""
+"""Compare the times of this and other packages on the same tasks, for `course.py bench`."""

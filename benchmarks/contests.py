@@ -47,7 +47,7 @@ CASES = {x: (ALONG, ALONG, ALONG + k * E1) for x, k in (("4a", 0), ("4b", 1), ("
 CASES["5"] = np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])
 """The rotation vectors and the end velocities of the figures of BK."""
 ENDS = {name: (np.eye(3), rb.exp_so3(turn), w0, w1) for name, (turn, w0, w1) in CASES.items()}
-BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])  # inertia of a book of 1 kg, in kg m²
+BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])  # the inertia of a book of 1 kg, in kg m²
 
 
 class Method(NamedTuple):
@@ -64,7 +64,7 @@ class Method(NamedTuple):
 
 
 def nearest_rotation(n, rng):
-    """Compare the rotations nearest to n noisy ones with det > 0."""
+    """Compare methods that find the rotations nearest to n noisy matrices with det > 0."""
     M = rb.sample_rotation(n, rng=rng) + 0.1 * rng.standard_normal((n, 3, 3))
     M[np.linalg.det(M) <= 0] *= -1
     methods = {
@@ -75,14 +75,14 @@ def nearest_rotation(n, rng):
     if roma:
         tensor = torch.from_numpy(M)
         methods["RoMa"] = Method("special_procrustes", lambda: roma.special_procrustes(tensor))
-    if n <= 1000:  # it takes a millisecond for each
+    if n <= 1000:  # this method takes a millisecond per matrix
         methods["pytransform3d"] = Method(polar.__name__, lambda: [polar(A) for A in M])
     methods["NumPy, SVD alone"] = Method("svd", lambda: np.linalg.svd(M), None)
     return methods, _distance([oracles.nearest_rotation(A) for A in M[:SAMPLE]])
 
 
 def geodesic(n, rng):
-    """Compare a geodesic at n times; only the evaluation is timed."""
+    """Compare evaluations of a geodesic at n times; making the curve is not timed."""
     R0, t = rb.sample_rotation(rng=rng), rng.random(n)
     R1 = R0 @ rb.exp_so3([1, -1, 1.5])
     ours, ends = rb.geodesic_so3(R0, R1), Rotation.from_matrix([R0, R1])
@@ -107,7 +107,7 @@ def geodesic(n, rng):
 
 
 def projected_cubic(n, rng, orders):
-    """Compare a projected cubic at n times; the textbook's derivatives are the reference."""
+    """Compare evaluations of a projected cubic at n times; the textbook is the reference."""
     t, ends, knots = rng.random(n), ENDS["5"], np.linspace(0, 1, 5)
     few, (R0, R1, w0, w1) = t[:SAMPLE], ends
     ours, theirs = rb.projected_cubic_so3(*ends), textbook.projected_cubic_so3
@@ -136,7 +136,7 @@ def projected_cubic(n, rng, orders):
 
 
 def closed_forms(n, rng, orders):
-    """Compare curves with the same ends at n times, as in lesson 12, and their derivatives."""
+    """Compare curves with the same ends, as in lesson 12, and their derivatives at n times."""
     t, methods = rng.random(n), {}
     for form, make in FORMS.items():
         curve, name = make(*ENDS["5"]), OURS if form == "projection" else f"rbcourse, {form}"
@@ -146,7 +146,7 @@ def closed_forms(n, rng, orders):
 
 
 def random_samples(n, rng, kind, author, form, name):
-    """Compare n random rotation matrices or unit quaternions; the error is that of xᵀx = I."""
+    """Compare samplers of n matrices or unit quaternions; the error is the defect of xᵀx = I."""
     ours, theirs = getattr(rb, f"sample_{kind}"), getattr(textbook, f"sample_{kind}")
     convert = getattr(Rotation, f"as_{form}")
     methods = {
@@ -165,7 +165,7 @@ def random_samples(n, rng, kind, author, form, name):
 
 
 def chain_of_poses(n, rng, legs, poses=1000):
-    """Compare a chain of poses at n increasing times; only the evaluation is timed."""
+    """Compare evaluations of a chain of poses at n increasing times; making it is not timed."""
     when, places = np.cumsum(rng.uniform(0.5, 1.5, poses)), rng.normal(size=(poses, 3)).cumsum(0)
     R, t = rb.exp_so3(rng.normal(0, 0.5, (poses, 3)).cumsum(0)), np.linspace(when[0], when[-1], n)
     motion = rb.chain(when, rb.pose_from_components(R, places), leg=LEGS[legs])
@@ -210,7 +210,7 @@ def splines(n, rng):
 
 
 def one_optimum(n, rng, case):
-    """Compare one problem of BK, from its ends to 101 rotations on the optimum."""
+    """Compare solvers on one problem of BK, from its ends to 101 rotations on the optimum."""
     matrices, vectors = oracles.rotation_of_quaternions, textbook.minimum_acceleration_so3
 
     def bvp(**options):
@@ -229,7 +229,7 @@ def one_optimum(n, rng, case):
 
 
 def one_body(n, rng, case):
-    """Compare a book's least torque, and similar optima, from the ends to 101 rotations."""
+    """Compare the least torque of a book with similar optima, from the ends to 101 rotations."""
     bvp, does = textbook.minimum_torque_so3, "minimum_acceleration_so3, of the book"
     rest = np.zeros(3)
     least = _ours(case, rb.minimum_acceleration_so3, BOOK)
@@ -243,9 +243,10 @@ def one_body(n, rng, case):
 
 
 def stacked_optima(n, rng, least, bvps=20):
-    """Compare n random optima at once with the first `bvps` of them by `solve_bvp`, one by one.
+    """Compare n random optima, solved together, with `bvps` of them, solved by `solve_bvp`.
 
-    The times are for one problem with a solution. `solve_bvp` may find another optimum.
+    `solve_bvp` solves the first `bvps` problems one by one. The times are per solved problem.
+    `solve_bvp` may find another optimum.
     """
     name, bodily = f"minimum_{least}_so3", least == "torque"
     ours, theirs = getattr(rb, name), getattr(textbook, name)
@@ -274,7 +275,7 @@ def stacked_optima(n, rng, least, bvps=20):
 
 
 def cubes(n, rng):
-    """Compare a GIF of two cubes with n frames."""
+    """Compare methods that write a GIF of two cubes with n frames."""
     t, A0 = np.linspace(0, 1, n), np.eye(4)
     A1 = rb.pose_from_coordinates([np.pi / 6, 2 * np.pi / 3, np.pi / 2, 8, 10, 12])
     motions = {"screw": rb.screw_se3(A0, A1)(t), "geodesic": rb.geodesic_se3(A0, A1)(t)}
@@ -301,13 +302,13 @@ def _ours(case, make, *further):
 
 
 def _distance(truth):
-    """Return a function that computes the largest distance of the first values from the truth."""
+    """Return a function that computes the largest distance of the first values from `truth`."""
     n, truth = len(truth), np.asarray(truth)
     return lambda value: np.linalg.norm((value[:n] - truth).reshape(n, -1), axis=1).max()
 
 
 def _true_optimum(ends, G, near=None):
-    """Return 101 rotations of a body's least torque by `solve_bvp`, with the guess `near`."""
+    """Return 101 rotations on the motion of least torque, by `solve_bvp` from the guess `near`."""
     near = near or rb.minimum_torque_so3(*ends, G)
     found, _ = oracles.stationary(("effort", G, np.eye(3)), tuple(ends), near)
     return oracles.rotation_of_quaternions(found.sol(MOMENTS)[:4])
@@ -331,7 +332,7 @@ def timing_of_poses(n, rng):
 
 
 def _by_toppra(curve, cells):
-    """Return the least time for a curve on [0, 1] by toppra, with the same limits and cells."""
+    """Return the least time of a curve on [0, 1], by toppra with the same limits and cells."""
     linear, s = toppra.constraint.linear_constraint, np.linspace(0, 1, cells + 1)
     V, A = curve(s, 1), curve(s, 2)
 

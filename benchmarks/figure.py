@@ -1,4 +1,4 @@
-"""Draw the figure of a run: the time for each item over N, and the times of the optimum."""
+"""Draw the figure of a run: the time per item against N, and the times of the optimum."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -49,7 +49,7 @@ def draw(rows):
 
 
 def draw_over_size(ax, rows):
-    """Draw the time for each item over N, with the quartiles as a band."""
+    """Draw the time per item against N, with the quartiles as a band."""
     for method in dict.fromkeys(row["method"] for row in rows):
         here = [row for row in rows if row["method"] == method]
         n = np.array([row["N [1]"] for row in here])

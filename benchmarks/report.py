@@ -58,7 +58,7 @@ def read_csv(path):
 
 
 def readme_table(rows):
-    """Return the README's table of times divided by ours, rounded down, at the largest N."""
+    """Return the README's table: the ratios of times to ours at the largest N, rounded down."""
     text = "\n| task | time over ours |\n|---|---|\n"
     for words, task, case in TABLE:
         here = [row for row in rows if (row["task"], row["case"]) == (task, case)]
@@ -77,7 +77,7 @@ def rounded_down(ratio):
 
 
 def update_readme(rows, path):
-    """Write the table between the marks of the README."""
+    """Write the table into the README, between its two marks."""
     before, rest = path.read_text("utf-8").split(START)
     text = before + START + readme_table(rows) + END + rest.split(END)[1]
     path.write_text(text, encoding="utf-8", newline="\n")

@@ -25,7 +25,8 @@ def compete(contest, n, rng, machine, **timing):
     rows = []
     for (name, method), column in zip(methods.items(), times.T, strict=True):
         off = error and method.value and float(error(np.asarray(method.value(method.call()))))
-        most, hidden = None, name.startswith(("RoMa", "SciPy"))  # hidden from Python
+        # Python cannot measure their memory
+        most, hidden = None, name.startswith(("RoMa", "SciPy"))
         if min(contest.sizes) < n == max(contest.sizes) and not hidden:
             tracemalloc.start()
             method.call()

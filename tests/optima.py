@@ -65,7 +65,7 @@ def times(A, x):
 
 
 def deviation(what, G, w, a, b=0):
-    """Return u, written independently: the cost is the integral of its square."""
+    """Return u by an independent formula; the cost is the integral of ‖u‖²."""
     if what in ("ball", "shooting", "jerk"):
         return np.sqrt(2) * (b + np.cross(w, a) / 2 if what == "jerk" else a)
     torque = times(G, a) + np.cross(w, times(G, w))

@@ -25,7 +25,7 @@ def exact_polynomial(coefficients, t):
 
 
 def polynomial_through(ends, t):
-    """Return at t the polynomial whose values, then derivatives and so on, at 0 and 1 are given."""
+    """Return p(t) for the polynomial p with the given values, derivatives and so on at 0 and 1."""
     count, ends = len(ends), np.asarray(ends, float)
     with mp.workdps(DIGITS):
         rows = [
@@ -40,7 +40,7 @@ def polynomial_through(ends, t):
 
 
 def exact_exp(w):
-    """Return Rodrigues' formula as an mpmath matrix; the caller sets the precision."""
+    """Return exp(ŵ) by Rodrigues' formula, as an mpmath matrix; the caller sets the precision."""
     angle, W = exact_norm(w), exact_hat([mp.mpf(x) for x in w])
     if angle == 0:
         return mp.eye(3)
@@ -90,7 +90,7 @@ def nearest_rotation(M):
 
 
 def right_jacobian_so3(w):
-    """Return ∫₀¹ exp(−s ŵ) ds, which defines the closed form, by Gauss's rule with 24 nodes."""
+    """Return the right Jacobian by its definition, ∫₀¹ exp(−s ŵ) ds, with 24 Gauss nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(24)
     turns = [exp_so3(-(1 + node) / 2 * np.asarray(w)) for node in nodes]
     return np.einsum("n,nij->ij", weights / 2, turns)
@@ -135,7 +135,7 @@ def two_smallest_eigenvalues(S):
 
 
 def derivative_by_differences(curve, t, size=2.0**-10):
-    """Return R'(t) of a matrix curve by a central difference of order 8, to about 1e-13."""
+    """Return R'(t) of a matrix curve by central differences of order 8, accurate to about 1e-13."""
     steps = np.array([1, 2, 3, 4])
     weights = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])
     return sum(
@@ -159,7 +159,7 @@ def quaternion_product(p, q):
 
 
 def between_rotations(p, q):
-    """Return the distance of unit quaternions p to the nearer of q and −q."""
+    """Return the distance from unit quaternions p to the nearer of q and −q."""
     return np.minimum(np.linalg.norm(p - q, axis=-1), np.linalg.norm(p + q, axis=-1))
 
 
@@ -214,7 +214,7 @@ def _crosses(v):
 def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
     """Solve BK (19) from I to exp(turn) by SciPy's `solve_bvp`: 13 equations for q, w, w', w''.
 
-    Returns its solution; `sol(t)` has the quaternion in rows 0 – 3, and w in rows 4 – 6.
+    Returns the solution; `sol(t)` has the quaternion in rows 0 – 3, and w in rows 4 – 6.
     """
     from scipy.integrate import solve_bvp
 
@@ -279,7 +279,7 @@ def free_body(moments, a, c, t):
 
 
 def stationary(functional, ends, curve, tol=1e-9):
-    """Solve R p = c by SciPy's `solve_bvp` with quaternions, from a curve nearby.
+    """Solve R p = c in quaternions by SciPy's `solve_bvp`, starting from a nearby curve.
 
     `functional` is ("effort", G, M), for ∫ τᵀ M τ dt, or ("jerk",). `ends` are R0, R1, w0, w1, and
     for the jerk a0, a1. Returns the solution, which has w in rows 4 – 6, and the cost ∫ ‖u‖² dt.
@@ -293,7 +293,8 @@ def stationary(functional, ends, curve, tol=1e-9):
     def in_body(q, c):
         w, v = q[0], q[1:]
         c = c[:, None] + 0 * v
-        turned = c + 2 * cross(v, cross(v, c) - w * c)  # turned by the conjugate of q / ‖q‖
+        # the vector c, turned by the conjugate of q / ‖q‖
+        turned = c + 2 * cross(v, cross(v, c) - w * c)
         return turned + (1 / np.sum(q * q, axis=0) - 1) * (turned - c)
 
     def spin(q, w):
@@ -343,11 +344,11 @@ def stationary(functional, ends, curve, tol=1e-9):
 
 
 def least_directly(deviation, ends, curve, terms=16, nodes=80):
-    """Minimise ∫ ‖u‖² dt over normalised polynomials of quaternions, from a curve nearby.
+    """Minimise ∫ ‖u‖² dt over normalised polynomials of quaternions, starting from a nearby curve.
 
     No Euler–Lagrange equation is used. `deviation` takes w, w', … and returns u, all of shape (...,
-    3). The number of rates that are fixed at each end is the number of pairs in `ends` after R0,
-    R1. Returns w as a function of t, and the cost.
+    3). After R0 and R1, each pair in `ends` fixes one more rate at both ends. Returns w as a
+    function of t, and the cost.
     """
     from math import comb
 
@@ -386,7 +387,7 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
         return base, [sum(comb(k, i) * B[i] * T[k - i] for i in range(k + 1)) for k in order]
 
     def rates(x, table):
-        """Return w and its rates from n w = 2 im(q̄ q'), n = ‖q‖², and its derivatives."""
+        """Return w and its rates; they solve n w = 2 im(q̄ q'), n = ‖q‖², and its derivatives."""
         base, shapes = table
         Q = [b + s @ x.reshape(*x.shape[:-1], terms, 4) for b, s in zip(base, shapes, strict=True)]
 
@@ -412,7 +413,7 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
     def residuals(x):
         Q, w = rates(x, table)
         u = root * deviation(*w)
-        # the norm is not determined otherwise
+        # without this term the norm would be undetermined
         norm = 30 * root[:, 0] * (np.sum(Q * Q, axis=-1) - 1)
         return np.concatenate([u.reshape(*u.shape[:-2], -1), norm], axis=-1)
 

@@ -1,9 +1,10 @@
-"""The numbers that the artists of a figure hold, compared with the CSV of the figure.
+"""Compare the numbers that the artists of a figure hold with the CSV of the figure.
 
-A kernel that runs `record` (see conftest.py) writes for each saved figure all numbers that its
-artists hold, for an animation in all frames. It stops at a figure that is clipped or has no labels.
-`not_shown` looks for the columns of the CSV among these numbers. If a title or a label names a
-column, it looks only among the numbers of the artists with this title or label.
+A kernel that runs `record` (see conftest.py) writes all numbers that the artists of each saved
+figure hold. For an animation, it writes those of all frames. It stops with an error at a figure
+that is clipped or has no labels. `not_shown` looks for the columns of the CSV among these numbers.
+If a title or a label names a column, it looks only among the numbers of the artists with this title
+or label.
 """
 
 import csv
@@ -19,37 +20,38 @@ STARTUP = """
 __import__("sys").path.insert(0, {tests!r})
 __import__("shown").record({folder!r})
 """
-# Columns of a CSV that need not be in the picture as numbers: a pattern of "figure, column", and
-# the share of the values that must be in the picture all the same.
+# CSV columns of which not every value must appear as a number in the picture. Each entry maps a
+# pattern for "figure, column" to the share of the values that must still appear.
 SHARES = {
-    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,  # values beside the drawn data
-    # the order of rows, or colours
+    # these columns accompany the drawn data
+    r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,
+    # the picture shows these columns by the order of points, or by colours
     r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,
-    r".*, (.* )?theta\d? \[rad\]": 0,  # shown by the places of links and corners
-    r"paper_fig[23][ab], .*": 0.3,  # six curves, and a surface with fewer points
+    r".*, (.* )?theta\d? \[rad\]": 0,  # the places of links and corners show it
+    r"paper_fig[23][ab], .*": 0.3,  # the picture has six curves, and a surface with fewer points
     r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, which is drawn three times
-    # the path of the corner is drawn, not that of the centre
+    # the picture shows the path of the corner, and not the path of the centre
     r"lesson01_straight, .* by the corner .*": 0,
     r"lesson08_half, turn \[rad\]": 0,  # the angle of the body
-    r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # frames are drawn at the ends only
-    # the place of the cell
+    r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # only the frames at the ends are drawn
+    # the place of the cell in the map shows both values
     r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,
 }
 FIGURES = Path(__file__).parents[1] / "figures"
-LETTERS = str.maketrans("ω₁₂₃", "w123")  # the letters of labels, as columns spell them
+LETTERS = str.maketrans("ω₁₂₃", "w123")  # from letters in labels to their spelling in columns
 BAR = "<colorbar>"
 GETTERS = "get_data", "get_data_3d", "get_segments", "get_xy", "get_offsets", "get_array"
 
 
 def columns(file):
-    """Return the columns of a CSV by their names, as words."""
+    """Return the columns of a CSV, as text, by their names."""
     with file.open(encoding="utf-8", newline="") as lines:
         header, *rows = csv.reader(lines)
     return dict(zip(header, np.array(rows).T, strict=True))
 
 
 def numbers(name):
-    """Return the columns of a committed figure by their names; columns without a unit are words."""
+    """Return the columns of a committed figure by their names; columns without a unit are text."""
     table = columns(FIGURES / f"{name}.csv")
     return {key: x.astype(float) if key.endswith("]") else x for key, x in table.items()}
 
@@ -86,7 +88,7 @@ def pooled(pairs):
 
 
 def by_names(artists):
-    """Yield the numbers that artists hold, under "" and under their titles and labels."""
+    """Yield each array of numbers that artists hold, once with each name: "", title or label."""
     for artist in artists:
         title = title_of(getattr(artist, "axes", None))
         label = str(artist.get_label()).removeprefix("about ").translate(LETTERS)
@@ -96,7 +98,7 @@ def by_names(artists):
 
 
 def title_of(ax):
-    """Return the first line of the title of axes, or "" if some axes of its figure lack one."""
+    """Return the first line of the title of an Axes, or "" if any Axes of the figure has none."""
     if not hasattr(ax, "get_title"):
         return ""
     others = [other for other in ax.figure.axes if other.axison and other.get_label() != BAR]
@@ -104,7 +106,7 @@ def title_of(ax):
 
 
 def numbers_of(artists):
-    """Yield the numbers that artists hold as flat arrays: coordinates, heights, values of a map."""
+    """Yield flat arrays of the numbers that artists hold: coordinates, heights, values of a map."""
     for artist in artists:
         held = [getattr(artist, name)() for name in GETTERS if hasattr(artist, name)]
         held += [getattr(artist, name) for name in ("U", "V") if hasattr(artist, name)]
@@ -134,7 +136,7 @@ def check_looks(fig):
         named = [line for line in ax.lines if not line.get_label().startswith("_")]
         looks = {(str(line.get_color()), line.get_marker()) for line in named}
         assert len(looks) == len(named), ax
-        for line in named:  # a label on two axes has one colour
+        for line in named:  # equal labels have equal colours
             place = title_of(ax), line.get_label()
             assert colours.setdefault(place, line.get_color()) == line.get_color(), place
     for ax in flat:
@@ -144,7 +146,7 @@ def check_looks(fig):
         for artist in [*ax.lines, *ax.patches]:
             if artist.get_transform().contains_branch(ax.transData):
                 places = artist.get_path().transformed(artist.get_transform()).vertices
-                if ax.get_aspect() == 1:  # a picture, whose marks must not be cut either
+                if ax.get_aspect() == 1:  # here marks must be complete, too
                     places = artist.get_window_extent().corners()
                 assert not (places < ax.bbox.min - 1e-6).any(), artist
                 assert not (places > ax.bbox.max + 1e-6).any(), artist
@@ -192,7 +194,7 @@ def held(pool, value):
 
 
 def start_recording(folder, ipython):
-    """Let kernels with the IPython folder record into `folder`; return the IPython folder."""
+    """Make kernels that use the folder `ipython` record into `folder`; return `ipython`."""
     startup = Path(ipython) / "profile_default" / "startup"
     startup.mkdir(parents=True)
     text = STARTUP.format(tests=os.path.dirname(__file__), folder=folder)

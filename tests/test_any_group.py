@@ -1,4 +1,4 @@
-"""The formulas of docs/near_optimal.md on SO(3), SO(4) and SO(5), written with brackets."""
+"""Check the formulas of docs/near_optimal.md, in Lie brackets, on SO(3), SO(4) and SO(5)."""
 
 import itertools
 from fractions import Fraction
@@ -57,7 +57,8 @@ def log(R):
 @pytest.mark.source("beyond BK 15")
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_the_two_forms_of_the_second_variation_are_equal(n):
-    """On integers, ‖x'‖² − w' · [η, x]' with x = η' + [w, η] equals the sum of squares exactly."""
+    """For vectors of integers, ‖x'‖² − w' · [η, x]' with x = η' + [w, η] equals the sum of squares
+    exactly."""
     rng, d = np.random.default_rng(n), n * (n - 1) // 2
     for _ in range(20):
         w, a, eta, rate, bend = (
@@ -94,7 +95,7 @@ def closed_forms(sigma, w0, w1, n):
 
 
 def deviation(s, e, d, n):
-    """Return (9) of docs/near_optimal.md by powers of u."""
+    """Return the coefficients of (9) of docs/near_optimal.md, in powers of u."""
 
     def triple(x, y, z):
         return bracket(x, bracket(y, z, n), n)
@@ -124,7 +125,7 @@ def as_so3(x):
 
 
 def excess(R, n):
-    """Return the cost of a curve above the lowest cost that descent finds, and the lowest cost."""
+    """Return the excess over the lowest cost that descent finds, and this lowest cost."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))
@@ -154,8 +155,8 @@ def excess(R, n):
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("n", [4, 5])
 def test_the_excess_of_closed_forms_agrees_with_the_note_in_higher_dimensions(n):
-    """Bézier's curve has E; the excess of the corrected curve has the eighth power of the data's
-    size."""
+    """The excess of Bézier's curve is E. The excess of the corrected curve grows as the eighth
+    power of the size of the data."""
     d = n * (n - 1) // 2
     for data in np.random.default_rng(n).normal(size=(20, 3, d)):
         data *= [[0.6], [0.8], [1.0]] / np.linalg.norm(data, axis=1, keepdims=True)
@@ -169,7 +170,7 @@ def test_the_excess_of_closed_forms_agrees_with_the_note_in_higher_dimensions(n)
 
 
 def test_the_eight_brackets_are_independent_on_so3():
-    """Degree three has only these brackets, so the derivation on SO(3) holds on every group."""
+    """No other brackets have degree three, so the derivation on SO(3) holds on every group."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
         s, e, d = (as_so3(x) for x in vectors)

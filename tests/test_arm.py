@@ -1,4 +1,4 @@
-"""The arm against complex numbers and differences; the misprints of the report's section 4."""
+"""Compare the arm with complex numbers and differences; check misprints of the report."""
 
 import re
 
@@ -20,8 +20,8 @@ def tips(q, *lengths):
 @pytest.mark.source("RR 4")
 @pytest.mark.parametrize("lengths", [(), LENGTHS[:1], LENGTHS[:3], LENGTHS])
 def test_arms_with_any_number_of_links_agree_with_complex_numbers(lengths):
-    """Without lengths, the arm is the report's of 2 and 1.5 m. Its Jacobian is tested by
-    differences."""
+    """Without given lengths, the links have 2 and 1.5 m, as in the report. The Jacobian is compared
+    with differences."""
     n = len(lengths) or 2
     q, given = RNG.uniform(-7, 7, (5, 6, n)), [lengths] * bool(lengths)
     joints, frames = arm.arm_forward_kinematics(q, *given)
@@ -47,7 +47,7 @@ def test_arms_with_any_number_of_links_agree_with_complex_numbers(lengths):
 def test_the_jacobian_of_two_links_is_singular_if_they_are_in_line():
     q = RNG.uniform(-7, 7, (100, 2))
     assert np.abs(np.linalg.det(arm.arm_tip_jacobian(q)) - 3 * np.sin(q[:, 1])).max() < 32 * EPS
-    # the lever arm of joint 0; that of joint 1 is always 1.5
+    # the lever arm of joint 0; the lever arm of joint 1 is always 1.5
     for bent, reach in ((0, 3.5), (np.pi, 0.5)):
         singular = np.linalg.svd(arm.arm_tip_jacobian([0.4, bent]), compute_uv=False)
         assert singular == pytest.approx([np.hypot(reach, 1.5), 0], abs=8 * EPS)
@@ -56,8 +56,8 @@ def test_the_jacobian_of_two_links_is_singular_if_they_are_in_line():
 @pytest.mark.source("RR (20)", "RR (21)", "RR 4.1", "errata 19")
 @pytest.mark.parametrize("steps", [1, 10, 37])
 def test_each_joint_goes_from_its_own_start_to_its_own_goal(steps):
-    """The printed formula would blend link 1's start with link 2's. Its first index counts the
-    links; in the sentence below it, the first index distinguishes start and goal."""
+    """The printed formula would blend the starts of links 1 and 2. Its first index counts the
+    links. In the sentence below the formula, the first index distinguishes start and goal."""
     theta = np.array([[0.1, 0.2], [1.0, 2.0]])
     path, t = arm.interpolate_joints(*theta, steps), np.linspace(0, 1, steps + 1)[:, None]
     assert np.array_equal(path[[0, -1]], theta)

@@ -1,4 +1,4 @@
-"""The benchmarks run and agree, and their README states the results. Nothing is timed here."""
+"""The benchmarks run, their methods agree, and the README states the results."""
 
 from functools import cache, partial
 from itertools import count
@@ -52,7 +52,7 @@ def once(contest):
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    """Run every task with one case and gentle problems; return the folder and the rows."""
+    """Run every task with one case and easy problems; return the folder and the rows."""
     folder = tmp_path_factory.mktemp("run")
     text = "before\n<!-- benchmarks -->\nold\n<!-- end of benchmarks -->\nafter\n"
     (folder / "README.md").write_text(text)

@@ -34,7 +34,7 @@ def test_matrices_that_are_symmetric_to_rounding_are_made_symmetric_and_others_a
     assert not checks.as_symmetric("G", np.zeros((2, 2)), 2).any()
 
 
-def test_times_and_angles_beyond_an_end_by_rounding_become_the_end_and_others_are_refused():
+def test_times_and_angles_that_pass_an_end_by_rounding_become_the_end_and_others_are_refused():
     assert checks.as_time([0, 1], 2).shape == (2, 1, 1)
     accumulated = np.cumsum(np.full(100, 0.07))  # the last one is 7.000000000000009
     assert accumulated[-1] > 7

@@ -1,4 +1,4 @@
-"""The closed forms of BK 1 against their definitions in 60 digits, and those for real bodies."""
+"""Test the closed forms of BK 1 against their definitions in 60 digits, and those for bodies."""
 
 from itertools import pairwise
 
@@ -34,7 +34,7 @@ def directions(count, rng):
 
 
 def ends(count, angle=None, size=None):
-    """Return R0, R1, w0, w1: turns by one angle, or any; velocities of one size, or up to 9."""
+    """Return R0, R1, w0, w1: turns by `angle` or any angle, velocities of `size` or up to 9."""
     rng = np.random.default_rng(count)
     R0, R1 = (Rotation.random(count, rng=rng).as_matrix() for _ in range(2))
     if angle is not None:
@@ -72,7 +72,7 @@ def along(w, share):
 
 
 def in_coordinates(coordinates, point):
-    """Return the cubic in coordinates whose rates at the ends are those of the turning body."""
+    """Return the cubic in coordinates whose end rates belong to the given end velocities."""
 
     def curve(turn, w0, w1):
         values, rates = [], []
@@ -129,7 +129,7 @@ def by_differences(f, t):
 
 
 def exactly(name, given, times):
-    """Return R, w and w' of a curve from I, by Rᵀ R'' = ŵ' + ŵ², in which ŵ² is symmetric."""
+    """Return R, w and w' of a curve from I; ŵ' is the skew part of Rᵀ R'' = ŵ' + ŵ²."""
     jets = []
     with mp.workdps(oracles.DIGITS):
         turn, w0, w1 = ([mp.mpf(float(x)) for x in v] for v in given)
@@ -142,8 +142,8 @@ def exactly(name, given, times):
 
 
 def test_the_exponential_of_quaternions_has_exact_derivatives():
-    """The tested lengths are inside and outside the power series, and at the poles of the
-    tangent."""
+    """The tested lengths are inside and outside the range of the power series, and at the poles of
+    the tangent."""
     lengths = [0, 1e-300, 1e-170, 1e-12, 1e-8, 1e-4, 0.1, 0.49, 0.5 - 1e-9, 0.5, 0.51, 1, 1.5]
     lengths += [np.pi / 2, 3, np.pi - 1e-8, np.pi, 3 * np.pi / 2, 2 * np.pi, 7, 50, 400]
     u0, u1, u2 = np.random.default_rng(5).normal(size=(3, 3, 1))
@@ -172,7 +172,7 @@ def test_quaternions_of_any_norm_give_the_same_rotation():
 
 
 def cases():
-    """Return turns, w0 and w1 of curves by name."""
+    """Return the turn, w0 and w1 of each case, by its name."""
     rng = np.random.default_rng(11)
     n, m = directions(2, rng)
     w0, w1, turn = np.array([2.0, -1, 3]), np.array([1.0, 4, -2]), np.array([0.3, -0.4, 1.2])
@@ -231,7 +231,7 @@ def test_the_ends_and_end_velocities_are_met_wherever_the_curve_is_defined(name,
 
 @pytest.mark.parametrize("make", [rb.exponential_cubic_long_so3, rb.bezier_long_so3])
 def test_the_long_way_round_completes_a_full_turn(make):
-    """Turns about one axis, from rest to rest or at the constant speed 1 − 2π."""
+    """The turns are about one axis, from rest to rest or at the constant rate 1 − 2π."""
     e, t = I3[1], np.linspace(0, 1, 201)
     for w in [0 * e, (1 - 2 * np.pi) * e][: 2 if make is rb.exponential_cubic_long_so3 else 1]:
         speed = make(I3, rb.exp_so3(e), w, w)(t, 1)[:, 1]
@@ -241,8 +241,8 @@ def test_the_long_way_round_completes_a_full_turn(make):
 
 
 def test_ends_outside_the_domain_are_refused_by_name():
-    """Bézier's velocities from 3π on, half-turns for Cayley's cubic, and inertias of impossible
-    bodies raise errors."""
+    """Three inputs raise errors: speeds of 3π or more for Bézier's curves, half-turns for Cayley's
+    cubic, and inertias of impossible bodies."""
     w, half = np.zeros((2, 3, 3)), np.diag([-1.0, 1, -1])
     w[1, 2] = 3 * np.pi * np.array([2, 1, 2]) / 3
     for name, given in (("w0", (w, REST)), ("w1", (REST, w))):
@@ -264,7 +264,7 @@ def test_ends_outside_the_domain_are_refused_by_name():
 
 
 @every_curve
-def test_with_velocities_along_the_geodesic_three_of_five_forms_follow_it(name):
+def test_if_end_velocities_are_along_the_geodesic_three_of_five_closed_forms_follow_it(name):
     """The expected curve is R0 exp(σ p(t)), where p is the cubic with the same end conditions."""
     R0, R1, _, _ = ends(40)
     turn = Rotation.from_matrix(R0.mT @ R1).as_rotvec()
@@ -282,7 +282,7 @@ def test_with_velocities_along_the_geodesic_three_of_five_forms_follow_it(name):
 
 @pytest.mark.parametrize("make", [*MAKERS.values(), rb.corrected_bezier_so3])
 def test_three_closed_forms_are_reversible_in_time_and_three_are_not(make):
-    """For some fast ends, the correction takes a logarithm that is not the shortest."""
+    """For some fast ends, the correction uses a logarithm that is not the shortest one."""
     R0, R1, w0, w1 = ends(40, 2.5)
     curve, back = make(R0, R1, w0, w1), make(R1, R0, -w1, -w0)
     t = np.linspace(0, 1, 11)
@@ -314,7 +314,7 @@ def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_leg_bef
 
 
 def cubic_of_quaternions(R0, R1, w0, w1, t):
-    """Return Q(t) by its definition, shape (N, 4, times), with q1 nearer to q0 than −q1."""
+    """Return Q(t) by its definition, shape (N, 4, times); q1 has the sign that is nearer to q0."""
     q = Rotation.from_matrix(R0.mT @ R1).as_quat(canonical=True, scalar_first=True).T
     one, (v0, v1) = np.eye(4)[:1].T, (np.insert(w, 0, 0, axis=1).T for w in (w0, w1))
     values = one + 0 * q, q, v0 / 2, oracles.quaternion_product(q, v1) / 2
@@ -335,9 +335,10 @@ def test_the_margin_is_the_least_norm_of_the_cubic():
 
 
 def in_a_plane(margin):
-    """Return a turn by 2 and both velocities about one axis.
+    """Return a turn by 2 rad about an axis, and both velocities along this axis.
 
-    Seen from halfway, Q is a complex number. Its minimum, at t = 1/2, is cos(1/2) + k/8 sin(1/2).
+    Relative to the half-way rotation, Q is a complex number. Its least norm, at t = 1/2, is
+    cos(1/2) + k/8 sin(1/2).
     """
     [n] = directions(1, np.random.default_rng(13))
     k = 8 * (margin - np.cos(0.5)) / np.sin(0.5)
@@ -362,7 +363,7 @@ def test_the_time_at_which_the_cubic_of_quaternions_is_zero_is_refused():
     stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
-    t = np.linspace(0, 0.4, 3000)  # more than a block for two curves
+    t = np.linspace(0, 0.4, 3000)  # more times than one block holds for two curves
     for order in (0, 1, 2):
         assert np.isfinite(stack([0, 0.25, 0.75, 1], order)).all()
         for k in (0, 2999):
@@ -396,7 +397,7 @@ def test_the_weighted_cubic_is_the_nearest_rotation_in_the_metric():
 
 @pytest.mark.source("beyond BK 7")
 def test_the_normal_cubic_satisfies_its_formula():
-    """SciPy solves for x(t) again, and x(t) is a cubic."""
+    """SciPy solves the formula for x(t), which must be a cubic."""
     curve = rb.normal_cubic_so3(R0[0], R1[0], W0[0], W1[0], BOOK)
     t, inverse = np.linspace(0, 1, 9), np.linalg.inv(BOOK)
 
@@ -429,7 +430,7 @@ def test_the_normal_cubic_of_thin_bodies_exists_except_at_the_singular_angle():
 
 
 @pytest.mark.source("beyond BK 8")
-def test_the_excess_of_the_quintic_has_the_fourth_power_and_is_zero_from_rest_to_rest():
+def test_the_excess_of_the_quintic_grows_as_the_fourth_power_and_is_zero_from_rest_to_rest():
     found = []
     for s in (0.2, 0.1, 1):
         ends = I3, rb.exp_so3(s * TURN), *(s * x for x in (W0, W1, A0, A1))

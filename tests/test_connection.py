@@ -50,7 +50,7 @@ def test_structure_constants_give_the_commutators_in_bases_of_any_scale(conditio
 @both_groups
 @pytest.mark.parametrize("definite", [True, False])
 def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(m, definite):
-    """The product rule d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩ holds, too."""
+    """The product rule d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩ is tested, too."""
     G, C = metrics(m, definite=definite), structure_constants(BASES[m])
     gamma, condition = christoffel(G, BASES[m]), np.linalg.cond(G)
     bound = 1e-14 * condition[:, None, None, None]
@@ -92,7 +92,7 @@ def test_the_acceleration_is_the_projection_of_the_ambient_one_on_the_tangent_sp
 
 
 @pytest.mark.source("BK 2.4", "errata 22")
-def test_the_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
+def test_the_covariant_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
     """The point A is not a tangent vector at A. Its rotational components are zero, so no vector
     would turn along it."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
@@ -135,9 +135,9 @@ def test_the_motion_of_a_free_body_satisfies_eulers_solution(a, c):
 
 
 @pytest.mark.source("BK (8)", "errata 13")
-def test_the_printed_geodesic_equation_is_not_that_of_the_free_body():
-    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the frame's symbols with ä of
-    coordinates instead of ẇ."""
+def test_the_printed_geodesic_equation_is_not_the_equation_of_the_free_body():
+    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the symbols Γ of the frame with
+    ä of coordinates instead of ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)
@@ -171,7 +171,7 @@ def steady_and_straight(S):
         (rb.METRIC_SE3, steady_and_straight, 3, 1e-10),
     ],
 )
-def test_geodesics_of_bi_invariant_metrics_are_subgroups_and_those_of_14_are_straight(
+def test_bi_invariant_geodesics_are_one_parameter_subgroups_and_metric_14_gives_straight_paths(
     G, exp, constant, tolerance
 ):
     v0 = np.random.default_rng(8).normal(size=(5, len(G)))
@@ -180,7 +180,7 @@ def test_geodesics_of_bi_invariant_metrics_are_subgroups_and_those_of_14_are_str
     assert np.abs(A - exp(TIMES[:, None, None] * v0)).max() < tolerance
 
 
-def test_geodesics_are_followed_at_times_in_any_order_and_in_large_batches():
+def test_geodesics_are_integrated_to_times_in_any_order_and_in_large_batches():
     start, spin = rb.exp_so3([1, 2, 3]), [0.3, 2, -1]
     t = np.array([[2.0, -1, 0], [2, 0.5, -3]])
     R, w = rb.geodesic_flow(INERTIA, start, spin, t)
@@ -192,14 +192,14 @@ def test_geodesics_are_followed_at_times_in_any_order_and_in_large_batches():
     back, _ = rb.geodesic_flow(INERTIA, R[0, 0], w[0, 0], -2)
     assert np.abs(back - start).max() < 1e-11
     crowd, _ = rb.geodesic_flow(INERTIA, start, [spin] + [[0.01, 0, 0]] * 399, 10)
-    alone, _ = rb.geodesic_flow(INERTIA, start, spin, 10)  # the batch loses at most a factor √400
+    alone, _ = rb.geodesic_flow(INERTIA, start, spin, 10)  # a batch may have √400 times the error
     assert np.abs(crowd[0] - alone).max() < 20 * 1e-12
     assert rb.geodesic_flow(INERTIA, start, spin, [])[0].shape == (0, 3, 3)
     assert rb.geodesic_flow(np.ones((0, 3, 3)), start, spin, 1)[0].shape == (0, 3, 3)
 
 
 def test_the_scale_of_velocities_and_metrics_does_not_matter():
-    """γ_sv(t) = γ_v(st), alone and in one batch, and also at extreme scales."""
+    """γ_sv(t) = γ_v(st) holds for single geodesics and in a batch, also at extreme scales."""
     w0 = np.array([0.3, 2, -1])
     R, w = rb.geodesic_flow(INERTIA, ONE, w0, 3)
     for s in (1e-8, 1e8):
@@ -227,7 +227,7 @@ def test_velocities_may_grow_in_an_indefinite_metric_but_the_momentum_is_conserv
     assert np.all(off < 1e-10 * speeds * np.linalg.norm(rb.adjoint_se3(A), axis=(-2, -1)))
 
 
-def test_a_start_near_the_group_is_projected_on_it():
+def test_a_start_near_the_group_is_projected_onto_the_group():
     start = rb.exp_so3([1, 2, 3]) + 1e-3
     R, _ = rb.geodesic_flow(INERTIA, start, [0.3, 2, -1], TIMES)
     assert np.abs(R[0] - rb.project_so(start)).max() < 4 * EPS

@@ -1,4 +1,4 @@
-"""The contract of all makers of curves: one test for all of them, and faults that it finds."""
+"""Test the contract of all functions that make curves, and that it detects known faults."""
 
 import inspect
 import math
@@ -15,7 +15,7 @@ import rbcourse as rb
 
 
 def of(function, *more):
-    """Return a maker with the required arguments of a function, and with the named ends `more`."""
+    """Return a maker: it calls `function` with the ends that are required, and those in `more`."""
     parameters = inspect.signature(function).parameters.values()
 
     def make(ends, **given):
@@ -91,8 +91,8 @@ def times(curve, *shape):
 
 
 def jet(curve, t, own=False):
-    """Return the curve and its derivatives, after a check of their shapes, with all components
-    last."""
+    """Return the curve and its derivatives, with all components on the last axis; check their
+    shapes."""
     call, shape = (curve.at_own_times, t.shape) if own else (curve, t.shape + curve.batch_shape)
     cores = CORES[curve.size]
     values = [call(t, order) for order in range(len(cores))]
@@ -102,7 +102,7 @@ def jet(curve, t, own=False):
 
 
 def off(a, b):
-    """Return the largest difference over the largest entry of its component or 1."""
+    """Return the largest difference, relative to the largest entry of its component, or to 1."""
     others = tuple(range(np.ndim(b) - 1))
     scale = np.abs(b).max(axis=others, initial=1)
     return (np.abs(np.subtract(a, b, dtype=float)).max(axis=others, initial=0) / scale).max()
@@ -123,8 +123,8 @@ def meets_its_ends(make):
 
 
 def has_the_derivatives_of_its_values(make):
-    """Check R' = R ŵ, w', w'', and on SE(3) Rᵀ d' and Rᵀ d'', as `Curve` says, also for small
-    motions."""
+    """Check R' = R ŵ, w' and w''; on SE(3) also Rᵀ d' and Rᵀ d'', as defined in `Curve`. Small
+    motions are tested, too."""
     long = make.function in (rb.exponential_cubic_long_so3, rb.bezier_long_so3)
     sizes = np.array([1, 1, 1] if long else [1, 1e-3, 1e-7])
     curve = make(sample(3, size=sizes[:, None]))
@@ -165,7 +165,7 @@ def is_the_stack_of_its_members(make):
 
 
 def has_values_at_times_of_any_shape(make):
-    """Check also no times, more times than are evaluated together, and an empty stack."""
+    """Check also empty times, more times than are evaluated together, and an empty stack."""
     for batch in ((), (2,), (0,), (2, 0)):
         curve = made(make, *batch)
         assert jet(curve, times(curve, 0)).size == 0
@@ -173,7 +173,7 @@ def has_values_at_times_of_any_shape(make):
             t = times(curve, *shape)
             assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
     curve = made(make, 2)
-    t = times(curve, 2600)  # more than a block for two curves
+    t = times(curve, 2600)  # more times than one block holds for two curves
     values = jet(curve, t)
     for part in (slice(1), slice(1, 40), slice(2500, 2600)):
         assert off(jet(curve, t[part]), values[part]) < 1e-12
@@ -197,7 +197,7 @@ INDICES += [([1, 0, 1], [2, 2, 0]), np.array([[True, False, True], [False, False
 
 
 def is_indexed_as_an_array_is(make):
-    """Check also the attributes that describe the curves."""
+    """Check indexing of a stack, and of the attributes that describe its curves."""
     stack = made(make, 2, 3)
     t = times(stack, 3)
     values, numbers = jet(stack, t), np.arange(6).reshape(2, 3)
@@ -267,8 +267,8 @@ def is_the_same_after_pickling(make):
 
 
 def moves_with_its_ends(make):
-    """Check that the poses L A0 and L A1 give L A(t); on SO(3), moved ends and inertia give L R(t)
-    Q."""
+    """Check that the ends L A0 and L A1 give the curve L A(t). On SO(3), check also that the ends L
+    R0 Q and L R1 Q, with the inertia turned by Q, give L R(t) Q."""
     ends, curve = sample(2), made(make, 2)
     L, Q = sample(seed=1), sample(seed=2)["R0"]
     t = times(curve, 3)
@@ -288,8 +288,7 @@ def moves_with_its_ends(make):
 
 
 def lasts_as_long_as_it_is_told(make):
-    """Check that a duration T for each curve equals a retimed curve from 0 to 1 with rates
-    times T."""
+    """Check that a curve of duration T is the curve on [0, 1] with rates times T, retimed to T."""
     if "duration" not in inspect.signature(make.function).parameters:
         return  # a curve without the parameter `duration` keeps its own duration
     ends, T = sample(3), np.array([0.5, 1, 1.5])
@@ -310,7 +309,7 @@ def lasts_as_long_as_it_is_told(make):
 
 
 def altered(name, change):
-    """Return a maker of projected cubics in which a function of the original replaces a method."""
+    """Return a maker of projected cubics whose method `name` is replaced by `change`."""
 
     def make(R0, R1, w0, w1):
         curve = copy(cubic(R0, R1, w0, w1))
@@ -327,7 +326,7 @@ def scaled(order, by):
     return altered("__call__", lambda call, c, t, k=0: call(c, t, k) * (by if k == order else 1))
 
 
-CONTRACT = {  # the clauses, and for each clause makers with a fault that it must find
+CONTRACT = {  # the clauses, and for each clause some makers with a fault that it must detect
     meets_its_ends: {
         "end": lambda R0, R1, w0, w1: bezier(R0, R1 @ rb.exp_so3([0, 0, 1e-9]), w0, w1),
         "end velocity": lambda R0, R1, w0, w1: bezier(R0, R1, w0, 1.0000001 * w1),
@@ -391,7 +390,7 @@ def test_every_function_that_returns_a_curve_has_a_maker():
 
 
 @pytest.mark.parametrize("clause", CONTRACT)
-def test_faults_are_found_by_their_clause(clause):
+def test_each_fault_is_reported_under_the_clause_that_it_breaks(clause):
     for fault in CONTRACT[clause].values():
         with pytest.raises((AssertionError, ValueError, pytest.fail.Exception)):
             clause(of(fault))

@@ -85,14 +85,14 @@ def test_zyx_angles_agree_with_the_printed_product_and_scipy_also_in_gimbal_lock
     for back in (rb.zyx_from_matrix(R), zyx_from_quaternion(q), zyx_from_quaternion(-q)):
         assert np.all(np.abs(back[:, 1]) <= np.pi / 2 * (1 + EPS))
         assert np.all((back[:, ::2] > -np.pi) & (back[:, ::2] <= np.pi))
-        # twice the loss of the quaternion
+        # twice the error of the quaternion
         assert np.abs(rb.matrix_from_zyx(back) - R).max() < 40 * EPS
-        plain = back[:200]  # the rest is near gimbal lock
+        plain = back[:200]  # the others are near gimbal lock
         off = np.abs(plain - want[:200].as_euler("ZYX")).max(axis=1)
         assert np.all(off < 20 * EPS / np.cos(plain[:, 1]))
 
 
-def test_within_16_eps_of_gimbal_lock_the_last_angle_is_zero_and_outside_both_are_found():
+def test_within_16_eps_of_gimbal_lock_the_last_angle_is_zero_and_farther_away_both_are_found():
     a, c = np.pi / 4 * np.array(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))).reshape(2, -1)
     for lock in (np.pi / 2, -np.pi / 2):
         R = rb.matrix_from_zyx(np.stack([a, np.full_like(a, lock), c], axis=1))

@@ -1,4 +1,4 @@
-"""The costs, against closed forms and another quadrature."""
+"""Compare the costs with closed forms and with another quadrature."""
 
 from functools import partial
 from itertools import product
@@ -79,7 +79,7 @@ def test_geodesics_cost_nothing_and_screw_motions_have_a_cost():
 
 @pytest.mark.parametrize("margin", [2e-3, 1e-3, 1e-4, 1e-5, 3e-6])
 def test_the_cost_of_sharp_turns_is_integrated(margin):
-    """Nearly all of the cost arises within a fraction of the time that is half the margin.
+    """Nearly all of the cost arises within a share of the time that is half the margin.
 
     The line is tested alone and as a leg of a chain. The breakpoints are close together where the
     cost arises.
@@ -93,7 +93,7 @@ def test_the_cost_of_sharp_turns_is_integrated(margin):
         assert rb.acceleration_cost(line) == pytest.approx(4 * np.pi * k**3 / 27, rel=1e-9)
         least = np.abs(np.setdiff1d(line.breakpoints, 0.5) - 0.5).min()
         assert margin / 20 < least < margin / 4
-    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)  # the cubic is 3/2 as fast there
+    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)  # the cubic turns 3/2 times as fast there
     assert rb.acceleration_cost(cubic) == pytest.approx(27 / 8 * 4 * np.pi * k**3, rel=20 * margin)
 
 
@@ -108,8 +108,8 @@ def late_line(when, angle):
 
 
 def cubic(when, off):
-    """Return a cubic about one axis that almost jumps: the complex cubic M is of order `off` at a
-    time."""
+    """Return a cubic about one axis that almost jumps: its complex M is of order `off` at time
+    `when`."""
     h00, h01, h10, h11 = (hermite(one, np.array(when)) for one in np.eye(4))
     turn = np.exp(2.5j)
     columns = np.array([1j * h10, 1j * turn * h11, -h00 - turn * h01])
@@ -156,7 +156,7 @@ def test_the_cost_of_a_sudden_turn_is_integrated(make, given):
 
 @pytest.mark.parametrize("speed", [1e3, 1e12, 1e26])
 def test_the_cost_of_fast_motion_in_the_first_instant_is_integrated(speed):
-    """M(t) = I + t M'(0) + … turns at once, so the cost is of the order of the speed cubed."""
+    """M(t) = I + t M'(0) + … turns immediately, so the cost is of the order of the speed cubed."""
     cubic = rb.projected_cubic_so3(I3, I3, [speed] * 3, REST)
     a = np.sqrt(3) * speed  # along one axis, θ = atan(a t)
     want = 2 * a**3 * quad(lambda u: (2 * u / (1 + u * u) ** 2) ** 2, 0, np.inf)[0]
@@ -200,7 +200,7 @@ def test_an_integral_that_does_not_converge_or_overflows_raises_an_error():
 
 
 @pytest.mark.parametrize("make", [rb.projected_cubic_so3, rb.quaternion_cubic_so3])
-def test_a_stack_has_one_cost_for_each_curve_with_one_inertia_or_one_for_each_curve(make):
+def test_a_stack_has_one_cost_for_each_curve_with_common_or_individual_inertias(make):
     turns = rb.exp_so3(np.linspace(0.5, 2.9, 6).reshape(2, 3, 1) * [0.6, 0, 0.8])
     stack = make(I3, turns, REST, [0, 2, 0])
     each = BOOK * np.linspace(1, 2, 6).reshape(2, 3, 1, 1)

@@ -90,7 +90,7 @@ def quintic_at_rest(R0, R1):
 
 
 def half_turns():
-    """Return starts, goals and axes, exact and rounded."""
+    """Return starts, goals and axes of half-turns, exact and rounded."""
     exact, axes = awkward.half_turns()
     R0, R1, n = awkward.rounded_half_turns(np.random.default_rng(180), 80)
     start = np.broadcast_to(I3, exact.shape)
@@ -100,7 +100,7 @@ def half_turns():
 def test_the_geodesic_over_a_half_turn_is_rodrigues_formula_about_the_axis_of_positive_sign():
     """The formula holds up to the end of the interval, where the tangent is infinite."""
     R0, R1, n = half_turns()
-    # the sign of the axis makes its largest component positive, the first one of equal ones
+    # the largest component of the axis is positive; if several are largest, the first of them is
     first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
     n *= np.sign(np.take_along_axis(n, first[:, None], axis=1))
     curves, cross = rb.geodesic_so3(R0, R1), rb.hat_so3(n)
@@ -157,7 +157,7 @@ def test_a_jump_gives_a_warning_and_its_time_is_refused(make):
     assert np.abs(stack.margin - [[2, 0], [0, 2], [2, 2]]).max() < 8 * EPS
     one = stack[0, 1]
     assert np.abs(one([0, 0.25, 0.75, 1]) - [I3, I3, half, half]).max() < 80 * EPS
-    t = np.linspace(0, 0.4, 1000)  # more than a block for six curves
+    t = np.linspace(0, 0.4, 1000)  # more times than one block holds for six curves
     own = np.full((1000, 3, 2), [[0.5, 0.25], [0.25, 0.5], [0.5, 0.5]])
     for order in (0, 1, 2):
         assert np.isfinite(stack(t, order)).all()

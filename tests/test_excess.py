@@ -28,8 +28,7 @@ FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
 
 
 def bent(*ends, bend):
-    """Return quintics with random accelerations at their ends; some cost much more than the
-    optimum."""
+    """Return quintics with random end accelerations; some cost much more than the optimum."""
     return rb.exponential_quintic_so3(
         *ends, *bend * np.random.default_rng(4).normal(size=(2, *ends[2].shape))
     )
@@ -69,8 +68,8 @@ def test_the_stored_table_is_the_derived_one(tmp_path):
 
 
 def test_the_constants_of_the_excess_near_a_geodesic_are_right():
-    """The compared terms have second order in e and d, for the cumulative form first order in
-    both."""
+    """The compared terms are of second order in e and d, and of first order in both for the
+    cumulative form."""
     ss, ee, dd, se, sd = exact.ss, exact.ee, exact.dd, exact.se, exact.sd
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |σ × e|², |σ × d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
@@ -90,7 +89,7 @@ def test_the_constants_of_the_excess_near_a_geodesic_are_right():
 
 
 def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
-    """The excess is 6401/180180 a⁴ for the projection, and a sixteenth of that for quaternions."""
+    """The excess is 6401/180180 a⁴ for the projection, and a sixteenth of this for quaternions."""
     ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
     wanted = dict.fromkeys(("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"), 0)
@@ -101,7 +100,7 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
 
 
 @pytest.mark.source("beyond BK 14")
-def test_the_constants_of_splines_there_and_back_are_right():
+def test_the_constants_of_splines_that_turn_there_and_back_are_right():
     found = Q(309247, 1441440), Q(20711, 180180), Q(20711, 16 * 180180)
     assert tuple(exact.of_splines()) == found
 
@@ -176,8 +175,8 @@ def test_the_deviation_in_the_package_is_the_derived_one():
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("name", TABULATED)
 def test_the_power_and_the_leading_term_of_the_excess_agree_with_the_solver(name):
-    """The relative error of the leading term falls as the square of the scale, for the cumulative
-    form linearly."""
+    """The relative error of the leading term falls as the square of the scale. For the cumulative
+    form, it falls linearly."""
     power, least = (2, 1.6) if name == "cumulative_bezier_so3" else (4, 3.4)
     found, errors = [], []
     for s in (0.4, 0.2, 0.1):
@@ -194,7 +193,7 @@ OVER = {"projected_cubic_so3": 6300, "quaternion_cubic_so3": 256 * 6300, "cayley
 
 @pytest.mark.parametrize(("name", "over"), OVER.items())
 def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
-    """With e = d = 0 they deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
+    """With e = d = 0 the curves deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/over, to leading order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
     curves = rb.CLOSED_FORMS[name](I3, rb.exp_so3(sigma), sigma, sigma)
@@ -203,7 +202,7 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
     assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # the relative error is of second order
 
 
-def test_the_excess_of_the_corrected_curve_has_the_eighth_power():
+def test_the_excess_of_the_corrected_curve_grows_as_the_eighth_power():
     """The solver shows the power in the median. The estimate resolves smaller values, and shows the
     power for each problem."""
     (large, _), (middle, middle_one), (_, small_one) = (
@@ -219,7 +218,7 @@ def test_the_excess_of_the_corrected_curve_has_the_eighth_power():
 
 @pytest.mark.parametrize("name", CURVES)
 @pytest.mark.source("beyond BK 11")
-def test_the_estimate_is_right_within_a_twentieth_or_nan(name):
+def test_the_estimate_is_nan_or_right_within_5_percent(name):
     for size in (0.5, 1, 2):
         curves, true = solved(name, 80, size, 8)
         estimate = rb.excess_estimate(curves)
@@ -232,8 +231,8 @@ def test_the_estimate_is_right_within_a_twentieth_or_nan(name):
 
 
 def test_the_correction_turns_in_the_direction_of_bezier():
-    """The velocities ask for the long way round. A correction by σ of the short way would cost far
-    more."""
+    """The velocities require the long way round. A correction with σ of the short way would cost
+    far more."""
     rng = np.random.default_rng(2)
     turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))
     ends = I3, rb.exp_so3(turn), *([0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3)))

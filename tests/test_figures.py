@@ -42,7 +42,8 @@ def test_every_figure_has_complete_files_units_and_legible_letters(name):
     assert b"/Type3" not in content.replace(b" ", b"")
     assert b"/FontFile2" in content
     assert b"CreationDate" not in content
-    # Numbers of 13.5 points are 2.5 % of a slide of 1080 pixels, once white margins are cut off.
+    # On a slide 1080 pixels high, numbers in 13.5 points have 2.5 % of the height, once the white
+    # margins are cut off.
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", content)
     width, height = map(float, box.groups())  # in points
     aspect = width / height
@@ -60,7 +61,7 @@ def circle(angle, radius):
 
 
 def half_turned(t):
-    """Return points from 30° on, over half a turn in twice the time."""
+    """Return points on a circle that start at 30° and turn by 90° per unit of time."""
     return np.cos((30 + 90 * t) * D), np.sin((30 + 90 * t) * D)
 
 
@@ -142,7 +143,7 @@ FORMULAS = {
 @pytest.mark.source("RR (21)", "RR (22)", "RR (23)", "RR Fig. 6", "RR Fig. 7", "RR Fig. 8")
 @pytest.mark.source("RR Fig. 9", "BK (9)")
 @pytest.mark.parametrize("place", FORMULAS)
-def test_columns_are_formulas_of_the_fraction_of_the_time(place):
+def test_columns_agree_with_formulas_in_the_fraction_of_the_time(place):
     name, _, prefix = place.partition(",")
     keys, formula = FORMULAS[place]
     data = columns(numbers(name), prefix + "{}", keys)
@@ -245,7 +246,7 @@ def test_the_numbers_of_paper_fig5_are_right():
         ("lesson13_growth", 3, 0.5, {"projection": 2, "Bézier": 2}),
     ],
 )
-def test_the_excess_is_a_power_of_the_excursion_and_mostly_the_fourth(name, count, off, others):
+def test_the_excess_is_a_power_of_the_excursion_usually_the_fourth(name, count, off, others):
     size, *_ = (data := numbers(name)).values()
     curves = {key.partition(" median")[0]: x for key, x in data.items() if "90 %" not in key}
     del curves[next(iter(data))]
@@ -299,8 +300,8 @@ def test_the_tips_of_arms_agree_with_their_joint_angles():
 
 
 @pytest.mark.source("BK 1", "BK 7")
-def test_the_excess_in_a_cell_of_the_atlas_is_that_of_its_hundred_problems():
-    cell = 100 + 4 * 10 + 5  # after the problems along the axis: 81°, 4.95 rad
+def test_the_excess_in_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
+    cell = 100 + 4 * 10 + 5  # 100 cells along the axis come first; this cell has 81° and 4.95 rad
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for name, place in (("median", 49), ("ninety", 89)):
@@ -315,8 +316,8 @@ def test_the_excess_in_a_cell_of_the_atlas_is_that_of_its_hundred_problems():
 
 @pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize("body", body_atlas.BODIES)
-def test_the_excess_in_a_cell_of_the_atlas_of_bodies_is_that_of_its_problems(body):
-    table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # 63°, 3.15 rad
+def test_the_excess_in_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(body):
+    table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # the cell has 63° and 3.15 rad
     data = {name: column[table["body"] == body][cell] for name, column in table.items()}
     assert [data[x] for x in list(data)[1:4]] == pytest.approx([np.radians(63), 3.15, 200])
     ends = body_atlas.body_problems(200, 31).take(slice(200 * cell, 200 * cell + 200))

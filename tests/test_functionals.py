@@ -1,4 +1,4 @@
-"""The functionals against their definitions: variations of the integral, and derivatives."""
+"""Compare the functionals with their definitions: variations of the integral, and derivatives."""
 
 import numpy as np
 import oracles
@@ -58,7 +58,8 @@ def test_the_jacobians_are_the_derivatives_of_their_functions(functional, what):
 @pytest.mark.source("beyond BK 5")
 @pytest.mark.parametrize(("kappa", "same"), [(0, False), (0.5, True), (1, False)])
 def test_the_covariant_jerk_has_the_same_norm_for_the_inverse_motion(kappa, same):
-    """Rᵀ(t) has the body velocity −R w. Only with κ = ½ has its jerk the same norm."""
+    """The inverse motion Rᵀ(t) has the body velocity −R w. Its jerk has the same norm only if κ =
+    ½."""
     w, a, b = np.random.default_rng(4).normal(size=(3, 3))
     here = b + kappa * np.cross(w, a)
     # the derivatives of −R w, rotated back by R, are −w, −a and −(b + w × a)

@@ -136,7 +136,7 @@ def test_parameters_and_results_are_documented(name):
     wanted = set(inspect.signature(function).parameters)
     assert wanted == {one for names in documented for one in names.split(", ")}
     assert "Returns" in text or inspect.signature(function).return_annotation == "None"
-    # one example serves all four
+    # all four functions share one example
     assert "Examples" in text or function.__module__ == "rbcourse.files"
 
 

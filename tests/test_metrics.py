@@ -20,7 +20,7 @@ def assert_close(value, wanted, units=400):
 
 
 @pytest.mark.source("BK (11)", "BK (13)", "BK Prop. 1", "BK 3.1", "BK 3.2")
-def test_the_trace_metric_is_a_sum_of_products_and_invariant_under_rotations_but_not_a_shear():
+def test_the_trace_metric_is_a_sum_of_products_invariant_under_rotations_but_not_under_a_shear():
     for inner, n in ((metrics.inner_gl, 4), (metrics.inner_ga, 4), (metrics.inner_gl, 1)):
         X, Y = RNG.normal(size=(2, 5, n, n))
         by_definition = [np.trace(x.T @ y) for x, y in zip(X, Y, strict=True)]
@@ -63,8 +63,8 @@ def test_the_trace_induces_metrics_of_so3_and_se3_that_are_twice_the_energy_of_a
 @pytest.mark.source("BK (1)", "BK (4)", "BK (5)", "BK (6)", "BK (7)", "BK 2.2", "BK 2.3")
 @pytest.mark.parametrize(("group", "left", "x", "y", "basis"), [ON_SO3, ON_SE3])
 def test_left_invariant_fields_and_metrics_agree_with_their_definitions(group, left, x, y, basis):
-    """A field is its components times the moved basis. A change of frame does not change a
-    metric."""
+    """A field is the sum of its components times the moved basis vectors. A change of frame does
+    not change a metric."""
     X, Y = metrics.tangent_from_components(group, x), metrics.tangent_from_components(group, y)
     assert_close(X, np.einsum("bi,bjk,ikl->bjl", x, group, basis))
     assert_close(metrics.components_from_tangent(group, X), x)

@@ -55,7 +55,8 @@ def test_rotation_and_origin_follow_separate_curves(name):
 
 @pytest.mark.source("beyond BK 9")
 def test_the_centre_of_mass_of_a_body_follows_a_cubic():
-    """Twist and acceleration are those of the body frame, whose origin is not the centre."""
+    """The twist and the acceleration refer to the body frame, whose origin is not the centre of
+    mass."""
     t, (w0, w1, *v) = np.linspace(0, 1, 21), RATES
     A, r = OFF_CENTRE(t), BODY["centre"]
     centre = (A[..., :3, :3] @ r + A[..., :3, 3]).reshape(21, -1)
@@ -79,9 +80,9 @@ def test_the_centre_of_mass_of_a_body_follows_a_cubic():
 
 
 @pytest.mark.source("BK 2.6", "errata 15")
-def test_each_definition_holds_for_screws_and_not_for_geodesics():
+def test_each_definition_of_a_screw_motion_holds_for_screws_and_not_for_geodesics():
     """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, and A' is a left-invariant field.
-    The definitions that are printed without the dot hold for every curve."""
+    The printed definitions lack the dot, and hold for every curve."""
     found, inside = [], TIMES[1:-1]
     for curve in (SCREWS, GEODESICS):
         A, rate = curve(inside), oracles.derivative_by_differences(curve, inside)
@@ -98,7 +99,7 @@ def test_each_definition_holds_for_screws_and_not_for_geodesics():
     assert np.abs(rb.vee_se3(rb.inverse_se3(A) @ rate) - SCREWS.twist).max() < 1e-11
     assert np.array_equal(SCREWS(0, 1), SCREWS.twist)
     a, b, ab = SCREWS([0.2, 0.5, 0.7])
-    assert np.abs(a @ b - ab).max() > 0.1  # A itself is not a subgroup, unless A0 = I
+    assert np.abs(a @ b - ab).max() > 0.1  # A(t) itself is not a subgroup, unless A0 = I
 
 
 @pytest.mark.source("errata 15")

@@ -81,8 +81,8 @@ def test_every_lesson_is_listed_with_its_minutes_and_has_two_questions_for_each_
 
 @every_lesson
 def test_the_figures_in_a_lesson_are_the_stored_ones(path):
-    """The test compares all figures whose captions name files. Pictures in exercises may have no
-    files."""
+    """The test compares all figures whose captions name files. Pictures in exercises need not have
+    stored files."""
     text = path.read_text("utf-8")
     shown = re.findall(BASE64 + r".{0,30}<figcaption>[^<]* <small>(\w+)\.", text)
     assert len(shown) == len(re.findall(r"<small>\w+\.(?:png|gif), ", text))

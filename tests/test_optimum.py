@@ -1,4 +1,4 @@
-"""The optima of two solvers against SciPy's, direct minimisation, and their own equations."""
+"""Compare the optima of two solvers with SciPy, direct minimisation, and their equations."""
 
 import functools
 import re
@@ -235,8 +235,8 @@ def test_problems_without_convergence_raise_alone_and_give_nan_in_stacks_and_mot
 
 
 def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkeypatch):
-    """For the first of three problems, Newton's method is made to fail on all curves except those
-    that turn the other way round."""
+    """For the first of three problems, the test makes Newton's method fail on all curves except
+    those that turn the other way round."""
     real, turns = search._follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
     ends = I3, turns, [0, 0, 1], [1, 0, 0]
     good = rb.minimum_acceleration_so3(*ends)
@@ -283,8 +283,8 @@ def test_ends_with_eight_digits_are_replaced_by_their_nearest_rotations(what):
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
-    """The matrices agree bit by bit, since those made with one number of threads are kept for
-    others."""
+    """The matrices agree bit by bit, because they are computed with one number of threads and then
+    used with all others."""
     found = []
     for threads in (1, 2):
         for kept in (grid, interpolation):

@@ -1,4 +1,4 @@
-"""The search for the cheapest optimum, against closed forms, another optimiser and known costs."""
+"""Compare the cheapest optima found with closed forms, another optimiser and known costs."""
 
 import warnings
 from functools import partial
@@ -17,21 +17,21 @@ from rbcourse.optimum.collocation import cost_of, relax_ball
 from rbcourse.optimum.search import ball
 
 MANY = random_problems(800, 50)
-# The short way costs 3504, and Bézier's curves cost 603 and 553.
+# For these ends the short way costs 3504, and Bézier's curves cost 603 and 553.
 ASTRAY = "-.46787982 1.84514378 2.04665512  -1.84205908 -6.79718364 -1.48113244 "
 ASTRAY += "2.12409307 -7.32863165 -2.12777328"
-KNOWN = {  # the rotation vector, velocities, and moments or accelerations; or a number in `MANY`
+KNOWN = {  # rotation vector, velocities, and moments or accelerations; or an index of `MANY`
     f"ball {ASTRAY}": "502.348",
     f"shooting {ASTRAY}": "502.348",
-    "acceleration 79": "256.965743",  # found from a curve whose torque was lowered first
+    "acceleration 79": "256.965743",  # found from a curve whose torque was reduced first
     "acceleration 654": "359.307210",
-    "torque 565": "615.812105",  # found from a curve whose acceleration was lowered first
-    "torque 177": "314.084507",  # found only after many steps along a valley
+    "torque 565": "615.812105",  # found from a curve whose acceleration was reduced first
+    "torque 177": "314.084507",  # found after many steps in a valley of the cost
     # Other programs found these costs from random starts.
     "torque 2.751 .431 1.014  5.098 -.082 4.558  -5.168 5.805 -4.112  .399 1.031 1.219": "134.51",
     "torque 1.532 1.491 .224  -3.494 7.652 2.381  2.509 5.826 -5.963  .21 .544 .654": "20.98",
     "jerk 0 0 -1.6796  .0478 -1.2536 7.2756  .7923 .2244 6.3072  "
-    # with one turn less, the cost is 34,447
+    # a curve with one turn fewer costs 34,447
     ".0926 -1.1733 13.5431  3.2645 -1.6836 -16.3042": "6350.394",
 }
 SELDOM_FOUND = {  # the least known costs of some of the fast problems of `best`
@@ -39,7 +39,7 @@ SELDOM_FOUND = {  # the least known costs of some of the fast problems of `best`
     "torque": {60 + 16: 2919.2413078, 60 + 27: 2059.4960175},
 }
 TIMES = np.linspace(0, 1, 101)
-OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # for ‖w‖ < 3π
+OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # defined for ‖w‖ < 3π
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
 of_forces = pytest.mark.parametrize("what", ["acceleration", "torque"])
 
@@ -106,8 +106,8 @@ def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
 
 
 @pytest.mark.source("BK 6.2")
-def test_turns_in_either_direction_do_not_cost_less(best):
-    """Newton's method starts from cumulative Bézier curves with four numbers of turns."""
+def test_extra_turns_in_either_direction_do_not_cost_less(best):
+    """Newton's method starts from cumulative Bézier curves with four different numbers of turns."""
     (R0, R1, w0, w1, *_), curves = best["ball"]
     first, last = rb.exp_so3(-w0 / 3), rb.exp_so3(-w1 / 3)
     middle = rb.log_so3(first @ R1 @ last)
@@ -130,7 +130,7 @@ def cost_about_an_axis(angle, k0, k1):
 
 @pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
 def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
-    """A cubic p(t) to σ plus any number of turns is admissible; the optimum costs no more."""
+    """A cubic p(t) may end at σ plus any number of full turns; the optimum costs no more."""
     rng, count = np.random.default_rng(speed), 30 if speed < 30 else 8
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
@@ -189,8 +189,8 @@ def test_tiny_motions_cost_as_much_as_their_cubic(power):
 @pytest.mark.source("beyond BK 1", "beyond BK 4")
 @of_forces
 def test_free_motions_cost_nothing(what):
-    """SciPy integrates Euler's equations. The optimum for the ends is the same motion, at speeds up
-    to 16."""
+    """SciPy integrates Euler's equations, for speeds up to 16. The optimum between the ends of this
+    free motion is the same motion."""
     rng, few = np.random.default_rng(16), [np.diag([1.0, 2, 2.9]), BOOK]
     w = rng.normal(size=(12, 3))
     w *= rng.uniform(3, 16, (12, 1)) / np.linalg.norm(w, axis=1, keepdims=True)
@@ -244,8 +244,8 @@ def test_the_cheapest_known_curve_is_found(case):
 
 
 @pytest.mark.source("beyond BK 5")
-def test_least_jerk_about_one_axis_is_the_best_quintic_of_all_numbers_of_turns():
-    """In half of the problems both accelerations add turns."""
+def test_least_jerk_about_one_axis_is_the_best_quintic_among_all_numbers_of_turns():
+    """In half of the problems, the accelerations at both ends favour extra turns."""
     rng, e = np.random.default_rng(55), np.array([0.6, 0, 0.8])
     angle = np.append(rng.uniform(-np.pi, np.pi, 200), [0.8, -0.6])
     w, a = rng.uniform(-9, 9, (2, 202)), rng.uniform(-20, 20, (2, 202))
@@ -264,7 +264,8 @@ def test_least_jerk_about_one_axis_is_the_best_quintic_of_all_numbers_of_turns()
 
 @pytest.mark.parametrize("moments", [(1, 2.22, 3.18), (0.3, 1, 1.28)])
 def test_the_least_torque_of_a_turn_about_the_largest_moment_may_leave_the_axis(moments):
-    """From rest to rest, a large turn about the axis is a saddle of the torque."""
+    """From rest to rest, a large turn about this axis is a saddle of the integral of squared
+    torque."""
     exact, near, small = (
         rb.minimum_torque_so3(I3, rb.exp_so3(turn), REST, REST, np.diag(moments)).cost
         for turn in ([0, 0, 3.1], [1e-4, 2e-4, 3.1], [0, 0, 1.0])
@@ -288,8 +289,8 @@ def is_the_same_however_rounded(make, R1, rng, count):
 @pytest.mark.parametrize("turn", [110, 140])
 @pytest.mark.parametrize("frame", [I3, rb.exp_so3([0.3, -0.5, 0.2])])
 def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
-    """Both curves start from rest about the axis of the largest moment. A half-turn about this axis
-    carries one curve into the other."""
+    """The goal is a turn about the axis of the largest moment, from rest to rest. A half-turn about
+    this axis carries one curve into the other."""
     G, axis = frame @ BOOK @ frame.T, frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(

@@ -1,4 +1,4 @@
-"""Any duration, and many poses: each leg is compared with the two-point curve itself."""
+"""Test any duration and many poses; each leg is compared with the two-point curve."""
 
 import re
 from functools import partial
@@ -63,7 +63,7 @@ def test_a_chain_meets_its_poses_and_its_joints_are_as_smooth_as_stated(leg, pos
     assert np.abs(c(np.nextafter(TIMES[1:], -9)) - poses[1:]).max() < 200 * EPS
     assert np.abs(c.jumps(0)).max() < 200 * EPS
     assert c([], 1).shape == (0, 3 * c.size - 6)
-    many = RNG.uniform(*c.domain, size=5000)  # more than a block of times
+    many = RNG.uniform(*c.domain, size=5000)  # more times than one block holds
     smooth = {rb.projected_quintic_so3: 2}.get(leg, int(velocities is not None))
     inner = TIMES[1:-1]
     for order in range(3):
@@ -87,7 +87,7 @@ def test_a_chain_meets_its_poses_and_its_joints_are_as_smooth_as_stated(leg, pos
 
 
 @every_leg
-def test_a_chain_rests_between_equal_neighbours(leg):
+def test_a_chain_rests_between_equal_neighbouring_poses(leg):
     poses = own_poses(leg)[[0, 1, 2, 2, 3]]
     poses[3, :3, :3] @= rb.exp_so3([1e-15, 0, 0])
     c = rb.chain(range(5), poses, leg=leg)
@@ -96,11 +96,11 @@ def test_a_chain_rests_between_equal_neighbours(leg):
 
 
 @pytest.mark.parametrize("ratio", [1, 100, 1e4])
-def test_uneven_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(ratio):
-    """Test rates to eps of ‖w‖ and ‖w‖² + ‖w'‖ at the poses, just before them, and in the joints.
+def test_uneven_time_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(ratio):
+    """Check rates to eps of ‖w‖ and ‖w‖² + ‖w'‖ at the poses, just before them, and in the joints.
 
-    The bound, against 60 digits, is the rounding of M, however large, over the sum of its two
-    smallest eigenvalues.
+    The reference has 60 digits. The bound is the rounding error of M, even if M is large, over the
+    sum of its two smallest eigenvalues.
     """
     steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
     times = np.append(0, np.cumsum(steps))
@@ -136,7 +136,7 @@ def test_a_chain_without_velocities_is_the_spline_that_rests_at_its_ends(poses):
 
 
 def test_user_defined_functions_make_legs():
-    """A leg may be a partial function, or make many paths with one rotation.
+    """The function of a leg may be partial, or make many paths with one rotation.
 
     A function that takes an acceleration gets a quintic for the origin; other functions get a
     cubic.
@@ -252,7 +252,7 @@ def test_bad_paths_velocities_times_and_durations_are_refused(function, argument
 
 
 def test_the_error_names_the_leg_that_is_singular_or_not_found():
-    """With the velocities, the cubic through a turn of 2 rad has rank 1 in its middle."""
+    """With these velocities, the cubic M over a turn by 2 rad has rank 1 at its middle."""
     turn = np.array([0, 0, 2.0])
     R = rb.exp_so3([[0, 0, 0], -turn / 2, turn / 2])
     w = -4 / np.tan(1) * np.array([[0, 0, 0], [0, 0, 1], [0, 0, 1]])
@@ -281,14 +281,15 @@ def test_retimed_chains_have_uniformly_scaled_times(duration):
         want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
         assert np.abs(again(t, order) - want).max() <= tolerance * np.abs(want).max()
     assert np.abs(again([start, end]) - c([first, last])).max() < 60 * EPS
-    again = rb.retime(rb.chain(1.3e9 + TIMES, ROTATIONS), 1e-3)  # from epoch times on
+    again = rb.retime(rb.chain(1.3e9 + TIMES, ROTATIONS), 1e-3)  # the times are seconds since 1970
     assert np.abs(again.legs.duration / H * np.ptp(TIMES) / 1e-3 - 1).max() < 1e-5
     assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
     assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
 
 
 def test_the_cost_of_a_chain_whose_velocity_jumps_raises_an_error():
-    """The second chain has a small jump of the angular velocity alone, beside fast motion."""
+    """In the second chain only the angular velocity jumps. The jump is small, and the motion is
+    fast."""
 
     def uneven(R0, R1, w0, w1, duration):
         return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
@@ -321,7 +322,7 @@ def test_a_chain_far_from_the_origin_is_the_same_motion():
 
 
 def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
-    """Equal poses may differ by the rounding of their products, also at the origin of the frame."""
+    """Equal poses may differ by rounding errors of products, also at the origin of the frame."""
     stay = POSES[[0, 1, 1, 2]]
     for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
         seen = frame @ stay
@@ -335,8 +336,8 @@ def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
 
 
 def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
-    """One parabola x(t) passes through the logarithms of the neighbours, for R_i exp(x(t)); another
-    one passes through d. Moved poses have moved velocities."""
+    """One parabola x(t), for R_i exp(x(t)), passes through the logarithms of the neighbours;
+    another parabola passes through d. If the poses are moved, the velocities move with them."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)

@@ -1,4 +1,4 @@
-"""Planar poses, twists and paths, against SciPy's expm, small steps and complex numbers."""
+"""Compare planar poses, twists and paths with SciPy's expm, small steps and complex numbers."""
 
 import re
 
@@ -61,8 +61,8 @@ def test_the_nearest_rotation_replaces_a_matrix_that_is_not_a_rotation():
 
 @pytest.mark.source("RR 3.2")
 def test_the_exponential_agrees_with_that_of_the_matrix_and_with_exp_se3():
-    """For small twists it also agrees with SciPy, whose error grows with the twist, to 5e-14
-    here."""
+    """For small twists it also agrees with SciPy's expm to 5e-14. SciPy's error grows with the
+    twist."""
     ours = planar.exp_planar(TWISTS)
     assert np.array_equal(ours[:, 2], TWISTS[:, 2])
     in_space = np.insert(TWISTS[:, [2, 0, 1]], [0, 0, 3], 0, axis=1)
@@ -78,7 +78,7 @@ def test_the_logarithm_undoes_the_exponential_except_for_full_turns():
     short = TWISTS[np.abs(TWISTS[:, 2]) <= np.pi]
     assert np.abs(planar.log_planar(planar.exp_planar(short)) - short).max() < 32 * EPS
     assert np.array_equal(planar.log_planar([1, 2, 0]), [1, 2, 0])
-    assert np.array_equal(planar.log_planar(short)[:, 2], short[:, 2])  # these include ±π
+    assert np.array_equal(planar.log_planar(short)[:, 2], short[:, 2])  # these angles include ±π
     many = np.array([[1, 2, w] for w in (*(np.arange(-41, 42) * np.pi), 1e6, -2.3e6, 1e15)])
     twists = planar.log_planar(many)
     assert np.abs(twists[:, 2]).max() <= np.pi

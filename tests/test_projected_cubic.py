@@ -1,4 +1,4 @@
-"""Projected cubics and quintics, and the polynomials of which they are projections."""
+"""Projected cubics and quintics, and the polynomials that are projected."""
 
 import numpy as np
 import oracles
@@ -64,7 +64,8 @@ def test_the_end_conditions_hold_to_rounding_and_the_printed_ones_do_not():
 
 
 def test_the_quintic_does_not_have_least_jerk():
-    """About one axis the least jerk is a quintic in the angle, 720 angle² from rest to rest."""
+    """About one axis, the least jerk is that of a quintic in the angle; from rest to rest it costs
+    720 angle²."""
     t = np.linspace(0, 1, 4001)
     for degrees, times in ((20, 1.002), (60, 1.17), (90, 2.31), (120, 11.56)):
         angle = np.radians(degrees)
@@ -75,7 +76,7 @@ def test_the_quintic_does_not_have_least_jerk():
 
 @pytest.mark.source("BK 6.1")
 def test_a_cubic_and_a_quintic_with_the_ends_of_the_projected_line_project_to_it():
-    """Both polynomials are the line times a positive number ρ(t), which the projection ignores."""
+    """Both polynomials are the line times a positive factor ρ(t), which the projection ignores."""
     line = rb.projected_line_so3(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
     ends = [line(t, order) for order in (0, 1, 2) for t in (0, 1)]
     for curve in (rb.projected_cubic_so3(*ends[:4]), rb.projected_quintic_so3(*ends)):
@@ -85,7 +86,8 @@ def test_a_cubic_and_a_quintic_with_the_ends_of_the_projected_line_project_to_it
 
 @pytest.mark.source("BK Prop. 3", "BK Prop. 5")
 def test_moved_and_reversed_ends_give_the_moved_and_reversed_curve():
-    """Ends are moved from both sides. The bound is the documented one, 1e-12 over the margin."""
+    """The ends are multiplied by rotations from both sides. The bound is the documented one, 1e-12
+    over the margin."""
     L, Q = Rotation.random(2, rng=5).as_matrix()
     ends, rates = (L @ R0 @ Q, L @ R1 @ Q), np.array([W0, W1, B0, B1]) @ Q
     for moved, curve, want in (
@@ -107,7 +109,7 @@ def test_the_margin_is_the_least_gap():
 @pytest.mark.parametrize("k", [40, 45, 50, 50.05, 55])
 @pytest.mark.parametrize("k1", [5, 40])
 def test_a_jump_between_the_sampled_times_is_found(k, k1):
-    """Jumps about one axis are at and off the midpoints between 65 sampled times, and between 129.
+    """The curves jump at and off the midpoints between 65 sampled times, and between 129 of them.
 
     The cubic is then a complex number z with z(0) = 1, z'(0) = i k0, z(1) = exp(ia) and z'(1) = i
     k1 exp(ia). With Hermite's basis, z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0
@@ -149,7 +151,8 @@ def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count)
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.source("BK 6")
 def test_the_polynomial_minimises_its_cost(count):
-    """The derivative in the cost is orthogonal to that of any change that keeps the ends."""
+    """The derivative that enters the cost is orthogonal to the same derivative of any change that
+    keeps the ends."""
     ends, order = RNG.normal(size=count), count // 2
     t = (1 + np.cos(np.pi * np.arange(9) / 8)) / 2
     best = Polynomial.fit(t, hermite(ends, t), count - 1).convert().deriv(order)

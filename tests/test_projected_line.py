@@ -18,7 +18,7 @@ def test_theta_and_f_and_their_derivatives_are_the_printed_ones(name, order):
     want = np.vectorize(getattr(oracles, name))(*grid, order)
     off = np.abs(getattr(line, name)(*grid, order) - want)
     scale = np.abs(want)
-    if (name, order) == ("theta", 3):  # a difference, whose error is relative to its terms
+    if (name, order) == ("theta", 3):  # this is a difference; its error is relative to its terms
         scale += 4 * line.theta(*grid, 2) ** 2 / line.theta(*grid, 1)
     assert np.all(off <= (2 * EPS if (name, order) == ("theta", 0) else 8 * EPS * scale + 1e-60))
 
@@ -80,12 +80,12 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
     projected = oracles.exp_so3(w * oracles.theta(x, a))
     holds = I3 + W / a * g2 + (1 - g1) * W @ W / a**2
     assert np.abs(holds - projected).max() < 8 * EPS
-    for unit in (I3, np.ones((3, 3))):  # two readings of a number plus a matrix
+    for unit in (I3, np.ones((3, 3))):  # the printed sum of a number and a matrix has two readings
         printed = I3 + W / a * g2 + (1 - g1) * unit + W @ W / a**2
         assert np.abs(printed - projected).max() > 0.1
     pairs = [(w, printed_eigenvectors(w))]
     along_y, turn = np.array([0, 1.2, 0]), oracles.exp_so3([0, 0.7, 0])
-    with np.errstate(invalid="ignore"):  # not defined along y, where any pair is valid
+    with np.errstate(invalid="ignore"):  # along y they are undefined, and any pair is valid
         assert np.isnan(printed_eigenvectors(along_y)).any(axis=1).all()
     pairs += [(along_y, I3[[0, 2]]), (along_y, I3[[0, 2]] @ turn.T)]
     for w, across in pairs:
@@ -95,7 +95,7 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
 
 
 @pytest.mark.source("BK Prop. 6", "errata 7")
-def test_theta_leaves_the_unit_interval_outside_it_and_is_accurate_far_from_the_line():
+def test_theta_leaves_the_unit_interval_if_t_does_and_is_accurate_far_from_the_line():
     outside = [(-0.5, 1.0), (1.5, 1.0), (1e6, 9.99e-10), (1e10, 9.99e-10), (-1e3, 1e-6), (1e12, 3)]
     want = np.array([oracles.theta(*one) for one in outside])
     off = np.abs(line.theta(*np.transpose(outside)) - want)

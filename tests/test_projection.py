@@ -79,8 +79,8 @@ def test_the_printed_projection_lacks_the_sign_and_the_printed_distance_is_squar
 
 @pytest.mark.source("BK Prop. 3", "BK 4")
 def test_projections_are_invariant_on_both_sides_or_on_the_left_only():
-    """The weighted projection is invariant on both sides if the weight turns. Gram–Schmidt is
-    not."""
+    """The weighted projection is invariant on both sides if the weight is turned, too. The result
+    of Gram–Schmidt is not."""
     rng = np.random.default_rng(3)
     M, L, W = rng.normal(size=(40, 3, 3)), members(3, rng), np.diag([1, 2, 5])
     R, Q = rb.project_so(M), rb.orthonormalize_gram_schmidt(M)
@@ -100,7 +100,7 @@ def test_projections_are_invariant_on_both_sides_or_on_the_left_only():
 def test_the_weighted_projection_is_the_nearest_in_its_own_metric(n):
     """Condition numbers are up to 1e6, and ranks include 1 (a rod) and n − 1 (a flat body).
 
-    Points of a flat body that a rotation has moved determine the rotation.
+    The moved points of a flat body determine the rotation.
     """
     rng = np.random.default_rng(n)
     sizes = 10.0 ** rng.uniform(-3, 3, size=(1000, n))
@@ -166,7 +166,7 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
 
 @pytest.mark.source("BK 5", "BK Prop. 4", "BK Prop. 5", "RR 1.6", "errata 16")
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_the_nearest_pose_is_the_nearest_and_keeps_the_translation(n):
+def test_the_projected_pose_is_the_nearest_one_and_keeps_the_translation(n):
     """The projection is invariant under poses on the left, but only under rotations on the right.
 
     tr(AᵀA) is n + 1 + dᵀd. The paper prints 4 + dᵀd.
@@ -211,7 +211,7 @@ def test_membership_allows_defects_up_to_1e_9_or_atol():
     assert np.array_equal(is_unit(np.outer([1.009, 1.011], np.eye(4)[0]), 0.01), [True, False])
     for share, passes in ((0.98, True), (1.02, False)):
         longer = 1 + share * 1e-9
-        # the determinant is 1, and MᵀM has the wanted defect
+        # M has the determinant 1, and MᵀM has the wanted defect
         stretched = np.diag([longer**0.5, 1 / longer**0.5, 1])
         assert is_so(stretched) == passes
         assert is_se(rb.pose_from_components(stretched, [1, 2, 3])) == passes

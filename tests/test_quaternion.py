@@ -51,7 +51,7 @@ def test_q_and_minus_q_have_one_canonical_form_and_half_turns_are_recognised_up_
         assert np.abs(np.abs(one) - np.abs(q)).max() < 4 * EPS
         assert np.all(one[:, 0] >= 0)
     for off, first in [(0, True), (1e-9, True), (-1e-9, True), (1e-7, False)]:
-        # of two largest components, the first decides
+        # if two components are largest, the first one decides
         q = rb.project_quaternion([0, -1, 1 + off, 0.3])
         assert (canonical_quaternion(q)[1] > 0) is np.bool_(first)
     for off in (1e-9, 1e-12, 1e-14):
@@ -62,7 +62,7 @@ def test_q_and_minus_q_have_one_canonical_form_and_half_turns_are_recognised_up_
 
 @pytest.mark.source("BK Remark 7")
 def test_slerps_agree_with_the_arcs_of_mpmath_and_the_formula_of_the_paper():
-    """The long way ends at −q1: its arc in R⁴ is longer than a quarter circle."""
+    """The long way ends at −q1; its arc in R⁴ is longer than a quarter circle."""
     for start in (RANDOM[0], ONE):
         for turn in awkward.quaternions()[::7]:
             goal = rb.quaternion_multiply(start, turn)
@@ -89,8 +89,8 @@ def test_slerps_agree_with_the_arcs_of_mpmath_and_the_formula_of_the_paper():
 
 
 def test_slerps_are_accurate_near_their_singular_sets():
-    """The singular sets are equal rotations and half-turns. Between half-turns, q1 decides on the
-    arc, and only rounding errors count as a half-turn."""
+    """The singular sets are equal rotations and half-turns. If the rotations differ by a half-turn,
+    up to rounding errors only, the sign of q1 selects the arc."""
     near = rb.slerp(ONE, [1, 1e-12, 0, 0], 0.25)
     assert abs(near[1] / 0.25e-12 - 1) < 4 * EPS
     for goal in (ONE, -ONE, [1, 1e-17, 0, 0]):

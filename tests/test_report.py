@@ -182,7 +182,7 @@ def edges_of(figure):
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7", "RR 4.3", "RR Fig. 8", "RR Fig. 9")
 @pytest.mark.parametrize(("states", "pale"), [(1, [0]), (12, [0, 2, 4, 7, 9, 11])])
 def test_paths_of_bodies_and_arms_are_drawn(states, pale):
-    """At most six states are pale; the last state is drawn over them."""
+    """At most six states are drawn pale; the last state is drawn over them."""
     path, arm_path = PATH[:states], ARM_PATH[:states]
     figure, animation = rr.visualize_path(path)
     arm, arm_animation = rr.visualize_arm_path(arm_path)
@@ -207,7 +207,8 @@ def test_paths_of_bodies_and_arms_are_drawn(states, pale):
 
 
 def test_the_animation_of_a_long_path_has_forty_frames_and_a_small_file(tmp_path):
-    """The path covers the plane. The file of a hundred random rotations is small, too."""
+    """The path covers the plane. The animation of a hundred random rotations has a small file,
+    too."""
     t = np.linspace(0, 1, 10_000)
     path = np.transpose([1.3 * np.cos(716.9 * t), np.sin(245.86 * t), 50 * t])
     figure, animation = rr.visualize_path(path)

@@ -45,7 +45,7 @@ EXTRAS = {  # extras of rbcourse and of rbcourse-classroom, by the list that con
 
 
 def ranges_of(name):
-    """Return the requirements behind a list: dependencies, and extras."""
+    """Return the requirements from which a list is made: dependencies, and extras."""
     wanted = []
     for project, extras in zip((PROJECT, CLASSROOM), EXTRAS[name], strict=True):
         wanted += project["dependencies"] if name == "environment.txt" else []
@@ -383,7 +383,7 @@ def test_every_task_is_listed_in_the_readme_or_in_contributing():
 
 
 def test_the_tests_that_contributing_names_exist():
-    """A row of the table of promises has a test, or says how to look."""
+    """Each row of the table of promises names a test, or a check by hand."""
     named = re.findall(r"`([\w/]+\.py)::(\w+)`", read("CONTRIBUTING.md"))
     assert len(named) > 25
     for file, test in named:
@@ -424,7 +424,7 @@ NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "
 NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
-IMPORTED = {  # the installed requirements, and the modules that need more
+IMPORTED = {  # requirements that are installed, and modules that need further ones
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),
@@ -434,7 +434,7 @@ IMPORTED = {  # the installed requirements, and the modules that need more
 
 @pytest.mark.parametrize("case", IMPORTED)
 def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_path, case):
-    """The environment has nothing else: links to the distributions, and the wheels.
+    """The environment has links to these distributions, the wheels, and nothing else.
 
     The example in the README runs with NumPy and SciPy alone.
     """

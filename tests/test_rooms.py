@@ -1,4 +1,4 @@
-"""Imports between the parts: one direction, no cycles, exported names only, at first only NumPy."""
+"""Imports go in one direction without cycles, use exported names, and at first load only NumPy."""
 
 import ast
 import importlib
@@ -20,7 +20,7 @@ PACKAGES = {
     name: Path(package.__file__).parent
     for name, package in {"rbcourse": rbcourse, "rbclassroom": rbclassroom}.items()
 }
-MAY_IMPORT = {  # the parts, apart from itself, that a part of the packages may import
+MAY_IMPORT = {  # the other parts that a part of the packages may import
     "rbcourse": set(),
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},
@@ -33,7 +33,7 @@ MAY_IMPORT = {  # the parts, apart from itself, that a part of the packages may 
         "rbclassroom.figures",
     },
     "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
-    "rbclassroom.course": {"rbclassroom"},  # not even the mathematics
+    "rbclassroom.course": {"rbclassroom"},  # this part does not import the mathematics either
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbclassroom.course", "rbcourse.draw"},
     "rbclassroom.live": {"rbclassroom.assignments"},
@@ -77,8 +77,8 @@ def part(module):
 
 
 def imports(module, path, known):
-    """Return the modules of the packages and the libraries that a module imports, also in
-    functions."""
+    """Return all modules of the packages, and all libraries, that a module or its functions
+    import."""
     inner, outer = set(), set()
     here = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -108,7 +108,7 @@ def faults(packages):
         inner, outer = imports(module, path, known)
         graph[module], own = inner - {module}, part(module)
         for other in sorted(inner):
-            top = other == "rbcourse" and module != other  # an import of all of the mathematics
+            top = other == "rbcourse" and module != other  # this imports all of the mathematics
             if part(other) not in {own, *MAY_IMPORT[own]} or (own == "rbcourse" and top):
                 yield f"{module} imports {other}"
         libraries = LIBRARIES["rbcourse"] | LIBRARIES[own] | set(sys.stdlib_module_names)

@@ -109,7 +109,7 @@ def test_bad_arguments_are_refused():
 
 
 def test_other_processors_draw_the_same_to_rounding():
-    """NumPy is told not to use the instructions that make its tangent fast."""
+    """In this test, NumPy does not use the instructions that make its tangent fast."""
     code = "import rbcourse as rb; print(*map(float, rb.sample_rotation(300, rng=8).ravel()))"
     slow = os.environ | {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
     done = subprocess.run(
@@ -165,7 +165,8 @@ def test_naive_draws_and_deliberate_errors_are_detected():
 
 
 def test_the_distribution_of_the_angle_is_the_area_of_a_cap_of_the_sphere_of_quaternions():
-    """The integral is (a − sin a)/π. Its relative accuracy is a few eps/a², or that of a³/(6π)."""
+    """The integral is (a − sin a)/π. Its relative error is a few eps/a², or the error of
+    a³/(6π)."""
     for a in (0.1, 1.0, 2.5, np.pi):
         cap, _ = quad(lambda u: np.sin(u) ** 2, 0, a / 2)
         assert angle_law(a) == pytest.approx(cap / (np.pi / 4), rel=1e-12)

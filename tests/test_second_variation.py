@@ -44,7 +44,7 @@ def upright(what, angle):
 
 
 def hessian(curve, count=16, nodes=41, h=2e-2):
-    """Return the eigenvalues of the second variation for turns η of the nodes, over ∫ ‖η⁽ᵏ⁾‖².
+    """Return eigenvalues of the second variation for turns η of the nodes, relative to ∫ ‖η⁽ᵏ⁾‖².
 
     The second differences use only values of R exp(η̂) at the nodes.
     """
@@ -80,8 +80,8 @@ def test_the_second_differences_are_right_for_a_curve_at_rest():
 
 
 def test_the_constants_of_the_lemma_are_right():
-    """The constants bound η, clamped at both ends, by ∫ ‖η''‖², as Rayleigh quotients of
-    polynomials."""
+    """The constants bound η, clamped at both ends, by ∫ ‖η''‖². They are computed as Rayleigh
+    quotients of polynomials."""
     nodes = grid(129)
     weights = nodes.integral[-1]
     eta, rate = polynomials(40, 2, 129)[:2]
@@ -95,7 +95,8 @@ def test_the_constants_of_the_lemma_are_right():
 
 
 def test_the_second_variation_satisfies_the_bound_of_the_lemma():
-    """Test 500 optima by the spectrum of the second variation on polynomials, over ∫ ‖D²η‖²."""
+    """Test the spectra of the second variations of 500 optima, on polynomials, relative to ∫
+    ‖D²η‖²."""
     nodes = grid(65)
     weights = nodes.integral[-1]
     eta, rate, bend = (
@@ -139,8 +140,8 @@ MINIMA = [
 
 @pytest.mark.parametrize(("what", "degrees"), SADDLES)
 def test_a_saddle_is_not_a_local_minimum(what, degrees):
-    """Turns about an axis from rest to rest are saddles: some turns of the nodes lower their
-    costs."""
+    """These turns about an axis from rest to rest are saddles: some turns of the nodes reduce the
+    cost."""
     curve = upright(what, np.radians(degrees))
     assert curve.converged.all()
     assert hessian(curve[0])[0] < -1e-5

@@ -47,7 +47,8 @@ def test_exp_and_log_agree_with_mpmath_and_are_inverse():
 
 
 def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
-    """About the axis, (1 − cos a)/a and (sin a)/a vanish, and n̂² + I is n nᵀ."""
+    """For huge angles a, (1 − cos a)/a and (sin a)/a vanish in the Jacobian, and n̂² + I is n
+    nᵀ."""
     n = awkward.UNIT_AXES[3]
     for length in (1e16, 1e154, 1e160, 1.7e308):
         R, J = rb.exp_so3(length * n), rb.right_jacobian_so3(length * n)
@@ -75,7 +76,7 @@ def test_the_printed_exponential_at_R_has_its_vector_outside_the_exponent():
 
 
 @pytest.mark.source("BK 2.5", "BK (1)")
-def test_the_jacobian_is_its_integral_maps_rates_to_velocities_and_has_an_inverse():
+def test_the_jacobian_equals_its_integral_maps_rates_to_velocities_and_has_an_inverse():
     """The inverse is huge near a full turn."""
     vectors = VECTORS[np.linalg.norm(VECTORS, axis=1) > 1e-13][::23]
     for w in [*vectors, [4, -3, 2]]:

@@ -32,7 +32,8 @@ every_spline = pytest.mark.parametrize("name", NATURAL)
 
 
 def path(count, degrees, seed, ratio=3.0):
-    """Return times and rotations; each leg has a new axis, and durations are within a ratio."""
+    """Return times and rotations; each leg has a new axis, and durations differ by at most the
+    factor `ratio`."""
     rng = np.random.default_rng([511, seed])
     axes = rng.normal(size=(count - 1, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
@@ -157,7 +158,7 @@ def test_the_optimum_about_one_axis_is_the_cubic_spline_of_the_angle(ends, size)
 
 
 def test_the_optimal_spline_through_samples_of_an_optimum_is_that_optimum():
-    """The inner samples change nothing."""
+    """Passing through the inner samples does not change the optimum."""
     _, (R0, R1) = path(2, 100, 6)
     w0, w1 = 2 * np.random.default_rng(7).normal(size=(2, 3))
     one = rb.minimum_acceleration_so3(R0, R1, w0, w1)
@@ -261,8 +262,8 @@ def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio)
 
 @pytest.mark.parametrize("seed", [2, 3, 9])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
-def test_large_turns_in_uneven_times_are_found_from_cheaper_curves(ends, seed):
-    """Plain Newton's method meets systems that are not positive definite in these problems."""
+def test_splines_of_large_turns_at_uneven_times_are_found_from_cheaper_curves(ends, seed):
+    """In these problems, plain Newton's method meets systems that are not positive definite."""
     t, R = path(10, 120, [10, seed], ratio=10)
     for name, make in (("optimum", None), ("torque", torque)):
         c = NATURAL[name](t, R, ends)
@@ -330,8 +331,9 @@ def test_the_certificate_needs_a_definite_system_and_legs_that_are_minima():
 
 @pytest.mark.parametrize("degrees", [120, 150])
 @pytest.mark.parametrize(("name", "power"), [("of a body", 1), ("torque", 2)])
-def test_a_body_leaves_the_axis_of_its_poses_where_that_costs_less(name, power, degrees):
-    """There and back about axis 3, from rest to rest; the cubics about the axis are stationary."""
+def test_a_body_leaves_the_axis_of_its_poses_if_this_costs_less(name, power, degrees):
+    """The poses turn there and back about axis 3, from rest to rest. The cubics about this axis are
+    stationary."""
     rest, angle = np.zeros(3), np.radians(degrees)
     R = rb.exp_so3([[0, 0, 0], [0, 0, angle], [0, 0, 0]])
     c = NATURAL[name]([0, 1, 2], R, (rest, rest))
@@ -340,8 +342,9 @@ def test_a_body_leaves_the_axis_of_its_poses_where_that_costs_less(name, power, 
     assert c.cost < 0.9999 * 2 * 12 * angle**2 * BOOK[2, 2] ** power
 
 
-def test_a_family_of_curves_of_one_cost_is_not_called_definite():
-    """For a plate, each curve that leaves its axis can be turned about this axis."""
+def test_a_family_of_curves_of_equal_cost_is_not_reported_as_definite():
+    """For a plate, each curve that leaves its axis can be turned about this axis at the same
+    cost."""
     rest, plate = np.zeros(3), np.diag([1, 1, 1.9])
     R = rb.exp_so3([[0, 0, 0], [0, 0, 2.0], [0, 0, 0]])
     c = rb.minimum_torque_spline_so3([0, 1, 2], R, (rest, rest), inertia=plate)
@@ -350,7 +353,8 @@ def test_a_family_of_curves_of_one_cost_is_not_called_definite():
 
 
 def test_a_saddle_is_not_returned_as_a_minimum():
-    """The long way there and the long way back: a curve about one axis, and a ball."""
+    """A ball takes the long way there and the long way back. The stationary curve about one axis is
+    a saddle."""
     R = rb.exp_so3([[0, 0, 0], [0, 0, 1.0], [0, 0, 0]])
     with pytest.raises(rb.ConvergenceError, match=r"only a saddle was found$"):
         rb.minimum_acceleration_spline_so3([0, 1, 2], R, long=True)
@@ -378,7 +382,7 @@ def test_bad_choices_of_the_long_way_are_refused(long):
 
 
 def test_very_uneven_times_give_a_minimum_or_an_error():
-    """The short legs are a thousand times shorter, but turn by the same angle."""
+    """The short legs last a thousandth of the time of the others, but turn by the same angle."""
     t = np.array([0, 1, 1.001, 2, 2.001, 3])
     _, R = path(6, 150, 17)
     try:

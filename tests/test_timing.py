@@ -1,4 +1,4 @@
-"""The fastest timing: formulas, other programs' optima, limits at many times, symmetries."""
+"""Check the fastest timing by formulas, other programs, limits at many times, and symmetries."""
 
 import re
 from itertools import pairwise
@@ -177,7 +177,7 @@ def test_limits_hold_and_one_limit_is_reached_at_nearly_all_times(name):
         assert max(share for share, _ in largest.values()) == pytest.approx(used.max(), abs=1e-4)
 
 
-def test_the_used_shares_are_those_of_torque_force_and_a_point_of_the_body():
+def test_the_used_shares_agree_with_the_torque_the_force_and_a_point_of_the_body():
     c, r, g = random_chain(4), np.array([0.2, -0.1, 0.4]), np.array([1.0, 2, -9])
     t = np.linspace(0.2, 0.8, 7) * c.times[1]
     V, A, R = c(t, 1), c(t, 2), c(t)[:, :3, :3]
@@ -208,11 +208,11 @@ def test_the_used_shares_are_those_of_torque_force_and_a_point_of_the_body():
 
 @pytest.mark.parametrize("name", SETS)
 def test_the_least_time_has_the_symmetries_of_the_problem(name):
-    """The path is moved, reversed, or has other times or another unit of length; then the limits
-    are faster."""
+    """The path is moved or reversed, or its times or its unit of length are changed. Finally all
+    limits are scaled to a faster motion."""
     c, limits = random_chain(7), SETS[name]
     t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
-    turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # about the vertical
+    turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # this pose turns about the vertical
     metres = ("speed", "acceleration", "force", "gravity", "centre")
 
     def longer(unit):
@@ -244,7 +244,7 @@ def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size)
     there = timed.times[np.searchsorted(timed.s, c.times)]
     assert np.abs(timed(there) - c(c.times)).max() < 1e-14
     assert timed.progress(timed.domain)[0] == pytest.approx(c.domain)
-    t = (timed.times[1:-1:50] + timed.times[2::50])[3:-3] / 2  # inside cells
+    t = (timed.times[1:-1:50] + timed.times[2::50])[3:-3] / 2  # these times are inside cells
     for order in range(2, 4 if size == 3 else 2):
         slope = oracles.derivative_by_differences(lambda t, k=order: timed(t, k - 1), t, 1e-4)
         np.testing.assert_allclose(timed(t, order)[:, :3], slope[:, :3], atol=1e-7)
@@ -261,7 +261,7 @@ def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size)
         rb.acceleration_cost(timed)
 
 
-def test_a_share_that_lasts_is_returned_with_its_first_time():
+def test_a_share_that_is_constant_for_a_while_is_returned_with_its_first_time():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 

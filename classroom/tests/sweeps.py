@@ -16,9 +16,10 @@ def made(name):
 
 
 def sweep(name, **base):
-    """Set each setting on top of these values; yield values and texts if there is a picture.
+    """Apply each setting to the start values and `base`; yield values and texts of each picture.
 
-    At every setting an explorer shows values or states why not, and no number is "nan" or "-0".
+    Check that the explorer shows values, or the reason for having none, at every setting, and that
+    no number is "nan" or "-0".
     """
     explorer = made(name)
     explorer.restart()
@@ -33,8 +34,8 @@ def sweep(name, **base):
 
 
 def settings(explorer):
-    """Yield each control at five places of its range, then all at extremes, each pair in all
-    ways."""
+    """Yield settings: each control alone at five places of its range, then all controls at
+    extremes, so that each pair takes all combinations."""
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)

@@ -83,7 +83,7 @@ def pixels(picture):
 
 
 def full(fig, artists, dpi):
-    """Return a figure as Matplotlib draws it, all at once."""
+    """Return the picture of a figure whose artists Matplotlib draws in a single pass."""
     for artist in artists:
         artist.set_animated(False)
     fig.savefig(content := io.BytesIO(), format="png", dpi=dpi)

@@ -1,4 +1,4 @@
-"""Arms are drawn where the path says, and their descriptions state its numbers."""
+"""Arms are drawn at the angles of the path, and the descriptions state its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -24,7 +24,8 @@ def ends(q, lengths=(2, 1.5)):
 
 
 def off(found, wanted):
-    """Return the largest distance of places (of a line, pairs, or complex numbers) from others."""
+    """Return the largest distance between found and wanted places: lines, pairs, complex
+    numbers."""
     pairs = np.transpose(found.get_data()) if hasattr(found, "get_data") else np.array(found)
     return np.abs((pairs if np.iscomplexobj(pairs) else pairs @ [1, 1j]) - wanted).max()
 
@@ -105,7 +106,7 @@ def test_arms_move_and_their_paths_are_drawn_in_the_room_and_in_the_plane_of_the
         assert off(line, ends(PATH[i])) < 1e-14  # the pale arms
 
 
-def test_descriptions_state_numbers():
+def test_descriptions_state_the_drawn_numbers():
     tips, steps = np.array([ends(q)[-1] for q in PATH]), np.diff(PATH, axis=0)
     covered, (first, second) = np.abs(np.diff(tips)).sum(), np.degrees(np.abs(steps).sum(axis=0))
     said = arm.describe_arm(PATH) + arm.describe_arm(np.zeros((1, 2)), [1e-3, 1000])

@@ -1,4 +1,4 @@
-"""Bodies and frames are drawn where the poses are."""
+"""Bodies and frames are drawn at the given poses."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -21,7 +21,7 @@ def axes():
 
 
 def off(box, pose, in_body):
-    """Return the largest distance of the corners of a box from those of a box in this pose."""
+    """Return the largest distance of a corner of a drawn box from its place in this pose."""
     return np.abs(box.corners - (in_body @ pose[:3, :3].T + pose[:3, 3])).max()
 
 
@@ -79,7 +79,7 @@ def test_paths_are_drawn_with_the_frame_at_the_start_and_at_each_different_end(a
 
 
 @pytest.mark.parametrize("view", [(18, -22), (32, -65), (60, 140)])
-def test_names_of_axes_are_beyond_the_numbers_and_apart_from_all_texts(view, axes):
+def test_names_of_axes_are_outside_the_tick_numbers_and_overlap_no_text(view, axes):
     ax, places = axes[0], np.array([[0, 0, 0], [8, 10, 12.0]])
     ax.figure.set_size_inches(13, 5)
     bodies.set_space(ax, places, 2.0, view)
@@ -95,7 +95,7 @@ def test_names_of_axes_are_beyond_the_numbers_and_apart_from_all_texts(view, axe
     assert at[words.index("y (m)"), 0] > high[0] + numbers
 
 
-def test_letters_of_a_frame_are_beyond_its_arrows(axes):
+def test_letters_of_a_frame_are_beyond_the_tips_of_its_arrows(axes):
     R, origin = A1[:3, :3], A1[:3, 3]
     bodies.draw_triad(axes[0], origin, R, "M")
     for text, direction in zip(axes[0].texts, R.T, strict=True):
@@ -104,8 +104,8 @@ def test_letters_of_a_frame_are_beyond_its_arrows(axes):
         assert beyond @ direction > 1.1
 
 
-def test_descriptions_state_numbers():
-    # the maximum is at 1/3; of the six times, the largest value is at 0.4
+def test_descriptions_state_the_drawn_numbers():
+    # the maximum is at 1/3, but at the six given times the largest value is at 0.4
     bump = 4 * TIMES * (1 - TIMES) ** 2
     turns = rb.exp_so3(np.radians(50) * np.outer(bump, [0, 0.6, 0.8]))
     tilted = rb.pose_from_components(turns, [0, 0, 0])

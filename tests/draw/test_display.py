@@ -1,4 +1,4 @@
-"""Display lists: when unpacked, they are the drawn polygons in their places and colours."""
+"""A display list, when unpacked, gives the drawn polygons with their places and colours."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -75,7 +75,7 @@ def test_a_marker_is_stored_once_and_drawn_at_each_point(ax):
 
 
 @pytest.mark.parametrize("width", [3, 15])
-def test_lines_that_leave_the_picture_keep_their_slope_and_far_places_stay_on_their_side(ax, width):
+def test_lines_that_leave_the_picture_keep_their_slope_and_far_corners_stay_outside(ax, width):
     ax.figure.set_size_inches(width, 4)
     (line,) = ax.plot([0, 5], [0, 5])
     patch = ax.add_patch(Rectangle((-1e6, 0), 2e6, 1e6))
@@ -96,7 +96,7 @@ def test_figures_that_are_too_large_are_refused(ax):
 
 
 def test_faces_are_recorded_at_their_places_and_those_without_area_as_edges(ax):
-    """In the browser, the plane of a face without area would not separate anything."""
+    """A face without area has no plane by which the browser could order the other parts."""
     space = ax.figure.add_subplot(projection="space")
     space.fit(np.full(3, -1.5), np.full(3, 4.5))
     cube, sight = bodies.draw_box(space, np.eye(4), 1.0), space.sight()

@@ -1,4 +1,4 @@
-"""Rectangles are drawn where the path says, and their descriptions state its numbers."""
+"""Rectangles are drawn at the poses of the path, and the descriptions state its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,7 +22,7 @@ def way_of(line):
 
 
 def assert_body(outline, nose, pose, length):
-    """Check that the body is in this pose, and in the picture."""
+    """Check that the body is drawn in this pose, inside the picture."""
     A, ax = rb.planar.matrix_from_planar(pose), outline.axes
     ahead = A @ [length / 2, 0, 1]  # the nose is ahead of the centre, as the lesson says
     assert np.abs(way_of(nose)[1] - ahead[:2]).max() < 1e-14

@@ -20,7 +20,7 @@ def saved(folder, monkeypatch, alt="a line"):
     return save.save_figure(fig, "line", TABLE, alt)
 
 
-def test_picture_document_and_numbers_have_the_same_bytes_each_time(tmp_path, monkeypatch):
+def test_the_png_pdf_and_csv_have_the_same_bytes_each_time(tmp_path, monkeypatch):
     picture, _ = (saved(tmp_path / folder, monkeypatch) for folder in "ab")
     files, again = ({f.name: f.read_bytes() for f in (tmp_path / x).iterdir()} for x in "ab")
     assert set(files) == {"line.png", "line.pdf", "line.csv"}
@@ -31,7 +31,7 @@ def test_picture_document_and_numbers_have_the_same_bytes_each_time(tmp_path, mo
 
 
 def seen(colour, matrix):
-    """Return a colour as CIE Lab for an eye whose deficiency is a matrix on linear RGB."""
+    """Return a colour in CIE Lab as an eye sees it; the matrix acts on linear RGB."""
     channels = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750]]
@@ -51,15 +51,16 @@ EYES = {
 
 @pytest.mark.parametrize("eye", EYES)
 def test_colours_can_be_distinguished_by_all_eyes(eye):
-    """The full deficiencies are those of Machado, Oliveira and Fernandes 2009; the difference is
-    CIE76."""
+    """The matrices of complete deficiencies are from Machado, Oliveira and Fernandes 2009. The
+    colour difference is CIE76."""
     matrix = np.array(EYES[eye].split(), dtype=float).reshape(3, 3)
     for one, other in combinations(save.COLOURS.values(), 2):
         assert np.linalg.norm(seen(one, matrix) - seen(other, matrix)) > 16.9, (one, other)
 
 
 def test_all_colours_have_a_contrast_of_3_on_white():
-    """The contrast is that of WCAG 2 for graphical objects. The Y of Lab is the luminance."""
+    """WCAG 2 requires this contrast for graphical objects. The luminance is computed from L of
+    Lab."""
     for colour in [*save.COLOURS.values(), save.PALE]:
         lightness, *_ = seen(colour, np.eye(3))
         luminance = max((lightness + 16) / 116, 6 / 29) ** 3

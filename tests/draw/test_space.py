@@ -103,7 +103,7 @@ def sampled(part):
 
 
 def covers(face, places, sight):
-    """Return which places overlap a face, or the disc of a ball, in the view."""
+    """Return a mask of the places that overlap a face, or the disc of a ball, in the view."""
     corners = sight.flat(face.places)
     (x, y), to = (np.roll(corners, -1, axis=0) - corners).T, sight.flat(places)[:, None] - corners
     if face.kind == "ball":
@@ -133,7 +133,7 @@ def test_each_part_is_drawn_before_the_faces_that_hide_it(ax, make):
 
 def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     bodies.draw_box(ax, np.eye(4), 0.5)
-    # the line goes there and comes back
+    # the line has two segments, to the right and back to the left
     corners = np.array([[-1, 0.1, 0.05], [1, 0.1, 0], [-1, -0.1, -0.05]])
     ax.plot(*corners.T, ls="--", lw=3)
     parts, sight = drawn(ax)
@@ -169,7 +169,7 @@ def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
 
 
 def test_bodies_that_pass_through_each_other_have_an_outline_where_they_meet(ax):
-    """The corner of a cube is inside another cube: six lines meet at their ends."""
+    """A corner of one cube is inside the other cube, so six lines meet at their ends."""
     corners, apart = bodies.draw_box(ax, np.eye(4), 1.0).corners[:6], np.array([0.4, 0.3, 0.2])
     ax.artists[0].remove()
     cube, other = (ax.add_artist(space.Faces(c, 6 * ["0.9"])) for c in (corners, corners + apart))
@@ -254,7 +254,7 @@ def test_artists_and_legends_are_drawn_once_and_hidden_axes_are_not_drawn(ax):
     ax.figure.savefig(content := io.BytesIO(), dpi=100)
     assert line.get_visible()
     picture = np.asarray(Image.open(content).convert("RGB"), dtype=int)
-    # drawn twice, the value would be 64
+    # if the artist were drawn twice, the value would be 64
     assert picture[200:, :, 1].min() == pytest.approx(127, abs=2)
     assert (picture[:100] < 100).all(axis=-1).any()  # the letters of the legend
     ax.set_visible(False)

@@ -31,7 +31,7 @@ def release(tmp_path_factory):
 
 
 def answered(release, edit=None, **answers):
-    """Return the set with the right answers, or with given ones instead, after an edit."""
+    """Return the set with the right answers, except for the given ones, after an optional edit."""
     notebook = nbformat.reads(release, as_version=4)
     given = {f"{key}-answer": text for key, text in answers.items()}
     notebook.metadata.kernelspec.name = "mine"
@@ -87,7 +87,7 @@ def test_an_answered_set_is_run_and_written_without_nbgrader(hand_in):
     assert last.endswith("ps0.ipynb")
     assert submitted(path).cells[-1].outputs[0].text == "é∞ 1\n"
     assert submitted(path).metadata.kernelspec.name == "python3"
-    # the output widget does not keep the output for itself
+    # the output widget must not swallow the output
     assert cell(submitted(path), "half-answer").outputs[0].text == "inside\n"
     assert path.read_bytes() == before
     names = sorted(file.name for file in path.parent.rglob("*.*"))
@@ -116,7 +116,7 @@ def test_faults_are_named_and_the_file_can_still_be_handed_in(hand_in, capsys, m
         assert words in said
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
     slow = "took more than half of the 30 s that grading allows"
-    assert said.count(slow) == 6  # for each cell with code, since the clock jumps
+    assert said.count(slow) == 6  # the clock jumps, so each cell with code is reported
     assert BoxedExecute().timeout == signature(check.check).parameters["seconds"].default == 30
     assert not (path.parent / "made_by_a_run").exists()
 
@@ -125,7 +125,7 @@ def test_faults_are_named_and_the_file_can_still_be_handed_in(hand_in, capsys, m
 def endless(monkeypatch, tmp_path):
     """Return a function that limits only one cell: ``endless(name, patience)``.
 
-    The limit begins with the endless loop of the cell, when it has run the code that is returned.
+    The limit begins when the cell has run the returned code, which stands before its endless loop.
     """
 
     def begin(name, patience):
@@ -248,7 +248,8 @@ TEST = "cell 4, test of “A tiny set”"
 )
 def test_locked_cells_are_restored_and_answers_are_kept(release, edit, said):
     original, notebook = nbformat.reads(release, as_version=4), answered(release, edit)
-    there = {grade_id(each): each.source for each in notebook.cells}  # of copies, the last one
+    # of several copies, the last one counts
+    there = {grade_id(each): each.source for each in notebook.cells}
     given = restore(notebook, original)
     nbformat.validate(notebook)
     assert all(map(str.__contains__, given, said))

@@ -1,5 +1,4 @@
-"""The collection of downloads from Moodle and Canvas, at the place where nbgrader looks for
-them."""
+"""Downloads from Moodle and Canvas are collected into the folder that nbgrader reads."""
 
 import csv
 import io
@@ -249,7 +248,7 @@ def test_all_files_in_the_zip_of_a_student_belong_to_the_student(course, inner):
     for given in ({"all.zip": packed(theirs)}, theirs):
         collected(course, given)
         assert list(files(course)) == ["ann_ay/ps1"]
-        # the entries of a student's zip have the dates of the student's machine
+        # the entries of a student's zip have dates from the student's machine
         assert "2030" not in (course / "submitted/ann_ay/ps1/timestamp.txt").read_text()
 
 
@@ -303,7 +302,7 @@ def test_the_last_of_several_uploads_to_canvas_is_taken_whatever_its_date(course
     assert len(of("duplicates", rows)) == 2
 
 
-def test_only_newer_downloads_replace_files_and_corrected_files_are_kept(course):
+def test_only_newer_downloads_replace_files_and_files_corrected_by_hand_are_kept(course):
     name, two = moodle("A_1"), answered(course, "", "ps2")
     first = {"a.zip": packed({name: answered(course, "new")}, LATER), "b_2_3_ps2.ipynb": two}
     assert len(of("collected", collected(course, first))) == 2
@@ -315,9 +314,9 @@ def test_only_newer_downloads_replace_files_and_corrected_files_are_kept(course)
     rows = collected(course, {"b.zip": packed({name: answered(course, "newest")}, NEWEST)})
     assert "replaces" in of("collected", rows)[0][1]
     assert files(course)["a/ps1"] == "newest"
-    (course / "submitted/a/ps1/ps1.ipynb").write_bytes(answered(course, "mended by hand"))
+    (course / "submitted/a/ps1/ps1.ipynb").write_bytes(answered(course, "corrected by hand"))
     assert of("unchanged", collected(course, {}))
-    assert files(course)["a/ps1"] == "mended by hand"
+    assert files(course)["a/ps1"] == "corrected by hand"
 
 
 def test_late_files_are_marked_by_canvas_or_dated_after_the_due_date(course):

@@ -62,7 +62,7 @@ def found(source, locked=LOCKED):
         ("match 1:\n    case math: pass", "gives math another meaning"),
     ],
 )
-def test_code_that_replaces_names_of_the_tests_is_found(source, what):
+def test_code_that_replaces_names_of_the_tests_is_reported(source, what):
     assert what in [said for _, said in found(source)]
 
 
@@ -96,17 +96,17 @@ def test_usual_code_is_accepted(source):
     assert found(source) == []
 
 
-def test_the_reported_line_is_that_of_the_cell():
+def test_lines_are_reported_by_their_numbers_in_the_cell():
     assert found("\n\nx = 1\nnp.allclose = print") == [(4, "replaces np.allclose")]
     assert found("%%time\nx = 1\nnp.allclose = print") == [(3, "replaces np.allclose")]
 
 
-def test_students_may_import_in_another_way_whatever_the_locked_cells_import():
+def test_students_may_import_the_same_module_in_another_way_than_the_locked_cells():
     locked = ["import matplotlib.pyplot as plt\nimport math\nmath.tau = 6"]
     assert found("from matplotlib import pyplot as plt", locked) == []
     assert found("from json import tool as plt", locked)
 
 
 def test_the_time_for_long_code_is_not_quadratic():
-    """With quadratic time, the second that the test takes would become years."""
+    """If the time were quadratic, this test would take years instead of a second."""
     assert found("%matplotlib" + " " * 10**6 + ";")

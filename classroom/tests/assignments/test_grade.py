@@ -54,8 +54,8 @@ def square(x):
 ### BEGIN HIDDEN TESTS
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """
-# This answer prints more than a cell may before its limit begins, and then slowly. Without the
-# pause, only fast machines would fill the memory within the limit.
+# This answer prints more than a cell may print before its time limit begins, and then prints
+# slowly. Without the pause, only fast machines would fill the memory within the limit.
 LOUD = f"""
 import sys, time
 from IPython.display import HTML, display
@@ -79,7 +79,7 @@ while True:
 LOOP, DOUBLE = f"{begun()}\nwhile True: pass", "def square(x):\n    return 2 * x"
 HUGE, DIES = "x = bytearray(2 * 10**9)", "import os\nos._exit(1)"
 SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tiny set”"
-# Student, change, answers, points (none if refused), and words of the remarks.
+# Each row has a student, a change, answers, points (none if refused), and words of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
     (

@@ -21,7 +21,7 @@ COIN = Sampler(
 
 
 def draws(law, n, rng):
-    """Return right draws, by SciPy."""
+    """Return draws from the right distribution, made with SciPy."""
     if law == "direction":
         points = rng.normal(size=(n, 3))
         return points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -33,7 +33,7 @@ def draws(law, n, rng):
 def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
     """The probabilities of refusal by Massart's bound add up to 1e-6 for every number of draws.
 
-    If the distribution of a row were not uniform, 20 times as many draws would show it.
+    The test uses 20 times as many draws, which would show a row that is not uniform.
     """
     problem = Sampler(**LAWS[law], mistakes=())
     drawn = draws(law, 20 * problem.draws, np.random.default_rng(17))

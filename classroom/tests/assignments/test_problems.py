@@ -72,7 +72,7 @@ def no_figure_stays():
 
 
 @problems
-def test_the_reference_passes_even_if_it_returns_lists_and_the_stub_fails(name, slug):
+def test_the_reference_answer_passes_even_as_lists_and_the_empty_answer_fails(name, slug):
     """The type of an answer that passes the visible tests must not make the hidden ones fail."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
@@ -80,14 +80,14 @@ def test_the_reference_passes_even_if_it_returns_lists_and_the_stub_fails(name, 
         namespace(name, f"{start}    raise NotImplementedError()", test)
     listed = f"_inner = {function}\n\n\ndef {function}(*arguments):\n"
     listed += "    result = _inner(*arguments)\n    return np.asarray(result).tolist()\n"
-    random = "law" in TABLES[name][slug]  # draws of a sampler are converted to an array first
+    random = "law" in TABLES[name][slug]  # draws of a sampler are first converted to an array
     for wrapper in [""] if random else ["", listed]:
         namespace(name, wrapper, test)
 
 
 @problems
 def test_wrong_answers_get_their_hints(name, slug):
-    """The first wrong sampler makes as many draws as a student's, which takes a second.
+    """The first wrong sampler makes as many draws as a sampler of a student; they take a second.
 
     The others make fewer draws, in which errors are harder to see and to tell apart.
     """
@@ -114,7 +114,7 @@ def place(numbers, form="g"):
 
 
 def examples():
-    """Return the examples that the questions state, from the reference answers."""
+    """Return the examples of the questions, as the reference answers compute them."""
     one, two = namespace("ps1"), namespace("ps2")
     plan = [(np.array([1, 0, 0]), 3), (np.array([0, 0, 0.5]), 2)]
     poses = one["run_plan"](np.zeros(3), plan)
@@ -150,7 +150,7 @@ def test_the_examples_in_the_questions_are_right():
 
 
 @sets
-def test_a_set_has_its_parts(name):
+def test_a_set_has_all_its_parts(name):
     notebook = SETS[name]
     texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
     numbers = re.findall(r"^## Problem (\d) · .* \(\d+ points\)$", "\n".join(texts), re.MULTILINE)

@@ -53,7 +53,7 @@ def wrong(grade_id, source):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """Return a course in which two sets were graded, the first one also wrong and untouched.
+    """Return a course in which two sets were graded; the first also with wrong and no answers.
 
     A different student solves each set, so that all can be graded in one run.
     """
@@ -162,5 +162,5 @@ def test_no_file_of_a_handout_reveals_solutions_or_hidden_tests(course, handed_o
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_no_reference_is_refused_for_forbidden_code(name):
+def test_no_reference_answer_is_refused_for_forbidden_code(name):
     assert list(find_in_cells(SETS[name].cells)) == []

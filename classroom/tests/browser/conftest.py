@@ -16,7 +16,7 @@ from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
-PATIENCE = 600_000  # milliseconds, long enough for a slow machine
+PATIENCE = 600_000  # milliseconds; this is long enough for a slow machine
 QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
 
@@ -45,8 +45,8 @@ def context():
 
 @pytest.fixture(scope="session")
 def home(tmp_path_factory):
-    """Return the course folder in the home of a user with copies of the lessons, and the
-    environment."""
+    """Return the course folder in a new home directory, with copies of the lessons, and the
+    environment variables."""
     home = tmp_path_factory.mktemp("home")
     kept = ("PATH", "SYSTEMROOT", "LANG")
     env = {name: os.environ[name] for name in kept if name in os.environ}
@@ -61,7 +61,8 @@ def home(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def lab(home):
-    """Return a function for addresses in JupyterLab, with the token: ``lab(path)``."""
+    """Return a function ``lab(path)``, which gives the address of a path in JupyterLab, with the
+    token."""
     course, env = home
     words = ["jupyterlab", "--no-browser", "--ServerApp.port=0", "--expose-app-in-browser"]
     words.append(f"--ServerApp.root_dir={course / 'work'}")
@@ -75,7 +76,7 @@ def lab(home):
 
 @pytest.fixture
 def page(context):
-    """Return a page for a single test, see `watched`."""
+    """Return a page for a single test; `watched` checks its requests and errors."""
     with watched(context) as page:
         yield page
 

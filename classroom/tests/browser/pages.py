@@ -1,4 +1,4 @@
-"""Actions of a user on the pages: open them, press keys, look."""
+"""Functions that act as a user does: they open pages, press keys, and look at pictures."""
 
 import re
 from contextlib import contextmanager
@@ -80,7 +80,7 @@ def centre(explorer):
 def move_every_control(explorer):
     """Move each slider by key and by mouse, and choose options by both; time is moved first.
 
-    The numbers have to change at once; the picture and the text may follow later.
+    The numbers must change immediately; the picture and the text may follow later.
     """
     table, sliders = explorer.locator("table"), explorer.locator(".widget-slider").all()
     said, picture = table.inner_text(), shown(explorer.locator("canvas"))

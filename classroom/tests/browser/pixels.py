@@ -1,4 +1,4 @@
-"""The picture of a canvas, compared with that of Matplotlib."""
+"""Compare the picture of a canvas with the picture that Matplotlib draws."""
 
 import base64
 import io
@@ -18,7 +18,7 @@ def shown(canvas):
 
 
 def check_alike(drawn, want, background):
-    """Check that under 1 % of the pixels, and at most half of those that move, are off by over 64.
+    """Check that under 1 % of all pixels, and at most half of the moving ones, differ by over 64.
 
     An empty canvas would pass the first condition alone, since thin lines cover little.
     """

@@ -1,4 +1,4 @@
-"""The book as a reader opens it: files on a disk, no server, no network."""
+"""The book as a reader opens it, from files, without a server and without a network."""
 
 import posixpath
 import re
@@ -173,7 +173,7 @@ def test_the_first_picture_of_a_lesson_is_visible_without_scrolling(path, page):
 
 
 def test_an_option_of_a_poll_shows_its_own_line_and_no_other(page):
-    """Test mouse and keys, with the names and states that screen readers use."""
+    """The mouse and the keys are tested, with the names and states that screen readers use."""
     page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
     poll = page.get_by_role("group", name="Poll 1")
     ideas = poll.locator(".idea")

@@ -1,4 +1,4 @@
-"""Explorers of each kind in JupyterLab: pictures follow keys; a table shows how fast."""
+"""In JupyterLab the pictures of explorers follow the keys; a table shows how fast."""
 
 import re
 import statistics
@@ -11,9 +11,9 @@ from playwright.sync_api import expect
 from rbclassroom import explorers
 from rbclassroom.course.notebooks import KERNEL
 
-# The kinds are plane, with a menu, with buttons, and in space. Each has the place and the name of
-# the slider whose keys are pressed; the slider changes the text. The last explorer is solved for
-# each picture.
+# These explorers represent all kinds: plane, with a menu, with buttons, and in space. Each has the
+# place and the name of a slider, which the test moves by keys and which changes the text. The last
+# explorer solves a problem for each picture.
 KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
 # A function that records when keys go down, and when the screen shows a new picture.
@@ -38,7 +38,8 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
     notebook = nbformat.v4.new_notebook(metadata={"kernelspec": KERNEL})
     notebook.cells = [nbformat.v4.new_code_cell(source) for source in cells]
     nbformat.write(notebook, home[0] / "work" / "explorers.ipynb")
-    page.set_viewport_size({"width": 1280, "height": 4000})  # all explorers are rendered at once
+    # this window renders all explorers together
+    page.set_viewport_size({"width": 1280, "height": 4000})
     open_in_lab(page, lab("workspaces/explorers/tree/explorers.ipynb"))
     run_all(page)
     there = page.locator(".rbcourse-explorer")

@@ -13,7 +13,8 @@ from playwright.sync_api import expect
 
 PANEL = "jupyterapp.shell.currentWidget"
 DIRTY = f"{PANEL}.context.model.dirty"
-# A function that tests whether just the pictures with these descriptions are shown, with states.
+# A function that tests whether exactly the pictures with these descriptions are shown, and whether
+# they have states.
 WHOLE = """(wanted) => {
   const pictures = [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")];
   const found = pictures.filter((picture) => picture.complete ?? true)
@@ -41,7 +42,7 @@ def opened(home, lab, page):
 
     The function returns the path of the copy.
     """
-    page.set_viewport_size({"width": 1280, "height": 30_000})  # all cells are rendered
+    page.set_viewport_size({"width": 1280, "height": 30_000})  # this window renders all cells
 
     def open_(lesson, name):
         path = home[0] / "work" / f"{lesson}.ipynb"
@@ -69,7 +70,7 @@ def show_all(page, path):
 
 
 def run_explorer(page, path):
-    """Run only the cell of the explorer, as its still tells the reader."""
+    """Run only the cell of the explorer, as the text on its still asks the reader to do."""
     cells = nbformat.read(path, as_version=4).cells
     number = next(i for i, cell in enumerate(cells) if "_explorer()" in cell.source)
     page.evaluate(f"{PANEL}.content.activeCellIndex = {number}")
@@ -86,8 +87,8 @@ def descriptions(path):
 
 
 def test_a_stored_lesson_is_complete_and_its_explorer_works_until_its_kernel_ends(opened, page):
-    """Without Python the explorer reports this, and it is a still when the lesson is opened
-    again."""
+    """When Python has ended, the explorer reports this. When the lesson is opened again, the
+    explorer is a still."""
     path = opened("06_geodesics", "stored")
     stored = descriptions(path)
     assert len(stored) > 3

@@ -1,4 +1,4 @@
-"""Python in the pages of the book, from a web server: lessons to try, problem sets to solve."""
+"""Python runs in the pages of the book, from a web server, for lessons and problem sets."""
 
 import base64
 import csv
@@ -73,7 +73,7 @@ def run(context, address):
 
 
 def shown(text):
-    """Return text as a terminal shows it: after a carriage return a line begins again."""
+    """Return text as a terminal shows it: a carriage return goes back to the start of the line."""
     return "\n".join(line.rstrip("\r").rpartition("\r")[2] for line in text.split("\n")).strip()
 
 
@@ -92,7 +92,8 @@ def told(outputs):
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
 def test_each_cell_gives_its_stored_text_except_for_those_left_out(run, path):
-    """Cells that are left out must differ, so that the list is exact. Slow cells are not run."""
+    """Cells on the list of exceptions must give another text, so that the list is exact. Slow cells
+    are not run."""
     notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
     stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
     differ = set()
@@ -133,7 +134,8 @@ def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
             for body in mistake["code"]:
                 wrong = start + indent(body.strip(), "    ")
                 found = run([*setup, *code], f"{wrong}\n\n{visible}", name)
-                if "law" in TABLES[name][slug]:  # the first one makes as many draws as a student's
+                # the first one makes as many draws as a sampler of a student
+                if "law" in TABLES[name][slug]:
                     visible = "\n".join([visible.split("assert")[0], *fewer])
                 if ["hint", mistake["hint"]] not in found:
                     missed[slug, mistake["hint"]] = found
@@ -147,7 +149,8 @@ def opened(page, address, name):
 
 
 def test_nothing_is_loaded_before_the_reader_acts_and_little_afterwards(page, address):
-    """The first result needs at most 10 MB, the first figure at most 20, from this server alone."""
+    """The first result loads at most 10 MB, and the first figure at most 20 MB, all from this
+    server."""
     asked = []
     page.on("request", lambda request: asked.append(request))
     page.on("dialog", lambda dialog: dialog.accept())
@@ -192,12 +195,12 @@ def test_a_cell_can_be_changed_stopped_and_reset_and_its_stored_output_stays(pag
 
 
 def test_outputs_appear_below_their_own_cells(page, address):
-    """Two cells are run at once, and one is run twice."""
+    """Two cells are run at the same time, and one cell is run twice."""
     opened(page, address, "problems/ps1.html")
     for number, code in enumerate(("import time\ntime.sleep(2)\nprint('one')", "print('two')")):
         write(page, number, code)
     checks = page.get_by_role("button", name="Check")
-    for _ in range(2):  # during the loading of Python, and after it
+    for _ in range(2):  # while Python is loading, and afterwards
         checks.nth(0).click()
         page.wait_for_timeout(500)
         checks.nth(1).click()
@@ -206,7 +209,7 @@ def test_outputs_appear_below_their_own_cells(page, address):
             expect(shown).to_have_text(said)
 
 
-def test_a_second_visit_uses_the_memory_of_the_first_and_loads_scipy(context, address):
+def test_a_second_visit_uses_the_files_stored_by_the_first_and_loads_scipy(context, address):
     codes = "import scipy.linalg as la; print(la.expm([[0.0]]))", "import rbcourse; print(1)"
     for visit in range(2):
         with watched(context) as page:

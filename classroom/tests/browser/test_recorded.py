@@ -1,4 +1,4 @@
-"""Players in Chromium, and recorded explorers of each kind: no kernel and no server."""
+"""Players, and recorded explorers of each kind, run in Chromium without a kernel or a server."""
 
 import html
 import io
@@ -39,7 +39,7 @@ def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpack
     button, slider = page.get_by_role("button", name="play or pause"), page.locator("input")
     canvas = page.get_by_role("img", name="what moves").and_(page.locator("canvas"))
     canvas.evaluate("(canvas) => canvas.style.width = 2 * parseFloat(canvas.style.width) + 'px'")
-    page.clock.pause_at(HOUR)  # from here on, time passes in steps only
+    page.clock.pause_at(HOUR)  # from here on, time passes only in steps
     button.press("Enter")
     page.clock.run_for(280)
     button.press("Enter")
@@ -100,7 +100,7 @@ def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, 
         assert low[0] != text
         assert low[1] != shown(canvas)
         assert page.get_by_text(text, exact=True).count()
-        # at this value all is visible
+        # at this value everything is visible
         slider.fill(str(round(0.6 * float(slider.get_attribute("max")))))
     if explorer.display.rooms:
         before = shown(canvas)

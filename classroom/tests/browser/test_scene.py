@@ -1,4 +1,4 @@
-"""Scenes in space, turned in Chromium, compared with Python's drawings from the same sides."""
+"""Compare scenes that are turned in Chromium with Python's drawings from the same sides."""
 
 import io
 import re
@@ -56,7 +56,7 @@ def crossing(ax):
 
 
 def turn_to(page, canvas, now, side):
-    """Drag from one view to another: half a degree for a pixel, in steps within the canvas."""
+    """Drag from one view to another, by half a degree per pixel, in steps within the canvas."""
     box, (up, across) = canvas.bounding_box(), np.subtract(side, now)
     steps = int(max(abs(up), abs(across)) // 60 + 1)
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -85,7 +85,7 @@ def put(page, player):
 def test_a_turned_scene_equals_the_drawing_from_the_same_side(
     make, sides, page, tmp_path, monkeypatch
 ):
-    """The place where a line leaves a body may be a pixel or two off, so few pixels differ."""
+    """The point at which a line leaves a body may be a pixel or two off, so a few pixels differ."""
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
     fig, ax = plt.subplots(**SIZE)
     make(ax)
@@ -106,7 +106,7 @@ def test_the_browser_cuts_and_orders_parts_as_python_does(page):
     """The parts, their order, their places, and the phases of their dashes are the same.
 
     The parts do not overlap in this test. Otherwise, rounding would decide whether the next plane
-    cuts the piece beyond it.
+    cuts a piece that lies beyond it.
     """
     fig, ax = plt.subplots(**SIZE)
     crossing(ax)

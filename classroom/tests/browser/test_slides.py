@@ -1,4 +1,4 @@
-"""The slides of the book, from files: every slide of every lesson, keys, votes, notes, PDF."""
+"""Test every slide of the book, from files, with its keys, votes, notes and PDF."""
 
 import re
 import subprocess
@@ -148,7 +148,7 @@ def test_keys_change_the_display_and_the_dark_scheme_is_never_automatic(context)
         page.keyboard.press("m")
         until(page, ".verdict")
         until(page, ":has(figure input)", "PageUp")
-        expect(table).to_be_visible()  # since the vote is over
+        expect(table).to_be_visible()  # the vote is over, so the table is shown
 
 
 @contextmanager

@@ -57,7 +57,7 @@ def view_moved(states, styles, texts, data, by=0.01):
 
 
 def renumbered(states, styles, texts, data):
-    """Give the style of the first polygon another number, which does not change the picture."""
+    """Change the number of the style of the first polygon; the picture remains the same."""
     styles.append(styles[states[0][0]])
     states[0][0] = len(styles) - 1
 
@@ -84,7 +84,7 @@ def test_in_an_interactive_picture_rounding_is_ignored_and_a_change_is_detected(
     assert reconciled(LIVING, again) == (LIVING if change in ROUNDING else again)
 
 
-def test_the_unit_of_the_comparison_is_that_of_the_display():
+def test_positions_are_compared_in_the_unit_of_the_display():
     assert agreement.UNIT == 1 / PARTS
 
 
@@ -169,7 +169,7 @@ def files(number="0.5", colour="#808080", duration=50, **others):
     ("stored", "drawn", "stale"),
     [
         (files(), files(), ""),
-        (files(), files("0.5000000000001"), ""),  # the document may differ where the numbers do
+        (files(), files("0.5000000000001"), ""),  # the PDF may change with the numbers
         (files(), files("0.50000001"), "csv"),
         (files(), files("word"), "csv"),
         (files(), files(colour="#908080"), "png"),

@@ -72,12 +72,12 @@ def test_the_picture_follows_the_controls_and_reset_restores_everything(explorer
     runs = []
     explorer.picture.observe(lambda change: runs.append(change.new), "run")
     explorer.controls["x"].value = 5.0
-    assert runs == []  # the control that plays asks for its states itself
+    assert runs == []  # the control that plays requests its states itself
     explorer.controls["kind"].value = "high"
     assert sent(explorer) == ([[at(5, 1)]], [[[("place", "5.0\nhigh")], "", repr(explorer)]])
     explorer.put(x=7.0, kind="low")
     assert sent(explorer)[0] == [[at(7, 0)]]
-    assert [run["index"] for run in runs] == [10, 14]  # once for each change
+    assert [run["index"] for run in runs] == [10, 14]  # the function runs once for each change
     explorer.play.playing = True
     explorer.reset.click()
     assert explorer.values == {"x": 2.0, "kind": "low"}
@@ -126,7 +126,7 @@ def test_settings_that_fail_and_warnings_are_reported(explorer):
 def test_a_click_sets_controls_or_states_the_reason_of_its_refusal(explorer):
     tell(explorer, place=[0.5, 0.5])
     assert explorer.values == {"x": 4.0, "kind": "high"}
-    for _ in range(2):  # the second click is at the same place
+    for _ in range(2):  # both clicks are at the same place
         version = explorer.picture.run["version"]
         tell(explorer, place=[0.125, 0.1])
         assert explorer.picture.run["version"] > version
@@ -170,7 +170,7 @@ def test_the_output_has_a_still_for_readers_without_a_kernel_and_can_be_serialis
 def test_readouts_have_as_many_digits_as_the_step():
     for step, shown in ((1.0, ".0f"), (0.25, ".2f"), (0.05, ".2f"), (5.0, ".0f")):
         assert slider("x (m)", 0.0, 0.0, 10.0, step).readout_format == shown
-    # the control has steps and no values between them
+    # the control has no values between its steps
     control = stepped("pitch (°)", 0.0, -0.3, 0.3, 0.1)
     assert control._options_labels == ("−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3")
     assert [value for _, value in control.options] == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]

@@ -48,11 +48,12 @@ def assert_seen(ax, places, *limits):
         ("body", {}, "torque", "1.11, 1.11, 1.00 × the least"),
         ("body", DIAGONAL, "acceleration", "1.36, 1.00, 1.04 × the least"),
         ("body", DIAGONAL, "torque", "1.62, 1.03, 1.00 × the least"),
-        # 77 % more, as in lesson 9 and the figure of the paper
+        # the cost is 77 % higher, as in lesson 9 and in the paper
         ("cube", {}, "their ratio", "1.773"),
         ("minimum_acceleration", {"k": 5.0}, "their ratio", "1.174"),  # case (c)
         ("minimum_acceleration", {"k": 0.0}, "cost, projection", "0.222 rad²"),  # case (a)
-        # For turns at constant ω, the geodesic: the projection costs 3e-11 rad² and 3e-14 rad².
+        # For turns at constant ω the optimum is the geodesic. The projection costs 3e-11 and 3e-14
+        # rad².
         ("minimum_acceleration", {"k": 0, "size": 0.1}, "their ratio", COSTS_NOTHING),
         ("minimum_acceleration", {"k": 0, "size": 0.05}, "their ratio", "none: both cost nothing"),
         ("flip", {"axis": "axis 1", "t": 8.0}, "turned over", "0 times"),
@@ -91,7 +92,7 @@ def test_no_answer_to_a_poll_is_visible_before_a_slider_is_moved():
     assert off(tips("projection", "nearest"), np.eye(3)) < 1e-15
     assert arm.values["t"] == plan.values["t"] == 0
     links, way = (points(arm.artists[name]) for name in ("links", "way"))
-    # the links cover their pale twin
+    # the links cover their pale copy
     assert off(points(arm.artists["links"].axes.lines[0]), links) < 1e-15
     assert np.ptp(way, axis=0).max() < 1e-15
     plan.put(t=4.0)
@@ -104,7 +105,7 @@ PANELS = {"as if a ball": (-15, 202), "least acceleration": (172, 389), "least t
 
 @cache
 def turned_books(about, turn, thickness):
-    """Return the three curves, the inertia, and both costs of each curve over the least costs.
+    """Return the three curves, the inertia, and the ratios of their costs to the least costs.
 
     Each problem is solved once.
     """
@@ -167,11 +168,11 @@ def test_the_screw_the_geodesic_and_the_axis_agree_with_the_package():
         tilt, angle, d = np.radians(v["tilt"]), abs(v["angle"]), np.array([v["x"], 0, v["z"]])
         r = np.radians(v["angle"]) * np.array([np.sin(tilt), 0, np.cos(tilt)])
         goal = rb.pose_from_components(rb.exp_so3(r), d)
-        r = rb.log_so3(goal[:3, :3])  # of a half-turn, either sign
+        r = rb.log_so3(goal[:3, :3])  # for a half-turn, either sign is right
         along = expm(v["t"] * rb.hat_se3(rb.log_se3(goal)))
         geodesic = rb.pose_from_components(rb.exp_so3(v["t"] * r), v["t"] * d)
         for name, pose in (("screw", along), ("geodesic", geodesic), ("goal", goal)):
-            # half the digits are lost at half-turns
+            # half of the digits are lost at half-turns
             assert_box(artists[name], pose[:3, :3], 0.4, pose[:3, 3], turned=1e-7, placed=1e-12)
             assert_seen(artists[name].axes, artists[name].corners, (0, 560), (0, 380))
             if name != "goal":
@@ -181,7 +182,7 @@ def test_the_screw_the_geodesic_and_the_axis_agree_with_the_package():
         assert reads(said["origins apart"], np.linalg.norm(along[:3, 3] - geodesic[:3, 3]))
         if 0 < angle < 180:
             axis = points(artists["axis"])
-            # equal for all points of the axis, and along it
+            # all points of the axis have the same displacement, along the axis
             steps = axis @ goal[:3, :3].T + d - axis
             assert off(*steps) < 1e-10
             assert np.abs(np.cross(steps[0], axis[1] - axis[0])).max() < 1e-10
@@ -198,7 +199,7 @@ def spun(axis, tilt):
     w0 = np.full(3, 4 * np.sin(np.radians(tilt)) / np.sqrt(2))
     w0[int(axis[-1]) - 1] = 4 * np.cos(np.radians(tilt))
     momentum = MOMENTS * w0 / np.linalg.norm(MOMENTS * w0)
-    assert momentum[2] >= 0  # the momentum points upwards, if only a little
+    assert momentum[2] >= 0  # the momentum points upwards, at least slightly
     cross = np.cross(momentum, [0, 0, 1])
     turn = np.linalg.norm(cross)
     start = rb.exp_so3(np.arcsin(turn) * cross / turn) if turn else np.eye(3)
@@ -490,7 +491,7 @@ def test_the_arm_moves_to_its_angles_or_to_a_click_or_states_why_it_cannot(elbow
         tell(arm, place=[x / box.width, 1 - y / box.height])
         if 0.5 <= np.hypot(*place) <= 3.5:
             assert off(points(links)[-1], place) < 1e-6
-            assert arm.values["theta1"] * elbow > 0  # the elbow stays on its side
+            assert arm.values["theta1"] * elbow > 0  # the elbow remains on the same side
             assert notice(arm) == ""
         else:
             assert "0.5 to 3.5 m from the base" in notice(arm)
@@ -498,7 +499,7 @@ def test_the_arm_moves_to_its_angles_or_to_a_click_or_states_why_it_cannot(elbow
 
 
 def tips(explorer, name):
-    """Return the columns of a matrix whose axes are drawn."""
+    """Return the matrix whose columns are the drawn axes."""
     lines = np.array([points(made(explorer).artists[f"{name} {axis}"]) for axis in "xyz"])
     assert not lines[:, 0].any()
     return lines[:, 1].T
@@ -517,7 +518,8 @@ def test_box_axes_turns_and_gimbal_lock_agree_with_the_angles():
         for name, axis in turns.items():
             assert np.abs(np.cross(points(artists[name]), axis)).max() < 1e-14
         one, angle = points(artists["axis"]), np.linalg.norm(rb.log_so3(R))
-        assert off(one @ R.T, one) < 1e-8  # half the digits of the axis are lost near half-turns
+        # near half-turns, half of the digits of the axis are lost
+        assert off(one @ R.T, one) < 1e-8
         assert one.any() == (angle > 1e-9)
         assert reads(said["matrix"], R)
         assert reads(said["quaternion"], rb.quaternion_from_matrix(R))

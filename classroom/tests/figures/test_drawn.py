@@ -1,7 +1,7 @@
 """The parts of the lessons' figures that are not in a CSV, and their descriptions.
 
-When a lesson draws a figure, the figure is compared with the stored one, and its artists with the
-CSV: they hold its numbers under their names, have labels, and are not clipped (tests/shown.py).
+When a lesson draws a figure, the figure is compared with the stored one. Its artists must hold the
+numbers of the CSV under their names, have labels, and not be clipped (tests/shown.py).
 """
 
 import matplotlib.pyplot as plt
@@ -46,7 +46,7 @@ def axes():
 
 
 def check_held(axes, held):
-    """Check that artists hold some numbers, by the titles of their axes and their labels."""
+    """Check that artists hold the given numbers, which are listed by title of axes and by label."""
     for (title, label), columns in held.items():
         artists = [x for ax in axes if ax.get_title() == title for x in ax.get_children()]
         found = list(numbers_of([x for x in artists if str(x.get_label()).startswith(label)]))
@@ -96,7 +96,7 @@ def test_descriptions_of_projected_matrices_state_their_numbers():
 @pytest.mark.source("RR 2")
 def test_histograms_count_all_draws_and_show_the_exact_distributions(axes):
     many = {"a": rb.sample_rotation(5000, rng=2), "b": rb.exp_so3(np.zeros((10, 3)))}
-    # some heights are beyond 1 by rounding
+    # rounding takes some heights beyond 1
     many["b"][:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)
     bins, axes = lesson05.histograms(many), axes(None, None, None)
     lesson05.draw_histograms(axes, bins)
@@ -184,13 +184,13 @@ def test_descriptions_of_curves_state_their_numbers():
     largest = np.linalg.norm(vectors("{} {} [N m]", torques)["least torque"], axis=-1).max()
     words = f"least torque: {largest:.2g} N m"
     check_said(lesson13.describe_torques(torques), words)
-    # The speed is 30 t² (1 − t)² of 2.67 rad, which is 1.875 times as much at half time.
+    # The speed is 2.67 rad times 30 t² (1 − t)², which is 1.875 at half time.
     check_said(lesson13.describe_speeds(numbers("lesson13_jerk")), "least jerk at most 5.0")
 
 
 @pytest.mark.source("BK (8)", "BK (9)")
 def test_descriptions_of_free_and_carried_bodies_state_their_numbers():
-    """The paths are circles about axes 1 and 3; one about axis 1 passes close to axis 2."""
+    """The paths are circles about axes 1 and 3. One circle about axis 1 passes close to axis 2."""
     spins = vectors("{} w{} [rad]", numbers("lesson08_spins"), "123")
     flips = np.count_nonzero(np.diff(np.sign(spins["axis 2"][:, 1])))
     kept = "it keeps its sign"
@@ -212,7 +212,7 @@ def test_descriptions_of_the_atlas_state_its_numbers(axes):
     table["size [rad]"], (ax,) = size, axes(None)
     words = "projection from 3.9e-06 to 8.1e-02", "normal from 1.2e-05 to 2.4e-01"
     check_said(atlas_figures.describe_growth(table), *words)
-    atlas_figures.draw_growth(ax, table)  # only the curves in the table are drawn
+    atlas_figures.draw_growth(ax, table)  # the figure has only the curves in the table
     ticks = [tick.get_text() for tick in ax.get_yticklabels()]
     assert all(tick.startswith("$10^") for tick in ticks) or not any("$" in x for x in ticks)
     colours = [line.get_color() for line in ax.lines]
@@ -274,14 +274,14 @@ def test_profiles_agree_with_the_motion():
 
 @pytest.mark.source("beyond BK 7")
 def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
-    """Free motions leave the lines t w as w² in exponential coordinates, and as w³ in normal
-    ones."""
+    """Free motions deviate from the lines t w by O(w²) in exponential coordinates, and by O(w³) in
+    normal coordinates."""
     book, t = rb.metrics.box_inertia([0.30, 0.20, 0.03]), np.linspace(0, 1, 5)
     w = np.array([[0.8, 0.6, 1], [-0.6, 0.8, 1]])
     kinds = "exponential coordinates", "normal coordinates"
 
     def off(inertia, size):
-        """Return by how much the two motions leave their lines in the plane, in both
+        """Return the deviations of the two motions from their lines in the plane, in both
         coordinates."""
         lines = vectors("{} {} [rad]", lesson13.normal_table(t, size * w, inertia), "xy")
         for k in (1, 2):
@@ -295,7 +295,7 @@ def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
     w_dot = -np.cross(w, w @ book) @ np.linalg.inv(book)  # Euler's equations
     want = 0.01**2 / 2 * w_dot[:, :2]
     assert off(book, 0.01)[0, :, -1] == pytest.approx(want, abs=0.03 * np.abs(want).max())
-    assert np.abs(off(2 * np.eye(3), 1)).max() < 1e-13  # for a ball, both are straight
+    assert np.abs(off(2 * np.eye(3), 1)).max() < 1e-13  # for a ball, both motions are straight
 
     data, panes = numbers("lesson13_normal"), axes(None, None)
     lesson13.draw_normal(panes, data)

@@ -56,7 +56,7 @@ def test_the_description_of_the_book_states_when_it_turns_over():
 
 @pytest.fixture(scope="module")
 def level():
-    """Return a function for the points of a level, from the table of the construction.
+    """Return a function of a name and k that gives the points of level k of the construction.
 
     The points have the shape (4 - k, 2 or 3, times).
     """
@@ -96,7 +96,7 @@ def test_the_construction_moves_along_lines_and_geodesics_as_in_its_table(axes, 
     a, b = level("plane", 2)[..., 7]
     assert np.abs(straight - (a[:, None] + np.outer(b - a, np.linspace(0, 1, 33)))).max() < 1e-12
     assert np.abs(np.linalg.norm(arc, axis=0) - 1).max() < 1e-12
-    # the arc is in one plane, so it is a circle
+    # the arc lies in one plane, so it is a circle
     assert np.linalg.svd(arc - arc[:, :1], compute_uv=False)[2] < 1e-12
     assert np.ptp(np.linalg.norm(np.diff(arc, axis=1), axis=0)) < 1e-12
     first, last = (np.degrees(np.linalg.norm(w) / 3) for w in ENDS[2:])

@@ -27,7 +27,7 @@ PIXEL = (
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+A8AAQUBAScY42YAAAAASUVORK5CYII="
 )
 HIDDEN = ["assert square(-3) == 9", "assert math.isclose(half, 0.5)"]
-SLEEP = f"9{os.getpid():08d}"  # a number of seconds that no other process sleeps
+SLEEP = f"9{os.getpid():08d}"  # no other process sleeps for this number of seconds
 SECRET = "the-token-of-the-teacher"
 REFUSALS = {"AssertionError", "CalledProcessError", "OperationalError"}
 KINDS = [OSError, *OSError.__subclasses__(), *ConnectionError.__subclasses__()]
@@ -50,7 +50,8 @@ HONEST = {
     "odd outputs": "odd = {'text/plain': {'a': 1}, 'application/x-odd': [float('inf')]}\n"
     "display(odd, raw=True)",
 }
-# Their attacks fail, and they report the results. The points are those of their answers.
+# The attacks of these students fail and report their results. Each answer gets only the points that
+# it earns.
 SNEAKS = {
     "reads the set": "print(open('COURSE/source/ps0/ps0.ipynb').read())",
     "reads others": "import os\nprint(os.listdir('COURSE/submitted'))",
@@ -75,7 +76,7 @@ SNEAKS = {
     "becomes root": "import os\nos.setuid(0)",
     "mounts": "import subprocess as s\ns.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
-# These attacks succeed inside the sandbox only. The points are those of their answers.
+# These attacks succeed only inside the sandbox. Each answer gets only the points that it earns.
 LOUD = {
     "leaves daemons": "import subprocess\nfor _ in range(50):\n"
     "    subprocess.Popen(['setsid', 'sleep', 'SLEEP'], start_new_session=True)",
@@ -153,7 +154,8 @@ CELL_5 = "cell 5, answer of “A tiny set”"
 TRANSFORMS = "import sys\nsys.modules['IPython'].get_ipython().input_transformers_post.append(abs)"
 CHANGES = {"writes words": write_words, "adds a cell": add_cell, "forges remarks": forge_remarks}
 SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
-# Student, answer, points (none if refused), and the beginning of the remark or the refusal.
+# Each row has a student, an answer, points (none if refused), and the beginning of the remark or of
+# the refusal.
 OTHERS = [
     *((student, "half = 0.5", "2 1", "") for student in ("tells", "writes words", "adds a cell")),
     ("forges remarks", "half = 0.5", "2 1", "cell 1, locked cell of “A tiny set” was changed; it"),
@@ -199,7 +201,7 @@ FILES = [
 RESULTS = [(student, *result) for student, _, *result in OTHERS + FILES]
 RESULTS += [("a link", " ", "ps0.ipynb or a file or folder beside it is a link")]
 RESULTS += [("prints", "2 1", f"{CELL_5}: the output is too large")]
-RESULTS += [(student, "2 1", "") for student in HONEST]  # without a remark
+RESULTS += [(student, "2 1", "") for student in HONEST]  # these students get no remark
 RESULTS += [(student, "2 0", None) for student in SNEAKS]
 RESULTS += [(student, "2 1", None) for student in LOUD if student != "prints"]
 
@@ -228,7 +230,7 @@ def hand_in_all(course, port):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory, template):
-    """Grade all of them in one run, while a server and a socket wait for connections."""
+    """Grade all submissions in one run, while a server and a socket wait for connections."""
     assert sandbox.missing() == ""
     course = Class(tmp_path_factory.mktemp("course"), template)
     asked = []
@@ -318,7 +320,8 @@ def test_pages_have_no_hidden_test_in_any_encoding_and_no_environment(pages):
 
 
 def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, monkeypatch, capsys):
-    """On macOS, for instance, a submission has the rights of the teacher."""
+    """Without a sandbox, for instance on macOS, a submission runs with the rights of the
+    teacher."""
     why = "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
     monkeypatch.setattr(sandbox, "missing", lambda: why)
     course = Class(tmp_path, template)

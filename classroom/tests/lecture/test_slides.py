@@ -160,7 +160,7 @@ def test_a_poll_comes_before_the_evidence_and_its_verdict_after_it(tmp_path):
     assert "Right: **B**." in asked.notes
 
 
-def test_slides_behind_the_end_are_grouped_and_long_tables_are_split(tmp_path):
+def test_slides_after_the_end_are_grouped_and_long_tables_are_split(tmp_path):
     rows = "".join(f"| row {i} | x |\n" for i in range(7))
     deck = tiny(
         tmp_path,
@@ -272,7 +272,7 @@ def plain(tex):
 
 
 def pieces(formula):
-    """Return the parts of a formula that is a chain or one of several; else, return the formula."""
+    """Return the parts of a formula between its signs "=", gaps and line breaks."""
     return [part for part in re.split(r"\\q?quad|=|\\\\", formula) if part.strip()]
 
 

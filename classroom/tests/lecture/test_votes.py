@@ -1,4 +1,4 @@
-"""Votes: the rules of the ballot, and thirty phones at the port of a lecture."""
+"""Test the rules of a vote, and thirty phones that vote in a lecture."""
 
 import json
 import re

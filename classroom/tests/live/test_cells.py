@@ -64,7 +64,7 @@ def test_a_cell_prints_the_same_as_after_all_cells_above(above, source, wanted, 
     for text in [*above, source]:
         exec(text, space)
     assert capsys.readouterr().out.strip() == wanted
-    for _ in "ab":  # the output is the same each time
+    for _ in "ab":  # the output must be the same each time
         assert run(above, source)[1].strip() == wanted
 
 

@@ -36,7 +36,7 @@ def test_each_cell_has_its_displacements_and_end_velocities_in_the_directions_of
 def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
-        share = (norms(x) / radius) ** 3  # the share of the volume, which is uniform
+        share = (norms(x) / radius) ** 3  # this share of the volume of the ball is uniform
         assert share.max() < 1 + 1e-9
         assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
@@ -62,8 +62,8 @@ def test_bad_sizes_and_families_are_refused():
 
 
 def about_the_identity(R0, R1, w0, w1):
-    """Return a curve by σ taken about I; it is reversible, but neither left- nor
-    right-invariant."""
+    """Return a curve that is linear in the logarithms of R0 and R1. It is reversible, but neither
+    left- nor right-invariant."""
     a, b = rb.log_so3(R0), rb.log_so3(R1)
     return lambda t: rb.exp_so3(a + t[:, None, None] * (b - a))
 
@@ -82,7 +82,7 @@ def test_moved_ends_move_all_closed_forms_and_exchanged_ends_reverse_some():
 
 
 def test_the_excess_is_nan_if_the_optimum_is_near_zero():
-    """Along the axis of a turn by a, w0 = w1 = a + d costs 24 d²."""
+    """For a turn by a with w0 = w1 = a + d along its axis, the optimum costs 24 d²."""
     a, d = 1.0, np.array([0.0, 0.005, 0.01, 0.5])
     e, R0 = np.eye(3)[2], np.tile(np.eye(3), (4, 1, 1))
     w = (a + d)[:, None] * e

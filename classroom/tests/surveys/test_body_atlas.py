@@ -20,7 +20,7 @@ def test_end_velocities_are_uniform_in_direction():
     for x, y in ((many.w0, sigma), (many.w1, sigma), (many.w0, many.w1)):
         cosine = np.sum(x * y, axis=-1) / norms(x) / norms(y)
         assert np.quantile(cosine, [0.25, 0.5, 0.75]) == pytest.approx(quartiles, abs=0.03)
-    for x in (many.w0, many.w1):  # uniform in the body frame, too
+    for x in (many.w0, many.w1):  # the directions are uniform in the body frame, too
         direction = x / norms(x)[:, None]
         assert np.abs(direction.mean(axis=0)).max() < 0.03
         assert direction.T @ direction / 10000 == pytest.approx(np.eye(3) / 3, abs=0.02)
@@ -85,7 +85,7 @@ def test_intervals_are_binomial_for_quantiles_and_clopper_pearson_for_shares(exc
         x, n = np.sort(excess[curve][inside]), inside.sum()
         assert table["problems [1]"][k] == n
         for name, share in (("median", 0.5), ("90 %", 0.9)):
-            # the probability that at most this number of n are below
+            # entry k is the probability that at most k of the n values are below the quantile
             fewer = binom.cdf(np.arange(n), n, share)
             ends = x[np.sum(fewer <= 0.025) - 1], np.quantile(x, share), x[np.sum(fewer < 0.975)]
             found = [table[f"{name}{end} [1]"][k] for end in (" low", "", " high")]

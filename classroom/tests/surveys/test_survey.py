@@ -25,7 +25,8 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 def test_a_survey_has_the_optimum_and_the_integral_for_every_curve(inertia):
     assert rb.projected_cubic_so3(*SHARP).margin < 0.004
     found = survey.survey(FEW, inertia=inertia)
-    best = rb.minimum_acceleration_so3(*FEW, inertia)  # several threads, while a survey uses one
+    # this call uses several threads; a survey uses one
+    best = rb.minimum_acceleration_so3(*FEW, inertia)
     assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
     makers = dict(atlas.FORMS)
     if inertia is not None:
@@ -54,7 +55,7 @@ def test_an_optimum_that_is_not_found_is_nan_without_a_warning():
 
 
 @pytest.mark.source("BK (19)")
-def test_the_optimum_is_the_lowest_of_several_starts():
+def test_the_optimum_costs_no_more_than_those_from_several_starts():
     """From the projected cubic, the solver turns in the wrong direction in many of the problems."""
     used, found = rb.minimum_acceleration_so3(*SOME).cost, several_starts(SOME)
     left_out = "corrected", "Cayley"
@@ -189,7 +190,7 @@ def test_the_maps_are_made_from_the_first_seed_and_the_intervals_from_all(tmp_pa
     body_atlas.make_tables("executor", tmp_path, 1, [5, 6])
     assert len(set(surveyed)) == 6
     assert {executor for executor, *_ in surveyed} == {"executor"}
-    assert len(body_atlas.stored("maps")["body"]) == 300  # from the first seed
+    assert len(body_atlas.stored("maps")["body"]) == 300  # this table is from the first seed
     assert body_atlas.stored("intervals")["seed [1]"].tolist() == [5] * 33 + [6] * 33
 
 
