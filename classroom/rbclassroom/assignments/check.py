@@ -118,8 +118,8 @@ def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
     faults = [(at, f" took longer than {seconds} s and was stopped") for at in client.slow]
     faults += [(at, near) for at in sorted(slow)] + [(at, f": {CUT}") for at in client.cut]
     for at, cell in enumerate(cells):
-        last, own = _error(cell), is_test(cell) or is_answer(cell)
-        if last and not (own or at in client.slow or last == "NotImplementedError"):
+        last, in_problem = _error(cell), is_test(cell) or is_answer(cell)
+        if last and not (in_problem or at in client.slow or last == "NotImplementedError"):
             faults.append((at, f" fails: {last}"))  # an empty answer is reported below
     return ends + [f"{name_cell(cells, at)}{fault}" for at, fault in faults]
 
