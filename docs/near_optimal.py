@@ -186,7 +186,7 @@ def cumulative_energy():
         return [a[i] * b[j] - a[j] * b[i] for i, j in pairs]
 
     # The body velocity at the end is w1 = u1 - sigma x u1/2, so the last turn has a part of second
-    # order. The middle turn has the second-order part of exp(-first) exp(sigma) exp(-last).
+    # order. To second order, the middle turn is exp(-first) exp(sigma) exp(-last).
     of_last = times(QQ(-1, 2), cross(sigma, last))
     of_middle = add(
         times(QQ(-1, 2), cross(first, sigma)),

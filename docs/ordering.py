@@ -46,7 +46,7 @@ def product(a, b):
 
 
 def entries():
-    """Return the pairs of V in the upper triangle of M, grouped by their products."""
+    """Return the index pairs of the upper triangle of M, grouped by the product V_k . V_l."""
     found = {}
     for i, a in enumerate(VECTORS):
         for b in VECTORS[i:]:

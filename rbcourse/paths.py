@@ -350,7 +350,7 @@ class Chain(Curve):
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
         for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
-            if k == 2:  # also relative to the velocity over the shortest duration
+            if k == 2:  # also relative to the velocity divided by the shortest duration
                 sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
             for half in (slice(3), slice(3, None)):  # the rotation in rad and the translation in m
                 jump = jumps[:, half].max(initial=0)

@@ -142,7 +142,7 @@ def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random rotation matrix, shape (3, 3), uniform by Arvo's method if not naive.
+    """Return a random rotation matrix, shape (3, 3): uniform (Arvo's method) unless `naive`.
 
     If naive, the three angles are uniform, but the rotation is not. `rng` is a Generator, a seed or
     None.
@@ -157,7 +157,7 @@ def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
 
 
 def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random unit quaternion, shape (4,), uniform by Shoemake's method if not naive.
+    """Return a random unit quaternion, shape (4,): uniform (Shoemake's method) unless `naive`.
 
     Source: RR 2.2.
 

@@ -106,7 +106,7 @@ def test_within_16_eps_of_gimbal_lock_the_last_angle_is_zero_and_farther_away_bo
         back = rb.zyx_from_matrix(rb.matrix_from_zyx(given))
         assert np.abs(back - given).max() < 10 * EPS / off
         assert abs((back - given) @ [1, 0, -1]) < 10 * EPS
-    # in units of 2⁻⁵³: 15 or 17 eps before gimbal lock
+    # the distance of q from gimbal lock, in units of 2⁻⁵³
     for steps, locked in ((17, True), (19, False)):
         for sign in (1, -1):
             q = [0.5 + steps * 2.0**-53, -0.25 * sign, 0.5 * sign, 0.25]

@@ -75,7 +75,7 @@ def test_the_quintic_does_not_have_least_jerk():
 
 
 @pytest.mark.source("BK 6.1")
-def test_a_cubic_and_a_quintic_with_the_ends_of_the_projected_line_project_to_it():
+def test_the_cubic_and_the_quintic_with_the_ends_of_the_projected_line_equal_it():
     """Both polynomials are the line times a positive factor ρ(t), which the projection ignores."""
     line = rb.projected_line_so3(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
     ends = [line(t, order) for order in (0, 1, 2) for t in (0, 1)]

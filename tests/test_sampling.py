@@ -75,7 +75,7 @@ def test_the_printed_matrix_is_always_a_reflection_and_its_negative_is_a_rotatio
 
 
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR (12)", "RR (13)", "errata 17")
-def test_quaternions_are_the_printed_ones_and_naive_matrices_turn_in_the_other_order():
+def test_quaternions_are_those_of_the_report_and_naive_matrices_multiply_in_reverse_order():
     s, x1, x2 = (x := np.random.default_rng(4).random((50, 3))).T
     t1, t2, inner, outer = 2 * np.pi * x1, 2 * np.pi * x2, np.sqrt(1 - s), np.sqrt(s)
     printed = [np.cos(t2) * outer, np.sin(t1) * inner, np.cos(t1) * inner, np.sin(t2) * outer]

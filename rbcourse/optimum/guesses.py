@@ -73,7 +73,7 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
         R = F exp(β v̂)
 
     has the given ends. One v is the shortest logarithm at t = ½, and the other v turns the other
-    way round at this time. The numbers of the problems are returned with the curves.
+    way round at this time. The indices of the problems are returned with the curves.
     """
     fine, t = grid(2 * n - 1).t, grid(n).t
     R0, w0 = np.stack([ends.R0, ends.R1]), _bounded(np.stack([ends.w0, -ends.w1]))
@@ -198,7 +198,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Return the cheapest of R and of the curves after a step times each of `SHARES`."""
+    """Return the cheapest curve: R, or R after one of `SHARES` of the step, and its cost."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))

@@ -85,7 +85,7 @@ def least_eigenvalues(curve: Optimum, m: int) -> tuple[float, float]:
     c = matvec(R, functional.p(*rates))[0].mean(axis=0)
     R, M, size = R[0], P[-1][0], float(np.linalg.norm(c))
 
-    root = np.linalg.inv(np.linalg.cholesky(M)).T  # with x = root y, L(x, x) = ‖y⁽ᵏ⁾‖²
+    root = np.linalg.inv(np.linalg.cholesky(M)).T  # with x = root @ y, L(x, x) = ‖y⁽ᵏ⁾‖²
     x = [on_each_axis(values, root) for values in polynomials(m, k, len(t))]
     rate = R @ x[0]
     total = np.tensordot(weights, rate, axes=1)

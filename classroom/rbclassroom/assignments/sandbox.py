@@ -107,7 +107,7 @@ def box(folder: Path, seconds: int) -> list[str]:
     words += ["--bind", str(folder), str(folder), "--chdir", str(folder / "work")]
     words += ["--remount-ro", "/dev", "--remount-ro", "/", "--"]
     if is_root:
-        user = NOBODY + secrets.randbelow(NOBODY)  # the limit on processes counts by user
+        user = NOBODY + secrets.randbelow(NOBODY)  # the limit on processes is per user
         for inner in (folder, *folder.rglob("*")):
             os.chown(inner, user, user)
         words += ["setpriv", f"--reuid={user}", f"--regid={user}", "--clear-groups"]

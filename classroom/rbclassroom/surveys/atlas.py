@@ -40,7 +40,7 @@ WAYS: dict[str, Maker] = {**FORMS, "projection": projection}
 
 
 def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
-    """Return the closed forms that are compared for a body: `WAYS`, and two that use its inertia.
+    """Return the closed forms that are compared for a body: `WAYS`, and two that use the inertia.
 
     These two are "weighted", `weighted_cubic_so3`, and "normal", `normal_cubic_so3`.
     """

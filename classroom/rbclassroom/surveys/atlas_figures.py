@@ -63,8 +63,8 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> None:
 def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
     """Draw heat maps of medians, with a row for each body and a column for each curve.
 
-    `data` is a table of `rbclassroom.surveys.body_atlas.maps`. `curves` maps names of its columns
-    to headings of the figure (beyond BK 3).
+    `data` is a table of `rbclassroom.surveys.body_atlas.maps`. `curves` maps names of
+    columns of this table to headings of the figure (beyond BK 3).
     """
     bodies = _groups(data, "body")
     axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)

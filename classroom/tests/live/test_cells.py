@@ -1,4 +1,4 @@
-"""Cells run after the statements above that they need, in any order."""
+"""Cells can be run in any order: the earlier statements that a cell needs are run first."""
 
 import ast
 import sys
