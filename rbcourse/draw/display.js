@@ -1,4 +1,4 @@
-// Draw what display.py has kept, over the picture of what does not move.
+// Draw the moving parts, as recorded by display.py, on top of a picture of the fixed parts.
 const rbcourseDisplay = {
   // Return the states in the bytes, each as an array of numbers.
   split(bytes) {
@@ -146,7 +146,7 @@ const rbcourseDisplay = {
       button.textContent = "❚❚";
     };
     panel.oninput = () => { pause(); show(); };
-    panel.onkeydown = (event) => event.stopPropagation(); // or JupyterLab takes them
+    panel.onkeydown = (event) => event.stopPropagation(); // otherwise JupyterLab handles the keys
     if (rooms.length) panel.prepend(rbcourseScene.turn(canvas, rooms, show));
     image.replaceWith(canvas);
     canvas.after(panel);

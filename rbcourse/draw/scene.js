@@ -1,4 +1,4 @@
-// What is in space, seen from any side, as space.py draws it from one. A piece is a face, a line, a mark
+// Draw a scene in space as seen from any side; space.py draws it from one. A piece is a face, a line, a mark
 // or a ball: { kind, zorder, style, places }; places are [x, y, z, along the line] in pixels of the room.
 const rbcourseScene = {
   // Return unit vectors to the right, upwards and to the eye, for an azimuth and an elevation in degrees.
@@ -44,7 +44,7 @@ const rbcourseScene = {
     places.forEach((p, i) => {
       for (const t of [-1, 1]) {
         if (sides[i] === t || !sides[i]) parts[t].at(-1).push(p);
-        else if (kind === "line" && parts[t].at(-1).length) parts[t].push([]); // it has left in a point of the plane
+        else if (kind === "line" && parts[t].at(-1).length) parts[t].push([]); // the line leaves this side at a point in the plane
       }
       const j = (i + 1) % places.length;
       if (sides[i] * sides[j] >= 0 || (kind === "line" && !j)) return;
@@ -165,9 +165,9 @@ const rbcourseScene = {
       else if (event.key in steps) by(...steps[event.key]);
       else return;
       event.preventDefault();
-      event.stopPropagation(); // JupyterLab and lectures have these keys, too
+      event.stopPropagation(); // JupyterLab and lectures also use these keys
     });
-    let from = null; // of the first finger
+    let from = null; // the last position of the first finger
     canvas.addEventListener("pointerdown", ({ pointerId, clientX, clientY }) => {
       from ??= { pointerId, clientX, clientY };
       canvas.setPointerCapture(pointerId);
