@@ -9,6 +9,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from pages import watched
+from playwright.sync_api import TimeoutError as TooLate
 from playwright.sync_api import expect
 from servers import serving
 
@@ -26,8 +27,14 @@ HERE = "() => Reveal.getCurrentSlide().innerText"
 
 
 def opened(page, address):
+    """Open slides and wait until they are laid out; reload them once if that takes a minute."""
+    ready = "document.documentElement.dataset.ready"
     page.goto(address)
-    page.wait_for_function("document.documentElement.dataset.ready")
+    try:
+        page.wait_for_function(ready, timeout=60_000)
+    except TooLate:
+        page.reload()
+        page.wait_for_function(ready, timeout=60_000)
     return page
 
 
@@ -235,6 +242,8 @@ def test_t_in_the_speaker_view_opens_the_vote(context, home):
 
 def test_on_paper_each_title_is_above_its_text_and_picture(page):
     opened(page, of(LESSONS[6]) + "?print-pdf")
+    page.locator(".pdf-page section h2").last.wait_for(state="attached")
+    page.wait_for_function("document.querySelectorAll('.pdf-page').length > 40")
     pairs = page.evaluate(
         """() => [...document.querySelectorAll(".pdf-page section:has(h2)")].map((section) =>
           ["h2", ".body"].map((part) => section.querySelector(part).getBoundingClientRect()))"""
