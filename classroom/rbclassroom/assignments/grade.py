@@ -241,7 +241,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
 def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
     """Return a page of feedback whose list has titles of problems in place of "Test cell".
 
-    The page also marks the answers `to_do`, which nobody has graded yet.
+    The page also marks the answers `to_do` as not graded yet.
     """
     cells, names = nbformat.read(graded, as_version=4).cells, dict[str, str]()
     for at, cell in enumerate(cells):
