@@ -81,6 +81,20 @@ def page(context):
         yield page
 
 
+@pytest.fixture
+def timed(context):
+    """Return a page whose clock the test controls, in a context of its own.
+
+    Playwright sets the clock of all pages of a context, also of later ones.
+    """
+    own = context.browser.new_context()
+    own.set_default_timeout(PATIENCE)
+    own.clock.install(time=0)
+    with watched(own) as page:
+        yield page
+    own.close()
+
+
 def pytest_terminal_summary(terminalreporter):
     reports = terminalreporter.stats.get("passed", []) + terminalreporter.stats.get("failed", [])
     rows = [value for report in reports for key, value in report.user_properties if key == "speed"]

@@ -20,7 +20,7 @@ HOUR = 3_600_000  # ms
 
 
 @plt.style.context(["default", "rbcourse.rbcourse"])
-def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpacked(page):
+def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpacked(timed):
     """The drawing has holes, dashes, corners, and lines that are cut at the edges of the axes."""
     fig, ax = plt.subplots(figsize=(9, 4), dpi=80)
     ax.set(xlim=(0, 9), ylim=(0, 4))
@@ -33,17 +33,16 @@ def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpack
         return [ring, line]
 
     player = animate.animate(fig, "player", "what moves", update, 20, seconds=0.8, still=0)
-    page.clock.install(time=0)
-    page.set_viewport_size({"width": 1600, "height": 1000})
-    page.set_content(f"<!doctype html>{player._repr_html_()}")
-    button, slider = page.get_by_role("button", name="play or pause"), page.locator("input")
-    canvas = page.get_by_role("img", name="what moves").and_(page.locator("canvas"))
+    timed.set_viewport_size({"width": 1600, "height": 1000})
+    timed.set_content(f"<!doctype html>{player._repr_html_()}")
+    button, slider = timed.get_by_role("button", name="play or pause"), timed.locator("input")
+    canvas = timed.get_by_role("img", name="what moves").and_(timed.locator("canvas"))
     canvas.evaluate("(canvas) => canvas.style.width = 2 * parseFloat(canvas.style.width) + 'px'")
-    page.clock.pause_at(HOUR)  # from here on, time passes only in steps
+    timed.clock.pause_at(HOUR)  # from here on, time passes only in steps
     button.press("Enter")
-    page.clock.run_for(280)
+    timed.clock.run_for(280)
     button.press("Enter")
-    page.clock.run_for(1000)
+    timed.clock.run_for(1000)
     assert slider.input_value() == "7"
     for frame, share in ((0, "0 %"), (19, "100 %")):
         slider.fill(str(frame))
@@ -54,22 +53,21 @@ def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpack
         check_alike(shown(canvas), full.getvalue(), player.background)
     plt.close(fig)
     button.press("Enter")
-    page.clock.run_for(40)
+    timed.clock.run_for(40)
     assert slider.input_value() == "0"
     without = "<!doctype html><script>DecompressionStream = undefined</script>"
-    page.set_content(without + player._repr_html_())
-    assert page.locator("img").is_visible()
-    assert page.locator("button, img[data-read]").count() == 0
+    timed.set_content(without + player._repr_html_())
+    assert timed.locator("img").is_visible()
+    assert timed.locator("button, img[data-read]").count() == 0
 
 
 @pytest.mark.parametrize("name", ["planar", "chain", "random", "minimum_acceleration", "cube"])
-def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, page):
-    page.clock.install(time=0)
-    page.set_viewport_size({"width": 1400, "height": 1000})
-    page.goto((FOLDER / f"{name}.html").as_uri())
+def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, timed):
+    timed.set_viewport_size({"width": 1400, "height": 1000})
+    timed.goto((FOLDER / f"{name}.html").as_uri())
     explorer, (moved, stride) = getattr(explorers, f"{name}_explorer")(), recorded.MOVED[name]
     steps = explorer.steps[explorer.time.index % stride :: stride]
-    canvas, sliders = page.locator("canvas"), page.locator("input").all()
+    canvas, sliders = timed.locator("canvas"), timed.locator("input").all()
     assert len(sliders) == len(moved) + 1
     canvas.evaluate("(canvas) => { canvas.style = 'display: block; width: 1120px'; }")
     rng = np.random.default_rng(1)
@@ -83,47 +81,46 @@ def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, 
             now[each] = values[k]
         state = explorer.state(**now)
         check_alike(shown(canvas), explorer.draw(state.shown, zoom=2), explorer.background)
-        rows = page.locator("tr").evaluate_all(
+        rows = timed.locator("tr").evaluate_all(
             "(rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent))"
         )
         said, _, line = state.texts
         assert rows == [list(pair) for pair in said]
-        seen = page.locator(".rbcourse-view output").all_inner_texts()
+        seen = timed.locator(".rbcourse-view output").all_inner_texts()
         assert canvas.get_attribute("aria-label") == " ".join([line, *seen])
     for slider, name in zip(sliders, [*moved, explorer.plays], strict=True):
         assert slider.get_attribute("aria-label") == explorer.controls[name].description
         box = slider.bounding_box()
-        page.mouse.click(box["x"] + 1, box["y"] + box["height"] / 2)
+        timed.mouse.click(box["x"] + 1, box["y"] + box["height"] / 2)
         low = slider.get_attribute("aria-valuetext"), shown(canvas)
-        page.keyboard.press("End")
+        timed.keyboard.press("End")
         text = slider.get_attribute("aria-valuetext")
         assert low[0] != text
         assert low[1] != shown(canvas)
-        assert page.get_by_text(text, exact=True).count()
+        assert timed.get_by_text(text, exact=True).count()
         # at this value everything is visible
         slider.fill(str(round(0.6 * float(slider.get_attribute("max")))))
     if explorer.display.rooms:
         before = shown(canvas)
         canvas.press("ArrowLeft")
         assert shown(canvas) != before
-    page.clock.pause_at(HOUR)
-    assert page.locator("[role=status]").inner_text() in canvas.get_attribute("aria-label")
+    timed.clock.pause_at(HOUR)
+    assert timed.locator("[role=status]").inner_text() in canvas.get_attribute("aria-label")
     time = sliders[-1]
     time.fill("0")
-    page.get_by_role("button", name="play or pause").press("Enter")
-    page.clock.run_for(3 * stride * explorer.play.interval)
+    timed.get_by_role("button", name="play or pause").press("Enter")
+    timed.clock.run_for(3 * stride * explorer.play.interval)
     assert time.input_value() == "3"
 
 
-def test_few_steps_are_shown_if_the_reader_reduces_motion(page):
-    page.clock.install(time=0)
-    page.emulate_media(reduced_motion="reduce")
-    page.goto((FOLDER / "theta.html").as_uri())
-    page.clock.pause_at(HOUR)
-    page.get_by_role("button", name="play or pause").click()
+def test_few_steps_are_shown_if_the_reader_reduces_motion(timed):
+    timed.emulate_media(reduced_motion="reduce")
+    timed.goto((FOLDER / "theta.html").as_uri())
+    timed.clock.pause_at(HOUR)
+    timed.get_by_role("button", name="play or pause").click()
     for step in (20, 40, 60, 80):
-        page.clock.run_for(800)
-        assert page.locator("input").last.input_value() == str(step)
+        timed.clock.run_for(800)
+        assert timed.locator("input").last.input_value() == str(step)
 
 
 def test_a_page_without_scripts_is_its_still_and_says_what_is_missing(context):

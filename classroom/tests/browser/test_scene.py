@@ -130,41 +130,40 @@ def test_the_browser_cuts_and_orders_parts_as_python_does(page):
 
 
 @plt.style.context(STYLES)
-def test_buttons_and_keys_set_the_view_which_is_stated_and_can_be_saved(page, tmp_path):
+def test_buttons_and_keys_set_the_view_which_is_stated_and_can_be_saved(timed, tmp_path):
     fig, axes = plt.subplots(1, 2, dpi=80, subplot_kw={"projection": "space"})
     motion = rb.screw_se3(np.eye(4), GOAL)(np.linspace(0, 1, 5))
     update = bodies.moving_boxes(axes, {"one": motion, "other": motion}, edges=1)
     player = animate.animate(fig, "player", "Two cubes.", update, 5, still=0)
     plt.close(fig)
-    page.clock.install()
-    canvas = put(page, player)
-    view, time = page.locator(".rbcourse-view output"), page.locator("input")
+    canvas = put(timed, player)
+    view, time = timed.locator(".rbcourse-view output"), timed.locator("input")
     first = told((18, -22))
     expect(view).to_have_text(first)
     assert canvas.get_attribute("aria-label") == f"Two cubes. {first}"
     seen = {first: shown(canvas)}
     for name, side in {"front": (0, -90), "side": (0, 0), "top": (90, -90)}.items():
-        page.get_by_role("button", name=name).press("Enter")
+        timed.get_by_role("button", name=name).press("Enter")
         expect(view).to_have_text(told(side))
         seen[told(side)] = shown(canvas)
     assert len(set(seen.values())) == 4
-    page.clock.run_for(500)
-    expect(page.locator("[role=status]")).to_have_text(told((90, -90)))
+    timed.clock.run_for(500)
+    expect(timed.locator("[role=status]")).to_have_text(told((90, -90)))
     canvas.press("ArrowUp")
     expect(view).to_have_text(told((90, -90)))  # the view does not pass over the top
     for key in ("Home", "ArrowRight", "ArrowDown"):
         canvas.press(key)
     expect(view).to_have_text(told((13, -27)))
-    page.get_by_role("button", name="as printed").click()
+    timed.get_by_role("button", name="as printed").click()
     expect(view).to_have_text(first)
     assert shown(canvas) == seen[first]
     time.press("End")  # the view is kept while time runs
-    page.get_by_role("button", name="side").click()
+    timed.get_by_role("button", name="side").click()
     time.press("Home")
     expect(view).to_have_text(told((0, 0)))
     assert shown(canvas) == seen[told((0, 0))]
-    with page.expect_download() as download:
-        page.get_by_role("button", name="save picture").click()
+    with timed.expect_download() as download:
+        timed.get_by_role("button", name="save picture").click()
     download.value.save_as(tmp_path / "saved.png")
     assert np.array_equal(pixels((tmp_path / "saved.png").read_bytes()), pixels(shown(canvas)))
     assert re.fullmatch(r"\w+\.png", download.value.suggested_filename)

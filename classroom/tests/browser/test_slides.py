@@ -9,7 +9,6 @@ from pathlib import Path
 import nbformat
 import pytest
 from pages import watched
-from playwright.sync_api import TimeoutError as TooLate
 from playwright.sync_api import expect
 from servers import serving
 
@@ -27,14 +26,9 @@ HERE = "() => Reveal.getCurrentSlide().innerText"
 
 
 def opened(page, address):
-    """Open slides and wait until they are laid out; reload them once if that takes a minute."""
-    ready = "document.documentElement.dataset.ready"
+    """Open slides and wait until they are laid out."""
     page.goto(address)
-    try:
-        page.wait_for_function(ready, timeout=60_000)
-    except TooLate:
-        page.reload()
-        page.wait_for_function(ready, timeout=60_000)
+    page.wait_for_function("document.documentElement.dataset.ready")
     return page
 
 
