@@ -96,6 +96,8 @@ def section(slide: Slide) -> str:
     elif slide.picture:
         narrow = " narrow" * (slide.words < 18)
         layout = "wide" if slide.picture.aspect > WIDE else f"split{narrow}"
+    elif "<h3>" not in words:  # a recap, or a slide after the end
+        head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
     layout += " tabled" * ("<table" in words)
     shown = f"<figure>{slide.picture.html}</figure>" if slide.picture else ""
     notes = "".join(f"<div>{marked(note)}</div>" for note in slide.notes)

@@ -63,8 +63,8 @@ class Slide:
 
 
 def words_of(text: str) -> int:
-    """Return the number of words of a slide text."""
-    text = re.sub(r"\$\$.*?\$\$", " ", text, flags=re.S)
+    """Return the number of words of a slide text without its heading."""
+    text = re.sub(r"^###.*|\$\$[\s\S]*?\$\$", " ", text, flags=re.M)
     text = re.sub(r"\$[^$]*\$", " x ", text)
     return len(
         re.findall(r"\w[\w’'.,-]*", re.sub(r"^[-*] |<[^>]*>|\. \. \.", " ", text, flags=re.M))

@@ -24,7 +24,7 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// A slide without pictures has larger text if the text fits. Text that is too long shrinks, down to 80 %.
+// A slide without pictures has larger text if the text fits. Other text shrinks if it is too long, down to 80 %.
 // A formula that is wider than its column shrinks, down to 62 %.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
@@ -37,8 +37,8 @@ const settle = (section) => {
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
   const over = () => words.offsetHeight > room + 4;
-  let size = section.matches(".plain:not(.tabled)") ? 52 : 45;
-  for (set(size); over() && size > 36; size = size > 45 ? 45 : size - 1) set(size > 45 ? 45 : size - 1);
+  let size = section.matches(".plain:not(.tabled)") ? 59 : 45;
+  for (set(size); over() && size > 36; set(size)) size -= size > 45 ? 7 : 1;
 };
 
 // Pictures of the current and of the next slide become interactive; on paper, pictures are stills.
