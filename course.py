@@ -35,7 +35,7 @@ LISTS = {  # lists of exact versions; an environment needs its own list and all 
 }
 PYTEST = "pytest -n auto --dist loadfile --no-loadscope-reorder"
 BROWSER = "pytest -n auto --dist worksteal classroom/tests/browser"
-TASKS = {  # environment, commands (the last one takes the further arguments), and help
+TASKS = {  # environment, commands, help; further arguments go to the last command
     "lab": ("lessons", ["rbclassroom.course.lab"], "open the lessons in JupyterLab"),
     "check": ("lessons", ["rbclassroom.assignments.check"], "check a problem set: check FILE"),
     "book": ("book", ["rbclassroom.book.build"], "write the course as web pages, in book/"),
@@ -54,12 +54,12 @@ TASKS = {  # environment, commands (the last one takes the further arguments), a
     "lint": ("test", ["ruff check", "ruff format --check", "mypy"], "check style and types"),
     "lock": ("test", ["rbclassroom.course.lock"], "write the lists of exact versions"),
 }
-PATHS = "check", "collect"  # tasks with a path, which is relative to the folder of the terminal
+PATHS = "check", "collect"  # tasks that take a path, relative to the terminal's folder
 PLAIN = "ledger", "atlas", "bench"  # tasks without further arguments
 
 
 class SetUpError(Exception):
-    """An error of a command of the set-up, with the end of its output."""
+    """A set-up command has failed; the message is the end of its output."""
 
 
 def main():
@@ -79,7 +79,7 @@ def main():
         words = [os.path.abspath(word) if os.path.exists(word) else word for word in words]
     environment, commands, _ = TASKS[task]
     set_up(environment)
-    if "pytest" in commands[-1]:  # each worker uses one processor, so it has one thread
+    if "pytest" in commands[-1]:  # each worker uses one processor, so one thread is enough
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         # otherwise each process compiles all modules again
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -90,7 +90,7 @@ def main():
 def run(*words):
     """Run a module in .venv, in the folder of the course; exit if it fails.
 
-    Ctrl-C also reaches the module, which decides how it ends.
+    Ctrl-C also reaches the module, and this function waits until the module ends.
     """
     job = subprocess.Popen([python(), "-m"] + list(words), cwd=ROOT)
     while True:
@@ -104,7 +104,7 @@ def run(*words):
 
 
 def set_up(environment):
-    """Make .venv, or add the missing distributions of an environment."""
+    """Make .venv if necessary, and install the distributions of an environment."""
     names = list(LISTS)[: list(LISTS).index(environment) + 1]
     wanted = {name: fingerprint(ROOT / LISTS[name]) for name in names}
     found = read_stamp()
@@ -141,7 +141,7 @@ def create(found):
     except OSError as error:
         sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
-    # this is written first, so that the next call notices an interruption
+    # if this run is interrupted, the next one finds this stamp
     write_stamp({"unfinished": True})
     print("Making .venv", end=" ", flush=True)
     if UV:
@@ -153,7 +153,7 @@ def create(found):
 
 
 def install(*words):
-    """Install into .venv with uv, which pip fetches if it is missing, or with pip if this fails."""
+    """Install into .venv with uv, or with pip if uv fails; pip fetches uv if it is missing."""
     pip = python(), "-m", "pip"
     uv, settings = UV, {}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -169,7 +169,7 @@ def install(*words):
 
 
 def settings_of_pip(*pip):
-    """Return the indexes and certificates of pip, as environment variables of uv."""
+    """Return pip's indexes and certificates as environment variables for uv."""
     names = {
         "index-url": "UV_DEFAULT_INDEX",
         "extra-index-url": "UV_INDEX",
@@ -192,9 +192,9 @@ def python():
 
 
 def patiently(*command, **settings):
-    """Run a command and print a dot every two seconds; if it fails, raise the end of its output.
+    """Run a command and print a dot every two seconds; raise `SetUpError` if the command fails.
 
-    Like pip, uv uses the certificates of the system, because networks of schools have their own.
+    Like pip, uv uses the system's certificates, which include those of a school's network.
     """
     uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
     environment = dict(dict(uv, **settings), **dict(os.environ, PIP_USER="0"))
@@ -213,12 +213,12 @@ def patiently(*command, **settings):
 
 
 def read_stamp():
-    """Return the record of the lists installed into .venv; None if course.py did not make .venv."""
+    """Return the record of the installed lists, or None if course.py did not make .venv."""
     try:
         return json.loads((VENV / "made-by-course.txt").read_text())
     except FileNotFoundError:
         return None
-    except ValueError:  # an earlier version of course.py wrote it
+    except ValueError:  # the stamp is from an earlier version of course.py
         return {}
 
 

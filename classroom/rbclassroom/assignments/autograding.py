@@ -1,6 +1,6 @@
 """nbgrader steps that restore cells, run code in a sandbox, and make feedback without secrets.
 
-`configure` enters them into the configuration of nbgrader, so that they also work in nbgrader's own
+`configure` adds the steps to nbgrader's configuration, so that they also work in nbgrader's own
 commands and in the formgrader.
 """
 
@@ -31,7 +31,7 @@ from rbclassroom.assignments.locked_cells import Refused, marks_of, name_cell
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 
 UNSEEN = "The visible tests pass, but a hidden test fails.\n"
-# pages show students' HTML without elements that run, load files or imitate the page
+# students' HTML is shown without elements that run, load files or imitate the page
 TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt"}
 TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
 TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
@@ -42,8 +42,8 @@ SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
 
 def configure(config: Config) -> None:
-    """Set the steps of nbgrader for submissions and feedback, and the path of its tools."""
-    # nbgrader calls alembic by name, which is found only in an activated environment
+    """Set nbgrader's steps for submissions and feedback, and the path of nbgrader's tools."""
+    # nbgrader runs the program alembic, which PATH contains only in an activated environment
     if not shutil.which("alembic"):
         path = os.environ.get("PATH", os.defpath)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
@@ -54,7 +54,7 @@ def configure(config: Config) -> None:
     # by default nbgrader gives no points if a cell writes to stderr, even a warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."
-    # the feedback comes from a run without hidden tests; the scores come from the gradebook
+    # the feedback shows a run without hidden tests, and the scores from the gradebook
     clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
     shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
     config.GenerateFeedback.preprocessors = shown
@@ -82,7 +82,7 @@ def inert_html(content: object) -> str:
 
 
 class _Renderer(IPythonRenderer):
-    """A renderer of Markdown that shows addresses of links and of missing pictures as text."""
+    """Render Markdown, with the addresses of links and of missing pictures as text."""
 
     def link(self, text: str, url: str, title: str | None = None) -> str:
         return f"{text} ({html.escape(url)})"
@@ -101,8 +101,8 @@ def inert_markdown(context: Any, source: str) -> str:
     return inert_html(MarkdownWithMath(renderer=renderer).render(source))
 
 
-class RestoreCells(nbgrader.OverwriteCells):  # its base class adds the hidden tests
-    """Restore the locked cells; refuse code that overrides names and objects of the tests."""
+class RestoreCells(nbgrader.OverwriteCells):  # the base class adds the hidden tests
+    """Restore the locked cells; refuse code that overrides names or objects of the tests."""
 
     def preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
         """Restore the notebook as it was released, and store the remarks in its metadata."""
@@ -161,7 +161,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
                     output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
-            # scores are known only in the run for the feedback
+            # scores are known only while feedback is made
             failed = marks.get("points") and not marks.get("score", True)
             if locked_cells.is_test(cell) and failed and not errors:
                 outputs.append(new_output("stream", name="stdout", text=UNSEEN))

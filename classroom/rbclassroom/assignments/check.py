@@ -65,7 +65,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
 
 
 def _find_original(path: Path) -> tuple[str, bytes]:
-    """Return the name and the content of the original of a set; in the course, generate it."""
+    """Return the name and the content of a set's original, which is generated in the course."""
     folder, course = path.parent / "original", Path("notebooks", "assignments")
     if course.is_dir() and not folder.exists():
         from rbclassroom.assignments.handout import release  # this needs nbgrader
@@ -81,7 +81,7 @@ def _find_original(path: Path) -> tuple[str, bytes]:
 
 
 class _Client(BoundedClient):
-    """A client that prints the number of the running cell, and records the time of each cell."""
+    """Print the number of the running cell, and record the time that each cell takes."""
 
     at, began, took = 0, 0.0, dict[int, float]()
 
@@ -95,7 +95,7 @@ class _Client(BoundedClient):
 
 
 def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
-    """Run all cells, and return remarks on errors outside of the problems."""
+    """Run all cells; return remarks on errors outside answers and tests."""
     log = logging.getLogger(__name__)
     log.setLevel(logging.CRITICAL + 1)  # this module reports the errors itself
     cells, ends = notebook.cells, list[str]()
@@ -130,12 +130,12 @@ def _error(cell: NotebookNode) -> str:
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
-    hint = lines[-1] and errors[-1].ename == "NotYet"  # its text is complete by itself
+    hint = lines[-1] and errors[-1].ename == "NotYet"  # a hint is complete without the name NotYet
     return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
 
 
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
-    """Print a line with the title of each problem; return which of the visible tests passed."""
+    """Print a line for each problem; return True or False for each visible test."""
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered, source, wrong = [], True, "", list[str]()

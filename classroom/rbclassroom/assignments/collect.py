@@ -1,9 +1,8 @@
 """Collect submissions from Moodle or Canvas downloads into the folders that nbgrader reads.
 
-The names of the files are set by mod/assign/classes/downloader.php of Moodle and by
-lib/content_zipper.rb of Canvas. The date of a file is often the date of the download. A date that
-is not after the due date shows that the file was in time; a later date does not show that it was
-late.
+Moodle names the files in mod/assign/classes/downloader.php, and Canvas in lib/content_zipper.rb.
+The date of a file is often the date of the download. A file with a date up to the due date was in
+time; a file with a later date need not be late.
 """
 
 import contextlib
@@ -31,7 +30,7 @@ CANVAS = re.compile(
 )
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
 FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
-# zipfile raises RuntimeError for a password, and its subclass NotImplementedError for a method
+# zipfile raises RuntimeError if a zip has a password or an unknown kind of compression
 BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["not on the roster", "missing"]
@@ -39,18 +38,18 @@ Row = tuple[str, str, str]  # the name of a list, a file or a student, and the r
 
 
 class Upload(NamedTuple):
-    """A notebook that a student handed in; among several, the last one in sorted order is used."""
+    """A notebook that a student handed in; of several, the last one in sorted order is used."""
 
     number: int  # given by Canvas; later uploads have larger numbers
     date: str
-    prepared: bool  # written by the check into to_submit/
+    prepared: bool  # the student's check wrote it
     file: str
     about: dict[str, str]
     content: bytes
 
 
 def collect(folder: Path, assignments: Path, due: datetime | None = None) -> list[Row]:
-    """Copy the notebooks in a folder to ``submitted/``, and return a row on each file.
+    """Copy the notebooks in a folder to ``submitted/``, and return a row for each file.
 
     If a student has several files for a set, the newest is used. A file in ``submitted/`` is
     replaced only by a newer one. ``submitted/report.csv`` stores the rows.
@@ -111,7 +110,7 @@ def _find(folder: Path) -> Iterator[Upload | Row]:
 def _look(label: str, name: str, stream: IO[bytes], date: datetime) -> Iterator[Upload | Row]:
     """Yield the notebooks in a file, or the reason why it is not used.
 
-    The student is known from `name`, the path of the file through the zips that contain it.
+    `name` is the path of the file, including the zips that contain it; it identifies the student.
     """
     suffix, owner = Path(name).suffix.lower(), _owner(name)
     try:
@@ -135,7 +134,7 @@ def _look(label: str, name: str, stream: IO[bytes], date: datetime) -> Iterator[
 
 def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterator[Upload | Row]:
     entries = [(_shown(e.filename), e) for e in zipped.infolist() if not e.is_dir()]
-    # a complete download may have a name like an upload to Canvas
+    # the name of a complete download may look like an upload to Canvas
     whole = label == name and not MOODLE.fullmatch(name) and any(_owner(n) for n, _ in entries)
     upload, size = _owner(name) and not whole, sum(entry.file_size for _, entry in entries)
     if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
@@ -146,7 +145,7 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
             if wanted and entry.file_size > FILE_BYTES:
                 raise ValueError("it is too large")
             content = zipped.read(entry) if wanted else b""
-            # dates in a student's zip come from the student's machine and are not used
+            # dates in a student's own zip are not used
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:
             yield "refused", f"{label}: {inner}", str(error)
@@ -156,8 +155,8 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
 
 
 def _shown(name: str) -> str:
-    """Return a name in composed letters, without characters that cannot be printed in a line."""
-    with contextlib.suppress(UnicodeError):  # many zips have names in UTF-8 without the flag for it
+    """Return a name in normal form C, without control characters."""
+    with contextlib.suppress(UnicodeError):  # many zips do not flag their UTF-8 names
         name = name.encode("cp437").decode("utf-8")
     name = name.encode("utf-8", "replace").decode("utf-8")
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
@@ -168,7 +167,7 @@ def _owner(name: str) -> re.Match[str] | None:
 
 
 def _written(date: datetime) -> str:
-    """Return a local time in the format that nbgrader reads."""
+    """Return a local time as text that nbgrader reads."""
     return f"{date.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
@@ -185,7 +184,7 @@ def _read_sets(assignments: Path) -> dict[str, set[str]]:
 
 
 def _read_roster(path: Path) -> list[dict[str, str]]:
-    """Return the rows of the roster, with any delimiter; no rows if there is no roster."""
+    """Return the rows of the roster, or no rows if it does not exist."""
     if not path.exists():
         return []
     try:
@@ -202,7 +201,7 @@ def _read_roster(path: Path) -> list[dict[str, str]]:
 
 
 def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
-    """Return the set of a file, found from its cells and its name, and a reason if none fits."""
+    """Return the set that fits a notebook's cells, and a reason if the notebook is not used."""
     cells, stem = read_notebook(upload.content, "it").cells, Path(upload.about["file"]).stem
     shared = {name: len({grade_id(cell) for cell in cells} & own) for name, own in sets.items()}
     named = [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", stem, re.IGNORECASE)]
@@ -216,7 +215,7 @@ def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
 
 
 def _plain(name: str) -> str:
-    """Return a name in small letters and digits, without apostrophes, which Moodle removes."""
+    """Return a name in lower case without apostrophes, which Moodle removes."""
     name = re.sub("['`’]", "", unicodedata.normalize("NFKC", name).casefold())
     return re.sub(r"[\W_]+", "_", name).strip("_")[:60]
 
@@ -231,19 +230,19 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
         found += [row["id"]] * (key(words.split("_")) == key(plain.split("_")))
     if len(found) == 1:
         return found[0]
-    # a number is added for unknown students of Canvas, anonymous ones, and reserved names
+    # unknown students of Canvas, anonymous students and reserved names need a number
     alone = plain not in ("", "participant", "aux", "con", "nul", "prn") and not canvas
     return plain if alone else f"{plain}_{number}".strip("_") or "student"
 
 
 def _take(best: Upload, place: Path) -> Row:
-    """Write a file to its folder, unless the folder has a newer one; return a row on it."""
+    """Write an upload to its folder, unless a newer one is there; return a row for it."""
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
     text = decode(best.content).encode()
     note = "; it is now stored in UTF-8" * (text != best.content)
     why = f"{place.parent.name}, {place.name}{note}"
     if target.exists():
-        # a file without a stamp was not collected, and is kept
+        # keep a file without a stamp, because it was not collected
         old = stamp.read_text(encoding="utf-8").strip() if stamp.exists() else "later"
         if target.read_bytes() == text or best.date == old:
             return "unchanged", best.file, why

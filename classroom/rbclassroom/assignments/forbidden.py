@@ -15,9 +15,9 @@ from nbformat import NotebookNode
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
 
-# each of these names gives access to objects that do not appear in the code
+# these names give access to objects that the code does not mention
 NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
-NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # In and _ih hold the tests
+NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # In and _ih show the tests
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
@@ -38,13 +38,13 @@ LOCAL = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef | ast
 
 
 def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
-    """Return the cell index, the line and the action of all code that overrides names of tests."""
+    """Return the cell index, the line and a description of each override in the student's code."""
     trees = {at: _parsed(c.source) for at, c in enumerate(cells) if c.cell_type == "code"}
     own = [at for at in trees if is_answer(cells[at]) or not grade_id(cells[at])]
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
     names = {_defines(node) for node in given} - {""}
     attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
-    modules = set[str]()  # names of modules and of their contents
+    modules = set[str]()  # imported names, and names of parts of modules
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))
@@ -55,7 +55,7 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
 
 
 def _parsed(source: str) -> ast.Module:
-    """Return the syntax tree of the code, or an empty tree if it is not Python and cannot run."""
+    """Return the syntax tree of the code, or an empty tree if the code is not valid Python."""
     for text in (HARMLESS.sub("pass", TIMED.sub("", source)), source):
         try:
             tree = ast.parse(TransformerManager().transform_cell(text))
@@ -82,7 +82,7 @@ def _root(node: ast.AST) -> str:
 
 
 def _rebound(node: ast.AST, local: bool) -> list[str]:
-    """Return the names that a node binds in the notebook, except those of customary imports."""
+    """Return the global names that a node binds, except for the usual ones, such as np."""
     match node:
         case ast.Global(names=names):
             return names
@@ -93,13 +93,13 @@ def _rebound(node: ast.AST, local: bool) -> list[str]:
         case ast.alias(name=name, asname=short) if not local:
             usual = CUSTOMARY.get(short or "", short)
             return [short] if short and usual != name.rpartition(".")[2] else []
-    return [] if local else [getattr(node, "name", "")]  # definitions and patterns of match
+    return [] if local else [getattr(node, "name", "")]  # definitions, and patterns of `match`
 
 
 def _overrides(
     tree: ast.Module, names: set[str], attributes: set[str], modules: set[str]
 ) -> Iterator[tuple[int, str]]:
-    """Yield the line and the action of code that bypasses the tests."""
+    """Yield the line and a description of code that could deceive the tests."""
     scopes = [node for node in ast.walk(tree) if isinstance(node, LOCAL)]
     inner = {n for scope in scopes for part in ast.iter_child_nodes(scope) for n in ast.walk(part)}
     node: Any
@@ -112,7 +112,7 @@ def _overrides(
             case ast.Attribute(attr=name, ctx=ast.Load()) if name in ATTRIBUTES:
                 yield node.lineno, f"uses {name}"
             case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
-                root = _root(node)  # `self` is an object of a class of the student
+                root = _root(node)  # `self` belongs to a class of the student
                 if root in modules or (name in attributes and root != "self"):
                     yield node.lineno, f"replaces {ast.unparse(node)}"
             case ast.Call(func=ast.Name(id="getattr"), args=args):

@@ -33,7 +33,7 @@ from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.tables import update
 
-WORKERS = 2  # number of students that are graded at the same time
+WORKERS = 2  # students graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
 Job = tuple[str, str]  # the names of a set and of a student
@@ -45,8 +45,8 @@ def grade(names: Iterable[str], assignments: Path, require_box: bool = False) ->
 
     The function prints a line for each submission, and writes feedback and a table for each set.
     Points given by hand are kept. A submission that is refused loses its feedback and its earlier
-    automatic points. If points of one student change while another is graded, or exceed the
-    maximum, a ValueError names the student and no table is written. The file
+    automatic points. If a student's points exceed the maximum, or change while another
+    student is graded, ValueError is raised and no table is written. The file
     ``gradebook.before-NAME.db`` is a copy of the gradebook before the run.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
@@ -100,7 +100,7 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
 
 
 def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[Job, Row]]:
-    """Grade submissions in parallel, but one per student at a time; yield the row of each."""
+    """Grade submissions in parallel, one per student at a time; yield their rows."""
     course, todo = CourseDirectory(config=course_config(jobs[0][0], assignments)), list(jobs)
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY,))
@@ -131,10 +131,7 @@ def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[J
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
-    """Yield files, perhaps of this set, that `collect` could not use, and students without files.
-
-    Each is yielded together with the reason.
-    """
+    """Yield unused files that may belong to this set, and students without files, with reasons."""
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
     for row in _report(assignments):
         what, student = row["what"], row["what"].removesuffix(f", {name}")
@@ -147,13 +144,13 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
 
 
 def _perhaps_late(assignments: Path) -> set[str]:
-    """Return the submissions, ``STUDENT, SET``, that `collect` listed as perhaps late."""
+    """Return the names ``STUDENT, SET`` of submissions that `collect` listed as perhaps late."""
     rows = (row for row in _report(assignments) if row["list"] == "late")
     return {row["what"] for row in rows if row["why"].startswith("perhaps")}
 
 
 def _report(assignments: Path) -> list[dict[str, str]]:
-    """Return the rows of the report of `collect`."""
+    """Return the rows that `collect` reported."""
     report = assignments / "submitted" / "report.csv"
     text = report.read_text("utf-8-sig") if report.exists() else ""
     return list(csv.DictReader(io.StringIO(text, newline="")))
@@ -171,7 +168,7 @@ def course_config(name: str, assignments: Path) -> Config:
 
 
 def run_step(converter: Any, config: Config) -> dict[str, Any]:
-    """Run a step of nbgrader without printing; replace earlier results."""
+    """Run a step of nbgrader silently, and replace earlier results."""
     log = logging.getLogger(__name__)
     log.propagate, log.handlers = False, [logging.NullHandler()]
     step = converter(CourseDirectory(config=config), config=config, log=log)
@@ -212,7 +209,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     if boxed and sandbox.missing():
         raise Refused(f"the sandbox does not work any more: {sandbox.missing()}")
     config = course_config(name, folder)
-    if hasattr(signal, "alarm"):  # a further time limit, for both runs together
+    if hasattr(signal, "alarm"):  # a time limit for both runs together
         signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
@@ -239,10 +236,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
 
 
 def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
-    """Return a page of feedback whose list has titles of problems in place of "Test cell".
-
-    The page also marks the answers `to_do` as not graded yet.
-    """
+    """Return a page of feedback that names the problems, and marks `to_do` as not graded yet."""
     cells, names = nbformat.read(graded, as_version=4).cells, dict[str, str]()
     for at, cell in enumerate(cells):
         title = re.sub(r" \(\d+ points?\)$", "", locked_cells.title_of(cells, at))
@@ -268,14 +262,14 @@ def _to_do(grades: Iterable[Any]) -> list[str]:
 
 
 def _words(path: Path) -> dict[str, str]:
-    """Return the texts of the answers that a person grades, in a notebook that was graded."""
+    """Return the answers that a person grades, from an autograded notebook."""
     cells = nbformat.read(path, as_version=4).cells if path.exists() else []
     words = (cell for cell in cells if is_answer(cell) and locked_cells.marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}
 
 
 def check_submission(folder: Path, name: str, given: set[str]) -> None:
-    """Raise `Refused` if nbgrader cannot read the notebook, or for links or additional files."""
+    """Raise `Refused` for an unreadable notebook, a link or an additional file."""
     wanted, there = f"{name}.ipynb", sorted(path.name for path in folder.iterdir())
     path = folder / wanted
     if wanted not in there:
@@ -319,13 +313,13 @@ def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[
 
 
 def _tidy(words: str) -> str:
-    """Return a remark, which may quote a student, as a short printable line."""
+    """Return a remark as a short printable line; it may quote a student."""
     words = "".join(letter if letter.isprintable() else "?" for letter in words)
     return words if len(words) <= 300 else f"{words[:300]}…"
 
 
 def _withdraw(gradebook: Any, root: Path, name: str, student: str) -> None:
-    """Remove the feedback and the automatic points of a submission that is refused now."""
+    """Remove the feedback and the automatic points of a refused submission."""
     for step in ("autograded", "feedback"):
         if (root / step / student / name).exists():
             rmtree(str(root / step / student / name))

@@ -77,7 +77,7 @@ def release(name: str, assignments: Path) -> dict[str, bytes]:
 
 
 def _leak(name: str, given: NotebookNode, notebook: NotebookNode, files: dict[str, bytes]) -> str:
-    """Return a message about a file that shows solutions, hidden tests or mark schemes, or ""."""
+    """Return a message if a file shows solutions, hidden tests or mark schemes, otherwise ""."""
     taken, common = _lines(given) - _lines(notebook), ("import ", "from ", "raise ")
     secrets = sorted(line for line in taken if len(line) >= 12 and not line.startswith(common))
     if any(cell.get("attachments") and is_answer(cell) for cell in notebook.cells):
@@ -98,7 +98,7 @@ def _lines(notebook: NotebookNode) -> set[str]:
 
 
 def build_wheel(course: Path) -> tuple[str, bytes]:
-    """Build the wheel of a distribution, with the same bytes each time, without the network."""
+    """Build the wheel of a distribution, reproducibly and without a network."""
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, "-m", "flit_core.wheel", "--outdir", folder]
         own = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the earliest date in a zip
@@ -108,7 +108,7 @@ def build_wheel(course: Path) -> tuple[str, bytes]:
 
 
 def make_handout(name: str, assignments: Path, course: Path) -> Path:
-    """Write ``handouts/NAME.zip`` for the students, with the same bytes each time."""
+    """Write ``handouts/NAME.zip`` for the students, reproducibly."""
     files = release(name, assignments)
     wheels = dict(build_wheel(folder) for folder in (course, course / "classroom"))
     environment = (course / "environment.txt").read_text("utf-8").splitlines()
@@ -122,17 +122,17 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
         **wheels,
     }
     if taken := files.keys() & own.keys():
-        raise ValueError(f"{name}: the handout needs the name {min(taken)} for a file of its own")
+        raise ValueError(f"{name}: rename {min(taken)}; the handout has its own file of this name")
     packed = pack({f"{name}/{path}": data for path, data in {**files, **own}.items()})
     return write_whole(assignments / "handouts" / f"{name}.zip", packed)
 
 
 def pack(files: dict[str, bytes]) -> bytes:
-    """Return a zip of files, with the same bytes each time."""
+    """Return a zip of files; equal files give equal bytes."""
     packed = io.BytesIO()
     with ZipFile(packed, "w") as archive:
         for path, data in sorted(files.items()):
-            entry = ZipInfo(path)  # with the earliest date in a zip
+            entry = ZipInfo(path)  # the default date is the earliest one
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
     return packed.getvalue()

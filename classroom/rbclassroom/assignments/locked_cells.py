@@ -16,7 +16,7 @@ from nbformat import NotebookNode
 
 
 class Refused(ValueError):
-    """An error for a submission that cannot be graded automatically; the message has the reason."""
+    """A submission cannot be graded automatically; the message gives the reason."""
 
 
 def decode(content: bytes) -> str:
@@ -31,7 +31,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
         raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start again")
     if content.startswith((b"%PDF", b"PK")):
         raise Refused(f"{name} is a PDF or an archive, not a notebook; hand in the notebook")
-    logging.disable()  # nbformat warns of cells without ids, which `restore` adds
+    logging.disable()  # nbformat warns about missing ids, which `restore` adds
     try:
         with warnings.catch_warnings(action="ignore"):
             notebook = nbformat.reads(decode(content), as_version=4)
@@ -69,14 +69,14 @@ def is_test(cell: NotebookNode) -> bool:
 
 
 def title_of(cells: list[NotebookNode], at: int) -> str:
-    """Return the last heading in or above a cell, except for headings of the student."""
+    """Return the last heading in or above a cell; headings of the student do not count."""
     given = [c for c in cells[: at + 1] if c.cell_type == "markdown" and not is_answer(c)]
     text = "\n".join(cell.source for cell in given if grade_id(cell))
     return (re.findall(r"^#+\s+(.+?)\s*$", text, re.MULTILINE) or [""])[-1]
 
 
 def name_cell(cells: list[NotebookNode], at: int) -> str:
-    """Return a description by which a person finds a cell."""
+    """Describe a cell by its number, kind and title."""
     cell, title = cells[at], title_of(cells, at)
     given = "answer" if is_answer(cell) else "test" if is_test(cell) else "locked cell"
     kind = given if grade_id(cell) else "added cell"
@@ -87,8 +87,8 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     """Restore the locked cells of a notebook, and return a remark for each change.
 
     Answers are not changed. If several cells have the same name, the last one counts, and the
-    others become cells of the student. Cells of the student lose their metadata, which could keep
-    them from being run.
+    others become cells of the student. Cells of the student lose their metadata, which could
+    prevent a run.
     """
     cells, wanted = notebook.cells, {grade_id(c): c for c in original.cells if grade_id(c)}
     last = {grade_id(cell): at for at, cell in enumerate(cells) if grade_id(cell)}

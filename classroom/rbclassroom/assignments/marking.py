@@ -22,7 +22,7 @@ IN_RADIANS = (
 
 
 class Mistake(NamedTuple):
-    """A common mistake: a hint, and the results on all inputs of functions that make it."""
+    """A common mistake: a hint, and the results of functions that make this mistake."""
 
     hint: str
     results: Sequence[Sequence[Any]]
@@ -85,7 +85,7 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            trials = zip(given, *mistake.results, strict=True)  # each input may match another one
+            trials = zip(given, *mistake.results, strict=True)  # any of the functions may match
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""
@@ -119,8 +119,8 @@ class Drawing(Problem):
     """A problem whose answer is a function that draws; the data of its artists are compared.
 
     The student's function gets axes before the arguments of `inputs`. A result is a list of
-    curves, each an array of points, shape (n, 2); the function may draw others, too. The bars of a
-    histogram are a curve through the middle of the top of each bar. Both axes need a label.
+    curves, each an array of points, shape (n, 2); the function may draw further curves. The bars of
+    a histogram give a curve through the midpoints of their upper edges. Both axes need a label.
     """
 
     accuracy: float = 1e-6
@@ -184,7 +184,7 @@ def curves_of(axes: Any) -> list[Array]:
         if (style := line.get_drawstyle()) != "default":
             outlines.append(np.column_stack(STEP_LOOKUP_MAP[style](*line.get_xydata().T)))
     for a, b in ((np.array(outline[:-1]), np.array(outline[1:])) for outline in outlines):
-        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # the tread of a step runs to the right
+        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # the top of a step runs to the right
         found.append((a + b)[treads] / 2)
     for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
         found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))
@@ -202,7 +202,7 @@ def as_numbers(value: Any) -> Array | None:
 
 
 def show(value: Any) -> str:
-    """Return a value as short text: small arrays as rounded lists, large ones by their shape."""
+    """Return a short text: the rounded entries of a small array, or the shape of a large one."""
     if isinstance(value, np.ndarray) and value.size > 16:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]

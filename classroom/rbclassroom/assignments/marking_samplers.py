@@ -19,10 +19,10 @@ Rows = dict[str, Array]
 class Sampler:
     """A problem whose answer is a sampler: the student's ``function(rng)`` returns one draw.
 
-    A correct sampler is rejected with a probability below `DELTA`, whatever generator it uses. The
-    reason is the inequality of Dvoretzky, Kiefer and Wolfowitz, with Massart's constant. For every
-    n, it bounds the probability that the observed distribution of n independent numbers is off by
-    more than e: the probability is at most 2 exp(−2 n e²).
+    A correct sampler is rejected with a probability below `DELTA`, whatever generator it uses. This
+    follows from the inequality of Dvoretzky, Kiefer and Wolfowitz, with Massart's constant: the
+    observed distribution of n independent numbers is off by more than e with a probability of at
+    most 2 exp(−2 n e²), for every n.
 
     The rows of `uniforms` are independent numbers, uniform on [0, 1], if the sampler is correct.
     The results of `mistakes` are quantiles of the distributions of these numbers.
@@ -60,7 +60,7 @@ class Sampler:
 
     def _hint(self, rows: Rows) -> str:
         """Return the hint of the mistake with the nearest distributions, or "" if none is near."""
-        near, hint = 2.0, ""  # in units of the bound; samples of one distribution are nearer
+        near, hint = 2.0, ""  # twice the bound; two samples of one distribution are nearer
         for mistake in self.mistakes:
             for result in mistake.results:
                 pairs = zip(rows.items(), result, strict=True)
@@ -88,7 +88,7 @@ class Sampler:
 
 
 def _gap(ordered: Array) -> float:
-    """Return the largest distance of the distribution of sorted numbers from the uniform one."""
+    """Return the largest distance between a sample's distribution and the uniform one."""
     steps = np.arange(len(ordered) + 1) / len(ordered)
     return float(max((steps[1:] - ordered).max(), (ordered - steps[:-1]).max()))
 
@@ -99,7 +99,7 @@ def quantiles(row: Array) -> Array:
 
 
 def _gap_to(ordered: Array, others: Array) -> float:
-    """Return the largest distance of a distribution from the one with the given quantiles."""
+    """Return the largest distance between a sample's distribution and given quantiles."""
     levels = (np.arange(len(others)) + 0.5) / len(others)
     return float(np.abs(np.searchsorted(ordered, others) / len(ordered) - levels).max())
 
@@ -157,7 +157,7 @@ def _direction_rows(drawn: Array) -> Rows:
 
 
 def _rotation_rows(R: Array) -> Rows:
-    """Return rows that are uniform for uniform R: entries in several frames, and three angles."""
+    """Return rows of entries and angles that are uniform if the rotations R are uniform."""
     heights = {f"the entry R[{i}, {j}]": R[:, i, j] for i in range(3) for j in range(3)}
     for i, x in enumerate(_DIAGONALS):
         for j, y in enumerate(_DIAGONALS):

@@ -11,7 +11,7 @@ from traitlets import Integer
 
 from rbclassroom.course.notebooks import kernel_address
 
-CELL_SECONDS = 30  # for a cell, in the student's check and in grading
+CELL_SECONDS = 30  # limit for a cell, in the check and in grading
 ROOM = {"stream": 100_000, "data": 2_000_000}  # characters of a cell's outputs, by kind
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
@@ -23,7 +23,7 @@ class BoundedClient(NotebookClient):
     """A client for a notebook whose cells may loop, print without end, or end their kernel.
 
     The kernel keeps its files in `folder`, which has to be set before the start. `slow` has the
-    indices of the cells that took too long, and `cut` has those of the cells whose output is
+    indices of the cells that took too long. `cut` has the indices of the cells whose output is
     incomplete.
     """
 
@@ -82,11 +82,11 @@ class BoundedClient(NotebookClient):
     def handle_comm_msg(self, outs: Any, msg: dict[str, Any], cell_index: int) -> None:
         """Ignore messages of widgets, so that the outputs that a widget captures stay in the cell.
 
-        If nbclient answered an Output widget, it could miss the reply of the cell.
+        While nbclient answers an Output widget, it can miss the reply of the cell.
         """
 
     def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
-        """Store the error that the reply names, because without it a test would seem to pass."""
+        """Store the error that the reply names; otherwise a failed test could seem to pass."""
         reply = execute_reply["content"]
         if reply["status"] != "ok":
             cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]

@@ -12,7 +12,7 @@ from rbclassroom.assignments.student_code import NotYet
 
 
 def problem(name: str, slug: str) -> Problem | Sampler:
-    """Return the problem `slug` of the set `name`, whose folder is the current one.
+    """Return the problem `slug` of the set `name`, whose folder must be the current folder.
 
     If the table of the set is beside the folder, as in the course, the data are updated first.
     """

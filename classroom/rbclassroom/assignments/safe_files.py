@@ -8,7 +8,7 @@ from typing import Any
 
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file, and make its folder; readers see the old or the new content, never a part."""
+    """Write a file and make its folder; readers see either the old or the new file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(f".{os.getpid()}.part")
     part.write_bytes(content)
@@ -16,7 +16,7 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write a CSV table whose columns are the keys of the rows; no cell is read as a formula."""
+    """Write a CSV table with the keys of the rows as columns; formulas become text."""
     columns = {key: "" for row in sorted(rows, key=len, reverse=True) for key in row}
     content = io.StringIO(newline="")
     table = csv.writer(content, lineterminator="\n")

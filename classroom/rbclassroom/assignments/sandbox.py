@@ -24,8 +24,8 @@ import rbcourse
 
 PROCESSES = 128  # the largest number of processes and threads
 FILE_BYTES = 100_000_000
-NOBODY = 2**30  # if root grades, kernels run as unused users from this id on: root has no limits
-# keys of a Linux session outlive its processes: each command begins a session of its own
+NOBODY = 2**30  # if root grades, kernels get unused user ids from this one on
+# each command begins its own Linux session, because keys of a session outlive its processes
 KEYCTL = {"x86_64": 250, "aarch64": 219}.get(platform.machine(), -1)
 ALONE = f"import ctypes, os, sys; ctypes.CDLL(None).syscall({KEYCTL}, 1, None); "
 ALONE += "os.execvp(sys.argv[1], sys.argv[1:])"
@@ -36,7 +36,7 @@ SYSTEM += ["/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtim
 
 @functools.cache
 def missing() -> str:
-    """Return why there is no sandbox here, and a remedy, in one line; "" if there is a sandbox."""
+    """Return "" if there is a sandbox, otherwise one line with the reason and a remedy."""
     if sys.platform != "linux":
         return "this system has no sandbox; to have one, grade on Linux with bubblewrap"
     if not shutil.which("bwrap"):
@@ -55,13 +55,13 @@ def prepare(folder: Path) -> None:
     """Make the folders in which the kernel works and keeps its files."""
     for name in ("work", "tmp", "matplotlib"):
         (folder / name).mkdir(exist_ok=True)
-    # without its list of fonts Matplotlib searches for seconds
+    # the copied list saves Matplotlib a search for fonts, which takes seconds
     for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):
         shutil.copy(fonts, folder / "matplotlib")
 
 
 def delete(folder: Path) -> None:
-    """Delete a folder with all files of a kernel: locked ones, deep folders, and links."""
+    """Delete a kernel's folder with all its content, including locked files and links."""
     for _ in range(50):  # a kernel may still write while it ends
         if os.name == "nt":
             shutil.rmtree(folder, ignore_errors=True)
@@ -88,7 +88,7 @@ def box(folder: Path, seconds: int) -> list[str]:
     python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
-    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # the change of the user drops these
+    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # dropped when the user changes
     # the command ends with this process, or after some seconds
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
     words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]
@@ -98,9 +98,9 @@ def box(folder: Path, seconds: int) -> list[str]:
     for path in SYSTEM:
         link = os.path.islink(path)
         words += ["--symlink", os.readlink(path), path] if link else ["--ro-bind-try", path, path]
-    for path in ("/tmp", "/dev/shm"):  # in memory these folders would have no limit
+    for path in ("/tmp", "/dev/shm"):  # by default they are in memory, without a limit
         words += ["--bind", str(folder / "tmp"), path]
-    for parent in sorted(seen)[1:]:  # otherwise they keep their permissions from outside
+    for parent in sorted(seen)[1:]:  # otherwise they keep the permissions of the real folders
         words += ["--dir", parent]
     for path in python:
         words += ["--ro-bind", path, path]
@@ -116,7 +116,7 @@ def box(folder: Path, seconds: int) -> list[str]:
 
 
 def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
-    """Let a manager start its kernel in the sandbox for `seconds`, with its files in the folder."""
+    """Let a manager start its kernel in the sandbox, with a folder and a time limit."""
     spec = manager.kernel_spec
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()

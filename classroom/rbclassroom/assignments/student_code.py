@@ -1,4 +1,4 @@
-"""Call a student's function; report the line of an error and functions that are not allowed.
+"""Call a student's function; report errors with their line, and functions that are not allowed.
 
 Only the names in a function are examined. This helps honest students; it is not protection.
 """
@@ -27,7 +27,7 @@ def call_student(
 ) -> list[Any]:
     """Return the results of a student's function, one for each call.
 
-    Raise `NotYet` if the function stops or uses an object of a library that is not allowed.
+    Raise `NotYet` if the function raises an error, or uses a library object that is not allowed.
     """
     for foreign in _foreign_names(function, allowed):
         how = "Write it yourself with Python, NumPy, and the functions that the problem set allows."
@@ -47,7 +47,7 @@ def call_student(
 
 
 def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
-    """Yield the library objects that a function or the functions that it calls refer to."""
+    """Yield the library objects in the code of a function and of the functions that it calls."""
     permitted = [("rbcourse", name) for name in allowed]
     waiting, known = [(function, list[str]())], set[tuple[Any, ...]]()
     while waiting:
@@ -59,10 +59,10 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             continue
         if isinstance(value, FunctionType) and module == "__main__":
             names = _names(value.__code__)
-            # a name that the function imports is not among its globals
+            # names that the function itself imports are not globals
             found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
         elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
-            # the code does not show whose attribute a name is, so each module is searched
+            # an attribute may belong to any module, so each module is searched
             found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
         elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:
             yield f"{own}.{name}"

@@ -1,4 +1,4 @@
-"""Convert the table of a problem set to data: inputs, answers and results of mistakes.
+"""Convert the table of a problem set to inputs, answers and results of mistakes.
 
 The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder. Students do not get the
 table. It has a section ``SLUG`` for the problem with the cells ``SLUG-answer`` and ``SLUG-test``. A
@@ -40,7 +40,7 @@ def update(folder: Path) -> None:
     target = folder / f"{folder.name}.json"
     if not target.exists() or json.loads(target.read_text("utf-8")).get("state") != state:
 
-        def plain(value: Any) -> Any:  # arrays and scalars of NumPy in a form that JSON has
+        def plain(value: Any) -> Any:  # JSON cannot store NumPy's arrays and scalars
             return {"array": value.tolist()} if isinstance(value, np.ndarray) else value.item()
 
         text = json.dumps({"state": state, **evaluate(folder)}, default=plain)

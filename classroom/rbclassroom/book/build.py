@@ -73,7 +73,7 @@ class Sources:
 
     @cached_property
     def works(self) -> dict[str, str]:
-        """The names of the works that the course cites, by their keys."""
+        """A dict from the keys of the cited works to their names."""
         return names(self.read("notebooks/REFERENCES.bib"))
 
     def read(self, path: str) -> str:
@@ -207,11 +207,11 @@ class Sources:
                 self.shown["run"] = relinked(
                     text[text.index("| to learn |") : text.index("<!--")], path, page
                 )
-                continue  # a template makes this page
+                continue  # this page has a template
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
-            # Sphinx puts such a formula into `split`, which allows no number
+            # Sphinx would use the environment `split`, which cannot contain \tag
             tagged = r"\$\$(.*?\\tag\{\d+\})\$\$"
             text = re.sub(tagged, r"\\begin{equation*}\n\1\n\\end{equation*}", text)
             self.put(page, relinked(text, path, page))
@@ -257,7 +257,7 @@ def write_sources(
 ) -> None:
     """Write all sources of the book to the folders `folder` and `extra`, see `Sources`.
 
-    If `pyodide`, a folder with the files of Pyodide, is given, Python runs in the pages.
+    `pyodide` is a folder with the files of Pyodide; if it is given, Python runs in the pages.
     """
     sources = Sources(root, folder, extra, repository, live=pyodide is not None)
     if pyodide:
@@ -273,7 +273,7 @@ def write_sources(
 def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = None) -> None:
     """Make the book of a course, in a new folder or in the folder of an older book.
 
-    If `pyodide`, a folder with the files of Pyodide, is given, Python runs in the pages.
+    `pyodide` is a folder with the files of Pyodide; if it is given, Python runs in the pages.
     """
     if book.exists() and not (book / MADE).exists():
         raise ValueError(f"{book} is not a book made by this command; move it away or delete it")

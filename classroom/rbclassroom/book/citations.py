@@ -1,4 +1,4 @@
-"""Citations: the keys of works in a text become names with years, which link to the works."""
+"""Replace the keys of works in a text by links that show names and years."""
 
 import re
 import unicodedata
@@ -11,7 +11,7 @@ _WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
 
 
 def names(bibliography: str) -> dict[str, str]:
-    r"""Return the name with which a text cites each work of a BibTeX file, by the key of the work.
+    r"""Return a dict from the keys of works in a BibTeX file to the names that texts cite.
 
     Examples
     --------
@@ -37,9 +37,9 @@ def names(bibliography: str) -> dict[str, str]:
 
 
 def with_citations(text: str, known: Mapping[str, str], here: set[str], elsewhere: str) -> str:
-    """Return a text whose citations are links, and whose list of works has their targets.
+    """Return a text with citations as links, and with link targets in its list of works.
 
-    `here` has the keys of the list on this page; every other citation links to the page
+    Citations of the keys `here` link to the list on this page; all others link to the page
     `elsewhere`.
     """
 

@@ -23,7 +23,7 @@ nb_code_prompt_show, nb_code_prompt_hide = "Show the code", "Hide the code"
 myst_enable_extensions = ["amsmath", "dollarmath"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-toc_object_entries = False  # otherwise the navigation of each page lists all objects
+toc_object_entries = False  # otherwise each page lists all objects in its navigation
 
 html_theme = "furo"
 html_static_path = ["static"]
@@ -32,7 +32,7 @@ html_js_files = ["book.js"]
 exclude_patterns = ["files"]
 html_favicon = "static/favicon.svg"
 html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
-html_show_search_summary = False  # pages opened from files cannot read others; see `write_texts`
+html_show_search_summary = False  # pages opened from disk cannot read others; see `write_texts`
 mathjax_path = "tex-svg.js"
 mathjax3_config = {"svg": {"scale": 0.97, "mtextInheritFont": True}}
 
@@ -46,7 +46,7 @@ def name_sections(_app: Any, doctree: Any) -> None:
 
 
 def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
-    """Omit members of other packages, and a constant that holds a page of JavaScript."""
+    """Omit members of other packages, and the constant ENGINE, a page of JavaScript."""
     module = getattr(obj, "__module__", None) or "rbcourse"
     own = module.startswith(("rbcourse", "rbclassroom"))
     return True if name == "ENGINE" or not own else None
@@ -86,7 +86,7 @@ def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
 
 
 def write_texts(app: Any, failed: Exception | None) -> None:
-    """Write the words of all pages to a file, for the excerpts below search results."""
+    """Write the words of all pages to a file, from which search results show excerpts."""
     if failed:
         return
     texts = {}

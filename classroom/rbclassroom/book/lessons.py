@@ -78,7 +78,7 @@ def cited_in(notebook: NotebookNode) -> list[str]:
 
 
 def without_outputs(notebook: NotebookNode) -> NotebookNode:
-    """Return a copy of a lesson without outputs, whose file is small."""
+    """Return a copy of a lesson without outputs."""
     plain = copy.deepcopy(notebook)
     for cell in plain.cells:
         if cell.cell_type == "code":
@@ -109,7 +109,7 @@ def with_picture_files(
 ) -> str:
     """Return HTML whose pictures are files; by default, they are loaded when they become visible.
 
-    `known` gives the addresses of pictures by their contents. Other pictures are written to the
+    `known` maps the contents of pictures to their addresses. Other pictures are written to the
     folder ``pictures`` inside `folder`. The attribute ``data-cuts`` of a wide picture lists the
     places between its panels at which the picture can be cut.
     """
@@ -131,10 +131,10 @@ def with_picture_files(
 
 
 def cuts_of(still: Image.Image) -> list[float]:
-    """Return the places between panels at which a wide still can be cut, as shares of its width.
+    """Return the places at which a wide still can be cut between panels, as shares of its width.
 
-    Each cut is in the middle of blank columns, near a limit between equal parts of the still. The
-    width of these parts is at most 1.5 times their height.
+    Each cut is in the middle of blank columns, near a boundary between equal parts of the still.
+    The width of these parts is at most 1.5 times their height.
     """
     width, height = still.size
     if width < 1.8 * height:
@@ -149,15 +149,15 @@ def cuts_of(still: Image.Image) -> list[float]:
 
 
 def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
-    """Return HTML whose interactive pictures have their states and their scripts in files.
+    """Return HTML with the states and scripts of interactive pictures in separate files.
 
-    Each file is written once, to the folder ``pictures`` inside `folder`; the address of
-    ``pictures`` is `to`. Pages of lessons load a script that draws the pictures. Pages of slides
+    Files are written to the folder ``pictures`` inside `folder`, and `to` is the address of this
+    folder. Pages of lessons load a script that draws the pictures. Pages of slides
     load only the data, because slides have their own script.
     """
 
     def kept(data: str) -> tuple[str, str]:
-        """Write data to a file; return the name of the data and the tag that loads the file."""
+        """Write data to a file; return the data's name, and the tag that loads the file."""
         name = hashlib.sha256(data.encode()).hexdigest()[:16]
         text = f'(window.rbcourseStates ??= {{}})["{name}"] = {data};\n'
         _put(folder / "pictures" / f"{name}.js", text)
@@ -185,7 +185,7 @@ def _put(path: Path, text: str) -> None:
 
 
 def with_files(shown: str) -> str:
-    """Return a figure whose caption links to its files; a still links to its full-size picture."""
+    """Return a figure whose caption links to its files, and whose still links to its full size."""
 
     def put(caption: re.Match[str]) -> str:
         name, endings = caption[1], caption[2].split(", ")
@@ -205,7 +205,7 @@ def with_lead(text: str, picture: str) -> str:
 
 
 def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells in a new order: the imports, which precede the first section, come last."""
+    """Return cells with the imports moved from the start of the lesson to its end."""
     first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
     imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
     others = [cell for cell in cells if not any(cell is each for each in imports)]
@@ -214,7 +214,7 @@ def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
 
 
 def joined(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells in which code without output is joined with the code that follows it."""
+    """Join each code cell without output to the code cell that follows it, and return all cells."""
     result: list[NotebookNode] = []
     for cell in cells:
         last = result[-1] if result else None

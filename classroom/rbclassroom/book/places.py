@@ -20,7 +20,7 @@ _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
 
 
 def source_of(path: str) -> str | None:
-    """Return the source of the page that shows a file of the course, or None if none shows it."""
+    """Return the source of the page that shows a file of the course, or None if no page does."""
     if lesson := re.fullmatch(r"notebooks/(\d\d_\w+\.ipynb)", path):
         return f"lessons/{lesson[1]}"
     if code := re.fullmatch(r"(rbcourse|classroom/rbclassroom)/([\w/]+)\.py", path):
@@ -48,7 +48,7 @@ def file_of(module: str) -> str:
 
 
 def has_page(module: str) -> bool:
-    """Tell whether a module has its own page; private and maintainers' modules have none."""
+    """Tell whether a module has its own page; modules for maintainers and private ones do not."""
     return not re.search(r"\b_|^(?:figures|course|lecture|assignments|book)\b", module)
 
 
@@ -140,8 +140,8 @@ def relinked(text: str, path: str, page: str) -> str:
     r"""Return the Markdown of a file, with its links and formulas adapted to a page of the book.
 
     A link to a file that has a page leads to this page. Any other link leads to a copy of its file
-    in the folder ``files``. The sign of a transpose becomes ``\top``, which the font of formulas
-    contains.
+    in the folder ``files``. The sign of a transpose becomes ``\top``, because the font of
+    formulas has this sign.
     """
     text = re.sub(r"\\mathsf(?: T|\{T\})", r"\\top", text)
 

@@ -1,4 +1,4 @@
-"""Polls of a lesson as buttons: each option shows the explanation of its own idea only."""
+"""Show the options of polls as buttons; each option shows only its own explanation."""
 
 import re
 

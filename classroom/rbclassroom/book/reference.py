@@ -19,7 +19,7 @@ from rbclassroom.course.ledger import Entry
 
 
 def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the modules that have a page, by the headings of their groups; see `module`."""
+    """Return a dict from headings to lists of the modules that have a page; see `module`."""
     groups = {title: names.split() for title, names in CONTENTS["modules"].items()}
     for room, title in CONTENTS["rooms"].items():
         folder = root / file_of(room).removesuffix(".py")
@@ -48,7 +48,7 @@ def module(name: str, root: Path) -> dict[str, Any]:
 
 
 def _documented(tree: ast.Module) -> list[str]:
-    """Return the public constants of a module that have a docstring."""
+    """Return the documented public constants of a module."""
     found = []
     for node, after in pairwise(tree.body):
         match node, after:
@@ -61,7 +61,7 @@ def _documented(tree: ast.Module) -> list[str]:
 
 
 def shown_code(root: Path) -> list[str]:
-    """Return the files whose code has a page; tests with answers to problems have none."""
+    """Return the files whose code has a page; tests that contain answers do not have one."""
     packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
@@ -91,7 +91,7 @@ def coloured(source: str) -> str:
 
 
 def naming(root: Path) -> dict[str, list[str]]:
-    """Return the tests that use each function, by the name of the function.
+    """Return a dict from the names of functions to the tests that use them.
 
     Functions have names such as ``so3.exp_so3``. Tests are named as in the ledger:
     ``test_so3.py::test_exp``.
@@ -117,7 +117,7 @@ def naming(root: Path) -> dict[str, list[str]]:
 
 
 def _imported(tree: ast.Module) -> dict[str, str]:
-    """Return the full names of the imports of a file, by the names in its code."""
+    """Return a dict from the imported names in a file to their full names."""
     known = {}
     for node in tree.body:
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -128,7 +128,7 @@ def _imported(tree: ast.Module) -> dict[str, str]:
 
 
 def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return the tests that use a function: those of its module if there are any, otherwise all."""
+    """Return the tests of a function in the test file of its module, or else all its tests."""
     *room, module, _ = name.split(".")
     own = "/".join([*room, f"test_{module}"])
     found = named.get(name, [])
@@ -149,7 +149,7 @@ def pictures_of(key: str, entry: Entry, figures: Iterable[Figure]) -> list[Figur
 
 
 def files_of(name: str, files: set[str]) -> list[str]:
-    """Return links to the files of a figure, and to tables that it shares with other figures."""
+    """Return links to the files of a figure, and to tables that several figures share."""
     found = {f"{name}.{ending}": ending.upper() for ending in ("png", "pdf", "csv", "gif")}
     table = re.compile(re.sub("(?<=[0-9])[a-z]$", "", name) + r"_.*\.csv")
     alone = (x for x in sorted(files) if x.endswith(".csv") and f"{x[:-4]}.png" not in files)

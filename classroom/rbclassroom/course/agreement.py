@@ -1,10 +1,10 @@
-"""Compare the results of a lesson with the stored ones, up to the rounding of processors.
+"""Compare new and stored results of a lesson, up to rounding differences of processors.
 
 Results agree under the following conditions. Texts have the same bytes. Numbers in a table differ
 by at most 1e-12 of the largest number in their column, or by 2 units of their eleventh digit. In a
-picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. A living
-picture is drawn by a browser from whole numbers. Two of them agree if they have the same polygons
-in the same styles, and no coordinate differs by more than one unit, 1/8 of a pixel.
+picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. A
+browser draws a living picture from whole numbers. Two living pictures agree if they have the same
+polygons in the same styles, and no coordinate differs by more than one unit, 1/8 of a pixel.
 """
 
 import base64
@@ -34,7 +34,7 @@ UNIT = 1 / 8
 
 
 def changed_lines(stored: str, again: str) -> Iterator[str]:
-    """Yield a diff of two notebooks in which checksums stand for pictures."""
+    """Yield a diff of two notebooks, with checksums in place of pictures."""
     pictures = rf'revive\(image, \{{\\"size\\":.*\}}\);|{BASE64}'
     texts = stored, reconciled_notebook(stored, again)
     before, after = (re.sub(pictures, _checksum, text).split("\n") for text in texts)
@@ -46,7 +46,7 @@ def _checksum(picture: re.Match[str]) -> str:
 
 
 def reconciled_notebook(stored: str, again: str) -> str:
-    """Return a notebook that was run again; stored pictures replace new ones that agree."""
+    """Return the notebook of a new run, with stored pictures in place of new ones that agree."""
     if stored == again:
         return again
     notebook = nbformat.reads(again, as_version=4)
@@ -63,7 +63,7 @@ def reconciled_notebook(stored: str, again: str) -> str:
 
 
 def reconciled(stored: str, again: str) -> str:
-    """Return a page that was made again; stored pictures replace new ones that agree."""
+    """Return a new page, with stored pictures in place of new ones that agree."""
     kept = [match[0] for match in PICTURE.finditer(stored)]
     if len(kept) != len(PICTURE.findall(again)):
         return again
@@ -96,10 +96,10 @@ def same_living_pictures(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 def _contents(data: dict[str, Any]) -> tuple[list[Any], NDArray[np.float64]]:
-    """Return the exact parts of a living picture, and coordinates that may differ by 1.
+    """Return the exact parts of a living picture, and its coordinates, which may differ by 1.
 
-    The unit of coordinates is 1/8 of a pixel. For the centres and views of scenes, the unit is
-    0.015, because these numbers have two decimals.
+    Coordinates are in units of 1/8 pixel. The centres and views of scenes, which have two decimals,
+    are in units of 0.015.
     """
     styles, texts = json.loads(_inflated(data["known"]))
     rest = data | dict.fromkeys(("states", "known", "background", "rooms"))
@@ -159,7 +159,7 @@ def _is_stored(file: Path, folder: Path) -> bool:
     try:
         if file.read_bytes() == kept.read_bytes():
             return True
-        if file.suffix == ".pdf":  # a PDF may differ only if the picture or a number does
+        if file.suffix == ".pdf":  # a PDF may differ only if its PNG or CSV file differs
             pairs = ([path.with_suffix(end) for path in (file, kept)] for end in (".png", ".csv"))
             return any(one.read_bytes() != other.read_bytes() for one, other in pairs)
         return file.suffix in same and same[file.suffix](file.read_bytes(), kept.read_bytes())
@@ -200,7 +200,7 @@ def _hardly_differ(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> bool:
 
 
 def same_tables(one: bytes, other: bytes) -> bool:
-    """Tell whether two CSV files agree, to 1e-12 of the largest number in each column."""
+    """Tell whether two CSV files agree up to 1e-12 times the largest number in each column."""
     ours, theirs = (list(csv.reader(io.StringIO(table.decode()))) for table in (one, other))
     if [len(row) for row in ours] != [len(row) for row in theirs]:
         return False
@@ -213,7 +213,7 @@ def _same_columns(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
         return False
     try:
         ours, theirs = (np.array(column[1:], dtype=float) for column in (one, other))
-    except ValueError:  # the columns are words and differ
+    except ValueError:  # two columns of words that differ
         return False
     largest = np.abs(theirs).max(initial=0, where=np.isfinite(theirs))
     allowed = np.maximum(2e-11 * np.abs(theirs), max(1e-12 * largest, 1e-13))

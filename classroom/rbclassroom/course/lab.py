@@ -28,9 +28,8 @@ get_config().ContentsManager.pre_save_hook = before_saving
 def configure() -> Path:
     """Write the configuration of JupyterLab into the environment; return its folder.
 
-    With it, JupyterLab does not ask for news, shows full names, and does not load the extensions
-    for lecturers. It encrypts the messages of kernels, inverts pictures in a dark theme, and saves
-    explorers as stills.
+    It switches off news and the extensions for lecturers, shows full names, and encrypts the
+    messages of kernels. It inverts pictures in a dark theme, and saves explorers as stills.
     """
     shared = Path(sys.prefix, "share")
     _write(shared / "jupyter" / "lab" / "settings" / "overrides.json", OVERRIDES)
@@ -79,7 +78,7 @@ def main() -> None:
     paths = [str(configure()), os.environ.get("JUPYTER_CONFIG_PATH")]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
     print("JupyterLab opens in the browser. To stop it, press Ctrl-C here.", flush=True)
-    # JupyterLab's own extensions warn, and JupyterLab reads its configuration twice
+    # JupyterLab itself causes these warnings; it reads its configuration twice
     warnings.filterwarnings("ignore", category=DeprecationWarning)
     warnings.filterwarnings("ignore", "Overriding existing pre_save_hook")
     from jupyterlab.labapp import LabApp

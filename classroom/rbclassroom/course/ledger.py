@@ -1,4 +1,4 @@
-"""The ledger: a list of where each equation of the texts is implemented, tested and taught."""
+"""The ledger lists where each equation of the texts is implemented, tested and taught."""
 
 import ast
 import re
@@ -57,16 +57,16 @@ class Entry:
     lessons: list[str] = field(default_factory=list)
 
     def lacks(self) -> list[str]:
-        """Return the kinds of places that the entry does not have."""
+        """Return the kinds of places in which the entry does not occur."""
         return [kind for kind in ("functions", "tests", "lessons") if not getattr(self, kind)]
 
 
 def collect(root: Path) -> dict[str, Entry]:
     """Return the places of each entry and each misprint.
 
-    The keys of functions are in "Source: …" in their docstrings, and those of constants in the text
-    below them. Tests have the mark ``source``. Sections of lessons have keys in small type below
-    their headings.
+    The keys of a function are in the paragraph "Source: …" of its docstring, and the keys of a
+    constant are in the text below it. Tests have keys in the mark ``source``. Sections of lessons
+    have keys in small type below their headings.
     """
     found = {key: Entry() for key in [*WHAT, *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
@@ -94,7 +94,7 @@ def _functions(root: Path) -> Iterator[tuple[str, str]]:
 
 
 def _sources(docstring: str) -> str:
-    """Return the paragraph "Source: …" of a docstring; without it, the text before the sections."""
+    """Return the paragraph "Source: …" of a docstring, or else the text before the sections."""
     if source := re.search(r"^Source: (.*?)(?=\n\n|\Z)", docstring, re.MULTILINE | re.DOTALL):
         return source[1]
     return " ".join(re.split(r"\n\n\w+( \w+)?\n-+\n", docstring)[0].split())
@@ -140,7 +140,7 @@ def render(found: dict[str, Entry]) -> str:
 
 
 def _place(function: str) -> str:
-    """Return the module of a function, or its folder for `draw` and the classroom."""
+    """Return the module of a function, or only its folder in `draw` and the classroom."""
     module = function.rsplit(".", 1)[0]
     return module if module.startswith("optimum") else module.split(".")[0]
 

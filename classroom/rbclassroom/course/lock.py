@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
-LISTS = {  # the distributions that each list adds to the lists before it
+LISTS = {  # what each list adds to the lists before it
     "environment.txt": COURSE,
     "classroom/environment-teach.txt": "-e ./classroom[grading]\n",
     "classroom/environment-book.txt": "-e ./classroom[book]\n",
@@ -18,7 +18,7 @@ HEAD = "# Exact versions, for every system and Python; written by 'course.py loc
 
 
 def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
-    """Return the required distributions, one per line, with the preferred versions if possible."""
+    """Return lines with the required distributions, in the preferred versions if possible."""
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder, "output.txt")
         output.write_text(preferred, "utf-8")

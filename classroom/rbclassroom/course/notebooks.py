@@ -1,4 +1,4 @@
-"""Execute and store the lessons, with the same bytes each time."""
+"""Execute and store the lessons reproducibly."""
 
 import hashlib
 import json
@@ -23,7 +23,7 @@ from tornado.web import HTTPError
 from rbclassroom.course.agreement import reconciled_notebook, stale_figures
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
-# JupyterLab adds these metadata to a notebook, and marks a notebook without them as changed
+# JupyterLab marks a notebook as changed if it has to add these metadata
 OPENED = {
     "kernelspec": {**KERNEL, "display_name": "Python 3 (ipykernel)"},
     "language_info": {
@@ -86,8 +86,8 @@ def execute(path: Path, figures: Path) -> str:
 def kernel_address(folder: str) -> dict[str, str]:
     """Return the address of a kernel, as settings of its manager.
 
-    A kernel listens at files, except on Windows. If it listened at a free port, another program
-    could take the port before the kernel does.
+    Except on Windows, a kernel uses files as addresses, because another program could take a free
+    port before the kernel does.
     """
     if os.name == "nt":
         return {}
@@ -115,7 +115,7 @@ def normalised(notebook: NotebookNode) -> str:
 
 
 def keep_stills(notebook: Any) -> None:
-    """Remove widgets that have a still beside them, because widgets need their kernel."""
+    """Remove widgets that have a still, because a widget needs its kernel."""
     for cell in notebook["cells"]:
         for output in cell.get("outputs", []):
             if "text/html" in (data := output.get("data", {})):
@@ -125,9 +125,9 @@ def keep_stills(notebook: Any) -> None:
 def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> None:
     """Save stills in place of widgets, and do not change the stored lessons.
 
-    Without ``course.py lab --edit``, an original with a copy in ``work/`` keeps its stored outputs
-    if it was only opened or run. An original that was changed is not saved, and the error message
-    gives the path of the copy.
+    Without ``course.py lab --edit``, the stored lesson is protected if it has a copy in ``work/``.
+    It keeps its outputs if it was only opened or run. A changed lesson is not saved, and the error
+    message gives the path of the copy.
     """
     if model["type"] != "notebook" or not model.get("content"):
         return
@@ -140,7 +140,7 @@ def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> Non
 
 
 def _as_stored(path: Path, content: Any) -> Any:
-    """Return a lesson as it is stored, or raise an error for JupyterLab if its cells differ."""
+    """Return the stored lesson; raise an error for JupyterLab if its cells were changed."""
     try:
         stored = nbformat.read(path, as_version=4)
         now = nbformat.from_dict(content)
@@ -167,9 +167,9 @@ def _with_numbered_ids(ran: list[Any]) -> list[Any]:
 def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
     """Execute lessons, then rewrite the stored outputs and figures that have changed.
 
-    By default all lessons run; if `names` are given, only lessons whose names begin with one of
-    them. Results that agree up to the rounding of processors are not rewritten. If a lesson fails,
-    no file is rewritten. If all lessons run, figures that none of them draws are removed.
+    By default all lessons run; `names` limits the run to lessons whose names begin with one of
+    these words. Results that agree up to the rounding of processors are not rewritten. If a lesson
+    fails, no file is rewritten. If all lessons run, figures that none of them draws are removed.
     """
     every = lesson_paths(lessons)
     if not every:
@@ -192,7 +192,7 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
             path.write_text(texts[path], encoding="utf-8", newline="\n")
         figures.mkdir(exist_ok=True)
         for file in drawn:
-            if file.stem in stale:  # all files of a figure belong together
+            if file.stem in stale:  # replace all files of a figure together
                 shutil.copyfile(file, figures / file.name)
         if chosen == every:
             for file in {file for file in figures.iterdir() if file.is_file()}:
@@ -202,11 +202,10 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:
-    """Copy the lessons as trusted notebooks to a folder to work in, and keep changed copies.
+    """Copy the lessons to a working folder as trusted notebooks, and keep changed copies.
 
-    A lesson without a copy is copied. If a lesson has changed since it was copied, its new version
-    replaces a copy whose cells are unchanged, even if they were run. A copy with changed cells is
-    kept, and the new version is stored beside it.
+    The new version of a lesson replaces a copy whose cells are unchanged, even if they were run. A
+    copy with changed cells is kept, and the new version is stored beside it.
     """
     work.mkdir(exist_ok=True)
     record = work / ".copied.json"

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 RANGES = ["-e", ".[draw,test]", "-e", "./classroom[lessons,grading]"]
-# lessons are not tested: their stored outputs belong to the releases of environment.txt
+# lessons are not tested, because their outputs were stored with the releases of environment.txt
 TESTS = ["-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
 TESTS += ["--deselect=notebooks", "--deselect=tests/test_notebooks.py"]
 

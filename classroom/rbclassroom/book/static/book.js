@@ -1,4 +1,4 @@
-// Scripts of the book's pages: polls, folded code, formulas that fit, panels on phones, excerpts.
+// Scripts of the book's pages, for polls, folded code, wide formulas, panels and excerpts.
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
 
@@ -23,7 +23,7 @@ addEventListener("DOMContentLoaded", () => {
     for (const each of all("details.hide")) each.open = shown;
   });
 
-  // A formula and the punctuation marks next to it are not separated by a line break.
+  // Keep a formula and the punctuation marks next to it on one line.
   const join = () => {
     for (const formula of all("span.math:has(> mjx-container)")) {
       const before = formula.previousSibling, after = formula.nextSibling, whole = document.createElement("span");
@@ -38,7 +38,7 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Formulas that are too wide shrink, down to 80 %. Formulas that are still too wide scroll, also by keys.
+  // Shrink formulas that are too wide, at most to 80 %. Formulas that are still too wide scroll, also with keys.
   const fit = () => {
     for (const formula of all('mjx-container[display="true"]')) {
       formula.style.fontSize = "";
@@ -61,7 +61,7 @@ addEventListener("DOMContentLoaded", () => {
   const current = all(".sidebar-tree .current-page").at(-1), list = document.querySelector(".sidebar-scroll");
   if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
 
-  // Add the panels of a wide still in a column, all at the same scale; CSS shows them on phones.
+  // Put the panels of a wide still into a column, at one scale; CSS shows the column on phones.
   for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
     const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
     const shares = ends.slice(1).map((end, k) => end - ends[k]), [wide, high] = still.style.aspectRatio.split("/").map(Number);

@@ -1,5 +1,5 @@
-// Show the rows of the ledger whose name equals the filter. If there are none, show the rows with a cell that
-// contains the filter; if there are none either, show the rows that contain all its words.
+// Show the rows whose name equals the filter. If there are none, show the rows with a cell that contains
+// the filter. If there are none either, show the rows that contain all words of the filter.
 addEventListener("DOMContentLoaded", () => {
   const filter = document.getElementById("filter"), found = document.getElementById("found");
   const plain = (text) => text.toLowerCase().replace(/\bfigures?\b/g, "fig.").replace(/\s+/g, " ").trim();
