@@ -15,7 +15,7 @@ from rbcourse.projected_line import line_singular_value, theta
 
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8
-_EDGES = np.array([0.20, 0.13, 0.03])  # of a book of half a kilogram, in m
+_EDGES = np.array([0.20, 0.13, 0.03])  # edges of a book of half a kilogram, in m
 _MOMENTS = np.diag(rb.metrics.box_inertia(_EDGES, 0.5))
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
@@ -27,8 +27,8 @@ def theta_explorer() -> Explorer:
     """Return an explorer of the straight line between two rotations and its projection, θ(t).
 
     The left picture shows the circle of the rotations between the two ends, with the chord; the
-    right one shows θ against time. The controls are the ``angle`` a in degrees, and the time ``t``,
-    which the play button moves (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
+    right picture shows θ against time. The controls are the ``angle`` a in degrees, and the time
+    ``t``, which the play button moves (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
@@ -132,7 +132,7 @@ def screw_explorer() -> Explorer:
 def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
-    The three axes stick out of the book on both sides, and one end of each has a number. The
+    The three axes stick out of the book on both sides, and one end of each axis has a number. The
     angular momentum is vertical and constant. The controls are the ``axis`` of the spin, the angle
     ``off`` between the spin and this axis in degrees, and the time ``t`` in s, which the play
     button moves. The time starts again when another axis is chosen (BK (8), BK 2.4).
@@ -181,10 +181,9 @@ def flip_explorer() -> Explorer:
 
 @lru_cache(maxsize=1)
 def _spins() -> tuple[rb.Array, rb.Array]:
-    """Return orientations and angular velocities by time, axis, and angle off this axis.
+    """Return the orientations and angular velocities for all times, axes, and angles off the axis.
 
-    All motions are integrated in advance, because integrating one of them while a slider moves
-    would take too long.
+    All motions are integrated in advance, because an integration is too slow while a slider moves.
     """
     tilt = np.radians(np.arange(0, _OFF_MOST + _OFF_STEP / 2, _OFF_STEP))[:, None]
     main = np.eye(3)[:, None]

@@ -29,7 +29,7 @@ _STYLES: Any = ["default", "rbcourse.rbcourse", dict.fromkeys(_SIZED, LABELS)]
 
 
 class Canvas(anywidget.AnyWidget):
-    """The picture in the browser, which draws the states that Python sends; see canvas.js.
+    """The picture in the browser; it draws the states that Python sends (see canvas.js).
 
     ``made`` never changes. A ``run`` has consecutive states of the control that the play button
     moves. All runs of one version have the same values of the other controls, and the first run may
@@ -49,7 +49,7 @@ class State:
 
     shown: list[Any]
     drawn: NDArray[np.int16]
-    texts: list[Any]  # pairs of a name and a value, a notice, and the same texts as one line
+    texts: list[Any]  # (name, value) pairs, a notice, and one line with all of these
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
@@ -161,7 +161,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     def draw(self, shown: Sequence[Any] | None, zoom: float = 1) -> bytes:
         """Return these artists as a PNG over the background, with `zoom` times the resolution.
 
-        If `shown` is None, the scenes in space, which the reader can turn, are left out.
+        If `shown` is None, scenes in space are omitted, because the reader can turn them.
         """
         with plt.style.context(_STYLES):
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
@@ -190,7 +190,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     def _push(self, first: int, states: Sequence[State], notice: str = "") -> None:
         self.picture.run = {
             "version": self._version,
-            "number": self.picture.run.get("number", 0) + 1,  # equal values are not sent
+            "number": self.picture.run.get("number", 0) + 1,  # since equal runs are not sent
             "index": first,
             "states": joined([state.drawn for state in states]),
             "texts": [state.texts for state in states],
@@ -238,7 +238,7 @@ def new_line(ax: Any, **style: Any) -> Any:
 
 
 def apart(R: Any, S: Any) -> str:
-    """Return the largest angle between two rotations or two stacks, in degrees, as text."""
+    """Return the largest angle between two rotations or two stacks, as text in degrees."""
     return f"{numbers(np.degrees(angle_between(R, S)).max(), 1)}°"
 
 

@@ -25,11 +25,11 @@ _WAYS = {"optimum": "-", "projection": "--"}
 def minimum_acceleration_explorer() -> Explorer:
     """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
 
-    Both curves run from I to exp(s σ), σ as in BK (21), with ω(0) = s σ and ω(1) = s σ + k e₁; the
-    cost is that of `acceleration_cost`. The box follows the optimum, and its pink outline follows
-    the closed form. The controls are the ``rival`` (the closed form), the ``size`` s, the time
-    ``t``, and ``k`` in rad per unit time, which the play button moves (BK 1, BK (18), BK (19), BK
-    (21), BK 6.2, BK Fig. 4).
+    Both curves run from I to exp(s σ), with ω(0) = s σ, ω(1) = s σ + k e₁, and the σ of BK (21).
+    `acceleration_cost` computes the costs. The box follows the optimum, and its pink outline
+    follows the closed form. The controls are the ``rival`` (the closed form), the ``size`` s, the
+    time ``t``, and ``k`` in rad per unit time, which the play button moves (BK 1, BK (18), BK (19),
+    BK (21), BK 6.2, BK Fig. 4).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.46, 0.69))
@@ -126,7 +126,7 @@ def _solved_rotations(rival: str, size: float, k: float) -> Solved:
 
 @lru_cache(maxsize=64)
 def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
-    """Solve the problem of BK 6.3 with these three changes; the result is kept for all times."""
+    """Solve the problem of BK 6.3 with these three changes."""
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
     goal = rb.pose_from_coordinates([*sigma, 8, 10, 12])
     ends = np.eye(4), goal, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]

@@ -38,8 +38,8 @@ _BETWEEN = np.linspace(0, 1, 25)
 def spline_explorer() -> Explorer:
     """Return an explorer of two curves through four rotations, with their accelerations over time.
 
-    Both curves are projected cubics: on the left with the velocities of parabolas, on the right
-    with those of the spline. On each sphere of directions, a line is the path of the first body
+    Both curves are projected cubics. The left curve has the velocities of parabolas, the right
+    curve those of the spline. On each sphere of directions, a line is the path of the first body
     axis, a short stroke shows the third axis, and dots are the given orientations. Below each
     sphere, a line shows ‖ω′‖ up to the present time. The controls are the ``ends`` ("natural" or
     "at rest"), the ``pitch`` of the third orientation in degrees, its time ``third`` in s, and the
@@ -84,7 +84,8 @@ def spline_explorer() -> Explorer:
         w[[0, -1]] *= ends == "natural"
         curves = rb.chain(times, R, w), rb.projected_spline_so3(times, R, rest)
         starts, h = times[:-1, None], np.diff(times)[:, None]
-        inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()  # both sides of each knot
+        # times on both sides of each knot
+        inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()
         inside[:: len(_BETWEEN)] = times[:-1]
         said, costs = {}, []
         for kind, curve in zip(KINDS, curves, strict=True):
@@ -114,9 +115,10 @@ def chain_explorer() -> Explorer:
     """Return an explorer of a box that moves through four poses.
 
     The controls are the ``curve``, the ``duration`` of the motion in s, and the time ``t`` as a
-    fraction of the duration, which the play button moves. The curve consists of geodesics, or of
-    projected cubics with the velocities of parabolas or of the spline, or it is the optimum. Except
-    for the geodesics, the curve is at rest at both ends (BK 6.3, beyond BK 14).
+    fraction of the duration, which the play button moves. There are four curves: geodesics,
+    projected cubics with the velocities of parabolas, projected cubics with the velocities of the
+    spline, and the optimum. All except the geodesics are at rest at both ends (BK 6.3, beyond BK
+    14).
     """
     with new_figure() as fig:
         space = new_space(fig, (-0.06, -0.1, 0.74, 1.2), 2.15)
@@ -170,7 +172,6 @@ def chain_explorer() -> Explorer:
 
 
 def _joined(curve: str, knots: rb.Array) -> rb.Chain:
-    """Return one of the curves of `chain_explorer`."""
     if curve == JOINED[0]:
         return rb.chain(knots, POSES, leg=rb.geodesic_se3)
     if curve == JOINED[1]:

@@ -61,9 +61,9 @@ def record(
 ) -> Player:
     """Return an explorer as a figure that moves without Python and has exactly these states.
 
-    `moved` has the values of some controls that are recorded, including their present values. Every
-    `stride`-th step of the control that plays is recorded, too, including the present step. The
-    other controls keep their present values.
+    `moved` maps some controls to the values that are recorded; the present value must be one of
+    them. Every `stride`-th step of the control that plays is recorded, too, including the present
+    step. The other controls keep their present values.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
     label = {each: control.description for each, control in explorer.controls.items()}
@@ -74,7 +74,7 @@ def record(
         f"{html.escape(_ABOUT + fixed)}</details>"
     )
     shown = explorer.state()
-    still = explorer.draw(shown.shown, zoom=2)  # before the artists move to other states
+    still = explorer.draw(shown.shown, zoom=2)  # must come before the artists move to other states
     start = time.index % stride
     steps = explorer.steps[start::stride]
     states = [

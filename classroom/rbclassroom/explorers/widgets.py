@@ -18,20 +18,20 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
 
 
 def stepped(label: str, value: float, low: float, high: float, step: float) -> Any:
-    """Return a slider that can play; it has only the values of these steps."""
+    """Return a slider that can play; its values are `step` apart."""
     values = np.round(np.arange(low, high + step / 2, step), _digits(step)) + 0.0
     options = [(numbers(x, _digits(step)), x) for x in values.tolist()]
     return ipywidgets.SelectionSlider(options=options, value=value, description=label, **_LOOK)
 
 
 def choice(label: str, options: list[str]) -> Any:
-    """Return a row of buttons for one choice; at first the first option is chosen."""
+    """Return a row of buttons for one choice; the first option is chosen initially."""
     style = {**_WIDE, "button_width": "auto"}
     return ipywidgets.ToggleButtons(options=options, description=label, style=style)
 
 
 def menu(label: str, options: list[str]) -> Any:
-    """Return a menu for one choice of many options; at first the first option is chosen."""
+    """Return a menu for one choice of many options; the first option is chosen initially."""
     return ipywidgets.Dropdown(options=options, description=label, **_LOOK)
 
 

@@ -1,4 +1,4 @@
-"""Figures that only one lesson shows: a module for each lesson has tables, drawings, captions."""
+"""Figures of single lessons: each module has the tables, drawings and captions for a lesson."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,10 @@ from rbcourse.draw.save import Table
 
 
 def columns(form: str, vectors: Mapping[str, Array], letters: str = "xyz") -> dict[str, Array]:
-    """Return vectors, shape (n, 2) or (n, 3), as columns with names such as "{} {} [m]"."""
+    """Return the components of vectors, shape (n, 2) or (n, 3), as columns of a table.
+
+    `form` combines the names of a vector and a component to the name of a column.
+    """
     return {
         form.format(name, letter): column
         for name, vector in vectors.items()
@@ -18,7 +21,7 @@ def columns(form: str, vectors: Mapping[str, Array], letters: str = "xyz") -> di
 
 
 def vectors(form: str, data: Table, letters: str = "xyz") -> dict[str, Array]:
-    """Return the vectors of a table made by `columns`, shape (n, len(letters)), by name."""
+    """Return the vectors of a table that `columns` made, by name."""
     return {
         name: np.stack([data[form.format(name, letter)] for letter in letters], axis=-1)
         for name in named(form.format("", letters[0]), data)
@@ -26,7 +29,7 @@ def vectors(form: str, data: Table, letters: str = "xyz") -> dict[str, Array]:
 
 
 def named(ending: str, data: Table) -> dict[str, Array]:
-    """Return the columns whose names have this ending, by the rest of their names."""
+    """Return the columns whose names end with `ending`; the keys are the names without `ending`."""
     return {
         name.removesuffix(ending): np.asarray(column)
         for name, column in data.items()

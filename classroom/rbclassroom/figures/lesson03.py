@@ -45,7 +45,7 @@ def describe_angles(data: Table) -> str:
 
 
 def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> None:
-    """Draw a box with its frame in orientations R, shape (n, 3, 3), each on its own axes.
+    """Draw a box and its frame in each orientation R, shape (n, 3, 3), on separate axes.
 
     The names become titles; pale lines are the axes of the fixed frame (RR 2.1).
     """

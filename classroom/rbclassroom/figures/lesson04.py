@@ -26,10 +26,10 @@ _COLOURS = {"nearest rotation": COLOURS["projection"], "Gram–Schmidt": COLOURS
 def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> Table:
     """Multiply a matrix repeatedly in single precision, and return its distance from SO(3).
 
-    For each name, `ways` has the factor, shape (3, 3), and the function that repairs the matrix
-    after every 100 products, or None. The table has the defect ‖RᵀR − I‖ of each name, before the
-    repair, at up to 60 numbers of steps. These numbers are equally spaced on a logarithmic scale,
-    and those above 100 are multiples of 100 (RR 1.4).
+    For each name, `ways` has the factor, shape (3, 3), and a function or None. The function repairs
+    the matrix after every 100 products. The table has the defect ‖RᵀR − I‖ of each name before the
+    repair. The rows are for up to 60 numbers of products, equally spaced on a logarithmic scale;
+    numbers above 100 are multiples of 100 (RR 1.4).
     """
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))
@@ -71,17 +71,16 @@ def describe_drift(data: Table) -> str:
 
 
 def column_table(matrices: Mapping[str, Array]) -> Table:
-    """Return a table of the columns of 2 × 2 matrices; it has a row for each matrix column."""
+    """Return a table of the columns of 2 × 2 matrices; each row has one column of each matrix."""
     return columns("{} {} [1]", {name: M.T for name, M in matrices.items()})
 
 
 def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     """Draw the columns of 2 × 2 matrices as arrows, each matrix on its own axes.
 
-    The first matrix is the given one. Its arrows are repeated in grey behind those of the other
+    The first matrix is the original. Its arrows are repeated in grey behind those of the other
     matrices, and a dotted line joins the two tips of each column. The titles state the Frobenius
-    distance, which is the root of the sum of the squares of the lengths of the two lines (BK Prop.
-    2, RR 1.4).
+    distance, which is √(a² + b²) for lines of lengths a and b (BK Prop. 2, RR 1.4).
     """
     given = next(iter(matrices.values()))
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
@@ -115,12 +114,11 @@ def describe_columns(matrices: Mapping[str, Array]) -> str:
 
 
 def _sense(M: Array) -> str:
-    """Describe a matrix: a mirror has its second column to the right of the first."""
     return "turns" if np.linalg.det(M) > 0 else "mirrors"
 
 
 def shadows(M: Array) -> dict[str, Array]:
-    """Return the shadows of matrices "M" and of the repaired matrices, each of shape (n, 2).
+    """Return the shadows of matrices "M" and of their repairs, each of shape (n, 2), by name.
 
     M contains matrices [[a, b], [c, d]], shape (n, 2, 2), with a positive determinant. The shadow
     of a matrix is the point x = (a + d)/2, y = (c − b)/2.
@@ -167,8 +165,8 @@ def describe_shadows(points: Mapping[str, Array]) -> str:
 def frame_table(M: Array, angles: ArrayLike) -> Table:
     """Return the rotations that repairs find if a 2 × 2 matrix is measured in a turned body frame.
 
-    The table has, for each angle of the frame in rad and each repair, the angle of the rotation
-    fix(M L) Lᵀ, where L is the turn of the frame. M has a positive determinant.
+    L is the turn of the frame. For each angle of L in rad and each repair ``fix``, the table has
+    the angle of the rotation fix(M L) Lᵀ. M has a positive determinant.
     """
     angles = np.asarray(angles, dtype=np.float64)
     cos, sin = np.cos(angles), np.sin(angles)

@@ -41,7 +41,7 @@ def histograms(R: Mapping[str, Array]) -> Bins:
 
 
 def histogram_table(bins: Bins) -> Table:
-    """Return `histograms` as a table: edges, and the densities in the bins that start there."""
+    """Return `histograms` as a table of the lower edge and the densities of each bin."""
     table: dict[str, Array] = {}
     for column, (edges, densities) in bins.items():
         table[f"{column} [{'rad' if column == 'angle' else '1'}]"] = edges

@@ -31,7 +31,7 @@ _LABELS |= {"theta_dot": "dθ/dt", "f_dot": "df/dt"}
 
 
 def draw_family(ax: Axes, data: Table) -> None:
-    """Draw up to six curves of a table (angle, abscissa, value) (BK Fig. 2, BK Fig. 3)."""
+    """Draw up to six curves from a table of angles, abscissas and values (BK Fig. 2, BK Fig. 3)."""
     (p_label, p), (x_label, x), (y_label, y) = _columns(data)
     sixths = np.arange(1, 6) * np.pi / 6
     rows = {*np.abs(p[:, :1] - sixths).argmin(axis=0).tolist(), len(p) - 1}
@@ -113,7 +113,7 @@ def path_table(t: Array, paths: Mapping[str, Array], speeds: Mapping[str, Array]
 
 
 def draw_paths(ax: Any, paths: Mapping[str, Array]) -> None:
-    """Draw the paths of one point, shape (times, 3), by a "geodesic" and a "projected line"."""
+    """Draw the paths of one point, shape (times, 3), for a "geodesic" and a "projected line"."""
     draw_sphere(ax)
     for name, path in paths.items():
         ax.plot(*path.T, label=name, **_MOTIONS[name])
@@ -153,13 +153,12 @@ def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> s
 
 
 def _columns(data: Table) -> list[tuple[str, Array]]:
-    """Return the columns of a table with the labels of their axes."""
+    """Return the label and the values of each column."""
     plain = {name.split(" [")[0]: np.asarray(column, float) for name, column in data.items()}
     return [(_LABELS.get(name, name), column) for name, column in plain.items()]
 
 
 def _pi_fraction(angle: float) -> str:
-    """Return an angle in rad as a fraction of π."""
     share = Fraction(angle / np.pi).limit_denominator(24)
     over = f"/{share.denominator}" if share.denominator > 1 else ""
     return f"{'' if share.numerator == 1 else share.numerator}π{over}"

@@ -89,10 +89,10 @@ def describe_momenta(directions: Array) -> str:
 
 
 def _course(path: Array) -> tuple[int, bool]:
-    """Return the axis that a path goes round, and whether it passes close to the middle axis.
+    """Return the axis that a path goes round, and whether the path comes close to the middle axis.
 
     A path goes round an axis if its component along this axis keeps its sign. If there are several
-    such axes, the one whose component remains farthest from 0 is returned.
+    such axes, the axis whose component remains farthest from 0 is returned.
     """
     keeps_sign = path.min(axis=0) * path.max(axis=0) > 0
     nearest, farthest = np.abs(path).min(axis=0), np.abs(path).max(axis=0)
@@ -102,10 +102,10 @@ def _course(path: Array) -> tuple[int, bool]:
 def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int], list[Any]]:
     """Draw a book with a pin along its middle axis, and return the function that turns the book.
 
-    R contains its orientations at the times t. In these orientations, the angular momentum is
-    vertical; a line through the centre of the book shows its direction. `edges` are the edges along
-    the axes of the book, in m; the pin is along the second. ``update(i)`` turns the book to
-    orientation i and returns the artists that move.
+    R contains the orientations of the book at the times t, in a frame whose vertical axis is the
+    direction of the angular momentum. A line through the centre of the book shows this direction.
+    `edges` are the lengths of the book along its axes, in m; the pin is along the second axis.
+    ``update(i)`` turns the book to orientation i and returns the artists that move.
     """
     poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))

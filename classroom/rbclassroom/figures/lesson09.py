@@ -29,8 +29,8 @@ def coordinate_table(curves: Mapping[str, Curve], t: ArrayLike) -> Table:
 def draw_comparison(fig: Figure, data: Table) -> None:
     """Draw the "optimum" and the "projection" in the coordinates σ.
 
-    The picture has their paths in the space of σ, the coordinates over time, and the difference
-    over time. Every tenth time is marked (BK Fig. 4).
+    The picture shows the paths in the space of σ, the coordinates over time, and their difference.
+    Every tenth time is marked (BK Fig. 4).
     """
     space: Any = {"a": {"projection": "3d"}}
     axes: Any = fig.subplot_mosaic("ab;ac", per_subplot_kw=space, height_ratios=[2, 1])

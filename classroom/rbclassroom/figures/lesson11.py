@@ -11,7 +11,7 @@ from rbcourse import Array, Ends, angle_between, exp_so3, geodesic_so3
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 
-_SHARES = np.linspace(0, 1, 33)  # the drawn points of a leg, as fractions of it
+_SHARES = np.linspace(0, 1, 33)  # fractions of a leg at which points are drawn
 _LOOKS = (PALE, 2), ("0.35", 2), (COLOURS["optimum"], 3)
 """Colour and width of the legs between the points of each level."""
 _NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v", "B₂v", "R₁v"]}
@@ -20,7 +20,7 @@ _NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v"
 def casteljau_table(
     t: Array, points: ArrayLike, ends: Sequence[ArrayLike], v: ArrayLike
 ) -> dict[str, Array]:
-    """Return the points of `moving_casteljau`: level 0 has the given points, level 3 the curve."""
+    """Return the points of all levels of `moving_casteljau`, from the given points to the curve."""
     constructed = {
         f"{name} level {k} point {j}": level[:, j]
         for name, (levels, _) in _constructions(t, points, ends, v).items()
@@ -37,12 +37,12 @@ def moving_casteljau(
 
     The first axes show the construction in the plane, with the four control `points`, shape (4, 2).
     The second axes, in space, show the construction on SO(3). Its control points are those of
-    `bezier_so3` for the `ends` R0, R1, w0, w1. Rotations are shown by the images of v on the unit
+    `bezier_so3` for the `ends` R0, R1, w0, w1. Each rotation is shown as the image of v on the unit
     sphere; choose v such that all images are in front.
 
-    ``update(i)`` divides all legs at the fraction t[i], draws the legs between the new points, and
-    continues to the single point that draws the curve. It returns the artists that move: a text,
-    and for each axes the legs of two levels, the curve so far, and its last point.
+    ``update(i)`` divides all legs at the fraction t[i] and joins the new points by legs, until a
+    single point is left. This point draws the curve. The function returns the artists that move: a
+    text and, for each Axes, the legs of two levels, the curve so far, and its last point.
     """
     plane, sphere = axes
     plane.set(title="in the plane", aspect="equal", adjustable="datalim", xmargin=0.15)

@@ -26,13 +26,13 @@ def torques(curve: Curve, inertia: Array, t: Array) -> Array:
 
 
 def torque_table(t: Array, curves: Mapping[str, Curve], inertia: Array) -> dict[str, Array]:
-    """Return times and the torques of curves in body axes, by the names of the curves."""
+    """Return a table of the torques of curves over time, in body axes."""
     found = {name: torques(curve, inertia, t) for name, curve in curves.items()}
     return {"t [s]": t} | columns("{} {} [N m]", found)
 
 
 def draw_torques(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the components and the norm of each torque of a `torque_table`, on its own axes."""
+    """Draw the components and the norm of each torque of a `torque_table`, one Axes per torque."""
     t, laws = data["t [s]"], vectors("{} {} [N m]", data)
     for ax, (law, torque) in zip(axes, laws.items(), strict=True):
         ax.axhline(0, color="0.8", lw=1, zorder=0)
@@ -58,13 +58,13 @@ def describe_torques(data: Table) -> str:
 
 
 def speed_table(t: Array, curves: Mapping[str, Curve]) -> dict[str, Array]:
-    """Return times and the angular speeds of curves, by the names of the curves."""
+    """Return a table of the angular speeds of curves over time."""
     speeds = {name: np.linalg.norm(curve(t, 1), axis=-1) for name, curve in curves.items()}
     return {"t [1]": t} | {f"{name} [rad]": speed for name, speed in speeds.items()}
 
 
 def draw_speeds(ax: Axes, data: Table) -> None:
-    """Draw the speeds of a `speed_table` of the "least jerk" and the "projected quintic"."""
+    """Draw a `speed_table` of two curves, the "least jerk" and the "projected quintic"."""
     for name, (colour, dash) in _SPEEDS.items():
         ax.plot(data["t [1]"], data[f"{name} [rad]"], label=name, color=COLOURS[colour], ls=dash)
     ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
@@ -86,11 +86,12 @@ _COORDINATES = {
 
 
 def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
-    """Return free motions in exponential and in normal coordinates, as columns (beyond BK 7).
+    """Return a table of free motions in exponential and in normal coordinates (beyond BK 7).
 
-    The motions start at I with the angular velocities w, shape (motions, 3). The columns have the
-    components x and y, at the times t, of the straight lines t w, of the logarithm, and of the
-    normal coordinates to second order, as in `normal_cubic_so3`.
+    The motions start at I with the angular velocities w, shape (motions, 3). For each motion, the
+    columns have the x and y components of three curves at the times t: the straight line t w, the
+    logarithm, and the normal coordinates. The normal coordinates are exact to second order, as in
+    `normal_cubic_so3`.
     """
     R, _ = geodesic_flow(inertia, np.eye(3), w, t)
     rest = np.zeros(3)
@@ -102,7 +103,7 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
 
 
 def draw_normal(axes: Sequence[Axes], data: Table) -> None:
-    """Draw motions and lines of a `normal_table`; each kind of coordinates has its own axes."""
+    """Draw the motions and lines of a `normal_table`, each kind of coordinates on its own axes."""
     lines, *kinds = _by_kind(data).items()
     for ax, (kind, motions) in zip(axes, kinds, strict=True):
         for k, line in enumerate(lines[1]):

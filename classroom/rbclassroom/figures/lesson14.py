@@ -1,4 +1,4 @@
-"""Lessons 14 to 16: accelerations of curves through rotations, their costs, speeds of motions."""
+"""Lessons 14 to 16: accelerations and costs of curves through rotations, and speeds of motions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
@@ -126,7 +126,7 @@ def describe_accelerations(data: Table, knots: ArrayLike) -> str:
 
 
 def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
-    """Return natural cubic splines through three angles, to which whole turns are added.
+    """Return a table of natural cubic splines through three angles plus whole turns.
 
     The "bend" of a spline is its difference from the straight line between its ends.
     """
@@ -175,8 +175,8 @@ def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
     """Return a table of the median excess of curves through ten rotations.
 
     Each leg turns by the same angle about a random axis. The curves and their optimum have the end
-    velocities of Bessel's parabolas. SciPy's spline is compared with the optimum for the end
-    velocities of this spline.
+    velocities of Bessel's parabolas. SciPy's spline is compared with the optimum that has this
+    spline's end velocities.
     """
     draw, times = np.random.default_rng(rng), np.arange(10.0)
     medians = []

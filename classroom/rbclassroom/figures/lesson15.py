@@ -35,8 +35,8 @@ _SHARES: dict[str, dict[str, Any]] = {
 def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, Array]:
     """Return the largest rates s' that the limits on accelerations and on speeds allow.
 
-    A rate satisfies the limits on accelerations if some s'' satisfies them. `limits` are norms,
-    with the names of `LIMITS`. The rate is infinite if no limit applies.
+    The limits on accelerations allow a rate if some s'' satisfies these limits at this rate.
+    `limits` maps names in `LIMITS` to the largest norms. The rate is infinite if no limit applies.
     """
     velocity, bend = (path(s, order).reshape(len(s), -1, 3) for order in (1, 2))
     squares, a, b = [np.zeros(len(s))], list[Array](), list[Array]()
@@ -53,14 +53,15 @@ def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, 
 
 
 def _least(a: list[Array], b: list[Array]) -> Array:
-    """Return the least max ‖a r + b‖² over r, at each s; a and b have a row for each limit."""
+    """Return, for each s, the least value over r of the largest ‖a r + b‖² of all limits."""
     if not a:
         return np.zeros(1)
     A, B = np.array(a), np.array(b)
     aa, ab, bb = (np.sum(x * y, axis=-1) for x, y in ((A, A), (A, B), (B, B)))
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = list(-ab / aa)
-        for i, j in combinations(range(len(aa)), 2):  # the norms of two limits are equal
+        # values of r for which the terms of two limits are equal
+        for i, j in combinations(range(len(aa)), 2):
             p, q, r = (x[i] - x[j] for x in (aa, ab, bb))
             root = np.sqrt(q * q - p * r)
             trials += [(-q + root) / p, (-q - root) / p]
@@ -70,7 +71,7 @@ def _least(a: list[Array], b: list[Array]) -> Array:
 
 
 def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
-    """Return limit curves over s, the constant rate for `even` seconds, and the fastest rate.
+    """Return a table of rates: the limit curves, the rate for `even` seconds, and the fastest rate.
 
     Rates above twice the largest rate of the fastest timing are replaced by NaN.
     """
@@ -146,7 +147,8 @@ def describe_shares(data: Table) -> str:
 def two_passes(highest: ArrayLike, step: float) -> tuple[Array, Array]:
     """Return the largest x at the nodes after the pass from the end, and after both passes.
 
-    No x exceeds `highest`, or the x of a neighbour by more than `step`; at both ends x = 0.
+    Each x is at most `highest`, and exceeds the x of a neighbour by at most `step`. At both ends x
+    = 0.
     """
     back = np.array(highest, float)
     back[[0, -1]] = 0

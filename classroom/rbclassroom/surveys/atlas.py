@@ -58,12 +58,12 @@ def _weighted(R0: Array, R1: Array, w0: Array, w1: Array, inertia: ArrayLike) ->
 def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng = None) -> Ends:
     """Return `draws` random problems in every cell of the atlas.
 
-    A cell is a family, a step of the displacement ‖σ‖ from 0 to π, and a step of the end velocity
-    v = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`. Within a cell, ‖σ‖ and v are uniform. A random angle
-    divides v between w0 and w1. In the family "along", both point along the axis of σ or against
-    it. In "across", each points in a random direction perpendicular to the axis, and in "any" in a
-    random direction. The problems are in the order family, displacement, end velocity, draw. R0 and
-    the axis of σ are uniform, too.
+    A cell is a family, a step of the displacement ‖σ‖ from 0 to π, and a step of the end velocity v
+    = √(‖w0‖² + ‖w1‖²) from 0 to `FASTEST`. Within a cell, ‖σ‖ and v are uniform. A random angle
+    divides v between w0 and w1. In the family "along", both velocities point along the axis of σ or
+    against it. In "across", each velocity has a random direction perpendicular to the axis; in
+    "any", it has any random direction. The problems are sorted by family, displacement, end
+    velocity and draw. R0 and the axis of σ are uniform, too.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
 
 
 def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
-    """Return random problems: σ in a ball of radius `size`, w0 and w1 in one of radius 2 `size`.
+    """Return random problems: σ in a ball of radius `size`, w0 and w1 in a ball of radius 2 `size`.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def starts() -> dict[str, Maker]:
 
 
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
-    """Return the defects of the invariance of curves when their ends are moved or exchanged.
+    """Return how far curves are from being invariant when their ends are moved or exchanged.
 
     The values are the largest angles in rad over all problems and 33 times, for random rotations L
     and Q (BK Prop. 3). "left" compares L R(t) with the curve of the ends moved by L, "right"
@@ -166,7 +166,7 @@ def near_zero(ends: Ends, optimum: Array, inertia: ArrayLike | None = None) -> N
 def excesses(
     ends: Ends, found: Mapping[str, Array], inertia: ArrayLike | None = None
 ) -> dict[str, Array]:
-    """Return the excesses in a survey: each cost over that of the optimum, minus 1.
+    """Return the excesses in a survey: each cost divided by the optimum's cost, minus 1.
 
     The excess is NaN if the optimum is near zero or was not found.
     """
@@ -195,7 +195,7 @@ def cell_table(
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
-    """Return the least number that is at least as large as `share` of the entries of the last axis.
+    """Return the least x such that at least `share` of the entries of the last axis are at most x.
 
     NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 

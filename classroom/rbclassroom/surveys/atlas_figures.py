@@ -112,7 +112,6 @@ def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
 
 
 def _label(fig: Figure, bar: Any, ways: str, quantile: str) -> None:
-    """Label the axes of heat maps and their scale of colours."""
     fig.supylabel(f"end velocity, {ways} (rad)", fontsize="medium")
     fig.supxlabel("displacement (°)", fontsize="medium")
     bar.set_label(f"cost / optimum − 1,\n{quantile}")
@@ -192,8 +191,8 @@ def _medians(data: Table) -> dict[str, Array]:
 def draw_margins(axes: Sequence[Axes], data: Table) -> None:
     """Draw the excess against the margin: projections on the left, quaternion cubics on the right.
 
-    In both panels, problems of the first family in the column "family" are dots, and those of up to
-    two others are large black marks. A line of slope −3 runs beside the projections.
+    In both panels, dots are problems of the first family in the column "family". Large black marks
+    are problems of up to two other families. A line of slope −3 runs beside the projections.
     """
     for ax, (way, (name, ticks)) in zip(axes, _MARGINS.items(), strict=True):
         dots: Any = {"color": COLOURS[_LOOKS[way][0]], "ms": 4, "rasterized": True}

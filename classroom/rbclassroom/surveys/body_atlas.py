@@ -65,7 +65,7 @@ def curves_for(body: str) -> dict[str, atlas.Maker]:
 
 
 def with_choices(excess: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the excesses of all `CURVES` from those of the curves in a survey."""
+    """Return the excesses of all `CURVES`, given the excesses of the curves in a survey."""
     two = np.fmin(excess["Bézier"], excess["other way"])
     chosen = {"two Béziers": two, "three": np.fmin(two, excess["normal"])}
     return {name: {**excess, **chosen}[name] for name in CURVES}
@@ -106,13 +106,14 @@ def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
     """Return quantiles and shares of the excess, with 95 % intervals, for each domain and curve.
 
     The columns are the median, the 90 % quantile, the share of the problems with an excess below a
-    tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. If several are
-    equally cheap, the first counts as the cheapest. For curves that are not closed forms, this
-    share is NaN. Each value has the ends of its interval, "low" and "high". Intervals of quantiles
-    end at numbers of the sample, from the binomial distribution, or are NaN if the sample is too
-    small. Intervals of shares are those of Clopper and Pearson. Both kinds hold for independent
-    problems; for a sample with the same number of problems in each cell, the intervals are too long
-    rather than too short. All values are rounded to four digits. Problems with a NaN do not count.
+    tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. If several
+    curves are equally cheap, the first counts as the cheapest. For curves that are not closed
+    forms, this share is NaN. For each value there are the ends of the interval, "low" and "high".
+    For quantiles, the binomial distribution selects these ends from the sample; they are NaN if the
+    sample is too small. Intervals of shares are those of Clopper and Pearson. Both kinds hold for
+    independent problems; for a sample with the same number of problems in each cell, the intervals
+    are too long rather than too short. All values are rounded to four digits. Problems with a NaN
+    do not count.
     """
     cheapest = np.argmin([excess[curve] for curve in CLOSED_FORMS], axis=0)
     known = ~np.isnan([excess[curve] for curve in CURVES]).any(axis=0)

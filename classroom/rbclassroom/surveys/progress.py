@@ -1,4 +1,4 @@
-"""A progress bar for notebooks, which becomes a line of text at the end."""
+"""A progress bar for notebooks; at the end it becomes a line of text."""
 
 import html
 import sys

@@ -40,24 +40,24 @@ def survey(
 ) -> dict[str, Array]:
     """Return the costs of the optimum and of closed forms, for each of many problems.
 
-    Source: BK 1, BK 7, BK (18); for bodies beyond BK 1.
+    Source: BK 1, BK 7, BK (18); for real bodies, beyond BK 1.
 
     Parameters
     ----------
     problems : Ends
-        Arrays of one batch axis, N problems.
+        Arrays with one batch axis, for N problems.
     executor : concurrent.futures.Executor, optional
-        The executor that computes the chunks of `CHUNK` problems. Its workers have to be able to
-        import `rbcourse`; an example is ``Client(...).get_executor()`` of dask.distributed for a
-        cluster. The default is `processes` on all processors of this machine. A script then has to
-        call this function below ``if __name__ == "__main__":``. A single chunk is computed in this
-        process.
+        The executor that computes the chunks of `CHUNK` problems. Its workers must be able to
+        import `rbcourse`. For a cluster, use for example ``Client(...).get_executor()`` of
+        dask.distributed. The default is `processes` on all processors of this machine. A script
+        must then call this function below ``if __name__ == "__main__":``. A single chunk is
+        computed in this process.
     inertia : array_like, shape (3, 3), optional
         The inertia of the body in body axes. By default the body is a ball.
     ways : mapping of str to callable, optional
         Functions ``make(R0, R1, w0, w1)`` of the curves that are compared, by default
-        `closed_forms`. Functions that are sent to other processes have to be functions of a module,
-        or partials of these.
+        `closed_forms`. Functions that are sent to other processes must be functions of a module, or
+        partials of these.
     report : callable, optional
         A function that is called as ``report(done, total)`` after each chunk, with numbers of
         problems.
@@ -65,10 +65,10 @@ def survey(
     Returns
     -------
     dict of str to ndarray, shape (N,)
-        The costs ∫ τᵀ G⁻¹ τ dt, for a ball ∫ 2 ‖w'‖² dt, of the "optimum" and of each of the ways.
-        The cost of an optimum that is not found is NaN. The relative error is at most 1e-5, mostly
-        1e-8. The chunks do not depend on the number of workers, and each is computed with one BLAS
-        thread, so the number of workers does not change a single bit of the results.
+        The cost ∫ τᵀ G⁻¹ τ dt of the "optimum" and of each of the ways. For a ball it is ∫ 2 ‖w'‖²
+        dt. The cost of an optimum that is not found is NaN. The relative error is at most 1e-5,
+        mostly 1e-8. The chunks do not depend on the number of workers, and each is computed with
+        one BLAS thread, so the number of workers does not change a single bit of the results.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def survey(
     if inertia is not None:
         rb.acceleration_cost(
             rb.geodesic_so3(np.eye(3), np.eye(3)), inertia
-        )  # raises ValueError if the inertia is invalid
+        )  # this raises ValueError if the inertia is invalid
     ways = closed_forms(inertia) if ways is None else ways
     for name, make in ways.items():
         try:
@@ -96,7 +96,9 @@ def survey(
                 f"ways: make(R0, R1, w0, w1) is wanted, got {name!r}: {error}"
             ) from error
     if "optimum" in ways:
-        raise ValueError("ways: names except 'optimum' are wanted, since this is the reference")
+        raise ValueError(
+            "ways: names other than 'optimum' are wanted, because the optimum is the reference"
+        )
     measures = {name: partial(costs, make, inertia=inertia) for name, make in ways.items()}
     return _in_chunks({"optimum": partial(_least, inertia), **measures}, problems, executor, report)
 
@@ -104,7 +106,7 @@ def survey(
 def several_starts(
     problems: Ends, executor: Executor | None = None, *, report: Report | None = None
 ) -> dict[str, Array]:
-    """Return the costs of the curves that Newton's method finds from several guesses, by guess.
+    """Return the costs of the curves that Newton's method finds from each of several guesses.
 
     The guesses are `starts`, and the body is a ball. `problems`, `executor` and `report` are those
     of `survey`. The curves are stationary, but none is proven to be the best. If no curve is found,
@@ -117,7 +119,7 @@ def several_starts(
 def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Array:
     """Return the costs of the curves ``make(R0, R1, w0, w1)`` for N problems, as `survey` does.
 
-    `acceleration_cost` computes the cost of any curve, to 1e-10 (BK (18)).
+    `acceleration_cost` computes the cost of any curve, accurate to 1e-10 (BK (18)).
 
     Examples
     --------
@@ -138,7 +140,7 @@ def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Arra
 
 
 def _least(inertia: ArrayLike | None, chunk: Ends) -> Array:
-    # a cost of NaN replaces the warning
+    # no warning is needed, because the cost is NaN
     with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):
         return np.asarray(rb.minimum_acceleration_so3(*chunk, inertia).cost)
 
@@ -200,7 +202,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
     ``with`` block ends or this process is killed. If an error or Ctrl-C ends the block, chunks that
     have not begun are not computed.
     """
-    from concurrent.futures import ProcessPoolExecutor  # missing in the Python of web pages
+    from concurrent.futures import ProcessPoolExecutor  # not available in web browsers
 
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent)
     try:
@@ -210,7 +212,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _end_with_parent() -> None:
-    """Leave Ctrl-C to the parent, and end when the parent is killed: the queue cannot show this."""
+    """Ignore Ctrl-C, and end when the parent is killed, which the queue does not report."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None

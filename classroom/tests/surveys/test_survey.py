@@ -113,7 +113,7 @@ def test_an_error_ends_a_survey_and_names_the_curve(monkeypatch, chunk, first):
         ({"inertia": np.stack([BOOK, BOOK])}, r"^inertia"),
         ({"inertia": [1, 2, 3]}, r"^inertia"),
         ({"inertia": -BOOK}, r"^inertia is not positive definite"),
-        ({"ways": {"optimum": rb.bezier_so3}}, r"^ways: names except 'optimum'"),
+        ({"ways": {"optimum": rb.bezier_so3}}, r"^ways: names other than 'optimum'"),
         ({"ways": {"g": rb.geodesic_so3}}, r"^ways: make\(R0, R1, w0, w1\) is wanted, got .g"),
         ({"ways": {"five": 5}}, r"^ways: make\(R0, R1, w0, w1\) is wanted, got 'five': 5 is"),
     ],
