@@ -1,1 +1,1 @@
-"""Compare the times of this and other packages on the same tasks, for `course.py bench`."""
+"""Compare the speed of rbcourse with other packages on the same tasks."""

@@ -9,7 +9,7 @@ from benchmarks import contests, figure, report, timing
 
 
 def run(chosen, rng, **options):
-    """Run contests, print and return their rows; the options are those of `timing.in_turn`."""
+    """Run contests; print and return their rows. `options` are passed to `timing.in_turn`."""
     machine, rows = timing.describe_machine(), []
     print(f"{machine}\nThe times of a call and their ratios are medians over rounds.")
     for contest in chosen:
@@ -22,7 +22,7 @@ def run(chosen, rng, **options):
 
 
 def main(chosen=contests.CONTESTS, folder=Path(__file__).parent, readme=report.README, **options):
-    """Run the contests with the packages that are installed, and write the results."""
+    """Run the contests of all installed packages, and write the results."""
     if not contests.roma:
         print("roma is not installed; the run continues without it.")
     rows = run(chosen, np.random.default_rng(), **options)

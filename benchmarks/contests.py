@@ -51,10 +51,10 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])  # the inertia of a book of 1 kg
 
 
 class Method(NamedTuple):
-    """A method for a task: the names of its functions, and the call with prepared input.
+    """A timed method: `does` names its functions, and `call` runs it on prepared input.
 
-    `value` converts the result for the error; it is None if the results are not comparable. The
-    time is divided by `items`, the number of problems that a call solves.
+    `value` converts the result, so that its error can be computed; it is None if results are not
+    comparable. The time is divided by `items`, the number of problems that a call solves.
     """
 
     does: str
@@ -136,7 +136,7 @@ def projected_cubic(n, rng, orders):
 
 
 def closed_forms(n, rng, orders):
-    """Compare curves with the same ends, as in lesson 12, and their derivatives at n times."""
+    """Compare closed-form curves between the same ends, and their derivatives, at n times."""
     t, methods = rng.random(n), {}
     for form, make in FORMS.items():
         curve, name = make(*ENDS["5"]), OURS if form == "projection" else f"rbcourse, {form}"
@@ -146,7 +146,10 @@ def closed_forms(n, rng, orders):
 
 
 def random_samples(n, rng, kind, author, form, name):
-    """Compare samplers of n matrices or unit quaternions; the error is the defect of xᵀx = I."""
+    """Compare samplers of n matrices or unit quaternions.
+
+    The error is the largest deviation of a singular value from 1.
+    """
     ours, theirs = getattr(rb, f"sample_{kind}"), getattr(textbook, f"sample_{kind}")
     convert = getattr(Rotation, f"as_{form}")
     methods = {
@@ -165,7 +168,7 @@ def random_samples(n, rng, kind, author, form, name):
 
 
 def chain_of_poses(n, rng, legs, poses=1000):
-    """Compare evaluations of a chain of poses at n increasing times; making it is not timed."""
+    """Compare evaluations of a chain at n increasing times; making the chain is not timed."""
     when, places = np.cumsum(rng.uniform(0.5, 1.5, poses)), rng.normal(size=(poses, 3)).cumsum(0)
     R, t = rb.exp_so3(rng.normal(0, 0.5, (poses, 3)).cumsum(0)), np.linspace(when[0], when[-1], n)
     motion = rb.chain(when, rb.pose_from_components(R, places), leg=LEGS[legs])
@@ -187,7 +190,7 @@ def chain_of_poses(n, rng, legs, poses=1000):
 
 
 def splines(n, rng):
-    """Compare the construction of curves with n legs of 30°; the names include the excess costs."""
+    """Compare the construction of splines with n legs of 30°; `does` states the excess cost."""
     axes, t = rng.normal(size=(n, 3)), np.cumsum(rng.uniform(0.5, 1.5, n + 1))
     turns = rb.exp_so3(np.pi / 6 * axes / np.linalg.norm(axes, axis=1)[:, None])
     R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
@@ -210,7 +213,7 @@ def splines(n, rng):
 
 
 def one_optimum(n, rng, case):
-    """Compare solvers on one problem of BK, from its ends to 101 rotations on the optimum."""
+    """Compare solvers on one problem of BK; each gives 101 rotations of its curve."""
     matrices, vectors = oracles.rotation_of_quaternions, textbook.minimum_acceleration_so3
 
     def bvp(**options):
@@ -229,7 +232,7 @@ def one_optimum(n, rng, case):
 
 
 def one_body(n, rng, case):
-    """Compare the least torque of a book with similar optima, from the ends to 101 rotations."""
+    """Compare the times to find optimal motions of a book, such as the least torque."""
     bvp, does = textbook.minimum_torque_so3, "minimum_acceleration_so3, of the book"
     rest = np.zeros(3)
     least = _ours(case, rb.minimum_acceleration_so3, BOOK)
@@ -243,7 +246,7 @@ def one_body(n, rng, case):
 
 
 def stacked_optima(n, rng, least, bvps=20):
-    """Compare n random optima, solved together, with `bvps` of them, solved by `solve_bvp`.
+    """Compare our solver, on n random problems together, with SciPy's `solve_bvp`.
 
     `solve_bvp` solves the first `bvps` problems one by one. The times are per solved problem.
     `solve_bvp` may find another optimum.
@@ -302,20 +305,20 @@ def _ours(case, make, *further):
 
 
 def _distance(truth):
-    """Return a function that computes the largest distance of the first values from `truth`."""
+    """Return a function that computes the largest distance between the first values and `truth`."""
     n, truth = len(truth), np.asarray(truth)
     return lambda value: np.linalg.norm((value[:n] - truth).reshape(n, -1), axis=1).max()
 
 
 def _true_optimum(ends, G, near=None):
-    """Return 101 rotations on the motion of least torque, by `solve_bvp` from the guess `near`."""
+    """Return 101 rotations of the least torque, by `solve_bvp` from the guess `near`."""
     near = near or rb.minimum_torque_so3(*ends, G)
     found, _ = oracles.stationary(("effort", G, np.eye(3)), tuple(ends), near)
     return oracles.rotation_of_quaternions(found.sol(MOMENTS)[:4])
 
 
 def timing_of_poses(n, rng):
-    """Compare fastest timings of a leg, with limits on components or norms, and of n poses."""
+    """Compare fastest timings of a leg, with two kinds of limits, and of a chain of n poses."""
     steps = rb.exp_se3(rng.uniform(-0.7, 0.7, (n - 1, 6)))
     poses = np.array(list(accumulate(steps, np.matmul, initial=np.eye(4))))
     path, leg, does = rb.chain(np.arange(n), poses), rb.geodesic_se3(*poses[:2]), "fastest, norms"
@@ -332,7 +335,7 @@ def timing_of_poses(n, rng):
 
 
 def _by_toppra(curve, cells):
-    """Return the least time of a curve on [0, 1], by toppra with the same limits and cells."""
+    """Let toppra compute the least time of a curve on [0, 1] with the same limits."""
     linear, s = toppra.constraint.linear_constraint, np.linspace(0, 1, cells + 1)
     V, A = curve(s, 1), curve(s, 2)
 
@@ -353,10 +356,10 @@ def _by_toppra(curve, cells):
 
 
 class Contest(NamedTuple):
-    """A contest of methods for a task and case, with their names in the CSV, and some sizes N.
+    """A contest of methods for a task and a case, named as in the CSV, at some sizes N.
 
-    `make` takes N, a generator and the options. It returns the methods, ours first, and a function
-    that computes the error of a value, or None. `bound` is the largest error that is allowed.
+    `make` takes N, a generator and the options. It returns the methods, with ours first, and a
+    function for the error of a value, or None. `bound` is the largest error that is allowed.
     """
 
     task: str

@@ -1,4 +1,4 @@
-"""Draw the figure of a run: the time per item against N, and the times of the optimum."""
+"""Draw the results of a run: the time per item against N, and the times for optimal curves."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -27,7 +27,7 @@ MARKERS = {"4a": "o", "4b": "s", "4c": "^", "5": "D", "random": "P"}
 
 
 def draw(rows):
-    """Return the figure of the rows of a run."""
+    """Return a figure with the results of a run."""
     with plt.style.context(["default", "rbcourse.rbcourse"]):
         fig = plt.figure(figsize=(9, 16))
         above, middle, below = fig.subfigures(3, 1, height_ratios=[0.55, 3.15, 1.1])
@@ -62,7 +62,7 @@ def draw_over_size(ax, rows):
 
 
 def draw_optimum(ax, rows):
-    """Draw the times of the optimum, with a line for each method and a mark for each case."""
+    """Draw the times for optimal curves: a row for each method and a mark for each case."""
     one = [row for row in rows if row["task"] == "optimum, one problem"]
     many = [row for row in rows if row["task"] == "optimum, stacked"]
     names = list(dict.fromkeys(row["method"] for row in one))

@@ -1,4 +1,4 @@
-"""Report a run: the printed lines, the CSV, and the table of ratios in README.md."""
+"""Write the results of a run as printed lines, as CSV, and as the table in README.md."""
 
 import csv
 import math
@@ -19,15 +19,15 @@ TABLE = [
     ("{} random quaternions", "random quaternions", ""),
     ("a chain of 1,000 poses at {} times", "chain at N times", "projected cubics"),
     ("the same with geodesic legs", "chain at N times", "geodesics"),
-    ("minimum acceleration through the ends of {} legs", "spline of N legs", "30°"),
-    ("the fastest timing of a leg, in 1,000 cells", "fastest timing", "chain of N"),
+    ("spline of minimum acceleration with {} legs", "spline of N legs", "30°"),
+    ("fastest timing of one leg, with 1,000 cells", "fastest timing", "chain of N"),
     ("minimum acceleration, BK Figure 4c", "optimum, one problem", "4c"),
-    ("minimum acceleration, {} random problems at once", "optimum, stacked", "random"),
+    ("minimum acceleration, {} random problems together", "optimum, stacked", "random"),
     ("least torque of a book, BK Figure 4c", "optimum of a body, one problem", "4c"),
-    ("least torque, {} random bodies at once", "optimum of a body, stacked", "random"),
-    ("{} frames of two cubes as GIF", "cubes as GIF", ""),
+    ("least torque, {} random bodies together", "optimum of a body, stacked", "random"),
+    ("GIF of two cubes with {} frames", "cubes as GIF", ""),
 ]
-"""The rows of the README: a text with {} in place of N, the task, and the case."""
+"""For each row of the README: its text with {} for N, the task, and the case."""
 
 
 def line(row, bound):
@@ -40,7 +40,7 @@ def line(row, bound):
 
 
 def write_csv(rows, path):
-    """Write rows with the same columns as CSV; numbers have four digits."""
+    """Write rows as CSV; numbers have four digits."""
     with open(path, "w", encoding="utf-8", newline="") as file:
         texts = ([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()] for row in rows)
         csv.writer(file, lineterminator="\n").writerows([rows[0], *texts])
@@ -58,8 +58,8 @@ def read_csv(path):
 
 
 def readme_table(rows):
-    """Return the README's table: the ratios of times to ours at the largest N, rounded down."""
-    text = "\n| task | time over ours |\n|---|---|\n"
+    """Return the README's table of times divided by ours, at the largest N, rounded down."""
+    text = "\n| task | time divided by ours |\n|---|---|\n"
     for words, task, case in TABLE:
         here = [row for row in rows if (row["task"], row["case"]) == (task, case)]
         n = max(row["N [1]"] for row in here)
@@ -77,7 +77,7 @@ def rounded_down(ratio):
 
 
 def update_readme(rows, path):
-    """Write the table into the README, between its two marks."""
+    """Replace the table between the two marks in the README."""
     before, rest = path.read_text("utf-8").split(START)
     text = before + START + readme_table(rows) + END + rest.split(END)[1]
     path.write_text(text, encoding="utf-8", newline="\n")

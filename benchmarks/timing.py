@@ -1,4 +1,4 @@
-"""Time the methods of a contest in turn, so that the machine is in the same state for all."""
+"""Time the methods of a contest in turn, so that the load of the machine is the same for all."""
 
 import os
 import platform
@@ -18,14 +18,14 @@ RATIOS = ("times ours [1]", "times ours low [1]", "times ours high [1]")
 
 
 def compete(contest, n, rng, machine, **timing):
-    """Return a row for each method of a contest with this N, as a dict from columns to values."""
+    """Time the methods of a contest at size n; return a list with a dict for each method."""
     methods, error = contest.make(n, rng, *contest.options)
     times = in_turn([method.call for method in methods.values()], **timing)
     times /= [method.items for method in methods.values()]
     rows = []
     for (name, method), column in zip(methods.items(), times.T, strict=True):
         off = error and method.value and float(error(np.asarray(method.value(method.call()))))
-        # Python cannot measure their memory
+        # Python cannot measure the memory of these packages
         most, hidden = None, name.startswith(("RoMa", "SciPy"))
         if min(contest.sizes) < n == max(contest.sizes) and not hidden:
             tracemalloc.start()
@@ -42,10 +42,10 @@ def compete(contest, n, rng, machine, **timing):
 
 
 def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter):
-    """Return the seconds for a call, shape (rounds, calls); each round runs every call.
+    """Return the seconds per call, shape (rounds, calls); each round runs every call.
 
-    A short call is repeated until about `loop` seconds have passed. All rounds together take about
-    `total` seconds, but there are at least `fewest` and at most `most`.
+    A short call is repeated until about `loop` seconds have passed. The number of rounds, from
+    `fewest` to `most`, is such that they take about `total` seconds.
     """
 
     def seconds(call, times):

@@ -1,4 +1,4 @@
-"""Inputs that break code which passes tests with random inputs."""
+"""Inputs that break code even if it passes tests with random inputs."""
 
 from itertools import product
 
@@ -38,7 +38,7 @@ def half_turns():
 
 
 def rounded_half_turns(rng, count=500):
-    """Return rounded pairs R0, R1 = R0 (2 n nᵀ − I) with random starts and axes, and the axes n."""
+    """Return R0 and R1 = R0 (2 n nᵀ − I), both rounded, and the axes n; R0 and n are random."""
     R0 = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
     R0[..., 0] *= np.linalg.det(R0)[:, None]
     n = np.concatenate([rng.normal(size=(count - 26, 3)), AXES])

@@ -1,4 +1,4 @@
-"""Problems for the optima, and their functionals."""
+"""Random problems for the optima, and the functionals."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -25,7 +25,7 @@ def exact_polynomial(coefficients, t):
 
 
 def polynomial_through(ends, t):
-    """Return p(t) for the polynomial p with the given values, derivatives and so on at 0 and 1."""
+    """Return p(t) for the polynomial p with the given values and derivatives at 0 and 1."""
     count, ends = len(ends), np.asarray(ends, float)
     with mp.workdps(DIGITS):
         rows = [
@@ -97,7 +97,7 @@ def right_jacobian_so3(w):
 
 
 def theta(t, angle, order=0):
-    """Return BK (16) for f(t) = t, as printed, or its derivative by differences."""
+    """Return BK (16) for f(t) = t, or its derivative by differences."""
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
         return float(
@@ -110,7 +110,7 @@ def theta(t, angle, order=0):
 
 
 def f(t, angle, order=0):
-    """Return BK Corollary 2, as printed, or its derivative by differences."""
+    """Return BK Corollary 2, or its derivative by differences."""
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
         return float(
@@ -173,7 +173,7 @@ def quaternion(w):
 
 
 def arc(q0, q1, t):
-    """Return the point at the share t of the shorter great-circle arc from q0 to q1."""
+    """Return the point at fraction t of the shorter great-circle arc from q0 to q1."""
     with mp.workdps(DIGITS):
         p, q = ([mp.mpf(float(c)) for c in x] for x in (q0, q1))
         p, q = ([c / mp.sqrt(mp.fdot(x, x)) for c in x] for x in (p, q))
@@ -347,8 +347,8 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
     """Minimise ∫ ‖u‖² dt over normalised polynomials of quaternions, starting from a nearby curve.
 
     No Euler–Lagrange equation is used. `deviation` takes w, w', … and returns u, all of shape (...,
-    3). After R0 and R1, each pair in `ends` fixes one more rate at both ends. Returns w as a
-    function of t, and the cost.
+    3). `ends` has R0, R1, and then pairs of rates at the two ends: w0, w1, and so on. Returns w as
+    a function of t, and the cost.
     """
     from math import comb
 
@@ -387,7 +387,7 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
         return base, [sum(comb(k, i) * B[i] * T[k - i] for i in range(k + 1)) for k in order]
 
     def rates(x, table):
-        """Return w and its rates; they solve n w = 2 im(q̄ q'), n = ‖q‖², and its derivatives."""
+        """Return w and its rates, by n w = 2 im(q̄ q') with n = ‖q‖², and by its derivatives."""
         base, shapes = table
         Q = [b + s @ x.reshape(*x.shape[:-1], terms, 4) for b, s in zip(base, shapes, strict=True)]
 

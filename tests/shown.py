@@ -1,10 +1,10 @@
 """Compare the numbers that the artists of a figure hold with the CSV of the figure.
 
 A kernel that runs `record` (see conftest.py) writes all numbers that the artists of each saved
-figure hold. For an animation, it writes those of all frames. It stops with an error at a figure
-that is clipped or has no labels. `not_shown` looks for the columns of the CSV among these numbers.
-If a title or a label names a column, it looks only among the numbers of the artists with this title
-or label.
+figure hold. For an animation, it writes the numbers of all frames. It stops with an error at a
+figure that is clipped or has no labels. `not_shown` looks for the columns of the CSV among these
+numbers. If a title or a label names a column, it looks only among the numbers of the artists with
+this title or label.
 """
 
 import csv
@@ -27,7 +27,7 @@ SHARES = {
     r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,
     # the picture shows these columns by the order of points, or by colours
     r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,
-    r".*, (.* )?theta\d? \[rad\]": 0,  # the places of links and corners show it
+    r".*, (.* )?theta\d? \[rad\]": 0,  # the positions of links and corners show this column
     r"paper_fig[23][ab], .*": 0.3,  # the picture has six curves, and a surface with fewer points
     r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, which is drawn three times
     # the picture shows the path of the corner, and not the path of the centre
@@ -38,7 +38,7 @@ SHARES = {
     r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,
 }
 FIGURES = Path(__file__).parents[1] / "figures"
-LETTERS = str.maketrans("ω₁₂₃", "w123")  # from letters in labels to their spelling in columns
+LETTERS = str.maketrans("ω₁₂₃", "w123")  # maps letters in labels to their spelling in columns
 BAR = "<colorbar>"
 GETTERS = "get_data", "get_data_3d", "get_segments", "get_xy", "get_offsets", "get_array"
 
@@ -88,7 +88,7 @@ def pooled(pairs):
 
 
 def by_names(artists):
-    """Yield each array of numbers that artists hold, once with each name: "", title or label."""
+    """Yield each array of numbers that artists hold, once for each name: "", title or label."""
     for artist in artists:
         title = title_of(getattr(artist, "axes", None))
         label = str(artist.get_label()).removeprefix("about ").translate(LETTERS)
@@ -146,14 +146,14 @@ def check_looks(fig):
         for artist in [*ax.lines, *ax.patches]:
             if artist.get_transform().contains_branch(ax.transData):
                 places = artist.get_path().transformed(artist.get_transform()).vertices
-                if ax.get_aspect() == 1:  # here marks must be complete, too
+                if ax.get_aspect() == 1:  # marks must be complete here
                     places = artist.get_window_extent().corners()
                 assert not (places < ax.bbox.min - 1e-6).any(), artist
                 assert not (places > ax.bbox.max + 1e-6).any(), artist
 
 
 def not_shown(figures, shown):
-    """Yield the columns of the CSV files of figures whose numbers the artists do not hold."""
+    """Yield the CSV columns whose numbers the artists of the figure do not hold."""
     for file in sorted(figures.glob("*.csv")):
         if not file.with_suffix(".png").exists():
             continue  # a table without a picture
@@ -188,13 +188,13 @@ def name_for(column, pools):
 
 
 def held(pool, value):
-    """Return whether a number is in the sorted pool, to the twelve digits of the CSV."""
+    """Return whether the sorted pool has this number, to the twelve digits of the CSV."""
     near = pool[np.clip(np.searchsorted(pool, value) + np.array([-1, 0]), 0, len(pool) - 1)]
     return bool((np.abs(near - value) <= 1e-11 * max(1, abs(value))).any())
 
 
 def start_recording(folder, ipython):
-    """Make kernels that use the folder `ipython` record into `folder`; return `ipython`."""
+    """Make kernels with the profile folder `ipython` record into `folder`; return `ipython`."""
     startup = Path(ipython) / "profile_default" / "startup"
     startup.mkdir(parents=True)
     text = STARTUP.format(tests=os.path.dirname(__file__), folder=folder)

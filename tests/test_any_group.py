@@ -1,4 +1,4 @@
-"""Check the formulas of docs/near_optimal.md, in Lie brackets, on SO(3), SO(4) and SO(5)."""
+"""Check the bracket formulas of docs/near_optimal.md on SO(3), SO(4) and SO(5)."""
 
 import itertools
 from fractions import Fraction
@@ -111,7 +111,7 @@ def deviation(s, e, d, n):
     ]
 
 
-def test_the_deviation_in_the_package_equals_the_one_on_so3():
+def test_the_deviation_agrees_with_the_package_on_so3():
     sigma, w0, w1 = np.random.default_rng(1).normal(size=(3, 3))
     e, d = seen_from_the_middle(sigma, w0, w1)
     ours = bezier_deviation(sigma, e, d)
@@ -120,12 +120,12 @@ def test_the_deviation_in_the_package_equals_the_one_on_so3():
 
 
 def as_so3(x):
-    """Return a vector of ℝ³ in the basis of so(3) used here."""
+    """Convert a vector of ℝ³ to the basis of so(3) used here."""
     return to_vector(np.array([[0, -x[2], x[1]], [x[2], 0, -x[0]], [-x[1], x[0], 0]]))
 
 
 def excess(R, n):
-    """Return the excess over the lowest cost that descent finds, and this lowest cost."""
+    """Return the excess over the lowest cost that descent finds, and this cost."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))
@@ -139,7 +139,7 @@ def excess(R, n):
         slope = np.einsum("t,ta,jta->j", weights, a, by)
         step = np.linalg.solve(np.einsum("t,ita,jta->ij", weights, by, by), -slope)
         x, x_rate, x_bend = (np.tensordot(step, z, axes=1) for z in (eta, rate, bend))
-        # w of R exp(x) minus w of R, as series of brackets, and its derivative
+        # w of R exp(x) minus w of R, as a series of Lie brackets, and its derivative
         dw, da, term, its_rate, k = x_rate.copy(), x_bend.copy(), x_rate, x_bend, 1
         other, other_rate = w, a
         while np.abs(term).max() + np.abs(other).max() > 1e-20 and k < 12:
@@ -154,7 +154,7 @@ def excess(R, n):
 
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("n", [4, 5])
-def test_the_excess_of_closed_forms_agrees_with_the_note_in_higher_dimensions(n):
+def test_the_excess_agrees_with_the_note_in_higher_dimensions(n):
     """The excess of Bézier's curve is E. The excess of the corrected curve grows as the eighth
     power of the size of the data."""
     d = n * (n - 1) // 2

@@ -96,7 +96,7 @@ def test_a_configuration_of_the_arm_is_not_a_planar_pose():
 @pytest.mark.parametrize(
     "lengths", [(2, 1.5), (1.5, 2), (1, 1), (1e-3, 4), (1e-200, 2e-200), (3e200, 1e200)]
 )
-def test_both_inverse_solutions_reach_the_tip_and_one_equals_the_original_angles(lengths):
+def test_both_inverse_solutions_reach_the_tip(lengths):
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, size=(4, 250, 2))
     q[0, :3, 1] = [0, np.pi, -np.pi]  # stretched and folded arms, whose tips are rounded
     tip = tips(q, lengths)
@@ -136,6 +136,6 @@ ANGLES_AND_LENGTHS = [
         ("arm_inverse_kinematics", ([1, 0], [1, 1, 1]), "lengths"),
     ],
 )
-def test_bad_arguments_and_places_out_of_reach_are_refused(function, arguments, message):
+def test_places_out_of_reach_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         getattr(arm, function)(*arguments)

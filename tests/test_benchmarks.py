@@ -27,8 +27,8 @@ class Clock:
         self.load *= grows
 
 
-def test_times_are_per_item_and_ratios_compare_methods_under_the_same_load():
-    """The machine gets twice as slow from round to round, for all methods of a round."""
+def test_ratios_compare_methods_under_the_same_load():
+    """The machine becomes twice as slow after each round."""
     clock, rounds = Clock(), {"loop": 0, "total": 0, "fewest": 3, "most": 3}
     ours, other = partial(clock.take, 6), partial(clock.take, 4, grows=2)
     methods = {OURS: contests.Method("", ours, items=3), "other": contests.Method("", other)}
@@ -69,7 +69,7 @@ def ran(tmp_path_factory):
     plt.close("all")
 
 
-def test_every_task_lists_our_method_first_and_all_methods_agree(ran):
+def test_all_methods_of_a_task_agree(ran):
     contest = {(contest.task, contest.case): contest for contest in CONTESTS}
     methods = {contest.task: [] for contest in CONTESTS}
     for row in ran[1]:

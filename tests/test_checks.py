@@ -8,7 +8,7 @@ from rbcourse import _checks as checks
 EPS = np.finfo(float).eps
 
 
-def test_messages_state_the_index_the_shape_and_the_type_of_the_argument():
+def test_error_messages_describe_the_wrong_argument():
     for value, core, message in (
         (np.zeros((4, 0, 0)), ("n", "n"), "x: shape (..., n, n) is wanted, got (4, 0, 0)"),
         ([[1, 2], [3]], (2,), "x: an array of numbers is wanted, got rows of unequal length"),
@@ -20,7 +20,7 @@ def test_messages_state_the_index_the_shape_and_the_type_of_the_argument():
     assert checks.as_finite("x", [True, False], 2).dtype == np.float64
 
 
-def test_matrices_that_are_symmetric_to_rounding_are_made_symmetric_and_others_are_refused():
+def test_matrices_symmetric_to_rounding_are_made_symmetric():
     given = np.array([[1, 2 + 1e-15], [2, 3]])
     assert np.array_equal(checks.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
     nearly = checks.as_symmetric("G", [[1, 1], [1 + 5e-13, 1]], 2)
@@ -34,9 +34,9 @@ def test_matrices_that_are_symmetric_to_rounding_are_made_symmetric_and_others_a
     assert not checks.as_symmetric("G", np.zeros((2, 2)), 2).any()
 
 
-def test_times_and_angles_that_pass_an_end_by_rounding_become_the_end_and_others_are_refused():
+def test_times_and_angles_just_outside_an_interval_are_moved_to_its_end():
     assert checks.as_time([0, 1], 2).shape == (2, 1, 1)
-    accumulated = np.cumsum(np.full(100, 0.07))  # the last one is 7.000000000000009
+    accumulated = np.cumsum(np.full(100, 0.07))  # the last time is 7.000000000000009
     assert accumulated[-1] > 7
     assert np.array_equal(checks.as_time(accumulated, 0, (0.0, 7.0)), np.minimum(accumulated, 7))
     assert checks.as_time(-1e-15, 0, (0.0, 7.0)) == 0

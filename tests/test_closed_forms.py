@@ -1,4 +1,4 @@
-"""Test the closed forms of BK 1 against their definitions in 60 digits, and those for bodies."""
+"""Compare the closed forms of BK 1, and those for bodies, with their definitions in 60 digits."""
 
 from itertools import pairwise
 
@@ -34,7 +34,7 @@ def directions(count, rng):
 
 
 def ends(count, angle=None, size=None):
-    """Return R0, R1, w0, w1: turns by `angle` or any angle, velocities of `size` or up to 9."""
+    """Return random R0, R1, w0, w1; `angle` and `size` fix the turn and the speeds."""
     rng = np.random.default_rng(count)
     R0, R1 = (Rotation.random(count, rng=rng).as_matrix() for _ in range(2))
     if angle is not None:
@@ -44,7 +44,7 @@ def ends(count, angle=None, size=None):
 
 
 def quaternion_of(R):
-    """Return the quaternion of a rotation, not normalised."""
+    """Return an unnormalised quaternion of a rotation."""
     sine = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
     return [1 + R[0, 0] + R[1, 1] + R[2, 2], *sine]
 
@@ -72,7 +72,7 @@ def along(w, share):
 
 
 def in_coordinates(coordinates, point):
-    """Return the cubic in coordinates whose end rates belong to the given end velocities."""
+    """Return the curve that is a cubic in these coordinates, with the given end velocities."""
 
     def curve(turn, w0, w1):
         values, rates = [], []
@@ -201,7 +201,7 @@ CASES = cases()
 @pytest.mark.source("BK 1")
 @every_curve
 @pytest.mark.parametrize("case", CASES)
-def test_curves_and_derivatives_are_those_of_the_definition(name, case):
+def test_curves_and_derivatives_agree_with_the_definition(name, case):
     """Errors of Cayley's parameters grow with the secant of half the angle: near a half-turn, all
     digits are lost."""
     (turn, w0, w1), start, times = CASES[case], Rotation.random(rng=1).as_matrix(), (0.13, 0.6, 1)
@@ -216,7 +216,7 @@ def test_curves_and_derivatives_are_those_of_the_definition(name, case):
 
 @every_curve
 @pytest.mark.parametrize("size", [None, 0, 9, 100], ids=str)
-def test_the_ends_and_end_velocities_are_met_wherever_the_curve_is_defined(name, size):
+def test_the_end_conditions_hold_wherever_the_curve_is_defined(name, size):
     size = min(size, 9.42) if size and name == "bezier" else size
     angles = [None, 0, 1e-9, 1e-3, 3, np.pi - 1e-3, np.pi - 1e-6, np.pi]
     for angle in angles[:-1] if name == "cayley" else angles:
@@ -264,7 +264,7 @@ def test_ends_outside_the_domain_are_refused_by_name():
 
 
 @every_curve
-def test_if_end_velocities_are_along_the_geodesic_three_of_five_closed_forms_follow_it(name):
+def test_three_closed_forms_follow_the_geodesic_if_the_velocities_do(name):
     """The expected curve is R0 exp(σ p(t)), where p is the cubic with the same end conditions."""
     R0, R1, _, _ = ends(40)
     turn = Rotation.from_matrix(R0.mT @ R1).as_rotvec()
@@ -281,7 +281,7 @@ def test_if_end_velocities_are_along_the_geodesic_three_of_five_closed_forms_fol
 
 
 @pytest.mark.parametrize("make", [*MAKERS.values(), rb.corrected_bezier_so3])
-def test_three_closed_forms_are_reversible_in_time_and_three_are_not(make):
+def test_three_closed_forms_are_reversible_in_time(make):
     """For some fast ends, the correction uses a logarithm that is not the shortest one."""
     R0, R1, w0, w1 = ends(40, 2.5)
     curve, back = make(R0, R1, w0, w1), make(R1, R0, -w1, -w0)
@@ -297,7 +297,7 @@ def test_three_closed_forms_are_reversible_in_time_and_three_are_not(make):
         assert np.all(off < 400 * EPS * np.abs(want).max(axis=others, initial=1) * worse)
 
 
-def test_no_leg_of_de_casteljaus_construction_is_longer_than_the_longest_leg_before():
+def test_legs_of_de_casteljaus_construction_never_get_longer():
     """Some velocities are just below 3π, so that their legs are almost half-turns."""
     R0, R1, w0, w1 = ends(100)
     for w in (w0[::2], w1[::4]):
@@ -358,12 +358,12 @@ def test_errors_grow_with_powers_of_the_inverse_norm_of_the_cubic(margin):
         assert np.all(off < 40 * EPS * 8**order / np.linalg.norm(Q, axis=0) ** (1 + order))
 
 
-def test_the_time_at_which_the_cubic_of_quaternions_is_zero_is_refused():
+def test_a_zero_of_the_quaternion_cubic_is_refused():
     turn, w0, w1 = in_a_plane(0)
     stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
-    t = np.linspace(0, 0.4, 3000)  # more times than one block holds for two curves
+    t = np.linspace(0, 0.4, 3000)  # these times fill more than one block, for two curves
     for order in (0, 1, 2):
         assert np.isfinite(stack([0, 0.25, 0.75, 1], order)).all()
         for k in (0, 2999):
@@ -430,7 +430,7 @@ def test_the_normal_cubic_of_thin_bodies_exists_except_at_the_singular_angle():
 
 
 @pytest.mark.source("beyond BK 8")
-def test_the_excess_of_the_quintic_grows_as_the_fourth_power_and_is_zero_from_rest_to_rest():
+def test_the_excess_of_the_quintic_grows_as_the_fourth_power():
     found = []
     for s in (0.2, 0.1, 1):
         ends = I3, rb.exp_so3(s * TURN), *(s * x for x in (W0, W1, A0, A1))

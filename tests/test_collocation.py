@@ -1,4 +1,4 @@
-"""Newton's method for R p = c: a problem of a stack that fails does not affect the others."""
+"""Newton's method may fail for one problem of a stack; the other problems are still solved."""
 
 import numpy as np
 import pytest

@@ -49,7 +49,7 @@ def test_structure_constants_give_the_commutators_in_bases_of_any_scale(conditio
 @pytest.mark.source("BK 2.4", "BK (8)")
 @both_groups
 @pytest.mark.parametrize("definite", [True, False])
-def test_the_connection_has_no_torsion_and_is_compatible_with_the_metric(m, definite):
+def test_the_connection_is_the_levi_civita_connection(m, definite):
     """The product rule d/dt ⟨x, y⟩ = ⟨Dx/dt, y⟩ + ⟨x, Dy/dt⟩ is tested, too."""
     G, C = metrics(m, definite=definite), structure_constants(BASES[m])
     gamma, condition = christoffel(G, BASES[m]), np.linalg.cond(G)
@@ -81,8 +81,9 @@ def test_the_connection_of_a_bi_invariant_metric_is_half_the_commutator():
 
 @pytest.mark.source("BK (9)", "BK (14)", "BK 2.4")
 @pytest.mark.parametrize(("G", "exp"), [(rb.METRIC_SO3, rb.exp_so3), (rb.METRIC_SE3, rb.exp_se3)])
-def test_the_acceleration_is_the_projection_of_the_ambient_one_on_the_tangent_space(G, exp):
-    """A flat metric induces (12) and (14). A'' is computed by differences, not from Γ."""
+def test_the_acceleration_is_the_tangential_part_of_the_ambient_one(G, exp):
+    """The metrics (12) and (14) are induced by a flat metric. A'' is computed by differences, not
+    from Γ."""
     start, v, a = np.random.default_rng(2).normal(size=(3, len(G)))
     h, A0 = 1e-4, exp(start)
     before, at, after = (A0 @ exp(v * t + a * t**2 / 2) for t in (-h, 0, h))
@@ -92,9 +93,9 @@ def test_the_acceleration_is_the_projection_of_the_ambient_one_on_the_tangent_sp
 
 
 @pytest.mark.source("BK 2.4", "errata 22")
-def test_the_covariant_derivative_is_along_the_velocity_and_not_along_the_point_as_printed():
-    """The point A is not a tangent vector at A. Its rotational components are zero, so no vector
-    would turn along it."""
+def test_the_covariant_derivative_is_along_the_velocity():
+    """The point A is not a tangent vector at A. A has no rotational components, so no vector would
+    turn along A."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
     gamma = christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
@@ -109,7 +110,7 @@ def test_the_covariant_derivative_is_along_the_velocity_and_not_along_the_point_
 
 @pytest.mark.source("BK (8)")
 @both_groups
-def test_the_velocity_is_the_derivative_and_energy_and_momentum_are_conserved(m):
+def test_energy_and_momentum_are_conserved(m):
     """The relative error of the energy is small over ten units of time, at condition numbers up to
     1e4."""
     rng, h = np.random.default_rng(5), 1e-4
@@ -128,16 +129,16 @@ def test_the_velocity_is_the_derivative_and_energy_and_momentum_are_conserved(m)
 
 @pytest.mark.source("BK (8)", "BK 2.4")
 @pytest.mark.parametrize(("a", "c"), [(1, 1), (0.01, 2), (1.5, 1)])
-def test_the_motion_of_a_free_body_satisfies_eulers_solution(a, c):
+def test_a_free_body_follows_eulers_solution(a, c):
     _, w = rb.geodesic_flow(INERTIA, ONE, [a, 0, c], TIMES)
     exact = [oracles.free_body([1, 2, 3], a, c, t) for t in TIMES]
     assert np.abs(w - exact).max() < 1e-9
 
 
 @pytest.mark.source("BK (8)", "errata 13")
-def test_the_printed_geodesic_equation_is_not_the_equation_of_the_free_body():
+def test_the_printed_geodesic_equation_is_wrong_for_the_free_body():
     """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the symbols Γ of the frame with
-    ä of coordinates instead of ẇ."""
+    ä of coordinates, where ẇ is needed."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)
@@ -151,7 +152,7 @@ def test_the_printed_geodesic_equation_is_not_the_equation_of_the_free_body():
     _, after = rb.geodesic_flow(inertia, ONE, w, h)
     assert np.abs((after - w) / h - euler).max() < 1e-2
     ways, _ = rb.geodesic_flow(rb.METRIC_SO3, turn, w, [-h, 0, h])
-    # coordinates along the geodesic, for their second derivative
+    # coordinates along the geodesic, to compute their second derivative
     before, at, ahead = rb.log_so3(ways)
     velocity, acceleration = (ahead - before) / (2 * h), (before - 2 * at + ahead) / h**2
     frame = christoffel(rb.METRIC_SO3, rb.BASIS_SO3)
@@ -171,16 +172,14 @@ def steady_and_straight(S):
         (rb.METRIC_SE3, steady_and_straight, 3, 1e-10),
     ],
 )
-def test_bi_invariant_geodesics_are_one_parameter_subgroups_and_metric_14_gives_straight_paths(
-    G, exp, constant, tolerance
-):
+def test_geodesics_of_bi_invariant_metrics_are_one_parameter_subgroups(G, exp, constant, tolerance):
     v0 = np.random.default_rng(8).normal(size=(5, len(G)))
     A, v = rb.geodesic_flow(G, exp(0 * v0[0]), v0, TIMES)
     assert np.abs(v - v0)[..., :constant].max() < 1e-12
     assert np.abs(A - exp(TIMES[:, None, None] * v0)).max() < tolerance
 
 
-def test_geodesics_are_integrated_to_times_in_any_order_and_in_large_batches():
+def test_geodesics_are_evaluated_at_times_in_any_order():
     start, spin = rb.exp_so3([1, 2, 3]), [0.3, 2, -1]
     t = np.array([[2.0, -1, 0], [2, 0.5, -3]])
     R, w = rb.geodesic_flow(INERTIA, start, spin, t)
@@ -192,7 +191,8 @@ def test_geodesics_are_integrated_to_times_in_any_order_and_in_large_batches():
     back, _ = rb.geodesic_flow(INERTIA, R[0, 0], w[0, 0], -2)
     assert np.abs(back - start).max() < 1e-11
     crowd, _ = rb.geodesic_flow(INERTIA, start, [spin] + [[0.01, 0, 0]] * 399, 10)
-    alone, _ = rb.geodesic_flow(INERTIA, start, spin, 10)  # a batch may have √400 times the error
+    # the error of a batch may be √400 times as large
+    alone, _ = rb.geodesic_flow(INERTIA, start, spin, 10)
     assert np.abs(crowd[0] - alone).max() < 20 * 1e-12
     assert rb.geodesic_flow(INERTIA, start, spin, [])[0].shape == (0, 3, 3)
     assert rb.geodesic_flow(np.ones((0, 3, 3)), start, spin, 1)[0].shape == (0, 3, 3)
@@ -217,7 +217,7 @@ def test_the_scale_of_velocities_and_metrics_does_not_matter():
         assert np.abs(v - w).max() < (1e-11 if size > 1e-300 else 1e-2)
 
 
-def test_velocities_may_grow_in_an_indefinite_metric_but_the_momentum_is_conserved():
+def test_the_momentum_is_conserved_even_if_velocities_grow():
     G = np.linalg.inv(np.kron([[0, 1], [1, 0]], np.diag([2, 0.5, 1])))
     v0 = np.linalg.solve(G, [1, 1, 0, 0, 0, 1])
     A, v = rb.geodesic_flow(G, np.eye(4), v0, [0, 10, 20])
@@ -237,9 +237,8 @@ def test_a_start_near_the_group_is_projected_onto_the_group():
     assert np.abs(A[:3, 3] - [3, 0, 0]).max() < 1e-12
 
 
-def test_a_fast_translation_does_not_disturb_the_rotation_and_a_body_at_rest_stays():
-    """The body travels 1e8 units of length in a unit of time, so the unit of length does not
-    matter."""
+def test_a_fast_translation_does_not_disturb_the_rotation():
+    """The body travels 1e8 units of length per unit of time; the unit of length must not matter."""
     G = np.diag([1.0, 2, 3, 1, 1, 1])
     _, w = rb.geodesic_flow(INERTIA, ONE, [1, 2, 3], TIMES)
     A, v = rb.geodesic_flow(G, np.eye(4), [1, 2, 3, 1e8, 0, 0], TIMES)
@@ -277,6 +276,6 @@ NEARLY_SO3 = [L1 + 1e-7 * ONE, L2, L3 + 1e-10]
         ("geodesic_flow", (ONE, ONE, [1, 2, 3], [0, np.nan]), "t[1] is nan"),
     ],
 )
-def test_bad_arguments_and_bases_without_a_lie_algebra_are_refused(function, arguments, message):
+def test_bases_without_a_lie_algebra_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         getattr(rb.connection, function)(*arguments)

@@ -1,4 +1,4 @@
-"""Test the contract of all functions that make curves, and that it detects known faults."""
+"""Test that all functions that make curves keep the contract, and that its checks detect faults."""
 
 import inspect
 import math
@@ -15,7 +15,7 @@ import rbcourse as rb
 
 
 def of(function, *more):
-    """Return a maker: it calls `function` with the ends that are required, and those in `more`."""
+    """Return a maker that calls `function` with the required ends and with those in `more`."""
     parameters = inspect.signature(function).parameters.values()
 
     def make(ends, **given):
@@ -102,7 +102,7 @@ def jet(curve, t, own=False):
 
 
 def off(a, b):
-    """Return the largest difference, relative to the largest entry of its component, or to 1."""
+    """Return the largest difference, relative to the largest entry of the component or to 1."""
     others = tuple(range(np.ndim(b) - 1))
     scale = np.abs(b).max(axis=others, initial=1)
     return (np.abs(np.subtract(a, b, dtype=float)).max(axis=others, initial=0) / scale).max()
@@ -173,7 +173,7 @@ def has_values_at_times_of_any_shape(make):
             t = times(curve, *shape)
             assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
     curve = made(make, 2)
-    t = times(curve, 2600)  # more times than one block holds for two curves
+    t = times(curve, 2600)  # these times fill more than one block, for two curves
     values = jet(curve, t)
     for part in (slice(1), slice(1, 40), slice(2500, 2600)):
         assert off(jet(curve, t[part]), values[part]) < 1e-12
@@ -288,7 +288,8 @@ def moves_with_its_ends(make):
 
 
 def lasts_as_long_as_it_is_told(make):
-    """Check that a curve of duration T is the curve on [0, 1] with rates times T, retimed to T."""
+    """Check that a curve of duration T equals the curve on [0, 1], made with rates times T and
+    retimed."""
     if "duration" not in inspect.signature(make.function).parameters:
         return  # a curve without the parameter `duration` keeps its own duration
     ends, T = sample(3), np.array([0.5, 1, 1.5])
@@ -384,7 +385,7 @@ def test_a_curve_keeps_the_contract(make, clause):
         clause(make)
 
 
-def test_every_function_that_returns_a_curve_has_a_maker():
+def test_every_function_that_returns_a_curve_is_tested():
     assert set(FUNCTIONS) <= set(MAKERS) | NO_STACKS
     assert len(FUNCTIONS) >= 20
 

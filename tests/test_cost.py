@@ -21,7 +21,7 @@ def about_z(angle):
 
 
 def gauss(density, near=(), end=1.0):
-    """Return the integral from 0 to `end` on panels that are halved towards the ends and `near`."""
+    """Integrate from 0 to `end`, on panels that get finer towards the ends and `near`."""
     apart = 2.0 ** -np.arange(1, 42)
     cuts = np.unique([x for t in (0, 1, *near) for x in (*(t - apart), t, *(t + apart))])
     cuts = end * cuts[(cuts >= 0) & (cuts <= 1)]
@@ -35,7 +35,7 @@ def squared(x):
 
 
 @pytest.mark.source("BK (18)", "BK (12)", "errata 1")
-def test_costs_of_turns_about_one_axis_have_a_closed_form():
+def test_costs_of_turns_about_one_axis_agree_with_formulas():
     """A cubic from rest to rest over the angle a costs 2 · 12 a². A projected line costs 2 ∫ (a
     θ'')²."""
     turn = rb.exp_so3([0, 0.9, 0])
@@ -46,7 +46,7 @@ def test_costs_of_turns_about_one_axis_have_a_closed_form():
 
 
 @pytest.mark.source("BK (18)", "BK (14)", "beyond BK 9")
-def test_the_parts_of_the_cost_on_se3_are_integrals_and_depend_on_the_centre_of_mass():
+def test_the_parts_of_the_cost_on_se3_agree_with_their_integrals():
     """∫ m ‖d_c''‖² is computed from the positions of the centre, by a Chebyshev series."""
     A1 = rb.pose_from_coordinates([0.5, 0.4, 0.3, 1, 2, 3])
     curve = rb.projected_cubic_se3(I4, A1, [1, 2, 0], [0, -1, 1], [1, 1, 1], [1, 0, 3])
@@ -67,7 +67,7 @@ def test_the_parts_of_the_cost_on_se3_are_integrals_and_depend_on_the_centre_of_
 
 
 @pytest.mark.source("BK 2.6")
-def test_geodesics_cost_nothing_and_screw_motions_have_a_cost():
+def test_geodesics_cost_nothing():
     A1 = rb.pose_from_coordinates([0, 0, 1, 2, 0, 0])
     assert rb.acceleration_cost(rb.geodesic_se3(I4, A1)) == 0
     screw = rb.screw_se3(I4, A1)
@@ -79,7 +79,7 @@ def test_geodesics_cost_nothing_and_screw_motions_have_a_cost():
 
 @pytest.mark.parametrize("margin", [2e-3, 1e-3, 1e-4, 1e-5, 3e-6])
 def test_the_cost_of_sharp_turns_is_integrated(margin):
-    """Nearly all of the cost arises within a share of the time that is half the margin.
+    """Nearly all of the cost arises in a small part of the time: half the margin.
 
     The line is tested alone and as a leg of a chain. The breakpoints are close together where the
     cost arises.
@@ -108,8 +108,8 @@ def late_line(when, angle):
 
 
 def cubic(when, off):
-    """Return a cubic about one axis that almost jumps: its complex M is of order `off` at time
-    `when`."""
+    """Return a cubic about one axis that almost jumps: at `when`, the complex M is of order
+    `off`."""
     h00, h01, h10, h11 = (hermite(one, np.array(when)) for one in np.eye(4))
     turn = np.exp(2.5j)
     columns = np.array([1j * h10, 1j * turn * h11, -h00 - turn * h01])
@@ -121,7 +121,8 @@ def cubic(when, off):
 
 
 def cubic_of_quaternions(margin):
-    """Return a turn by 2 rad about one axis; halfway, Q is the complex cos(1/2) + k/8 sin(1/2)."""
+    """Return a turn by 2 rad about an axis; halfway, the complex Q equals cos(1/2) + k/8
+    sin(1/2)."""
     k = 8 * (margin - np.cos(0.5)) / np.sin(0.5)
     curve = rb.quaternion_cubic_so3(I3, about_z(2.0), [0, 0, k], [0, 0, k])
     assert curve.margin == pytest.approx(margin)
@@ -129,7 +130,7 @@ def cubic_of_quaternions(margin):
 
 
 def cayleys_cubic(short_of):
-    """Return a cubic that makes a fast extra turn, in a time of about the square of `short_of`."""
+    """Return a cubic that makes an extra turn within a time of about `short_of`²."""
     w0, w1, n = np.array([1.0, 0, 0]), np.array([0, 2.0, 0]), np.array([1.0, 2, 2]) / 3
     goal = n / np.tan(short_of / 2)
     rate = (w1 + np.cross(goal, w1) + goal * (goal @ w1)) / 2
@@ -169,7 +170,7 @@ def test_panels_are_equally_fine_for_motions_about_each_axis():
     assert all(other == pytest.approx(one, rel=1e-9) for other in others)
 
 
-def test_the_cost_of_a_jump_or_of_a_curve_that_was_not_found_raises_an_error():
+def test_the_cost_of_a_jump_raises_an_error():
     for turn in (np.diag([-1.0, -1, 1]), np.diag([1.0, -1, -1]), about_z(np.pi - 5e-7)):
         with pytest.warns(RuntimeWarning, match="margin < 1e-6"):
             jump = rb.projected_cubic_so3(I3, turn, [0, 1e-9, 0], REST)
@@ -183,7 +184,7 @@ def test_the_cost_of_a_jump_or_of_a_curve_that_was_not_found_raises_an_error():
         rb.acceleration_cost(stack)
 
 
-def test_an_integral_that_does_not_converge_or_overflows_raises_an_error():
+def test_an_integral_that_does_not_converge_raises_an_error():
     noise, turn = np.random.default_rng(0), (np.pi - 1e-6) * np.array([1, 2, 2]) / 3
 
     def line(bend):
@@ -200,7 +201,7 @@ def test_an_integral_that_does_not_converge_or_overflows_raises_an_error():
 
 
 @pytest.mark.parametrize("make", [rb.projected_cubic_so3, rb.quaternion_cubic_so3])
-def test_a_stack_has_one_cost_for_each_curve_with_common_or_individual_inertias(make):
+def test_a_stack_has_one_cost_for_each_curve(make):
     turns = rb.exp_so3(np.linspace(0.5, 2.9, 6).reshape(2, 3, 1) * [0.6, 0, 0.8])
     stack = make(I3, turns, REST, [0, 2, 0])
     each = BOOK * np.linspace(1, 2, 6).reshape(2, 3, 1, 1)
@@ -235,7 +236,7 @@ CURVES = rb.CLOSED_FORMS | {
 
 @pytest.mark.source("beyond BK 1", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize("name", CURVES)
-def test_costs_are_the_integrals_of_their_definitions(name):
+def test_costs_agree_with_the_integrals_that_define_them(name):
     curve = CURVES[name](I3, rb.exp_so3([0.5, 1.2, -0.4]), [1, 2, 0], [0, -1, 1])
 
     def densities(t):
@@ -250,7 +251,7 @@ def test_costs_are_the_integrals_of_their_definitions(name):
     assert found == pytest.approx(want, rel=1e-10, abs=1e-20)
 
 
-def test_a_chain_that_is_smooth_enough_costs_the_sum_of_its_legs():
+def test_a_smooth_chain_costs_the_sum_of_its_legs():
     """Quintic legs have a continuous acceleration here. The acceleration of chained cubics
     jumps."""
     R = rb.exp_so3([[0, 0, 0], [0.3, 0.8, 0], [0, 1.0, 1.0]])
@@ -282,7 +283,7 @@ def test_a_chain_that_is_smooth_enough_costs_the_sum_of_its_legs():
 @pytest.mark.parametrize(
     "leg", [rb.exponential_cubic_so3, rb.bezier_so3, rb.minimum_acceleration_so3]
 )
-def test_a_steady_turn_in_legs_has_no_jerk_in_any_unit_of_time(leg, unit):
+def test_a_steady_turn_of_several_legs_has_no_jerk(leg, unit):
     """The accelerations of the turn, and their jumps at the joints, are rounding errors."""
     t, w = np.array([0, 1, 2.5, 3]), 0.7 * np.array([0.6, 0, 0.8])
     chain = rb.chain(unit * t, rb.exp_so3(np.outer(t, w)), [w / unit] * 4, leg=leg)
@@ -302,7 +303,7 @@ def test_costs_scale_with_the_unit_of_inertia(size):
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-8, 1e-12])
 def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
-    """One of the two tested lines turns fast halfway."""
+    """One of the two tested lines turns fast at half time."""
     curve = rb.projected_line_so3(I3, rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
     for cost in (
         partial(rb.acceleration_cost, curve),

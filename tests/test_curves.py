@@ -27,7 +27,7 @@ I3, REST = np.eye(3), np.zeros(3)
 
 
 def quick(t, order):
-    """Return a reparameterisation that leaves [0, 1], 4 t² − 3 t, and its derivatives."""
+    """Return 4 t² − 3 t, a reparameterisation that leaves [0, 1], and its derivatives."""
     return (4 * t**2 - 3 * t, 8 * t - 3, 8 + 0 * t, 0 * t)[order]
 
 
@@ -36,7 +36,7 @@ def squared(t, order):
 
 
 @pytest.mark.source("BK 6.1", "BK Remark 7")
-def test_the_geodesic_turns_uniformly_about_one_axis_as_slerp_does():
+def test_the_geodesic_agrees_with_slerp():
     R, from_I = GEODESICS(TIMES), rb.geodesic_so3(I3, TURNED)(TIMES)
     want = np.array([[oracles.exp_so3(t * w) for w in TURNS] for t in TIMES])
     assert np.abs(from_I - want).max() < 8 * EPS
@@ -55,7 +55,7 @@ def test_the_geodesic_turns_uniformly_about_one_axis_as_slerp_does():
 
 @pytest.mark.source("BK Prop. 6", "BK (15)", "BK (17)", "BK Cor. 1")
 @pytest.mark.parametrize("timing", [None, quick])
-def test_the_projected_line_is_the_projection_of_the_line_and_follows_the_geodesic(timing):
+def test_the_projected_line_is_the_projection_of_the_line(timing):
     """The rotation from the start to any point of the curve is about the axis of the geodesic."""
     curves, t = rb.projected_line_so3(STARTS, GOALS, timing), np.linspace(0, 1, 1001)[::50]
     x = (t if timing is None else quick(t, 0))[:, None, None, None]
@@ -97,10 +97,10 @@ def half_turns():
     return np.concatenate([start, R0]), np.concatenate([exact, R1]), np.concatenate([axes, n])
 
 
-def test_the_geodesic_over_a_half_turn_is_rodrigues_formula_about_the_axis_of_positive_sign():
+def test_the_geodesic_over_a_half_turn_follows_rodrigues_formula():
     """The formula holds up to the end of the interval, where the tangent is infinite."""
     R0, R1, n = half_turns()
-    # the largest component of the axis is positive; if several are largest, the first of them is
+    # the largest component of the axis is positive (the first, if several are largest)
     first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
     n *= np.sign(np.take_along_axis(n, first[:, None], axis=1))
     curves, cross = rb.geodesic_so3(R0, R1), rb.hat_so3(n)
@@ -112,7 +112,7 @@ def test_the_geodesic_over_a_half_turn_is_rodrigues_formula_about_the_axis_of_po
         assert np.abs(curves(t) - want).max() < 20 * EPS
 
 
-def test_the_middle_of_the_line_between_rotations_a_half_turn_apart_is_refused():
+def test_the_middle_of_a_line_over_a_half_turn_is_refused():
     for R0, R1, _ in zip(*half_turns(), strict=True):
         with pytest.warns(RuntimeWarning, match="^margin < 1e-6: .* jumps there"):
             curve = rb.projected_line_so3(R0, R1)
@@ -132,10 +132,8 @@ def test_the_middle_of_the_line_between_rotations_a_half_turn_apart_is_refused()
         (at_rest, "t", lambda t: 3 * t**2 - 2 * t**3),
     ],
 )
-def test_a_curve_near_the_singular_set_is_accurate_or_a_warning_is_given(
-    make, where, share, short_of
-):
-    """Just short of a half-turn the margin is 2 cos(a/2), and errors are of the order of eps over
+def test_a_curve_near_the_singular_set_is_accurate_or_gives_a_warning(make, where, share, short_of):
+    """Just short of a half-turn, the margin is 2 cos(a/2), and errors are of order eps divided by
     the gap."""
     turn, margin = np.array([0, 0, np.pi - short_of]), f"{short_of:.1e}"
     message = rf"^margin < 1e-6: {margin} at {where} = 0\.5; "
@@ -149,15 +147,15 @@ def test_a_curve_near_the_singular_set_is_accurate_or_a_warning_is_given(
 
 
 @pytest.mark.parametrize("make", [rb.projected_line_so3, at_rest, quintic_at_rest])
-def test_a_jump_gives_a_warning_and_its_time_is_refused(make):
-    """From rest to rest over a half-turn, the matrix passes through one of rank 1."""
+def test_a_jump_gives_a_warning(make):
+    """From rest to rest over a half-turn, the matrix passes through rank 1."""
     half = np.diag([1.0, -1, -1])
     with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6 of curve \[0, 1\]: .* t = 0\.5; .* j"):
         stack = make(I3, np.array([[I3, half], [half, I3], [I3, I3]]))
     assert np.abs(stack.margin - [[2, 0], [0, 2], [2, 2]]).max() < 8 * EPS
     one = stack[0, 1]
     assert np.abs(one([0, 0.25, 0.75, 1]) - [I3, I3, half, half]).max() < 80 * EPS
-    t = np.linspace(0, 0.4, 1000)  # more times than one block holds for six curves
+    t = np.linspace(0, 0.4, 1000)  # these times fill more than one block, for six curves
     own = np.full((1000, 3, 2), [[0.5, 0.25], [0.25, 0.5], [0.5, 0.5]])
     for order in (0, 1, 2):
         assert np.isfinite(stack(t, order)).all()
@@ -174,7 +172,7 @@ def test_a_jump_gives_a_warning_and_its_time_is_refused(make):
                     call(given, order)
 
 
-def test_f_may_return_numbers_change_its_argument_and_miss_the_end_by_rounding():
+def test_f_may_miss_the_end_by_rounding():
     def in_place(t, order):
         t *= t
         return (t * (1 + 1e-14), 2 * np.sqrt(t), 2)[order]
@@ -196,7 +194,7 @@ def test_f_may_return_numbers_change_its_argument_and_miss_the_end_by_rounding()
         *((one, r"f: a callable f\(t, order\) is wanted") for one in (0, 1, [], "f")),
     ],
 )
-def test_f_that_is_not_a_timing_is_refused(timing, message):
+def test_an_f_that_is_not_a_timing_is_refused(timing, message):
     with pytest.raises(ValueError, match=message):
         rb.projected_line_so3(STARTS[0], GOALS[0], timing)
 

@@ -18,7 +18,7 @@ TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # tables without pictur
 
 
 def columns(data, form, keys="xyz"):
-    """Return the columns of a table with these keys in their names, side by side."""
+    """Return the columns whose names contain these keys, side by side."""
     return np.stack([data[form.format(key)] for key in keys], axis=-1)
 
 
@@ -29,7 +29,7 @@ def matrices(data, form="R{} [1]"):
 @pytest.mark.parametrize(
     "name", sorted({file.stem for file in FIGURES.iterdir() if file.is_file()})
 )
-def test_every_figure_has_complete_files_units_and_legible_letters(name):
+def test_every_figure_has_complete_files_and_legible_letters(name):
     plain = "figure", "curve", "frame", "family", "body", "domain"
     for column in numbers(name):
         assert column.endswith(tuple(f" [{unit}]" for unit in UNITS)) or column in plain, column
@@ -42,7 +42,7 @@ def test_every_figure_has_complete_files_units_and_legible_letters(name):
     assert b"/Type3" not in content.replace(b" ", b"")
     assert b"/FontFile2" in content
     assert b"CreationDate" not in content
-    # On a slide 1080 pixels high, numbers in 13.5 points have 2.5 % of the height, once the white
+    # On a slide 1080 pixels high, numbers in 13.5 points are 2.5 % of the height when the white
     # margins are cut off.
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", content)
     width, height = map(float, box.groups())  # in points
@@ -96,7 +96,7 @@ def straight(t):
 
 
 def screwed(t):
-    """Return poses on a circle about the one point that stays in place."""
+    """Return poses on a circle about a fixed point."""
     centre = GOAL / (1 - TURNED) * (1 - np.exp(150j * D * t))
     return centre.real, centre.imag, 150 * D * t
 
@@ -143,7 +143,7 @@ FORMULAS = {
 @pytest.mark.source("RR (21)", "RR (22)", "RR (23)", "RR Fig. 6", "RR Fig. 7", "RR Fig. 8")
 @pytest.mark.source("RR Fig. 9", "BK (9)")
 @pytest.mark.parametrize("place", FORMULAS)
-def test_columns_agree_with_formulas_in_the_fraction_of_the_time(place):
+def test_columns_agree_with_formulas(place):
     name, _, prefix = place.partition(",")
     keys, formula = FORMULAS[place]
     data = columns(numbers(name), prefix + "{}", keys)
@@ -182,7 +182,7 @@ SIGMA = np.pi / 6 * np.array([1, 2, 3])
 @pytest.mark.source("BK Fig. 4", "BK (21)")
 @pytest.mark.parametrize(("name", "extra"), [("4a", 0), ("4b", 1), ("4c", 5)])
 def test_the_numbers_of_paper_fig4_are_right(name, extra):
-    """The optimum is SciPy's; the projection is tested by the definition of the nearest
+    """SciPy computes the optimum; the projection must satisfy the definition of the nearest
     rotation."""
     data = numbers(f"paper_fig{name}")
     t, w1 = data["t [1]"], SIGMA + np.array([extra, 0, 0])
@@ -246,7 +246,7 @@ def test_the_numbers_of_paper_fig5_are_right():
         ("lesson13_growth", 3, 0.5, {"projection": 2, "Bézier": 2}),
     ],
 )
-def test_the_excess_is_a_power_of_the_excursion_usually_the_fourth(name, count, off, others):
+def test_the_excess_usually_grows_as_the_fourth_power_of_the_excursion(name, count, off, others):
     size, *_ = (data := numbers(name)).values()
     curves = {key.partition(" median")[0]: x for key, x in data.items() if "90 %" not in key}
     del curves[next(iter(data))]
@@ -258,7 +258,7 @@ def test_the_excess_is_a_power_of_the_excursion_usually_the_fourth(name, count, 
 
 @pytest.mark.source("RR 2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize(("sample", "kind"), [("three angles", "_naive"), ("uniform", "")])
-def test_the_numbers_of_random_rotations_are_those_of_the_samplers(sample, kind):
+def test_stored_random_rotations_agree_with_the_samplers(sample, kind):
     draw = getattr(rb.sampling, f"sample_rotation{kind}")
     quaternions = getattr(rb.sampling, f"sample_quaternion{kind}")(100, rng=6)
     for name, R in (
@@ -300,7 +300,7 @@ def test_the_tips_of_arms_agree_with_their_joint_angles():
 
 
 @pytest.mark.source("BK 1", "BK 7")
-def test_the_excess_in_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
+def test_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
     cell = 100 + 4 * 10 + 5  # 100 cells along the axis come first; this cell has 81° and 4.95 rad
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
@@ -316,7 +316,7 @@ def test_the_excess_in_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
 
 @pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize("body", body_atlas.BODIES)
-def test_the_excess_in_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(body):
+def test_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(body):
     table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # the cell has 63° and 3.15 rad
     data = {name: column[table["body"] == body][cell] for name, column in table.items()}
     assert [data[x] for x in list(data)[1:4]] == pytest.approx([np.radians(63), 3.15, 200])
@@ -344,7 +344,7 @@ def test_the_intervals_cover_all_problems_of_three_seeds():
 
 @pytest.mark.source("beyond BK 1", "beyond BK 3", "beyond BK 4")
 def test_the_torques_of_lesson_13_turn_its_book_to_the_goal():
-    """Euler's equation with the stored torques leads from rest to the stored goal, at rest."""
+    """Euler's equation with the stored torques leads from rest at the start to rest at the goal."""
     torques, poses = numbers("lesson13_torques"), numbers("lesson13_book")
     G, t = rb.metrics.box_inertia([0.3, 0.2, 0.03]), torques["t [s]"]
     diagonal = rb.exp_so3(np.radians(150) * np.ones(3) / np.sqrt(3))

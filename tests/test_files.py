@@ -22,7 +22,7 @@ FULL = f"{PLAIN}{RATES},vx body [m/s],vy body [m/s],vz body [m/s]"
 PLAN = "vx world [m/s],vy world [m/s],vtheta [rad/s],duration [s]\n"
 
 
-def test_a_written_path_is_read_back(tmp_path):
+def test_a_written_path_can_be_read_back(tmp_path):
     for poses, velocities, endings in (
         (POSES, TWISTS, ["csv"]),
         (POSES, None, ["csv", "tum", "txt", "TUM"]),
@@ -39,7 +39,7 @@ def test_a_written_path_is_read_back(tmp_path):
 
 
 @pytest.mark.source("RR 3.2", "RR 4.2")
-def test_a_saved_plan_is_loaded_to_the_last_digit(tmp_path):
+def test_loading_a_saved_plan_restores_every_digit(tmp_path):
     for kind, plan in {
         "world": [(RNG.normal(size=3) * 10.0**k, 10.0**-k) for k in range(-9, 9)],
         "body": [([1, 0, -0.5], 2), ([0.1, 1 / 3, np.pi], 0)],
@@ -58,7 +58,7 @@ def test_a_saved_plan_is_loaded_to_the_last_digit(tmp_path):
 
 
 def test_other_programs_read_a_written_path(tmp_path):
-    """The scalar is the last component for SciPy and TUM. The signs of quaternions do not jump."""
+    """SciPy and TUM put the scalar last. The signs of quaternions do not jump."""
     tum, csv = tmp_path / "path.tum", tmp_path / "path.csv"
     rb.write_path(tum, TIMES, POSES)
     rb.write_path(csv, TIMES, POSES, TWISTS)
@@ -142,7 +142,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("kind", BAD_FILES)
-def test_the_error_of_a_bad_file_states_the_line_and_the_reason(tmp_path, kind):
+def test_errors_in_files_state_the_line_and_the_reason(tmp_path, kind):
     file = tmp_path / (kind if "." in kind else "plan.csv")
     for text, reason in BAD_FILES[kind]:
         file.write_bytes(text.encode(errors="surrogateescape"))
@@ -192,7 +192,7 @@ REFUSED = [
 ]
 
 
-def test_bad_arguments_are_refused_and_no_file_is_changed(tmp_path):
+def test_bad_arguments_change_no_file(tmp_path):
     for function, name, arguments, message in REFUSED:
         for file in (tmp_path / name, tmp_path / f"there_{name}"):
             if "there" in file.name:

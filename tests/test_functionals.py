@@ -1,4 +1,4 @@
-"""Compare the functionals with their definitions: variations of the integral, and derivatives."""
+"""Check the functionals by variations of the integral and by derivatives."""
 
 import numpy as np
 import oracles
@@ -17,7 +17,7 @@ every_functional = pytest.mark.parametrize(
 @pytest.mark.source("beyond BK 2")
 @every_functional
 def test_the_costate_is_the_derivative_of_the_integral(functional):
-    """½ d/ds ∫ ‖u‖² along w + s δw is ±∫ p · δw, if δw vanishes at both ends."""
+    """½ d/ds ∫ ‖u‖² along w + s δw equals ±∫ p · δw if δw vanishes at both ends."""
     rng, order = np.random.default_rng(1), functional.ends // 2
     x, weights = np.polynomial.legendre.leggauss(40)
     w = [Polynomial(rng.normal(size=5)) for _ in range(3)]

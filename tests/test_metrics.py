@@ -20,7 +20,7 @@ def assert_close(value, wanted, units=400):
 
 
 @pytest.mark.source("BK (11)", "BK (13)", "BK Prop. 1", "BK 3.1", "BK 3.2")
-def test_the_trace_metric_is_a_sum_of_products_invariant_under_rotations_but_not_under_a_shear():
+def test_the_trace_metric_is_invariant_under_rotations_only():
     for inner, n in ((metrics.inner_gl, 4), (metrics.inner_ga, 4), (metrics.inner_gl, 1)):
         X, Y = RNG.normal(size=(2, 5, n, n))
         by_definition = [np.trace(x.T @ y) for x, y in zip(X, Y, strict=True)]
@@ -33,10 +33,11 @@ def test_the_trace_metric_is_a_sum_of_products_invariant_under_rotations_but_not
 
 @pytest.mark.source("BK (12)", "BK Remark 1", "BK Remark 2", "BK 3.1", "errata 1")
 @pytest.mark.source("BK (14)", "BK Remark 3", "BK Remark 4", "BK Remark 5", "BK 3.2")
-def test_the_trace_induces_metrics_of_so3_and_se3_that_are_twice_the_energy_of_a_ball():
-    """On SO(3) the metric is twice the identity. On SE(3) a translation on the right changes it.
+def test_induced_trace_metrics_are_twice_the_energy_of_a_ball():
+    """On SO(3) the metric is twice the identity. On SE(3) a translation on the right changes the
+    metric.
 
-    Six equal masses on the axes have the moments of a ball, 2 about all axes, and mass 1.
+    Six equal masses on the axes have total mass 1 and, like a ball, the moment 2 about every axis.
     """
     points = np.sqrt(3) * np.concatenate([np.eye(3), -np.eye(3)])
     X, Y = metrics.tangent_from_components(R, w), metrics.tangent_from_components(R, z)
@@ -62,7 +63,7 @@ def test_the_trace_induces_metrics_of_so3_and_se3_that_are_twice_the_energy_of_a
 
 @pytest.mark.source("BK (1)", "BK (4)", "BK (5)", "BK (6)", "BK (7)", "BK 2.2", "BK 2.3")
 @pytest.mark.parametrize(("group", "left", "x", "y", "basis"), [ON_SO3, ON_SE3])
-def test_left_invariant_fields_and_metrics_agree_with_their_definitions(group, left, x, y, basis):
+def test_left_invariant_fields_agree_with_their_definition(group, left, x, y, basis):
     """A field is the sum of its components times the moved basis vectors. A change of frame does
     not change a metric."""
     X, Y = metrics.tangent_from_components(group, x), metrics.tangent_from_components(group, y)
@@ -78,7 +79,7 @@ def test_left_invariant_fields_and_metrics_agree_with_their_definitions(group, l
     small, large = X * 1e-200, np.eye(x.shape[-1]) * 1e308
     value = metrics.inner_left_invariant(large, group, small, 1e-100 * Y)
     assert_close(value / 1e8, np.vecdot(x, y))
-    # the symmetric part is ignored
+    # a symmetric part of Rᵀ X is ignored
     X[:, :3, :3] += group[:, :3, :3] @ [[1, 4, 5], [4, 2, 6], [5, 6, 3]]
     X[:, 3:] = 7
     assert_close(metrics.components_from_tangent(group, X), x)
@@ -98,7 +99,7 @@ def test_the_indefinite_metric_is_invariant_on_both_sides():
 
 
 @pytest.mark.source("BK 3")
-def test_the_weighted_trace_induces_the_inertia_of_the_points_of_a_body():
+def test_the_weighted_trace_induces_the_inertia_of_a_body():
     P = RNG.normal(size=(50, 3, 8))
     W = P @ P.mT
     X, Y = metrics.tangent_from_components(R, w), metrics.tangent_from_components(R, z)
@@ -118,7 +119,7 @@ def test_the_weighted_trace_induces_the_inertia_of_the_points_of_a_body():
 
 
 @pytest.mark.source("BK 3")
-def test_a_weight_exists_if_each_moment_is_at_most_the_sum_of_the_others():
+def test_a_weight_exists_if_the_moments_satisfy_triangle_inequalities():
     for moments in ([2, 3, 4.9], [2, 3, 5 - 1e-12], [1, 2, 3], [1, 1, 2], [0, 1, 1], [0, 0, 0]):
         G = R @ np.diag(moments) @ R.mT
         W = metrics.weight_from_inertia(G)
@@ -135,7 +136,7 @@ def test_a_weight_exists_if_each_moment_is_at_most_the_sum_of_the_others():
         assert_close(W / size, np.diag([2.5, 1.5, 0.5]), 8)
 
 
-def test_bad_arguments_are_refused_and_the_metrics_are_read_only():
+def test_the_metrics_are_read_only():
     one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
     inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
     for name, arguments, message in (

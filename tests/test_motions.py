@@ -1,4 +1,4 @@
-"""Motions on SE(3): separate rotation and path, bodies with an offset centre, and screws."""
+"""Test motions on SE(3): separate curves for rotation and origin, bodies, and screws."""
 
 import numpy as np
 import oracles
@@ -37,7 +37,7 @@ def turned(A, v):
 @pytest.mark.source("BK 6.3", "BK (1)", "BK (9)", "BK 2.6", "BK (14)")
 @pytest.mark.parametrize("name", ["geodesic", "projected_cubic", "minimum_acceleration"])
 def test_rotation_and_origin_follow_separate_curves(name):
-    """The origin moves on a cubic, and for a geodesic on a line at constant speed."""
+    """The origin moves on a cubic or, for a geodesic, on a line at constant speed."""
     rates, slopes = (RATES, RATES[2:]) if name != "geodesic" else ((), [(A1 - A0)[:, :3, 3]] * 2)
     motion = getattr(rb, f"{name}_se3")(A0, A1, *rates)
     rotation = on_so3(getattr(rb, f"{name}_so3"), *rates[:2])
@@ -80,7 +80,7 @@ def test_the_centre_of_mass_of_a_body_follows_a_cubic():
 
 
 @pytest.mark.source("BK 2.6", "errata 15")
-def test_each_definition_of_a_screw_motion_holds_for_screws_and_not_for_geodesics():
+def test_only_screws_satisfy_each_definition_of_a_screw_motion():
     """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, and A' is a left-invariant field.
     The printed definitions lack the dot, and hold for every curve."""
     found, inside = [], TIMES[1:-1]
@@ -114,7 +114,7 @@ def test_the_subgroup_through_a_pose_is_not_unique():
 
 
 @pytest.mark.source("BK 2.6")
-def test_every_displacement_is_a_turn_about_an_axis_and_a_translation_along_it():
+def test_every_displacement_is_a_screw():
     screw = rb.screw_from_pose(A1)
     on_axis = screw.point + 3 * screw.axis
     moved = turned(A1, on_axis) + A1[:, :3, 3]
@@ -134,7 +134,7 @@ def test_every_displacement_is_a_turn_about_an_axis_and_a_translation_along_it()
     assert np.array_equal(rb.screw_se3(wrong, A1)(0.3), rb.screw_se3(np.eye(4), A1)(0.3))
 
 
-def test_displacements_that_turn_only_by_rounding_are_translations():
+def test_displacements_that_turn_only_by_rounding_errors_are_translations():
     still = rb.screw_from_pose(np.eye(4))
     assert not np.any([*still.axis, *still.point, still.angle, still.slide])
     assert np.isnan(still.pitch)

@@ -1,4 +1,5 @@
-"""Compare the optima of two solvers with SciPy, direct minimisation, and their equations."""
+"""Compare the optima of two solvers with SciPy and direct minimisation, and test their
+equations."""
 
 import functools
 import re
@@ -36,7 +37,7 @@ FEW = random_problems(2, 5, 2.0, 4.0)
 
 
 def of_paper(case):
-    """Return a problem of the paper, without an inertia and accelerations."""
+    """Return a problem of the paper, for a ball and without accelerations at the ends."""
     turn, w0, w1 = PAPER[case]
     return I3, rb.exp_so3(turn), w0, w1, None, REST, REST
 
@@ -150,7 +151,7 @@ def test_the_least_jerk_from_rest_to_rest_follows_the_geodesic(angle):
 
 
 @every_optimum
-def test_reversed_ends_reverse_the_optimum_and_the_unit_of_inertia_only_scales_the_cost(what):
+def test_reversed_ends_reverse_the_optimum(what):
     size = (100, 36, np.pi, 12.0) if what == "ball" else (12, 36, 2.5, 5.0)
     R0, R1, w0, w1, G, a0, a1 = problems = random_problems(*size)
     curves, back = OPTIMA[what](*problems), OPTIMA[what](R1, R0, -w1, -w0, G, a1, a0)
@@ -166,7 +167,7 @@ def test_reversed_ends_reverse_the_optimum_and_the_unit_of_inertia_only_scales_t
 
 @pytest.mark.source("BK 6.2")
 @every_optimum
-def test_a_stack_with_a_round_body_gives_the_same_optima_as_single_problems(what):
+def test_a_stack_gives_the_same_optima_as_single_problems(what):
     problems = random_problems(6, 39, 2.0, 5.0)
     problems[4][2] = 0.7 * I3
     stack = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
@@ -183,7 +184,7 @@ def test_a_stack_with_a_round_body_gives_the_same_optima_as_single_problems(what
 
 
 @pytest.mark.parametrize(("what", "speed"), [*((what, 1e160) for what in OPTIMA), ("ball", 1e3)])
-def test_a_problem_without_convergence_is_named_and_does_not_affect_the_others(what, speed):
+def test_a_problem_without_convergence_does_not_affect_the_others(what, speed):
     problems = random_problems(6, 41, 2.0, 4.0)
     problems[0][4], problems[1][4] = I3, rb.exp_so3([1, 2, 0])
     good, others = OPTIMA[what](*problems), np.arange(6) != 4
@@ -208,7 +209,7 @@ def test_a_problem_without_convergence_is_named_and_does_not_affect_the_others(w
 
 
 @pytest.mark.source("BK 6.3")
-def test_problems_without_convergence_raise_alone_and_give_nan_in_stacks_and_motions():
+def test_single_problems_without_convergence_raise_an_error():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
         curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
@@ -235,8 +236,8 @@ def test_problems_without_convergence_raise_alone_and_give_nan_in_stacks_and_mot
 
 
 def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkeypatch):
-    """For the first of three problems, the test makes Newton's method fail on all curves except
-    those that turn the other way round."""
+    """For the first of three problems, the test lets Newton's method converge only to curves that
+    turn the other way."""
     real, turns = search._follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
     ends = I3, turns, [0, 0, 1], [1, 0, 0]
     good = rb.minimum_acceleration_so3(*ends)
@@ -257,7 +258,7 @@ def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkey
 
 
 @pytest.mark.parametrize("angle", [1.9, 2.5, 3.1, -1.9, -2.5, -3.1])
-def test_the_search_starts_with_the_shortest_way_and_then_tries_the_other_one(angle):
+def test_the_search_tries_both_directions_of_the_turn(angle):
     ends = Ends(I3, rb.exp_so3([[0, 0, angle]]), REST, REST)
     _, starts = guesses.starts(ends, 5)
     halfway = np.linalg.norm(rb.log_so3(starts[:, 2]), axis=-1)
@@ -275,7 +276,7 @@ def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
 
 
 @pytest.mark.parametrize("what", ["ball", "shooting"])
-def test_ends_with_eight_digits_are_replaced_by_their_nearest_rotations(what):
+def test_ends_with_eight_digits_are_replaced_by_the_nearest_rotations(what):
     _, R1, *rates = of_paper("4b")[:4]
     rounded, exact = (SOLVERS[what](I3, R, *rates) for R in (R1.round(8), R1))
     assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
@@ -283,8 +284,8 @@ def test_ends_with_eight_digits_are_replaced_by_their_nearest_rotations(what):
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
-    """The matrices agree bit by bit, because they are computed with one number of threads and then
-    used with all others."""
+    """The matrices are computed with one thread count and used with all others, so they agree bit
+    by bit."""
     found = []
     for threads in (1, 2):
         for kept in (grid, interpolation):
@@ -294,7 +295,7 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
     assert found[0] == found[1]
 
 
-def test_a_guess_is_followed_and_a_guess_that_is_not_a_curve_on_so3_is_refused():
+def test_the_solver_follows_a_guess():
     ends = random_problems(6, 42, 2.0, 4.0)[:4]
     found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)

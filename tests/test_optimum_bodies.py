@@ -1,4 +1,4 @@
-"""Compare the cheapest optima found with closed forms, another optimiser and known costs."""
+"""Compare the cheapest optima with closed forms, another optimiser and known costs."""
 
 import warnings
 from functools import partial
@@ -34,7 +34,7 @@ KNOWN = {  # rotation vector, velocities, and moments or accelerations; or an in
     # a curve with one turn fewer costs 34,447
     ".0926 -1.1733 13.5431  3.2645 -1.6836 -16.3042": "6350.394",
 }
-SELDOM_FOUND = {  # the least known costs of some of the fast problems of `best`
+SELDOM_FOUND = {  # the least known costs of some fast problems in `best`
     "acceleration": {60 + 9: 1251.1935149, 60 + 18: 842.5309036},
     "torque": {60 + 16: 2919.2413078, 60 + 27: 2059.4960175},
 }
@@ -72,7 +72,7 @@ def best():
 
 @pytest.mark.source("BK 1", "BK 6.2", "beyond BK 6", "beyond BK 7")
 @every_optimum
-def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
+def test_no_closed_form_costs_less_than_the_optimum(best, what):
     (R0, R1, w0, w1, G, a0, a1), curves = best[what]
     assert curves.converged.all()
     assert curves.residual.max() < 1e-11
@@ -100,9 +100,8 @@ def test_many_problems_converge_and_no_closed_form_costs_less(best, what):
             other = make(*some(given, those))
         rates = (np.moveaxis(other(t, k), 0, 1) for k in (1, 2, 3)[: 3 if what == "jerk" else 2])
         u = deviation(what, None if G is None else G[those][:, None], *rates)
-        assert np.all(
-            np.trapezoid(np.sum(u**2, axis=-1), t) > curves.cost[those] * (1 - 1e-3)
-        )  # the trapezoidal rule is rough
+        # the trapezoidal rule is inaccurate
+        assert np.all(np.trapezoid(np.sum(u**2, axis=-1), t) > curves.cost[those] * (1 - 1e-3))
 
 
 @pytest.mark.source("BK 6.2")
@@ -244,8 +243,8 @@ def test_the_cheapest_known_curve_is_found(case):
 
 
 @pytest.mark.source("beyond BK 5")
-def test_least_jerk_about_one_axis_is_the_best_quintic_among_all_numbers_of_turns():
-    """In half of the problems, the accelerations at both ends favour extra turns."""
+def test_the_best_quintic_has_the_least_jerk_about_one_axis():
+    """In half of the problems, the end accelerations favour extra turns."""
     rng, e = np.random.default_rng(55), np.array([0.6, 0, 0.8])
     angle = np.append(rng.uniform(-np.pi, np.pi, 200), [0.8, -0.6])
     w, a = rng.uniform(-9, 9, (2, 202)), rng.uniform(-20, 20, (2, 202))
@@ -263,7 +262,7 @@ def test_least_jerk_about_one_axis_is_the_best_quintic_among_all_numbers_of_turn
 
 
 @pytest.mark.parametrize("moments", [(1, 2.22, 3.18), (0.3, 1, 1.28)])
-def test_the_least_torque_of_a_turn_about_the_largest_moment_may_leave_the_axis(moments):
+def test_turns_about_the_largest_moment_may_leave_the_axis(moments):
     """From rest to rest, a large turn about this axis is a saddle of the integral of squared
     torque."""
     exact, near, small = (
@@ -276,7 +275,7 @@ def test_the_least_torque_of_a_turn_about_the_largest_moment_may_leave_the_axis(
 
 
 def is_the_same_however_rounded(make, R1, rng, count):
-    """Check that curves to ends near R1 have the same velocities; return the velocities."""
+    """Check that curves to ends near R1 have the same velocities; return these."""
     t = np.linspace(0, 1, 5)
     first, *others = (
         make(R1 @ rb.exp_so3(nudge))(t, 1)
@@ -290,7 +289,7 @@ def is_the_same_however_rounded(make, R1, rng, count):
 @pytest.mark.parametrize("frame", [I3, rb.exp_so3([0.3, -0.5, 0.2])])
 def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
     """The goal is a turn about the axis of the largest moment, from rest to rest. A half-turn about
-    this axis carries one curve into the other."""
+    this axis carries one best curve into the other."""
     G, axis = frame @ BOOK @ frame.T, frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(

@@ -1,4 +1,4 @@
-"""Test any duration and many poses; each leg is compared with the two-point curve."""
+"""Test curves of any duration, and chains; compare each leg with the curve of its two poses."""
 
 import re
 from functools import partial
@@ -42,9 +42,9 @@ def own_poses(leg):
 
 @every_leg
 @both_groups
-def test_a_chain_meets_its_poses_and_its_joints_are_as_smooth_as_stated(leg, poses):
-    """The curve just before a joint is compared with the curve at it, and legs with the two-point
-    curves at times of any shape. The chain neither changes its arguments nor reads them later."""
+def test_a_chain_meets_its_poses(leg, poses):
+    """Compare the curve at each joint with the curve just before it, and each leg with the curve of
+    its two poses. The chain neither changes its arguments nor reads them later."""
     poses = POSES if own_poses(leg) is POSES else poses
     given = [TIMES.copy(), poses.copy(), TWISTS[:, : 3 if poses is ROTATIONS else 6].copy()]
     if leg in WITHOUT_VELOCITIES:
@@ -96,11 +96,11 @@ def test_a_chain_rests_between_equal_neighbouring_poses(leg):
 
 
 @pytest.mark.parametrize("ratio", [1, 100, 1e4])
-def test_uneven_time_steps_lose_no_digits_and_quintics_are_the_nearest_rotations(ratio):
-    """Check rates to eps of ‖w‖ and ‖w‖² + ‖w'‖ at the poses, just before them, and in the joints.
+def test_uneven_time_steps_lose_no_digits(ratio):
+    """At poses and joints, w and w' are accurate to a few eps, relative to ‖w‖ and ‖w‖² + ‖w'‖.
 
-    The reference has 60 digits. The bound is the rounding error of M, even if M is large, over the
-    sum of its two smallest eigenvalues.
+    The reference has 60 digits. The bound is the rounding error of M divided by the sum of its two
+    smallest eigenvalues.
     """
     steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
     times = np.append(0, np.cumsum(steps))
@@ -123,8 +123,8 @@ def test_uneven_time_steps_lose_no_digits_and_quintics_are_the_nearest_rotations
 
 
 @both_groups
-def test_a_chain_without_velocities_is_the_spline_that_rests_at_its_ends(poses):
-    """The accelerations of the chain are continuous, and equal to those of its quintics."""
+def test_a_chain_without_velocities_rests_at_its_ends(poses):
+    """The accelerations of the chain are continuous, and equal to those of a chain of quintics."""
     rest = np.zeros(3 if poses is ROTATIONS else 6)
     c, chosen = rb.chain(TIMES, poses), rb.spline_velocities(TIMES, poses, (rest, rest))
     assert np.abs(c(TIMES, 1) - chosen).max() < 400 * EPS
@@ -136,7 +136,7 @@ def test_a_chain_without_velocities_is_the_spline_that_rests_at_its_ends(poses):
 
 
 def test_user_defined_functions_make_legs():
-    """The function of a leg may be partial, or make many paths with one rotation.
+    """A leg's function may be a partial one, or combine one rotation with many paths.
 
     A function that takes an acceleration gets a quintic for the origin; other functions get a
     cubic.
@@ -246,12 +246,12 @@ UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
         (rb.retime, (LATE, 1e-9), "duration is 1e-09: it vanishes by rounding when added"),
     ],
 )
-def test_bad_paths_velocities_times_and_durations_are_refused(function, arguments, message):
+def test_bad_paths_and_durations_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         function(*arguments)
 
 
-def test_the_error_names_the_leg_that_is_singular_or_not_found():
+def test_errors_name_the_leg():
     """With these velocities, the cubic M over a turn by 2 rad has rank 1 at its middle."""
     turn = np.array([0, 0, 2.0])
     R = rb.exp_so3([[0, 0, 0], -turn / 2, turn / 2])
@@ -321,7 +321,7 @@ def test_a_chain_far_from_the_origin_is_the_same_motion():
     assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
 
 
-def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
+def test_equal_poses_are_a_rest_in_every_frame():
     """Equal poses may differ by rounding errors of products, also at the origin of the frame."""
     stay = POSES[[0, 1, 1, 2]]
     for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
@@ -336,8 +336,9 @@ def test_equal_poses_are_a_rest_in_every_frame_and_close_poses_are_not():
 
 
 def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
-    """One parabola x(t), for R_i exp(x(t)), passes through the logarithms of the neighbours;
-    another parabola passes through d. If the poses are moved, the velocities move with them."""
+    """For rotations, R_i exp(x(t)) passes through the neighbours, where x(t) is a parabola; for d,
+    a parabola passes through the positions. If the poses are moved, the velocities move with
+    them."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)

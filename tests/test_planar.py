@@ -26,7 +26,7 @@ def hat(S):
 
 
 @pytest.mark.source("RR 3.1", "RR 3.2")
-def test_matrices_carry_points_into_the_world_and_agree_with_products_and_inverses():
+def test_matrices_carry_points_into_the_world():
     A, (x, y, theta) = planar.matrix_from_planar(POSES), POSES.T
     for point in (1, 1j, 2 - 3j):
         moved = x + 1j * y + np.exp(1j * theta) * point
@@ -60,7 +60,7 @@ def test_the_nearest_rotation_replaces_a_matrix_that_is_not_a_rotation():
 
 
 @pytest.mark.source("RR 3.2")
-def test_the_exponential_agrees_with_that_of_the_matrix_and_with_exp_se3():
+def test_the_exponential_agrees_with_exp_se3():
     """For small twists it also agrees with SciPy's expm to 5e-14. SciPy's error grows with the
     twist."""
     ours = planar.exp_planar(TWISTS)
@@ -88,7 +88,7 @@ def test_the_logarithm_undoes_the_exponential_except_for_full_turns():
 
 @pytest.mark.source("RR (14)", "RR (15)", "RR (16)")
 @pytest.mark.parametrize("steps", [1, 37])
-def test_poses_are_blended_evenly_with_exact_ends(steps):
+def test_blended_poses_have_exact_ends(steps):
     path = planar.interpolate_planar(POSES[0], POSES[1], steps)
     even = POSES[0] + np.linspace(0, 1, steps + 1)[:, None] * (POSES[1] - POSES[0])
     assert np.abs(path - even).max() < 16 * EPS
@@ -111,14 +111,15 @@ def test_the_short_way_turns_by_at_most_half_a_turn():
         ends = [[5, 6, 1 + delta + 2 * np.pi * turns] for turns in (-3, 0, 2)]
         path = short([0, 0, 1], ends)
         assert np.abs(path - [[[0, 0, 1]], [[5, 6, 1 + delta]]]).max() < 32 * EPS
-    start, goal = POSES[:, None] * [1, 1, 0.3], POSES * [1, 1, 0.3]  # the path is short already
+    # these turns are already the short way
+    start, goal = POSES[:, None] * [1, 1, 0.3], POSES * [1, 1, 0.3]
     assert np.array_equal(short(start, goal)[1], np.broadcast_to(goal, (200, 200, 3)))
     for angle in (1, -1, np.pi, -np.pi):
         assert short([0, 0, 0], [1, 2, angle])[-1, 2] == angle
 
 
 @pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
-def test_a_command_adds_in_the_world_frame_and_is_a_constant_twist_in_the_body_frame():
+def test_a_command_in_the_body_frame_is_a_constant_twist():
     added, A = [POSES[0]], [planar.matrix_from_planar(POSES[0])]
     for velocity, duration in PLAN:
         added.append(added[-1] + np.array(velocity) * duration)
@@ -132,7 +133,7 @@ def test_a_command_adds_in_the_world_frame_and_is_a_constant_twist_in_the_body_f
 
 @pytest.mark.source("RR 3.2")
 @both_frames
-def test_stacks_follow_a_plan_and_the_reversed_plan_leads_back(frame):
+def test_a_reversed_plan_leads_back(frame):
     plan = [(np.array(v, float), d) for v, d in PLAN]
     there = planar.propagate_planar(POSES.reshape(4, 50, 3), plan, frame=frame)
     one = planar.propagate_planar(POSES[57], PLAN, frame=frame)

@@ -1,4 +1,4 @@
-"""Projected cubics and quintics, and the polynomials that are projected."""
+"""Test projected cubics and quintics, and the polynomials that are projected."""
 
 import numpy as np
 import oracles
@@ -50,7 +50,7 @@ def test_the_cubic_is_projected_to_the_nearest_rotation():
 
 
 @pytest.mark.source("BK 6.2", "errata 11")
-def test_the_end_conditions_hold_to_rounding_and_the_printed_ones_do_not():
+def test_the_end_conditions_hold_to_rounding():
     """The printed second derivative at the end is not the prescribed one, and R0 ŵ0 is singular."""
     for curve in (CUBICS, QUINTICS):
         scale = np.linalg.norm(curve.ends, axis=(-2, -1)).sum(axis=-1)[:, None]
@@ -64,8 +64,8 @@ def test_the_end_conditions_hold_to_rounding_and_the_printed_ones_do_not():
 
 
 def test_the_quintic_does_not_have_least_jerk():
-    """About one axis, the least jerk is that of a quintic in the angle; from rest to rest it costs
-    720 angle²."""
+    """About one axis, a quintic in the angle has the least jerk; from rest to rest it costs 720
+    angle²."""
     t = np.linspace(0, 1, 4001)
     for degrees, times in ((20, 1.002), (60, 1.17), (90, 2.31), (120, 11.56)):
         angle = np.radians(degrees)
@@ -75,8 +75,9 @@ def test_the_quintic_does_not_have_least_jerk():
 
 
 @pytest.mark.source("BK 6.1")
-def test_the_cubic_and_the_quintic_with_the_ends_of_the_projected_line_equal_it():
-    """Both polynomials are the line times a positive factor ρ(t), which the projection ignores."""
+def test_the_cubic_with_the_ends_of_the_projected_line_equals_this_line():
+    """The cubic and the quintic are the line times a positive factor ρ(t), which the projection
+    ignores."""
     line = rb.projected_line_so3(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
     ends = [line(t, order) for order in (0, 1, 2) for t in (0, 1)]
     for curve in (rb.projected_cubic_so3(*ends[:4]), rb.projected_quintic_so3(*ends)):
@@ -85,7 +86,7 @@ def test_the_cubic_and_the_quintic_with_the_ends_of_the_projected_line_equal_it(
 
 
 @pytest.mark.source("BK Prop. 3", "BK Prop. 5")
-def test_moved_and_reversed_ends_give_the_moved_and_reversed_curve():
+def test_moved_ends_give_the_moved_curve():
     """The ends are multiplied by rotations from both sides. The bound is the documented one, 1e-12
     over the margin."""
     L, Q = Rotation.random(2, rng=5).as_matrix()
@@ -109,11 +110,11 @@ def test_the_margin_is_the_least_gap():
 @pytest.mark.parametrize("k", [40, 45, 50, 50.05, 55])
 @pytest.mark.parametrize("k1", [5, 40])
 def test_a_jump_between_the_sampled_times_is_found(k, k1):
-    """The curves jump at and off the midpoints between 65 sampled times, and between 129 of them.
+    """The curves jump between 65 or 129 sampled times, at the midpoints and elsewhere.
 
-    The cubic is then a complex number z with z(0) = 1, z'(0) = i k0, z(1) = exp(ia) and z'(1) = i
-    k1 exp(ia). With Hermite's basis, z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0
-    determines k0 and a.
+    The cubic is a complex number z with z(0) = 1, z'(0) = i k0, z(1) = exp(ia) and z'(1) = i k1
+    exp(ia). With Hermite's basis, z(t) = h00 + i k0 h10 + exp(ia) (h01 + i k1 h11) = 0 determines
+    k0 and a.
     """
     h00, h01, h10, h11 = (hermite(one, np.array((k + 0.25) / 64)) for one in np.eye(4))
     k0 = np.sqrt(h01**2 + (k1 * h11) ** 2 - h00**2) / h10
@@ -125,7 +126,7 @@ def test_a_jump_between_the_sampled_times_is_found(k, k1):
 
 @pytest.mark.source("BK 6.2")
 @pytest.mark.parametrize("count", [2, 4, 6])
-def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count):
+def test_the_polynomial_has_least_degree_and_exact_ends(count):
     """The ends may have very different sizes, and small changes are computed without
     cancellation."""
     given, t = RNG.normal(size=(6, 5))[:count], np.linspace(0, 1, 21)
@@ -151,8 +152,8 @@ def test_the_polynomial_has_least_degree_exact_ends_and_exact_derivatives(count)
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.source("BK 6")
 def test_the_polynomial_minimises_its_cost(count):
-    """The derivative that enters the cost is orthogonal to the same derivative of any change that
-    keeps the ends."""
+    """The derivative in the cost is orthogonal to the same derivative of any change that keeps the
+    ends."""
     ends, order = RNG.normal(size=count), count // 2
     t = (1 + np.cos(np.pi * np.arange(9) / 8)) / 2
     best = Polynomial.fit(t, hermite(ends, t), count - 1).convert().deriv(order)

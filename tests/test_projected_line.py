@@ -13,7 +13,7 @@ GRID = np.meshgrid(awkward.LINE_TIMES, awkward.LINE_ANGLES, indexing="ij")
 @pytest.mark.parametrize("order", [0, 1, 2, 3])
 @pytest.mark.parametrize("name", ["theta", "f"])
 @pytest.mark.source("BK (16)", "BK Prop. 6", "BK Cor. 1", "BK Cor. 2")
-def test_theta_and_f_and_their_derivatives_are_the_printed_ones(name, order):
+def test_theta_and_f_agree_with_the_corrected_formulas(name, order):
     grid = [x[:, 1::3] for x in GRID] if order == 3 else GRID
     want = np.vectorize(getattr(oracles, name))(*grid, order)
     off = np.abs(getattr(line, name)(*grid, order) - want)
@@ -32,7 +32,7 @@ def test_theta_is_the_inverse_of_f():
 
 
 @pytest.mark.source("BK (16)", "BK Cor. 1", "BK Cor. 2", "errata 8", "errata 9", "errata 10")
-def test_the_printed_formulas_for_theta_its_derivative_and_f_do_not_hold():
+def test_the_printed_formulas_for_theta_and_f_do_not_hold():
     """The arguments of atan2 are exchanged, θ' lacks a square, and f lacks an angle on the
     right."""
     angle, t = 2.0, 0.15
@@ -95,7 +95,7 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
 
 
 @pytest.mark.source("BK Prop. 6", "errata 7")
-def test_theta_leaves_the_unit_interval_if_t_does_and_is_accurate_far_from_the_line():
+def test_theta_is_accurate_far_from_the_line():
     outside = [(-0.5, 1.0), (1.5, 1.0), (1e6, 9.99e-10), (1e10, 9.99e-10), (-1e3, 1e-6), (1e12, 3)]
     want = np.array([oracles.theta(*one) for one in outside])
     off = np.abs(line.theta(*np.transpose(outside)) - want)
@@ -103,8 +103,8 @@ def test_theta_leaves_the_unit_interval_if_t_does_and_is_accurate_far_from_the_l
     assert want[0] < 0 < 1 < want[1]
 
 
-def test_theta_and_f_have_their_limits_at_angle_0_and_a_step_at_angle_pi():
-    """An angle may be larger than π by rounding."""
+def test_theta_and_f_have_their_limits_at_angle_0():
+    """Rounding may make an angle larger than π."""
     t = awkward.LINE_TIMES
     for function in (line.theta, line.f):
         for angle in (0, 1e-310):

@@ -42,13 +42,14 @@ def assert_nearest(R, M, W=None):
 
 
 def condition(M, R):
-    """Return ‖M‖ over the sum of the two smallest eigenvalues of RᵀM, which amplifies rounding."""
+    """Return the factor that amplifies rounding: ‖M‖ divided by the sum of the two smallest
+    eigenvalues of RᵀM."""
     return np.linalg.norm(M, axis=(-2, -1)) / oracles.two_smallest_eigenvalues(R.mT @ M)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
 @pytest.mark.source("BK Prop. 2", "BK Remark 6", "RR 1.4", "RR (4)", "RR (5)")
-def test_the_projection_is_a_rotation_and_the_nearest_one_as_in_the_textbook(n):
+def test_the_projection_is_the_nearest_rotation(n):
     rng = np.random.default_rng(n)
     M, others = awkward.matrices(n, rng), members(n, rng)
     R = rb.project_so(M)
@@ -67,7 +68,7 @@ def test_the_projection_is_a_rotation_and_the_nearest_one_as_in_the_textbook(n):
 
 
 @pytest.mark.source("BK Prop. 2", "BK Remark 6", "errata 2", "errata 3")
-def test_the_printed_projection_lacks_the_sign_and_the_printed_distance_is_squared():
+def test_the_printed_projection_lacks_the_sign():
     for M, distance in ((np.diag([3.0, 1, 1]), 2), (np.diag([3.0, 2, -1]), 3)):
         U, d, Vt = np.linalg.svd(M)
         assert np.linalg.det(U @ Vt) * np.linalg.det(M) > 0
@@ -78,9 +79,9 @@ def test_the_printed_projection_lacks_the_sign_and_the_printed_distance_is_squar
 
 
 @pytest.mark.source("BK Prop. 3", "BK 4")
-def test_projections_are_invariant_on_both_sides_or_on_the_left_only():
-    """The weighted projection is invariant on both sides if the weight is turned, too. The result
-    of Gram–Schmidt is not."""
+def test_projections_are_invariant():
+    """The weighted projection is invariant on both sides if the weight is turned, too. Gram–Schmidt
+    is invariant only on the left."""
     rng = np.random.default_rng(3)
     M, L, W = rng.normal(size=(40, 3, 3)), members(3, rng), np.diag([1, 2, 5])
     R, Q = rb.project_so(M), rb.orthonormalize_gram_schmidt(M)
@@ -97,7 +98,7 @@ def test_projections_are_invariant_on_both_sides_or_on_the_left_only():
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 @pytest.mark.source("BK 4")
-def test_the_weighted_projection_is_the_nearest_in_its_own_metric(n):
+def test_the_weighted_projection_is_the_nearest_in_its_metric(n):
     """Condition numbers are up to 1e6, and ranks include 1 (a rod) and n − 1 (a flat body).
 
     The moved points of a flat body determine the rotation.
@@ -137,7 +138,7 @@ def test_gram_schmidt_leaves_an_upper_triangular_matrix(n):
     assert np.all(np.diagonal(T, axis1=-2, axis2=-1) > 0)
 
 
-def test_dependent_columns_and_weights_with_negative_eigenvalues_are_refused():
+def test_dependent_columns_are_refused():
     gram_schmidt, negative = rb.orthonormalize_gram_schmidt, "has a negative eigenvalue"
     weighted, stack = rb.project_so_weighted, [np.eye(3), -np.eye(3), np.eye(3)]
     for function, arguments, message in (
@@ -166,7 +167,7 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
 
 @pytest.mark.source("BK 5", "BK Prop. 4", "BK Prop. 5", "RR 1.6", "errata 16")
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_the_projected_pose_is_the_nearest_one_and_keeps_the_translation(n):
+def test_the_projected_pose_is_the_nearest_one(n):
     """The projection is invariant under poses on the left, but only under rotations on the right.
 
     tr(AᵀA) is n + 1 + dᵀd. The paper prints 4 + dᵀd.
@@ -282,7 +283,7 @@ def by_foam(M):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.source("BK Prop. 2")
-def test_foam_is_accurate_far_from_the_singular_set_and_no_worse_than_the_svd(kind):
+def test_foam_is_no_less_accurate_than_the_svd(kind):
     M = KINDS[kind]
     want = np.array([oracles.nearest_rotation(m) for m in M])
     off, svd_off = (np.abs(R - want).max() for R in (rb.project_so(M), textbook.project_so(M)))
@@ -304,9 +305,9 @@ def test_foam_projects_every_matrix_of_a_stack():
 
 
 @pytest.mark.source("BK Prop. 2")
-def test_matrices_in_a_stack_of_blocks_have_the_same_projections_as_alone():
-    """Some matrices are near the singular set, and some neighbours are extreme or of rank 1 or
-    0."""
+def test_matrices_in_a_stack_are_projected_as_they_are_alone():
+    """Some matrices are near the singular set; some have neighbours that are extreme or of rank 1
+    or 0."""
     rng = np.random.default_rng(10)
     kinds = [*KINDS.values(), np.ones((1, 3, 3)), 1e200 * np.ones((1, 3, 3))]
     kinds += [factor * KINDS["noisy"] for factor in (-1, 2.0**900, 2.0**-900, 1e150, 1e-150)]

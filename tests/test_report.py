@@ -1,4 +1,4 @@
-"""The report's functions: names, examples, and figures."""
+"""Test the report's functions: names, examples and figures."""
 
 import inspect
 
@@ -54,8 +54,8 @@ def test_names_and_signatures_are_those_of_the_report():
 
 @pytest.mark.source("RR 1.4", "RR (4)", "RR (5)", "RR Fig. 1", "errata 21")
 @pytest.mark.source("RR 1.5", "RR (6)", "RR Fig. 2", "RR 1.6", "RR Fig. 3")
-def test_the_examples_of_the_reports_figures_1_to_3():
-    """Valid arguments, of integers, are returned unchanged. The first invalid one is singular."""
+def test_the_examples_give_the_results_printed_in_the_report():
+    """Valid integer arguments are returned unchanged. The first invalid argument is singular."""
     quarter = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     valid = (rr.correct_SOn, np.eye(3)), (rr.correct_quaternion, [1, 0, 0, 0])
     for correct, given in (*valid, (rr.correct_SEn, quarter)):
@@ -79,7 +79,7 @@ def test_the_examples_of_the_reports_figures_1_to_3():
 
 
 @pytest.mark.source("RR 1.1", "RR 1.2", "RR 1.3", "RR (1)", "RR (2)", "RR (3)")
-def test_checks_take_epsilon_as_the_largest_defect():
+def test_checks_allow_defects_up_to_epsilon():
     for off, within in [(0.0099, True), (0.0101, False)]:
         assert rr.check_quaternion([1 + off, 0, 0, 0]) is within
         bent = np.array([[1, off, 0], [0, 1, 0], [0, 0, 1]])
@@ -95,7 +95,7 @@ def test_checks_take_epsilon_as_the_largest_defect():
 
 
 @pytest.mark.parametrize(("check", "correct", "good"), TRIPLES)
-def test_checks_never_raise_and_corrections_copy_or_project(check, correct, good):
+def test_checks_never_raise_errors(check, correct, good):
     """Malformed and infinite arguments fail the check; valid ones are copied."""
     for thing in (
         *([], [[]], 5, None, "abc", [1, 0, 0], [[1, 0, 0], [0, 1, 0]], [[1, 0], [0]]),
@@ -123,7 +123,7 @@ def strokes_of(figure):
 
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize("quaternion", [True, False])
-def test_random_rotations_are_those_of_the_samplers_and_are_drawn(quaternion):
+def test_random_rotations_equal_those_of_the_samplers(quaternion):
     one = rr.random_quaternion if quaternion else rr.random_rotation_matrix
     for choice, steps in (({}, 5 if quaternion else 100), ({"naive": True}, 3)):
         naive = bool(choice)
@@ -160,7 +160,7 @@ def test_one_rotation_is_shown_step_by_step(function):
 @pytest.mark.source("RR 3.1", "RR (14)", "RR (15)", "RR (16)")
 @pytest.mark.source("RR 3.2", "RR (17)", "RR (18)", "RR (19)")
 @pytest.mark.source("RR 4.1", "RR (20)", "RR (21)", "RR 4.2", "RR (22)", "RR (23)")
-def test_paths_have_ten_steps_and_plans_are_in_the_world_frame_by_default():
+def test_paths_have_ten_steps_by_default():
     for interpolate, path in ((rr.interpolate_rigid_body, PATH), (rr.interpolate_arm, ARM_PATH)):
         for steps, options in ((10, {}), (3, {"steps": 3})):
             want = np.linspace(*path[:2], steps + 1)
@@ -206,7 +206,7 @@ def test_paths_of_bodies_and_arms_are_drawn(states, pale):
     assert np.abs(np.array(others) - joints[pale]).max() < 1e-14
 
 
-def test_the_animation_of_a_long_path_has_forty_frames_and_a_small_file(tmp_path):
+def test_the_animation_of_a_long_path_has_forty_frames(tmp_path):
     """The path covers the plane. The animation of a hundred random rotations has a small file,
     too."""
     t = np.linspace(0, 1, 10_000)
@@ -221,7 +221,7 @@ def test_the_animation_of_a_long_path_has_forty_frames_and_a_small_file(tmp_path
 
 @pytest.mark.parametrize("place", [[1.1, 0.7], [1e14, 0]])
 def test_a_body_that_turns_on_the_spot_is_visible(place):
-    """Rounding may move the body after a circle; the description does not state this tiny
+    """After a full circle, rounding may move the body; the description does not state this tiny
     length."""
     spin = rr.interpolate_rigid_body([*place, 0], [*place, 6], steps=3)
     circle = [([2 * np.pi, 0, 2 * np.pi], 1)] * 2
@@ -235,7 +235,7 @@ def test_a_body_that_turns_on_the_spot_is_visible(place):
 
 
 @pytest.mark.parametrize(("size", "far"), [(1e-6, 1000), (0.25, 1e9), (1e6, 0)])
-def test_the_rectangle_is_a_fifth_of_the_extent_and_the_description_has_its_scale(size, far):
+def test_the_drawn_rectangle_is_a_fifth_of_the_extent(size, far):
     path = np.array([[far, 0, 0], [far + 2 * size, size, 0]])
     figure, animation = rr.visualize_path(path)
     extent = path[1, 0] - far
@@ -277,7 +277,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("function", "arguments", "message"), BAD)
-def test_bad_arguments_are_refused_and_no_figure_stays_open(function, arguments, message):
+def test_bad_arguments_leave_no_figure_open(function, arguments, message):
     options = arguments[-1] if isinstance(arguments[-1], dict) else {}
     with pytest.raises(ValueError, match=f"^{message}"):
         function(*(one for one in arguments if one is not options), **options)

@@ -61,7 +61,7 @@ def read(name):
     return (ROOT / name).read_text("utf-8")
 
 
-def test_all_lists_pin_the_same_versions_and_the_first_one_has_no_tools_of_maintainers():
+def test_all_lists_pin_the_same_versions():
     versions = {}
     for name, lines in LISTS.items():
         editable = [line.split("#")[0].strip() for line in lines if line.startswith("-")]
@@ -77,8 +77,8 @@ def test_all_lists_pin_the_same_versions_and_the_first_one_has_no_tools_of_maint
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_list_is_complete_and_within_the_ranges_of_its_distributions(name):
-    """A list is complete if it, or a list before it, has all direct and indirect requirements."""
+def test_each_list_has_all_requirements(name):
+    """A list and the lists before it must have all direct and indirect requirements."""
     pins = {canonical(pin.name): pin for other in NAMES for pin in PINS[other]}
     there = {canonical(pin.name) for other in NAMES[: NAMES.index(name) + 1] for pin in PINS[other]}
     ranges = ranges_of(name)
@@ -100,7 +100,7 @@ def test_examples_in_documents_run(document, tmp_path, monkeypatch):
     assert not failed
 
 
-def test_binder_the_citation_and_the_licences_agree_with_the_package():
+def test_binder_and_the_citation_agree_with_the_package():
     assert read(".binder/requirements.txt").split() == ["-r", "../environment.txt"]
     python = read(".binder/runtime.txt").strip().removeprefix("python-")
     assert SpecifierSet(PROJECT["requires-python"]).contains(python)
@@ -143,9 +143,7 @@ def test_an_old_python_and_an_unknown_task_are_reported(
     assert said.out == ""
 
 
-def test_without_a_task_the_tasks_are_listed_and_a_failed_command_shows_its_last_output(
-    monkeypatch, capsys
-):
+def test_tasks_are_listed_if_none_is_given(monkeypatch, capsys):
     module = course_module()
     monkeypatch.setattr(sys, "argv", ["course.py"])
     module.main()
@@ -172,7 +170,7 @@ def course_module():
 
 @pytest.fixture
 def setting_up(tmp_path, monkeypatch):
-    """Return course.py with a folder of its own, where set-up only records its commands."""
+    """Return course.py with a folder of its own, in which set-up only records its commands."""
     module, done = course_module(), []
 
     def pretend(*command, **_):
@@ -197,7 +195,7 @@ def installed(done):
     return [command[command.index("-r") + 1 :: 2] for command in done if "-r" in command]
 
 
-def test_environments_grow_and_a_list_is_installed_once_and_again_if_it_changes(
+def test_a_list_is_installed_again_only_if_it_changes(
     setting_up,
 ):
     module, done = setting_up
@@ -251,7 +249,7 @@ def test_the_environment_in_use_is_not_made_again(setting_up, monkeypatch):
     assert module.VENV.exists()
 
 
-def test_pip_fetches_uv_with_its_own_indexes_and_installs_if_uv_fails(setting_up, monkeypatch):
+def test_pip_installs_the_packages_if_uv_fails(setting_up, monkeypatch):
     module, done = setting_up
     monkeypatch.setattr(module, "UV", None)
     listed = "global.index-url='https://a/simple'\nglobal.extra-index-url='b\\nc'\n:env:.no='x'\n"
@@ -424,7 +422,7 @@ NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "
 NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
-IMPORTED = {  # requirements that are installed, and modules that need further ones
+IMPORTED = {  # installed requirements, and modules that need further ones
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),
@@ -434,7 +432,7 @@ IMPORTED = {  # requirements that are installed, and modules that need further o
 
 @pytest.mark.parametrize("case", IMPORTED)
 def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_path, case):
-    """The environment has links to these distributions, the wheels, and nothing else.
+    """The environment contains the wheels and links to these distributions, and nothing else.
 
     The example in the README runs with NumPy and SciPy alone.
     """
@@ -471,7 +469,7 @@ def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_p
         assert rows[40].startswith("2.0,2.0")
 
 
-def test_wheels_contain_types_styles_and_pages_and_nothing_else(wheels):
+def test_wheels_contain_types_and_styles(wheels):
     for path, package, files in (
         (wheels[0], "rbcourse", {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"}),
         (

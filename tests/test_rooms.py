@@ -1,4 +1,4 @@
-"""Imports go in one direction without cycles, use exported names, and at first load only NumPy."""
+"""Test imports: no cycles, only exported names, and no library except NumPy at first."""
 
 import ast
 import importlib
@@ -20,7 +20,7 @@ PACKAGES = {
     name: Path(package.__file__).parent
     for name, package in {"rbcourse": rbcourse, "rbclassroom": rbclassroom}.items()
 }
-MAY_IMPORT = {  # the other parts that a part of the packages may import
+MAY_IMPORT = {  # for each part of the packages, the other parts that it may import
     "rbcourse": set(),
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},
@@ -77,8 +77,7 @@ def part(module):
 
 
 def imports(module, path, known):
-    """Return all modules of the packages, and all libraries, that a module or its functions
-    import."""
+    """Return all package modules and all libraries that a module or its functions import."""
     inner, outer = set(), set()
     here = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -196,7 +195,7 @@ def test_names_that_are_not_exported_are_reported(text, found):
     assert sorted(set(not_exported(text))) == found
 
 
-def test_names_in_all_exist_and_are_documented():
+def test_exported_names_exist_and_are_documented():
     for module in PUBLIC:
         public = importlib.import_module(f"rbcourse.{module}")
         assert len(set(public.__all__)) == len(public.__all__)

@@ -20,8 +20,7 @@ with mp.workdps(50):
 
 
 def stationary(what, R, ends, G=BOOK, accelerations=(REST, REST)):
-    """Return the curve that Newton's method finds from rotations at its nodes; it may be a
-    saddle."""
+    """Return the curve that Newton's method finds from guessed rotations; it may be a saddle."""
     one = Ends(*(np.asarray(x, float)[None] for x in ends))
     if what == "jerk":
         task = jerk(one, *(np.asarray(a, float)[None] for a in accelerations))
@@ -95,7 +94,7 @@ def test_the_constants_of_the_lemma_are_right():
 
 
 def test_the_second_variation_satisfies_the_bound_of_the_lemma():
-    """Test the spectra of the second variations of 500 optima, on polynomials, relative to ∫
+    """For 500 optima, test the spectrum of the second variation on polynomials, relative to ∫
     ‖D²η‖²."""
     nodes = grid(65)
     weights = nodes.integral[-1]
@@ -117,7 +116,7 @@ def test_the_second_variation_satisfies_the_bound_of_the_lemma():
             np.einsum("t,...tia,...tib->...ab", weights, p, q)
             for p, q in ((x_rate, x_rate), (D2, D2), (eta, C @ x))
         )
-        Q -= (P + P.mT) / 2  # the term w'' · (η × x), by parts
+        Q -= (P + P.mT) / 2  # the term w'' · (η × x), integrated by parts
         L = np.linalg.inv(np.linalg.cholesky(M))
         least = np.linalg.eigvalsh(L @ Q @ L.mT)[:, 0]
         assert np.all(least > bound)
@@ -174,7 +173,7 @@ def test_saddles_are_recognised_among_many_stationary_curves():
     assert 2 < np.sum(told) < len(told) - 2
 
 
-def test_minima_are_recognised_in_stacks_and_motions_and_missing_curves_are_not_minima():
+def test_missing_curves_are_not_minima():
     ends = I3, rb.exp_so3([[0, 0, 1.0], [0, 0, 2.0]]), [[0, 1, 0], [0, 1e160, 0]], REST
     with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
         curves = rb.minimum_acceleration_so3(*ends)

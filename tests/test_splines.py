@@ -1,4 +1,4 @@
-"""Splines through many rotations and poses, in closed form and optimal."""
+"""Test splines through many rotations and poses, in closed form and optimal."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -66,7 +66,7 @@ def off(x, size):
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
 def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
     """The acceleration is 0 at natural ends and equal at periodic ends. The same holds for the
-    torque of bodies, and for j of the least jerk."""
+    torque of bodies, and for j of least-jerk splines."""
     t, R = path(7, degrees, 1)
     c = NATURAL[name](t, R, ends)
     assert off(c(t) - R, 1) < 100 * EPS
@@ -83,7 +83,7 @@ def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
 
 
 @pytest.mark.source("beyond BK 13")
-def test_the_velocities_of_projected_splines_agree_with_the_textbook_and_join_poses():
+def test_velocities_of_projected_splines_agree_with_the_textbook():
     t, R = path(9, 100, 2)
     assert off(rb.spline_velocities(t, R) - textbook.spline_velocities(t, R), 1) < 100 * EPS
     poses = poses_of(R)
@@ -104,7 +104,7 @@ def test_the_velocities_of_projected_splines_agree_with_the_textbook_and_join_po
 
 
 @every_spline
-def test_a_moved_or_reversed_path_has_the_moved_or_reversed_spline(name):
+def test_a_moved_path_has_the_moved_spline(name):
     """With the inertia of a body, only the fixed frame is moved."""
     t, R = path(6, 80, 3)
     c, s = NATURAL[name](t, R), np.linspace(t[0], t[-1], 30)
@@ -125,7 +125,7 @@ def test_the_excess_of_a_spline_there_and_back_has_the_exact_constant(name):
     """The angle about one axis is (0, θ, 0) at 0, 1, 2. Let σ = θ p + θ³ r + … on a leg, where p is
     the spline and r the leading error of the projected cubic. The excess is θ⁴ ∫ r''² / ∫ p''²."""
     p, H = Polynomial([0, 1.5, 0, -0.5]), Polynomial([0, 0, 3, -2])
-    r = -p / 6 + p * H / 2 - p**3 / 3  # from tan σ = y/x of the cubics for cos and sin
+    r = -p / 6 + p * H / 2 - p**3 / 3  # from tan σ = y/x, with the cubics y for sin and x for cos
     parts = [(x.deriv(2) ** 2).integ()(1) for x in (r, p)]
     constant = Fraction(20711, 180180) / (16 if name == "quaternion" else 1)
     if name == "projected":
@@ -189,9 +189,9 @@ def test_the_optimum_agrees_with_the_textbook():
 
 
 def least_cost(t, R, bodies):
-    """Return the least cost of quaternions (p, v)/‖(p, v)‖, with p the cubic of the ends and v of a
-    higher degree. The velocities at the rotations are free, and no Euler–Lagrange equation is used.
-    """
+    """Return the least cost of quaternions (p, v)/‖(p, v)‖, where p is the cubic of the ends and v
+    has a higher degree. The velocities at the rotations are free, and no Euler–Lagrange equation is
+    used."""
     h, count, free = np.diff(t), len(R), 9
     x, weight = np.polynomial.legendre.leggauss(30)
     s = (x + 1) / 2
@@ -235,9 +235,9 @@ def test_direct_minimisation_finds_no_lower_cost(bodies):
 
 
 @pytest.mark.parametrize(("degrees", "ratio"), [(30, 10), (60, 2), (90, 10), (120, 2)])
-def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio):
-    """All splines have the same ends. A chain with velocities of parabolas costs a tenth to a third
-    more."""
+def test_no_other_spline_costs_less_than_the_optimum(degrees, ratio):
+    """All splines have the same ends. A chain whose velocities come from parabolas costs a tenth to
+    a third more."""
     chains = []
     for seed in range(12):
         t, R = path(10, degrees, [10, seed], ratio)
@@ -262,7 +262,7 @@ def test_random_optima_are_minima_and_no_other_spline_costs_less(degrees, ratio)
 
 @pytest.mark.parametrize("seed", [2, 3, 9])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
-def test_splines_of_large_turns_at_uneven_times_are_found_from_cheaper_curves(ends, seed):
+def test_splines_of_large_turns_at_uneven_times_are_found(ends, seed):
     """In these problems, plain Newton's method meets systems that are not positive definite."""
     t, R = path(10, 120, [10, seed], ratio=10)
     for name, make in (("optimum", None), ("torque", torque)):
@@ -274,7 +274,7 @@ def test_splines_of_large_turns_at_uneven_times_are_found_from_cheaper_curves(en
         assert off(rate(c, s) - before, before) < 1e-9
 
 
-def test_the_long_way_is_kept_and_costs_agree_with_quadrature():
+def test_the_long_way_is_kept():
     t, R = path(5, 70, 11)
     way = [False, True, False, False]
     c = rb.minimum_acceleration_spline_so3(t, R, long=way)
@@ -293,7 +293,7 @@ def test_the_long_way_is_kept_and_costs_agree_with_quadrature():
 
 
 @pytest.mark.parametrize("ends", ["natural", "periodic", "given"])
-def test_motions_of_bodies_have_the_optimal_rotation_and_a_spline_of_the_centre(ends):
+def test_the_rotation_of_a_body_is_optimal_on_se3(ends):
     t, R = path(5, 60, 12)
     poses, centre = poses_of(R, 13), np.array([0.3, -0.2, 0.1])
     twist = np.random.default_rng(14).normal(size=(2, 6))

@@ -26,8 +26,7 @@ def test_the_geodesic_agrees_with_the_textbook():
 
 @pytest.mark.source("BK 6.2")
 def test_the_projected_cubic_agrees_with_the_textbook():
-    """The bound is eps over the least gap, and for derivatives eps over the square and the cube of
-    the gap."""
+    """The bound is eps divided by the least gap; for derivatives, by its square and its cube."""
     rng = np.random.default_rng(62)
     for _ in range(15):
         ends = *Rotation.random(2, rng=rng).as_matrix(), *3 * rng.normal(size=(2, 3))

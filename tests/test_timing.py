@@ -149,7 +149,7 @@ def test_no_timing_on_the_same_cells_is_faster(name, monkeypatch):
         assert -1e-8 < found / T - 1 < 1e-4
 
 
-def test_times_within_boxes_agree_with_toppra():
+def test_times_with_box_limits_agree_with_toppra():
     for seed, T in enumerate([2.4639600513, 2.8119294681, 1.8797166882]):
         c, rng = random_chain(seed), np.random.default_rng(seed)
         A0, A1 = c(np.array(c.domain))
@@ -160,7 +160,7 @@ def test_times_within_boxes_agree_with_toppra():
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_limits_hold_and_one_limit_is_reached_at_nearly_all_times(name):
+def test_one_limit_is_reached_at_nearly_all_times(name):
     for seed in range(3):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
         t = np.linspace(*timed.domain, 100_001)
@@ -177,7 +177,7 @@ def test_limits_hold_and_one_limit_is_reached_at_nearly_all_times(name):
         assert max(share for share, _ in largest.values()) == pytest.approx(used.max(), abs=1e-4)
 
 
-def test_the_used_shares_agree_with_the_torque_the_force_and_a_point_of_the_body():
+def test_used_shares_agree_with_the_torque_and_the_force():
     c, r, g = random_chain(4), np.array([0.2, -0.1, 0.4]), np.array([1.0, 2, -9])
     t = np.linspace(0.2, 0.8, 7) * c.times[1]
     V, A, R = c(t, 1), c(t, 2), c(t)[:, :3, :3]
@@ -235,7 +235,7 @@ def test_the_least_time_has_the_symmetries_of_the_problem(name):
 
 
 @pytest.mark.parametrize("size", [3, 4])
-def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size):
+def test_a_timed_curve_has_exact_derivatives(size):
     c = random_chain(5)
     if size == 3:
         c = rb.chain(c.times, c(c.times)[:, :3, :3])
@@ -261,7 +261,7 @@ def test_a_timed_curve_is_a_curve_with_exact_derivatives_through_the_poses(size)
         rb.acceleration_cost(timed)
 
 
-def test_a_share_that_is_constant_for_a_while_is_returned_with_its_first_time():
+def test_a_constant_share_is_returned_with_its_first_time():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 
@@ -277,7 +277,7 @@ def test_no_uniform_timing_within_the_limits_is_faster(name):
 
 
 def test_limits_hold_in_the_cells_next_to_a_rest():
-    """In the cells next to a rest, a speed and an acceleration vary as a polynomial."""
+    """Speeds and accelerations in the cells next to a rest vary as polynomials."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
     slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
     still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)
@@ -334,7 +334,7 @@ def test_bad_limits_and_paths_are_refused(curve, limits, message):
         rb.fastest(curve, **limits)
 
 
-def test_the_call_in_the_readme_starts_and_ends_at_rest():
+def test_the_motion_in_the_readme_starts_and_ends_at_rest():
     text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
     (call,) = re.findall(r"`(rb\.fastest\(motion.*?\))`", text)
     timed = eval(call, {"rb": rb, "motion": random_chain(1)})

@@ -1,4 +1,4 @@
-"""Programs of the system that tests need."""
+"""Find or install the system programs that tests need."""
 
 import os
 import shutil

@@ -16,10 +16,9 @@ def made(name):
 
 
 def sweep(name, **base):
-    """Apply each setting to the start values and `base`; yield values and texts of each picture.
+    """Apply each setting over the start values and `base`; yield the values and the texts.
 
-    Check that the explorer shows values, or the reason for having none, at every setting, and that
-    no number is "nan" or "-0".
+    Check that each setting shows values, or the reason for having none, and no "nan" or "-0".
     """
     explorer = made(name)
     explorer.restart()
@@ -34,8 +33,8 @@ def sweep(name, **base):
 
 
 def settings(explorer):
-    """Yield settings: each control alone at five places of its range, then all controls at
-    extremes, so that each pair takes all combinations."""
+    """Yield settings. First, each control alone takes five values in its range. Then all controls
+    take extreme values, so that each pair takes all combinations."""
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)
@@ -64,14 +63,13 @@ def read_off(explorer):
 
 
 def reads(text, wanted):
-    """Return whether the numbers of a text are these, up to half a unit of their last digits."""
+    """Return whether the numbers in a text equal these, up to half a unit of the last digit."""
     found = re.findall(r"-?\d+(?:\.\d+)?", text)
     digits = np.array([len(each.partition(".")[2]) for each in found])
     return np.all(np.abs(np.array(found, float) - np.ravel(wanted)) <= 0.51 * 10.0**-digits)
 
 
 def notice(explorer):
-    """Return the notice, or ""."""
     return explorer.picture.run["notice"] or explorer.picture.run["texts"][0][1]
 
 

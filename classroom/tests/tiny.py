@@ -1,4 +1,4 @@
-"""A course of one small lesson, the command that runs a module, and a server for the lesson."""
+"""Helpers: a course with one small lesson, a command that runs a module, and a server."""
 
 import http.client
 import subprocess

@@ -1,4 +1,4 @@
-"""A course folder with the tiny set, and students who hand in."""
+"""A course folder with the tiny set, and functions to hand in as a student."""
 
 import csv
 import html
@@ -43,8 +43,8 @@ c.Execute.timeout_func = limit
 def make_template(folder):
     """Write a course folder with the tiny set and its gradebook.
 
-    Only cells that report that they have `begun` have a limit, which begins at that time. Returns
-    the folder, and the set as it is handed out.
+    A time limit applies only to cells that report that they have `begun`. Returns the folder, and
+    the set as it is handed out.
     """
     write_tiny_set(folder)
     (folder / "nbgrader_config.py").write_text(CONFIG)
@@ -53,13 +53,12 @@ def make_template(folder):
 
 
 def begun():
-    """Return code that a cell runs when its endless part begins; the code is unique for each
-    cell."""
+    """Return code that reports the start of a cell's endless part; it is unique for each cell."""
     return f"open('begun-{uuid.uuid4().hex}', 'w').close()"
 
 
 class Class:
-    """A course folder with the tiny set, and students who hand in."""
+    """A course folder with the tiny set, and functions to hand in as a student."""
 
     def __init__(self, folder, template):
         made, self.given = template
@@ -69,7 +68,7 @@ class Class:
         return Gradebook(f"sqlite:///{self.folder / 'gradebook.db'}")
 
     def submit(self, student, change=None, **answers):
-        """Hand in the right answers, or given ones instead, after a change of the notebook."""
+        """Hand in the given answers, and right answers to the other questions."""
         notebook = nbformat.reads(self.given.decode(), as_version=4)
         given = {name.replace("_", "-") + "-answer": text for name, text in answers.items()}
         for name, text in (ANSWERS | {"words-answer": "It is."} | given).items():
@@ -91,9 +90,7 @@ class Class:
         return self.folder / "autograded" / student / "ps0" / "ps0.ipynb"
 
     def page(self, student):
-        """Return the page with the feedback."""
         return (self.folder / "feedback" / student / "ps0" / "ps0.html").read_text("utf-8")
 
     def feedback(self, student):
-        """Return the text of the feedback."""
         return html.unescape(re.sub(r"<[^>]*>", "", self.page(student).split("<body>", 1)[1]))

@@ -11,7 +11,6 @@ ANSWERS = {"square-answer": "def square(x):\n    return x * x", "half-answer": "
 
 
 def cell(notebook, grade_id):
-    """Return the cell with this name."""
     names = [
         marks.get("nbgrader", {}).get("grade_id") for marks in (c.metadata for c in notebook.cells)
     ]
@@ -19,7 +18,6 @@ def cell(notebook, grade_id):
 
 
 def marked(cell, grade_id, points=None, **kind):
-    """Return the cell with nbgrader's metadata."""
     marks = {"schema_version": 3, "grade_id": grade_id, "locked": True, "grade": False}
     marks |= {"solution": False, "task": False, "cell_type": cell.cell_type, **kind}
     cell.metadata["nbgrader"] = marks | ({} if points is None else {"points": points})

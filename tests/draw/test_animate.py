@@ -1,4 +1,4 @@
-"""Animations: each frame equals a full drawing, and players need no network."""
+"""Test animations: each frame equals a full drawing, and players need no network."""
 
 import base64
 import io
@@ -45,7 +45,7 @@ def saved(tmp_path_factory):
     return made
 
 
-def test_without_files_no_frames_are_drawn_and_the_player_is_the_same(saved, tmp_path, monkeypatch):
+def test_no_frames_are_drawn_without_files(saved, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RBCOURSE_FIGURES", "")
     fig, update = cube()
@@ -119,7 +119,7 @@ def test_the_gif_shows_each_frame_in_its_colours(saved):
 
 
 @pytest.mark.parametrize(("count", "seconds"), [(60, 4), (100, 1.99), (3, 1), (7, 0.5)])
-def test_a_gif_lasts_as_long_as_asked(count, seconds):
+def test_a_gif_lasts_as_long_as_requested(count, seconds):
     shades = [Image.new("L", (4, 4), 2 * i) for i in range(count)]
     with Image.open(io.BytesIO(animate.gif(shades, seconds))) as picture:
         durations = [picture.seek(i) or picture.info["duration"] for i in range(picture.n_frames)]
@@ -158,7 +158,7 @@ def test_the_player_starts_with_the_still_frame(still, count):
     plt.close(fig)
 
 
-def test_the_files_have_the_same_bytes_each_time_and_the_figure_is_closed(saved):
+def test_animation_files_have_the_same_bytes_each_time(saved):
     (player, files), (other, again) = saved
     assert set(files) == {"cube.gif", "cube.png", "cube.pdf", "cube.csv"}
     assert files == again
@@ -177,7 +177,8 @@ def test_the_player_is_complete(saved):
     assert not re.search(r"https?:|src=\"(?!data:)", page)
     assert "$" not in re.sub(r"\$\{|\"data:[^\"]*\"", "", page)  # all placeholders are filled in
     assert 'alt="a &quot;cube&quot;"' in page
-    assert page.count("data:image/png;base64,") == 2  # the still, and the fixed artists
+    # one picture for the still, and one for the fixed artists
+    assert page.count("data:image/png;base64,") == 2
     assert '>a "cube" <small>cube.gif, .png, .pdf, .csv</small></figcaption>' in page
     data = held(page)
     shares = data["controls"][0]["values"]

@@ -1,4 +1,4 @@
-"""Arms are drawn at the angles of the path, and the descriptions state its numbers."""
+"""Arms are drawn at the angles of the path, and the descriptions state the numbers of the path."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -24,13 +24,12 @@ def ends(q, lengths=(2, 1.5)):
 
 
 def off(found, wanted):
-    """Return the largest distance between found and wanted places: lines, pairs, complex
-    numbers."""
+    """Return the largest distance between two lists of lines, pairs or complex numbers."""
     pairs = np.transpose(found.get_data()) if hasattr(found, "get_data") else np.array(found)
     return np.abs((pairs if np.iscomplexobj(pairs) else pairs @ [1, 1j]) - wanted).max()
 
 
-def test_the_table_of_a_path_has_joint_angles_and_the_ends_of_links():
+def test_the_path_table_has_joint_angles_and_link_ends():
     path, lengths = np.random.default_rng(1).uniform(-3, 3, (4, 3)), (1, 2, 3)
     table = arm.path_table(path, lengths)
     places = [f"{axis}{k} [m]" for k in (1, 2, 3) for axis in "xy"]
@@ -42,7 +41,7 @@ def test_the_table_of_a_path_has_joint_angles_and_the_ends_of_links():
 
 @pytest.mark.source("RR 4")
 @pytest.mark.parametrize("q", [[0.5, 0.8], [-0.5, -2], [2, -1]])
-def test_a_posture_shows_links_frames_and_angles(axes, q):
+def test_a_drawn_arm_has_its_links_frames_and_angles(axes, q):
     links, *arrows = arm.draw_posture(axes[0], np.array(q))
     joints, headings = ends(q), np.cumsum(q)
     assert off(links, joints) < 1e-14
@@ -86,7 +85,7 @@ def test_the_reach_is_bounded_by_circles(axes, lengths, radii):
 
 
 @pytest.mark.source("RR 4.1", "RR 4.3", "RR Fig. 8", "RR Fig. 9")
-def test_arms_move_and_their_paths_are_drawn_in_the_room_and_in_the_plane_of_the_angles(axes):
+def test_arms_move_along_their_paths(axes):
     tips = np.array([ends(q)[-1] for q in PATH])
     update = arm.moving_arm(axes[0], PATH, shown=[0, 2])
     for i in (0, 3, 1):

@@ -21,7 +21,7 @@ def axes():
 
 
 def off(box, pose, in_body):
-    """Return the largest distance of a corner of a drawn box from its place in this pose."""
+    """Compare a drawn box with its pose; return the largest distance between corners."""
     return np.abs(box.corners - (in_body @ pose[:3, :3].T + pose[:3, 3])).max()
 
 
@@ -49,7 +49,7 @@ def test_cubes_with_a_square_on_one_face_are_drawn_at_the_poses(axes):
     assert np.allclose(np.divide(*(axes[0].get_box_aspect()[:2])), np.divide(*(high - low)[:2]))
 
 
-def test_boxes_move_and_a_box_that_stays_at_the_origin_fills_its_axes(axes):
+def test_a_box_that_stays_at_the_origin_fills_its_axes(axes):
     edges = np.array([0.3, 0.2, 0.03])
     still = rb.pose_from_components(rb.exp_so3(np.outer(TIMES, [1.0, 2, 3])), np.zeros(3))
     update = bodies.moving_boxes(axes, {"screw": SCREW, "still": still}, edges)
@@ -63,7 +63,7 @@ def test_boxes_move_and_a_box_that_stays_at_the_origin_fills_its_axes(axes):
     assert [text.get_text() for text in axes[1].texts] == ["x", "y", "z"]
 
 
-def test_paths_are_drawn_with_the_frame_at_the_start_and_at_each_different_end(axes):
+def test_paths_are_drawn_with_the_frames_at_their_ends(axes):
     lines = bodies.draw_ways(axes[0], MOTIONS)
     for line, (name, poses) in zip(lines, MOTIONS.items(), strict=True):
         assert np.array_equal(line.get_data_3d(), poses[:, :3, 3].T)
@@ -79,7 +79,7 @@ def test_paths_are_drawn_with_the_frame_at_the_start_and_at_each_different_end(a
 
 
 @pytest.mark.parametrize("view", [(18, -22), (32, -65), (60, 140)])
-def test_names_of_axes_are_outside_the_tick_numbers_and_overlap_no_text(view, axes):
+def test_axis_names_overlap_no_text(view, axes):
     ax, places = axes[0], np.array([[0, 0, 0], [8, 10, 12.0]])
     ax.figure.set_size_inches(13, 5)
     bodies.set_space(ax, places, 2.0, view)
@@ -123,7 +123,7 @@ def test_descriptions_state_the_drawn_numbers():
         assert words in said
 
 
-def test_tables_hold_the_poses_and_the_rates_with_their_units():
+def test_tables_hold_the_poses_and_rates_with_units():
     table = bodies.pose_table({"t [1]": TIMES}, SCREW)
     wanted = {"t [1]": TIMES, "y [m]": SCREW[:, 1, 3], "R23 [1]": SCREW[:, 1, 2]}
     assert list(table)[:4] == ["t [1]", "x [m]", "y [m]", "z [m]"]

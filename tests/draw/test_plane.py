@@ -1,4 +1,4 @@
-"""Rectangles are drawn at the poses of the path, and the descriptions state its numbers."""
+"""Rectangles are drawn at the poses of a path, and the descriptions state its numbers."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -34,7 +34,7 @@ def assert_body(outline, nose, pose, length):
 
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")
-def test_rectangles_are_drawn_at_the_poses_of_the_table_and_move_along_their_path(ax):
+def test_rectangles_are_drawn_at_the_poses_of_the_table(ax):
     way, *bodies = plane.draw_route(ax, PATH, 1.5, shown=[0, 1, 2, 3])
     assert {text.get_text(): text.xy[0] for text in ax.texts} == {"start": 0, "goal": 1}
     table = plane.path_table(PATH)
@@ -54,7 +54,7 @@ def test_rectangles_are_drawn_at_the_poses_of_the_table_and_move_along_their_pat
         assert np.array_equal(way_of(way), PATH[: i + 1, :2])
 
 
-def test_two_paths_are_compared(ax):
+def test_two_paths_are_drawn_in_different_styles(ax):
     raised = PATH + np.array([0, 1, 0]) * [[0], [1], [2], [0.5]]
     pair, points = {"one": PATH, "other": raised}, ([0, 0], [0.3, -0.2])
     artists = plane.draw_compared(ax, pair, 1, shown=[1], points=points)
@@ -73,7 +73,7 @@ def test_two_paths_are_compared(ax):
     )
 
 
-def test_the_description_states_the_start_the_goal_and_the_turns():
+def test_the_description_states_the_start_and_the_goal():
     said = plane.describe_route(PATH)
     assert "from (0, 0) m, heading 0 degrees, to (1, 4) m, heading -115 degrees" in said
     assert f"its centre covers {3 + 2 + np.sqrt(8):.2f} m" in said

@@ -1,4 +1,4 @@
-"""Saved figures: the same bytes each time, and colours that all eyes can tell apart."""
+"""Saved figures have the same bytes each time, and colours that all eyes can distinguish."""
 
 import html
 import re
@@ -31,7 +31,7 @@ def test_the_png_pdf_and_csv_have_the_same_bytes_each_time(tmp_path, monkeypatch
 
 
 def seen(colour, matrix):
-    """Return a colour in CIE Lab as an eye sees it; the matrix acts on linear RGB."""
+    """Return the CIE Lab colour that an eye sees; the matrix acts on linear RGB."""
     channels = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750]]
@@ -51,7 +51,7 @@ EYES = {
 
 @pytest.mark.parametrize("eye", EYES)
 def test_colours_can_be_distinguished_by_all_eyes(eye):
-    """The matrices of complete deficiencies are from Machado, Oliveira and Fernandes 2009. The
+    """The matrices for full colour deficiency are from Machado, Oliveira and Fernandes 2009. The
     colour difference is CIE76."""
     matrix = np.array(EYES[eye].split(), dtype=float).reshape(3, 3)
     for one, other in combinations(save.COLOURS.values(), 2):
@@ -59,8 +59,8 @@ def test_colours_can_be_distinguished_by_all_eyes(eye):
 
 
 def test_all_colours_have_a_contrast_of_3_on_white():
-    """WCAG 2 requires this contrast for graphical objects. The luminance is computed from L of
-    Lab."""
+    """WCAG 2 requires this contrast for graphical objects. The luminance is computed from the
+    lightness L."""
     for colour in [*save.COLOURS.values(), save.PALE]:
         lightness, *_ = seen(colour, np.eye(3))
         luminance = max((lightness + 16) / 116, 6 / 29) ** 3
@@ -74,7 +74,7 @@ def test_figures_are_saved_beside_the_notebook_by_default(tmp_path, monkeypatch)
     assert (tmp_path / "figures" / "empty.csv").exists()
 
 
-def test_no_files_are_written_if_the_folder_is_empty(tmp_path, monkeypatch):
+def test_an_empty_folder_name_writes_no_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RBCOURSE_FIGURES", "")
     fig, ax = plt.subplots()
@@ -92,7 +92,7 @@ def test_no_files_are_written_if_the_folder_is_empty(tmp_path, monkeypatch):
         ('A < "B": no end', 'A &lt; "B": no end'),
     ],
 )
-def test_the_caption_has_the_first_sentence_and_the_files(alt, sentence):
+def test_the_caption_has_the_first_sentence_of_the_description(alt, sentence):
     picture = save.Picture("line", alt, b"", 100)
     page, files = picture._repr_html_(), "line.png, .pdf, .csv"
     assert repr(picture) == f"line: {alt}"
@@ -104,9 +104,7 @@ RAGGED = {"t [1]": [0, 1], "x [m]": [0, 1, 2]}, "one shape are wanted, got t [1]
 
 
 @pytest.mark.parametrize("name", ["pitch [deg]", "t", "angle (rad)", "x[m]", None])
-def test_tables_that_are_ragged_or_lack_units_are_refused_and_nothing_is_written(
-    name, tmp_path, monkeypatch
-):
+def test_ragged_tables_and_tables_without_units_are_refused(name, tmp_path, monkeypatch):
     monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
     unit = {"body": ["a"], name: [1.0]}, f"data: {name!r} must end with"
     table, message = unit if name else RAGGED

@@ -1,4 +1,4 @@
-"""Scenes in space: nearer objects hide farther ones, from every side."""
+"""Scenes in space: nearer objects hide farther ones, from every viewpoint."""
 
 import inspect
 import io
@@ -28,13 +28,13 @@ def ax():
 
 
 def drawn(ax):
-    """Return the parts of a scene in the order in which they are drawn, and the view."""
+    """Return the parts of a scene in drawing order, and the view."""
     pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
     return scene.in_sight(pieces, ax.sight().eye), ax.sight()
 
 
 @pytest.mark.parametrize("fitted", [True, False])
-def test_the_view_agrees_with_matplotlib_and_has_equal_units_and_a_fixed_centre(fitted):
+def test_the_view_agrees_with_matplotlib(fitted):
     fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "space"})
     ax.plot([0, 1], [0, 5], [0, 20])
     if fitted:
@@ -64,7 +64,7 @@ def test_the_view_agrees_with_matplotlib_and_has_equal_units_and_a_fixed_centre(
         (("set_title", r"$\frac{1$"), "frac"),
     ],
 )
-def test_scenes_that_cannot_be_drawn_are_refused_and_no_artist_stays_hidden(ax, call, message):
+def test_scenes_that_cannot_be_drawn_are_refused(ax, call, message):
     (line,) = ax.plot([0, 1], [0, 0], [0, 0])
     getattr(ax, call[0])(*call[1:])
     with pytest.raises(ValueError, match=message):
@@ -103,7 +103,7 @@ def sampled(part):
 
 
 def covers(face, places, sight):
-    """Return a mask of the places that overlap a face, or the disc of a ball, in the view."""
+    """Return a mask of the places that, in the view, lie on a face or on the disc of a ball."""
     corners = sight.flat(face.places)
     (x, y), to = (np.roll(corners, -1, axis=0) - corners).T, sight.flat(places)[:, None] - corners
     if face.kind == "ball":
@@ -145,7 +145,7 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     assert max(places[-1, 3] for places in line) == pytest.approx(steps.sum())
 
 
-def test_a_line_that_crosses_a_plane_at_two_of_its_points_is_cut_into_three_lines(ax):
+def test_a_line_that_crosses_a_plane_twice_is_cut_in_three(ax):
     corners = np.array([[0, 0, 5], [1, 0, 0], [2, 0, -5], [3, 0, 0], [4, 0, 5.0]])
     ax.plot(*corners.T, lw=3)
     pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
@@ -163,7 +163,7 @@ def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
         pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
         found = scene.in_sight(pieces, ax.sight().eye, 2)
         parts = [part.places[:, 0] for part in found if part.gc.get_linewidth() == 3]
-        far, near = sorted(parts, key=np.mean)  # the view is from +x
+        far, near = sorted(parts, key=np.mean)  # seen from +x
         assert far.max() - near.min() == pytest.approx(overlap)
         line.remove()
 
@@ -199,7 +199,7 @@ def test_edges_are_drawn_after_both_faces_that_they_bound(ax):
                     assert max(np.array([k for k, _ in lines])[on]) > i
 
 
-def test_the_zorder_decides_in_the_plane_of_a_face_and_above_the_scene(ax):
+def test_the_zorder_decides_the_order_in_the_plane_of_a_face(ax):
     ax.plot([-0.4, 0.4], [0, 0], [0.5, 0.5], lw=3, zorder=9)
     bodies.draw_box(ax, np.eye(4), 1.0)
     ax.text(0, 0, 0, "inside", zorder=scene.OVER)
@@ -213,7 +213,7 @@ def test_the_zorder_decides_in_the_plane_of_a_face_and_above_the_scene(ax):
     assert in_plane[-1].gc.get_linewidth() == 3
 
 
-def test_a_line_has_no_parts_in_its_gaps_and_markevery_selects_its_marks(ax):
+def test_a_line_is_not_drawn_in_its_gaps(ax):
     places = np.array([[0, 0, 0], [1, 0, 0], [np.nan] * 3, [0, 1, 0], [1, 1, 0], [0, np.inf, 0]])
     (line,) = ax.plot(*places.T)
     parts, sight = drawn(ax)
@@ -231,7 +231,7 @@ def test_a_line_has_no_parts_in_its_gaps_and_markevery_selects_its_marks(ax):
         drawn(ax)
 
 
-def test_only_pieces_that_changed_are_made_again(ax):
+def test_only_changed_pieces_are_made_again(ax):
     (line,), text = ax.plot([0, 1], [0, 0], [0, 0]), ax.text(0, 0, 0, "a")
     first, _ = drawn(ax)
     assert drawn(ax)[0] == first  # the same objects
@@ -246,7 +246,7 @@ def test_only_pieces_that_changed_are_made_again(ax):
     assert len(drawn(ax)[0]) == 1
 
 
-def test_artists_and_legends_are_drawn_once_and_hidden_axes_are_not_drawn(ax):
+def test_artists_are_drawn_once(ax):
     (line,) = ax.plot([-1, 1], [0, 0], [0, 0], color="red", lw=8, alpha=0.5, label="a line")
     legend, inside = ax.legend(loc="upper left"), [line, space.Ball(), ax.text(0, 0, 0, "")]
     assert space.scenes(ax.figure) == [ax.scene]
@@ -263,7 +263,7 @@ def test_artists_and_legends_are_drawn_once_and_hidden_axes_are_not_drawn(ax):
     assert (np.asarray(canvas.buffer_rgba())[..., :3] == 255).all()
 
 
-def test_faces_without_area_separate_nothing_and_faces_that_are_not_flat_are_drawn(ax):
+def test_faces_that_are_not_flat_are_drawn(ax):
     plate = bodies.draw_box(ax, np.eye(4), np.array([1.6, 1.6, 0.0]))
     ax.plot([-1, 1], [0, 0], [-0.6, -0.6], lw=3)
     ax.view_init(20, -60)

@@ -13,7 +13,7 @@ IMAGES = {"one": (V0, V1), "other": (-V0, -V1)}
 
 
 @pytest.mark.source("RR 2.2", "RR Fig. 4", "RR Fig. 5")
-def test_the_first_images_are_drawn_listed_and_counted():
+def test_the_first_images_are_drawn_and_counted():
     fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"})
     update = spheres.moving_images(axes, IMAGES)
     assert [ax.get_title() for ax in axes] == list(IMAGES)

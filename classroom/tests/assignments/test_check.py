@@ -1,4 +1,4 @@
-"""The report before a submission, and the file to submit."""
+"""Test `check`: its report, and the file to submit."""
 
 import os
 import subprocess
@@ -31,7 +31,7 @@ def release(tmp_path_factory):
 
 
 def answered(release, edit=None, **answers):
-    """Return the set with the right answers, except for the given ones, after an optional edit."""
+    """Return the set with the given answers, and with right answers to the other questions."""
     notebook = nbformat.reads(release, as_version=4)
     given = {f"{key}-answer": text for key, text in answers.items()}
     notebook.metadata.kernelspec.name = "mine"
@@ -44,8 +44,7 @@ def answered(release, edit=None, **answers):
 
 @pytest.fixture
 def hand_in(tmp_path, release):
-    """Return a function that writes a student's file into the unpacked handout, and returns its
-    path."""
+    """Return a function that saves a student's notebook in the unpacked handout."""
     folder = tmp_path / "my folder ü" / "ps0"
     (folder / "original").mkdir(parents=True)
     (folder / "original" / "ps0.ipynb").write_text(release, encoding="utf-8")
@@ -66,7 +65,7 @@ RUN = (
 )
 
 
-def test_an_answered_set_is_run_and_written_without_nbgrader(hand_in):
+def test_check_writes_the_file_to_submit_without_nbgrader(hand_in):
     half = "half = float(open('points.csv').read()) / 2\nfrom ipywidgets import Output\n"
     half += "with Output():\n    print('inside')"
     added = new_code_cell("print('é∞', 1)")
@@ -94,7 +93,7 @@ def test_an_answered_set_is_run_and_written_without_nbgrader(hand_in):
     assert names == ["points.csv", "ps0.ipynb", "ps0.ipynb", "ps0.ipynb"]
 
 
-def test_faults_are_named_and_the_file_can_still_be_handed_in(hand_in, capsys, monkeypatch):
+def test_faults_are_reported_and_the_file_is_still_written(hand_in, capsys, monkeypatch):
     def change(notebook):
         cell(notebook, "half-test").source = "assert True"
         notebook.cells.append(new_code_cell("open('made_by_a_run', 'w').close(); nowhere"))
@@ -116,16 +115,16 @@ def test_faults_are_named_and_the_file_can_still_be_handed_in(hand_in, capsys, m
         assert words in said
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
     slow = "took more than half of the 30 s that grading allows"
-    assert said.count(slow) == 6  # the clock jumps, so each cell with code is reported
+    assert said.count(slow) == 6  # the test's clock jumps, so every cell with code is reported
     assert BoxedExecute().timeout == signature(check.check).parameters["seconds"].default == 30
     assert not (path.parent / "made_by_a_run").exists()
 
 
 @pytest.fixture
 def endless(monkeypatch, tmp_path):
-    """Return a function that limits only one cell: ``endless(name, patience)``.
+    """Return a function that gives a time limit to a single cell: ``endless(name, patience)``.
 
-    The limit begins when the cell has run the returned code, which stands before its endless loop.
+    The cell runs the returned code just before its endless loop; then the limit begins.
     """
 
     def begin(name, patience):
@@ -143,9 +142,7 @@ def endless(monkeypatch, tmp_path):
     return begin
 
 
-def test_an_endless_loop_is_stopped_its_output_is_cut_and_a_dead_kernel_is_reported(
-    hand_in, capsys, endless
-):
+def test_an_endless_loop_and_a_dead_kernel_are_reported(hand_in, capsys, endless):
     def ran_before(notebook):
         cell(notebook, "half-test").execution_count = 7
 
@@ -165,7 +162,7 @@ def test_an_endless_loop_is_stopped_its_output_is_cut_and_a_dead_kernel_is_repor
 
 
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are not signals on Windows")
-def test_a_loop_that_cannot_be_stopped_ends_the_run(hand_in, capsys, endless):
+def test_a_cell_that_cannot_be_interrupted_ends_the_run(hand_in, capsys, endless):
     stuck = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
     begin = endless("square-test", 1)
     check.check(hand_in(square=f"def square(x):\n    {stuck}; {begin}\n    while True: pass"))
@@ -176,7 +173,7 @@ def test_a_loop_that_cannot_be_stopped_ends_the_run(hand_in, capsys, endless):
     assert "0 of 2 visible tests passed" in said
 
 
-def test_problems_without_an_answer_or_with_hidden_tests_only_are_not_counted(release, capsys):
+def test_problems_without_an_answer_are_not_counted(release, capsys):
     notebook = nbformat.reads(release, as_version=4)
     assert check._print_problems(notebook, notebook) == [False, False]
     empty = "; ".join(f"cell {at} is not answered yet" for at in (3, 5, 8))
@@ -187,8 +184,8 @@ def test_problems_without_an_answer_or_with_hidden_tests_only_are_not_counted(re
     assert "cell 6 has hidden tests only" in capsys.readouterr().out
 
 
-def test_a_failed_answer_that_calls_another_failed_answer_names_it(release, capsys):
-    """The first answer is wrong; the second one, which calls it, has no mistake of its own."""
+def test_a_failure_names_the_failed_answer_that_it_calls(release, capsys):
+    """The second answer is wrong only because it calls the first one."""
     notebook, original = (nbformat.reads(release, as_version=4) for _ in range(2))
     cell(notebook, "square-answer").source = "def square(x):\n    return x"
     cell(notebook, "half-answer").source = "half = square(0.7)"
@@ -246,9 +243,9 @@ TEST = "cell 4, test of “A tiny set”"
         (with_test(lambda t: t.metadata.update(editable=True)), [f"{TEST} was unlocked; it is"]),
     ],
 )
-def test_locked_cells_are_restored_and_answers_are_kept(release, edit, said):
+def test_changed_locked_cells_are_restored(release, edit, said):
     original, notebook = nbformat.reads(release, as_version=4), answered(release, edit)
-    # of several copies, the last one counts
+    # the last copy of an answer counts
     there = {grade_id(each): each.source for each in notebook.cells}
     given = restore(notebook, original)
     nbformat.validate(notebook)
@@ -284,7 +281,7 @@ BROKEN = b"no json", b'{"cells": 3}', b"\xff\xfe", b'{\n<<<<<<< HEAD\n"a": 1\n==
     [(b"", "empty"), (b"%PDF-1.7", "a PDF or an archive")]
     + [(content, "damaged or not a notebook") for content in BROKEN],
 )
-def test_a_file_that_is_not_a_notebook_is_refused_in_one_line(content, word, hand_in):
+def test_files_that_are_not_notebooks_are_refused(content, word, hand_in):
     path = hand_in()
     path.write_bytes(content)
     with pytest.raises(ValueError, match=word):
@@ -292,9 +289,7 @@ def test_a_file_that_is_not_a_notebook_is_refused_in_one_line(content, word, han
     assert not (path.parent / "to_submit").exists()
 
 
-def test_the_original_is_made_from_the_source_in_the_course_and_required_elsewhere(
-    hand_in, tmp_path, monkeypatch
-):
+def test_a_missing_original_is_made_from_its_source(hand_in, tmp_path, monkeypatch):
     def checked(path):
         monkeypatch.setattr(sys, "argv", ["check", str(path)])
         check.main()
@@ -313,7 +308,7 @@ def test_the_original_is_made_from_the_source_in_the_course_and_required_elsewhe
         checked(path.rename(tmp_path / "mine.ipynb"))
 
 
-def test_errors_are_reported_even_if_their_output_is_lost_and_hints_are_reported_alone():
+def test_errors_are_reported_even_if_their_output_is_lost():
     notebook = new_notebook(cells=[new_code_cell("1 / 0")])
     reply = {"status": "error", "ename": "ZeroDivisionError", "evalue": "by zero", "traceback": []}
     check._Client(notebook).on_cell_executed(notebook.cells[0], 0, {"content": reply})

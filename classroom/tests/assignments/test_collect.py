@@ -1,4 +1,4 @@
-"""Downloads from Moodle and Canvas are collected into the folder that nbgrader reads."""
+"""Test that downloads from Moodle and Canvas are collected in nbgrader's folder."""
 
 import csv
 import io
@@ -26,7 +26,7 @@ FILES = {"collected", "unchanged", "duplicates", "unmatched", "refused", "ignore
 
 @pytest.fixture
 def course(tmp_path):
-    """Return a course with two sets, and an empty folder for downloads."""
+    """Return a course with two problem sets, and an empty folder for downloads."""
     assignments = tmp_path / "notebooks" / "assignments"
     for name in ("ps1", "ps2"):
         path = write_tiny_set(assignments, name)
@@ -40,14 +40,12 @@ def moodle(student, file="ps1.ipynb"):
 
 
 def answered(course, words="mine", name="ps1"):
-    """Return a notebook of a set, as bytes."""
     notebook = nbformat.read(course / "source" / name / f"{name}.ipynb", as_version=4)
     notebook.cells.append(new_markdown_cell(words, id="own"))
     return nbformat.writes(notebook).encode()
 
 
 def packed(entries, date=DAY, method=zipfile.ZIP_STORED):
-    """Return a zip, as bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", method) as archive:
         for name, content in entries.items():
@@ -57,7 +55,7 @@ def packed(entries, date=DAY, method=zipfile.ZIP_STORED):
 
 
 def collected(course, files, due=None):
-    """Collect files from the folder of downloads; return the lists."""
+    """Save files as downloads and collect them; return the rows of the report."""
     folder = course.parents[1] / "downloads"
     for name, content in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -78,7 +76,7 @@ def of(kind, rows):
 
 
 def files(course):
-    """Return the text of each student, by the folders of the collected notebooks."""
+    """Return a dict from the folders of collected notebooks to their texts."""
     paths = (course / "submitted").glob("*/*/*.ipynb")
     notebooks = {path: nbformat.read(path, as_version=4) for path in paths}
     return {
@@ -108,9 +106,7 @@ def files(course):
     ],
 )
 @pytest.mark.parametrize("packing", ["zip", "loose"])
-def test_the_student_is_read_from_the_file_names_of_moodle_and_canvas(
-    entry, student, packing, course
-):
+def test_the_file_names_of_moodle_and_canvas_give_the_student(entry, student, packing, course):
     content = answered(course)
     given = {"ROB_2026_01_all.zip": packed({entry: content})} if packing == "zip" else {}
     rows = collected(course, given or {entry: content})
@@ -125,14 +121,14 @@ def test_the_student_is_read_from_the_file_names_of_moodle_and_canvas(
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
-def test_other_encodings_are_stored_in_utf8_and_reported(encoding, course):
+def test_notebooks_in_other_encodings_are_stored_as_utf8(encoding, course):
     content, name = answered(course, "ü"), moodle("A_1")
     rows = collected(course, {name: content.decode().encode(encoding)})
     assert of("collected", rows) == [(name, "a, ps1; it is now stored in UTF-8")]
     assert (course / "submitted/a/ps1/ps1.ipynb").read_bytes() == content
 
 
-def test_no_name_becomes_a_formula_in_a_spreadsheet(course):
+def test_names_never_become_formulas_in_a_spreadsheet(course):
     name = moodle("=cmd' -C calc'!A0_1")
     collected(course, {name: answered(course)})
     report = (course / "submitted" / "report.csv").read_text("utf-8-sig")
@@ -141,7 +137,7 @@ def test_no_name_becomes_a_formula_in_a_spreadsheet(course):
     assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
 
 
-def test_sets_are_recognised_by_cells_and_names(course):
+def test_each_notebook_is_assigned_to_its_problem_set(course):
     empty = nbformat.writes(new_notebook(cells=[new_markdown_cell("mine")])).encode()
     one, two = answered(course), answered(course, name="ps2")
     given = {
@@ -168,7 +164,7 @@ def test_sets_are_recognised_by_cells_and_names(course):
     assert files(course).keys() == wanted
 
 
-def test_a_name_in_undeclared_utf8_or_with_combining_marks_is_the_same_student(course):
+def test_different_encodings_of_a_name_give_one_student(course):
     content, plain = answered(course), moodle("Jörg Müller_1")
     undeclared = bytearray(packed({plain: content}))
     for mark, at in ((b"PK\x03\x04", 7), (b"PK\x01\x02", 9)):
@@ -180,7 +176,7 @@ def test_a_name_in_undeclared_utf8_or_with_combining_marks_is_the_same_student(c
     assert all("Jörg Müller" in what for _, what, _ in rows)
 
 
-def test_students_with_the_same_name_are_kept_apart_in_any_order(course):
+def test_students_with_the_same_name_are_kept_apart(course):
     collected(course, {moodle("Al Li_11"): answered(course, "first")})
     rows = collected(course, {moodle("Al Li_22"): answered(course, "second")})
     why = "2 students have this name, and now numbered folders; delete this one"
@@ -190,13 +186,13 @@ def test_students_with_the_same_name_are_kept_apart_in_any_order(course):
     assert found["al_li_22/ps1"] == "second"
 
 
-def test_a_student_has_one_id_in_all_sets_although_moodle_changes_the_numbers(course):
+def test_a_student_keeps_one_id_in_all_sets(course):
     two = answered(course, name="ps2")
     collected(course, {moodle("Al Li_11"): answered(course), moodle("Al Li_99", "ps2.ipynb"): two})
     assert files(course).keys() == {"al_li/ps1", "al_li/ps2"}
 
 
-def test_the_roster_gives_ids_and_shows_missing_students(course):
+def test_students_missing_from_the_roster_or_the_downloads_are_listed(course):
     roster = "id,first_name,last_name,email,lms_user_id\n"
     roster += "s1,Jörg,Müller,,\ns2,Eva,Maria Roth,,\ns3,Al,Li,,500\ns4,Bo,Ek,,\ns5,Al,O'Neil,,\n"
     (course / "students.csv").write_text(roster, "utf-8-sig")
@@ -209,7 +205,7 @@ def test_the_roster_gives_ids_and_shows_missing_students(course):
     assert of("not on the roster", rows) == [("new_one", "New One (8)")]
 
 
-def test_rosters_of_spreadsheets_are_read_and_others_are_refused(course):
+def test_rosters_saved_by_spreadsheets_are_read(course):
     roster = course / "students.csv"
     roster.write_text("id;first_name;last_name\ns1;Jörg;Müller\n", "utf-8")
     collected(course, {moodle("Müller Jörg_500"): answered(course)})
@@ -223,7 +219,7 @@ def test_rosters_of_spreadsheets_are_read_and_others_are_refused(course):
             collected(course, {})
 
 
-def test_the_file_to_submit_is_taken_from_the_zip_of_a_student(course):
+def test_the_file_to_submit_is_found_in_a_zip(course):
     inner = {
         "work/ps1.ipynb": answered(course, "work"),
         "ps1/to_submit/ps1.ipynb": answered(course, "to submit"),
@@ -242,7 +238,7 @@ def test_the_file_to_submit_is_taken_from_the_zip_of_a_student(course):
 @pytest.mark.parametrize(
     "inner", [moodle("Bob Bee_2"), "ps1_2026_11_final.ipynb", "img/plot_2026_11_20"]
 )
-def test_all_files_in_the_zip_of_a_student_belong_to_the_student(course, inner):
+def test_all_files_in_the_zip_of_a_student_get_the_same_student(course, inner):
     upload = packed({"ps1.ipynb": answered(course), inner: answered(course)}, NEWEST)
     theirs = {moodle("Ann Ay_1", "ps1.zip"): upload}
     for given in ({"all.zip": packed(theirs)}, theirs):
@@ -252,7 +248,7 @@ def test_all_files_in_the_zip_of_a_student_belong_to_the_student(course, inner):
         assert "2030" not in (course / "submitted/ann_ay/ps1/timestamp.txt").read_text()
 
 
-def test_unsafe_files_are_refused_and_the_others_are_collected(course):
+def test_only_unsafe_files_are_refused(course):
     good = answered(course)
     encrypted, broken = (bytearray(packed({moodle(who): good})) for who in ("E_5", "F_6"))
     encrypted[6] |= 1
@@ -276,7 +272,7 @@ def test_unsafe_files_are_refused_and_the_others_are_collected(course):
     }
     zips = [packed(entries), bytes(encrypted), bytes(broken), bomb, b"PK", b""]
     rows = collected(course, {f"{k}.zip": content for k, content in enumerate(zips)})
-    # a name with a path outside the folder is only read for the student
+    # this file name points outside the folder; only the student is read from it
     assert files(course).keys() == {f"{who}/ps1" for who in ("a", "b", "d", "good_one")}
     why = [reason for _, reason in of("refused", rows)]
     assert len(why) == 9
@@ -287,14 +283,14 @@ def test_unsafe_files_are_refused_and_the_others_are_collected(course):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a permission on Windows")
-def test_links_in_the_folder_are_not_followed(course):
+def test_symbolic_links_are_not_followed(course):
     folder = course.parents[1] / "downloads"
     (folder / "A_1_assignsubmission_file_ps1.ipynb").symlink_to(course / "source/ps1")
     rows = collected(course, {})
     assert of("refused", rows) == [("A_1_assignsubmission_file_ps1.ipynb", "it is a link")]
 
 
-def test_the_last_of_several_uploads_to_canvas_is_taken_whatever_its_date(course):
+def test_the_last_upload_to_canvas_counts(course):
     names = {"li_5_100_ps1.ipynb": LATER, "li_5_300_ps1-2.ipynb": DAY, "li_5_200_ps1-1.ipynb": DAY}
     zips = {f"{k}.zip": packed({k: answered(course, k)}, when) for k, when in names.items()}
     rows = collected(course, zips)
@@ -302,7 +298,7 @@ def test_the_last_of_several_uploads_to_canvas_is_taken_whatever_its_date(course
     assert len(of("duplicates", rows)) == 2
 
 
-def test_only_newer_downloads_replace_files_and_files_corrected_by_hand_are_kept(course):
+def test_only_newer_downloads_replace_collected_files(course):
     name, two = moodle("A_1"), answered(course, "", "ps2")
     first = {"a.zip": packed({name: answered(course, "new")}, LATER), "b_2_3_ps2.ipynb": two}
     assert len(of("collected", collected(course, first))) == 2
@@ -319,7 +315,7 @@ def test_only_newer_downloads_replace_files_and_files_corrected_by_hand_are_kept
     assert files(course)["a/ps1"] == "corrected by hand"
 
 
-def test_late_files_are_marked_by_canvas_or_dated_after_the_due_date(course):
+def test_late_files_are_reported(course):
     names = moodle("A_1"), "b_2_3_ps1.ipynb", "c_LATE_3_4_ps1.ipynb"
     entries = dict.fromkeys(names, answered(course))
     rows = collected(course, {"a.zip": packed(entries, LATER)}, datetime(2026, 12, 1, 23, 59))

@@ -1,4 +1,4 @@
-"""Code that replaces names of the tests is found; usual code of students is accepted."""
+"""Code that replaces names used by the tests is reported; ordinary code is not."""
 
 import pytest
 from nbformat.v4 import new_code_cell
@@ -13,7 +13,7 @@ LOCKED = [
 
 
 def found(source, locked=LOCKED):
-    """Return the remarks on a cell of a student below locked cells."""
+    """Return the remarks on a student's cell that follows locked cells."""
     marks = {"grade_id": "locked", "locked": True}
     cells = [new_code_cell(text, metadata={"nbgrader": marks}) for text in locked]
     return [(line, what) for _, line, what in find_in_cells([*cells, new_code_cell(source)])]
@@ -62,7 +62,7 @@ def found(source, locked=LOCKED):
         ("match 1:\n    case math: pass", "gives math another meaning"),
     ],
 )
-def test_code_that_replaces_names_of_the_tests_is_reported(source, what):
+def test_code_that_replaces_names_used_by_tests_is_reported(source, what):
     assert what in [said for _, said in found(source)]
 
 
@@ -92,21 +92,21 @@ def test_code_that_replaces_names_of_the_tests_is_reported(source, what):
         "f = " + "lambda: (a := " * 40 + "1" + ")" * 40,
     ],
 )
-def test_usual_code_is_accepted(source):
+def test_ordinary_code_is_accepted(source):
     assert found(source) == []
 
 
-def test_lines_are_reported_by_their_numbers_in_the_cell():
+def test_remarks_state_the_number_of_the_line_in_the_cell():
     assert found("\n\nx = 1\nnp.allclose = print") == [(4, "replaces np.allclose")]
     assert found("%%time\nx = 1\nnp.allclose = print") == [(3, "replaces np.allclose")]
 
 
-def test_students_may_import_the_same_module_in_another_way_than_the_locked_cells():
+def test_students_may_import_the_same_module_in_another_way():
     locked = ["import matplotlib.pyplot as plt\nimport math\nmath.tau = 6"]
     assert found("from matplotlib import pyplot as plt", locked) == []
     assert found("from json import tool as plt", locked)
 
 
-def test_the_time_for_long_code_is_not_quadratic():
+def test_long_code_is_checked_in_linear_time():
     """If the time were quadratic, this test would take years instead of a second."""
     assert found("%matplotlib" + " " * 10**6 + ";")

@@ -54,8 +54,8 @@ def square(x):
 ### BEGIN HIDDEN TESTS
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """
-# This answer prints more than a cell may print before its time limit begins, and then prints
-# slowly. Without the pause, only fast machines would fill the memory within the limit.
+# This answer exceeds the limit on output before its time limit begins, and then prints slowly.
+# Without the pause, only fast machines would fill the memory within the limit.
 LOUD = f"""
 import sys, time
 from IPython.display import HTML, display
@@ -79,7 +79,7 @@ while True:
 LOOP, DOUBLE = f"{begun()}\nwhile True: pass", "def square(x):\n    return 2 * x"
 HUGE, DIES = "x = bytearray(2 * 10**9)", "import os\nos._exit(1)"
 SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tiny set”"
-# Each row has a student, a change, answers, points (none if refused), and words of the remarks.
+# Each row has a student, a change, answers, points (none if refused), and parts of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
     (
@@ -104,7 +104,7 @@ FILES = [
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """Return a class that was graded in one run."""
+    """Return a course whose submissions were graded in one run."""
     template = make_template(tmp_path_factory.mktemp("template"))
     course = Class(tmp_path_factory.mktemp("a course"), template)
     with course.gradebook() as gradebook:
@@ -143,14 +143,14 @@ def test_each_submission_has_its_points_and_remarks(course, rows, student, point
         assert row["late"] == ("1.5 h" if student == "good one" else "")
 
 
-def test_tests_are_restored_before_grading(course):
+def test_changed_tests_are_restored_before_grading(course):
     notebook = nbformat.read(course.graded("tampers"), as_version=4)
     assert "BEGIN HIDDEN TESTS" in cell(notebook, "square-test").source
     assert cell(notebook, "half-test").metadata.nbgrader.points == 1
     assert cell(notebook, "half-test").cell_type == "code"
 
 
-def test_feedback_shows_points_and_failures_but_no_hidden_tests(course):
+def test_feedback_shows_no_hidden_tests(course):
     for path in (course.folder / "feedback").glob("*/ps0/ps0.html"):
         text = re.sub(r"\s", "", course.feedback(path.parents[1].name))
         assert not [line for line in HIDDEN if line in text], path
@@ -176,7 +176,7 @@ def test_feedback_shows_points_and_failures_but_no_hidden_tests(course):
 
 
 class Killed(ProcessPoolExecutor):
-    """A pool of workers; the worker of one student is killed at its start."""
+    """A pool of workers that kills one student's worker at its start."""
 
     def submit(self, work, name, student, *further):
         if student == "half right":
@@ -241,8 +241,7 @@ def test_grading_again_keeps_manual_scores_and_comments(again):
         assert gradebook.find_submission("ps0", "nosy").score == 2.5
 
 
-def test_students_who_were_not_graded_or_not_collected_are_in_the_table(again):
-    """A worker was killed, and a cell could not be stopped."""
+def test_the_table_lists_students_who_were_not_graded(again):
     remarks = {student: row["remarks"] for student, row in again.rows().items()}
     del remarks["good one"], remarks["nosy"]
     assert remarks == {
@@ -255,14 +254,13 @@ def test_students_who_were_not_graded_or_not_collected_are_in_the_table(again):
     }
 
 
-def test_alembic_is_found_if_the_environment_is_not_activated(monkeypatch):
-    """nbgrader calls alembic by its name."""
+def test_alembic_is_found_without_an_activated_environment(monkeypatch):
     monkeypatch.setenv("PATH", os.defpath)
     configure(Config())
     assert Path(shutil.which("alembic")).parent == Path(sys.executable).parent
 
 
-def test_sets_without_submissions_and_unknown_sets_are_refused(tmp_path):
+def test_unknown_sets_are_refused(tmp_path):
     write_tiny_set(tmp_path)
     with pytest.raises(ValueError, match="ps0: a submission in"):
         grade(["ps0"], tmp_path)
@@ -272,14 +270,13 @@ def test_sets_without_submissions_and_unknown_sets_are_refused(tmp_path):
         grade([], tmp_path)
 
 
-def test_the_commands_of_nbgrader_are_configured_in_the_same_way():
-    """The configuration that nbgrader's own commands read has all that grading needs."""
+def test_nbgrader_commands_use_the_same_configuration():
     wanted = Config()
     configure(wanted)
     assert read_config(ROOT / "notebooks" / "assignments") == wanted
 
 
-def test_grading_stops_if_the_sandbox_is_no_longer_available(tmp_path, monkeypatch):
+def test_grading_stops_if_the_sandbox_becomes_unavailable(tmp_path, monkeypatch):
     monkeypatch.setattr(sandbox, "missing", lambda: "it failed")
     with pytest.raises(Refused, match="the sandbox does not work any more: it failed"):
         grade_one("ps0", "ann", tmp_path, boxed=True)

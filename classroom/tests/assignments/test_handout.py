@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """Return a course folder, in a path with a space, with the tiny set and a file beside it."""
+    """Return a course folder with the tiny set and a data file; its path contains a space."""
     folder = tmp_path_factory.mktemp("a course") / "assignments"
     path = write_tiny_set(folder)
     (path.parent / "table.csv").write_text("1,2\n")
@@ -51,7 +51,7 @@ def test_the_handout_has_all_files_that_a_student_needs(course, unpacked):
     assert lines[-2:] == [f"./{name}" for name in wheels]
     assert all(f"\n{line} " in environment for line in lines[:-2])
     assert len(lines) == environment.count("==") - environment.count("== ") + 2
-    readme = (unpacked / "README.txt").read_bytes()  # plain text for every system
+    readme = (unpacked / "README.txt").read_bytes()  # readable as plain text on every system
     assert readme.count(b"\r\n") == readme.count(b"\n") > 20
     assert readme.decode("ascii").startswith("Problem set ps0")
 
@@ -66,7 +66,7 @@ def test_the_wheels_are_installed_from_the_unpacked_folder(unpacked, tmp_path):
     assert place.startswith(str(tmp_path))
 
 
-def test_the_same_handout_is_made_each_time(course):
+def test_the_handout_has_the_same_bytes_each_time(course):
     path = make_handout("ps0", course, ROOT)
     before = path.read_bytes()
     path.unlink()
@@ -74,7 +74,7 @@ def test_the_same_handout_is_made_each_time(course):
     assert [file.name for file in path.parent.iterdir()] == ["ps0.zip"]
 
 
-def test_a_private_set_replaces_the_set_of_the_course(tmp_path):
+def test_a_private_set_replaces_the_public_one(tmp_path):
     write_tiny_set(tmp_path)
     private = write_tiny_set(tmp_path / "other")
     private.write_text(private.read_text().replace("A tiny set", "My own set"))
@@ -104,7 +104,7 @@ def test_sets_that_reveal_solutions_or_hidden_tests_are_refused(tmp_path, at, ch
     assert not (tmp_path / "handouts").exists()
 
 
-def test_a_file_with_a_solution_and_a_second_notebook_are_refused(tmp_path):
+def test_data_files_with_solutions_are_refused(tmp_path):
     folder = write_tiny_set(tmp_path).parent
     (folder / "helper.py").write_text("def square(x):\n    return x * x\n")
     with pytest.raises(ValueError, match=r"helper\.py gives away"):
@@ -115,7 +115,7 @@ def test_a_file_with_a_solution_and_a_second_notebook_are_refused(tmp_path):
         release("ps0", tmp_path)
 
 
-def test_unknown_sets_and_folders_without_sets_are_refused(course, tmp_path, monkeypatch):
+def test_unknown_sets_are_refused(course, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"one of the problem sets is wanted \(ps0\), got ps9"):
         release("ps9", course)
     monkeypatch.chdir(tmp_path)
@@ -124,7 +124,7 @@ def test_unknown_sets_and_folders_without_sets_are_refused(course, tmp_path, mon
         main()
 
 
-def test_solutions_are_run_and_have_no_hidden_test_and_no_mark_scheme(course):
+def test_solutions_contain_no_hidden_test(course):
     path = make_solutions("ps0", course)
     assert path == course / "handouts" / "ps0-solutions.ipynb"
     notebook = nbformat.read(path, as_version=4)
@@ -136,7 +136,7 @@ def test_solutions_are_run_and_have_no_hidden_test_and_no_mark_scheme(course):
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
 
 
-def test_solutions_that_fail_are_not_written(tmp_path):
+def test_failing_solutions_are_not_written(tmp_path):
     path = write_tiny_set(tmp_path)
     path.write_text(path.read_text("utf-8").replace("return x * x", "return x"), "utf-8")
     with pytest.raises(CellExecutionError, match="times itself"):

@@ -1,4 +1,4 @@
-"""A problem accepts right answers, and gives hints for listed mistakes."""
+"""A problem accepts right answers and gives hints for known mistakes."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ DEGREES = f"{IN_RADIANS} There is a second mistake: sign"
         ("return undefined", "stops: NameError: name 'undefined' is not defined"),
     ],
 )
-def test_wrong_answers_get_a_hint_or_a_description(body, said):
+def test_wrong_answers_get_a_hint_or_a_description_of_the_error(body, said):
     before = [x.copy() for x, _ in DOUBLE.inputs]
     text = told(DOUBLE, f"import numpy as np\ndef answer(x, k):\n    {body}")
     assert text == said if said in ("half", "sign", DEGREES) else said in text

@@ -1,4 +1,4 @@
-"""A right sampler is almost never refused; a wrong one is refused with the reason."""
+"""Right samplers are almost never refused; wrong ones are refused with the reason."""
 
 from dataclasses import replace
 
@@ -31,9 +31,9 @@ def draws(law, n, rng):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
-    """The probabilities of refusal by Massart's bound add up to 1e-6 for every number of draws.
+    """For any number of draws, Massart's bounds on the probability of refusal add up to 1e-6.
 
-    The test uses 20 times as many draws, which would show a row that is not uniform.
+    With 20 times as many draws, the test would detect a row that is not uniform.
     """
     problem = Sampler(**LAWS[law], mistakes=())
     drawn = draws(law, 20 * problem.draws, np.random.default_rng(17))
@@ -56,7 +56,7 @@ def test_a_right_sampler_is_accepted_with_any_generator(name, capsys):
     assert capsys.readouterr().out == "The 4000 draws agree with the distribution that is wanted.\n"
 
 
-def test_a_sampler_may_have_its_own_generator():
+def test_a_sampler_may_use_its_own_generator():
     source = "import random\nrandom.seed(3)\ndef answer(rng): return random.random()"
     assert COIN.accepts(student(source))
 
@@ -93,20 +93,20 @@ def test_wrong_samplers_are_refused_with_the_reason(body, said):
         ("1 / 0", "Your function stops: ZeroDivisionError"),
     ],
 )
-def test_an_error_late_in_the_run_is_found(late, said):
+def test_an_error_after_many_draws_is_reported(late, said):
     counted = "calls = []\ndef answer(rng):\n    calls.append(0)\n    "
     source = f"{counted}return rng.random() if len(calls) < 3000 else {late}"
     assert told(COIN, source).startswith(said)
 
 
 @pytest.mark.parametrize("step", [1, -1])
-def test_the_nearer_of_two_similar_mistakes_gets_its_hint(step):
+def test_similar_mistakes_get_their_own_hints(step):
     near = [Mistake("near", [[quantiles(np.linspace(0, 1, 4001) ** 2.02)]]), *COIN.mistakes]
     alike = replace(COIN, mistakes=near[::step], draws=40_000)
     assert told(alike, "def answer(rng): return rng.random() ** 1.98", 5) == "squared"
 
 
-def test_draws_that_are_used_twice_are_detected():
+def test_repeated_draws_are_detected():
     source = """
         import numpy as np
         last = []
@@ -137,7 +137,7 @@ def test_draws_that_are_used_twice_are_detected():
         ("rotation", lambda R: R * [1, 1, 0.5], "A draw is not a rotation. If you reflect"),
     ],
 )
-def test_draws_that_are_not_allowed_are_described(law, change, said):
+def test_invalid_draws_are_described(law, change, said):
     right = draws(law, 1000, np.random.default_rng(2))
     assert LAWS[law]["fault"](change(right)).startswith(said)
     assert LAWS[law]["fault"](right) == ""

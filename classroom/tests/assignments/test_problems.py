@@ -1,4 +1,4 @@
-"""The problem sets: references pass, empty answers fail, and each wrong answer gets its hint."""
+"""Test the problem sets: reference answers pass, and wrong answers get their hints."""
 
 import ast
 import contextlib
@@ -34,7 +34,6 @@ sets = pytest.mark.parametrize("name", SETS)
 
 
 def cells(name):
-    """Return the cells of a set by their grade_ids."""
     return {cell.metadata.nbgrader.grade_id: cell for cell in SETS[name].cells}
 
 
@@ -44,7 +43,7 @@ def compiled(text):
 
 
 def namespace(name, *further):
-    """Return the names in the notebook after its answers and further cells."""
+    """Return the variables of the notebook after its answers and `further` code."""
     sources = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
     answers = [text for key, text in sources.items() if key.endswith("-answer")]
     space = {"__name__": "__main__"}
@@ -55,7 +54,7 @@ def namespace(name, *further):
 
 
 def head(name, slug):
-    """Return the first lines of an answer, without the solution, and the name of its function."""
+    """Return an answer's code above the solution, and the name of its function."""
     text = re.split(r" *### BEGIN SOLUTION", cells(name)[f"{slug}-answer"].source)[0]
     return text, re.search(r"def (\w+)\(", text)[1]
 
@@ -72,8 +71,8 @@ def no_figure_stays():
 
 
 @problems
-def test_the_reference_answer_passes_even_as_lists_and_the_empty_answer_fails(name, slug):
-    """The type of an answer that passes the visible tests must not make the hidden ones fail."""
+def test_the_reference_answer_passes_even_as_lists(name, slug):
+    """If lists pass the visible tests, they must pass the hidden tests."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
     with pytest.raises(NotYet, match="Nothing is written here yet"):
@@ -87,9 +86,9 @@ def test_the_reference_answer_passes_even_as_lists_and_the_empty_answer_fails(na
 
 @problems
 def test_wrong_answers_get_their_hints(name, slug):
-    """The first wrong sampler makes as many draws as a sampler of a student; they take a second.
+    """The first wrong sampler makes as many draws as a student's, which takes a second.
 
-    The others make fewer draws, in which errors are harder to see and to tell apart.
+    The others make fewer draws, so their errors are harder to detect and to distinguish.
     """
     start, function = head(name, slug)
     judge, seed = known(name, slug), [5] if "law" in TABLES[name][slug] else []
@@ -114,7 +113,7 @@ def place(numbers, form="g"):
 
 
 def examples():
-    """Return the examples of the questions, as the reference answers compute them."""
+    """Return the examples in the questions, computed by the reference answers."""
     one, two = namespace("ps1"), namespace("ps2")
     plan = [(np.array([1, 0, 0]), 3), (np.array([0, 0, 0.5]), 2)]
     poses = one["run_plan"](np.zeros(3), plan)
@@ -150,7 +149,7 @@ def test_the_examples_in_the_questions_are_right():
 
 
 @sets
-def test_a_set_has_all_its_parts(name):
+def test_each_set_is_complete(name):
     notebook = SETS[name]
     texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
     numbers = re.findall(r"^## Problem (\d) · .* \(\d+ points\)$", "\n".join(texts), re.MULTILINE)
@@ -164,7 +163,7 @@ def test_a_set_has_all_its_parts(name):
 
 
 @sets
-def test_the_points_of_cells_headings_and_the_set_agree(name):
+def test_the_points_of_the_problems_add_up(name):
     announced, given = {}, {}
     for cell in SETS[name].cells:
         points = cell.metadata.nbgrader.get("points", 0)
@@ -181,7 +180,7 @@ def test_the_points_of_cells_headings_and_the_set_agree(name):
 
 
 @sets
-def test_every_cell_has_its_own_name_and_its_place_in_the_grading(name):
+def test_the_names_of_cells_are_unique(name):
     marks = [cell.metadata.nbgrader for cell in SETS[name].cells]
     assert len({mark.grade_id for mark in marks}) == len(marks)
     for mark in marks:
@@ -192,8 +191,8 @@ def test_every_cell_has_its_own_name_and_its_place_in_the_grading(name):
 
 
 @problems
-def test_test_cells_end_with_assertions_and_hidden_tests_need_no_package(name, slug):
-    """At the end of a cell, nbgrader would take the value of a bare expression for the points."""
+def test_each_test_cell_ends_with_an_assertion(name, slug):
+    """nbgrader would use the value of a final expression as the points."""
     source = cells(name)[f"{slug}-test"].source
     visible, hidden, end = re.split(r"### (?:BEGIN|END) HIDDEN TESTS", source)
     for text in (source, visible + end):
@@ -207,7 +206,7 @@ def test_test_cells_end_with_assertions_and_hidden_tests_need_no_package(name, s
 
 
 @problems
-def test_hidden_tests_refuse_an_answer_that_only_knows_the_visible_inputs(name, slug):
+def test_hidden_tests_refuse_answers_memorised_for_the_visible_inputs(name, slug):
     if "law" in TABLES[name][slug]:
         return
     hidden = cells(name)[f"{slug}-test"].source.partition("### BEGIN HIDDEN TESTS")[2]

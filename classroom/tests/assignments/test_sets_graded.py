@@ -1,4 +1,4 @@
-"""The problem sets handed out, handed in and graded, as students and teachers see them."""
+"""Hand out, hand in and grade the problem sets, as students and teachers do."""
 
 import base64
 import csv
@@ -34,7 +34,7 @@ def regions(name, kinds):
 
 
 def points(name):
-    """Return the points of the cells with tests, and of the answers in words."""
+    """Return two dicts of points: for cells with tests, and for answers in words."""
     marks = [cell.metadata.nbgrader for cell in SETS[name].cells]
     graded = {mark.grade_id: mark.points for mark in marks if mark.grade}
     tests = {key: value for key, value in graded.items() if key.endswith("-test")}
@@ -42,7 +42,7 @@ def points(name):
 
 
 def wrong(grade_id, source):
-    """Return a wrong answer of the first set."""
+    """Return a wrong answer to a problem of the first set."""
     slug, table = grade_id.removesuffix("-answer"), TABLES[FIRST]
     if slug not in table:
         return source
@@ -53,7 +53,7 @@ def wrong(grade_id, source):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """Return a course in which two sets were graded; the first also with wrong and no answers.
+    """Return a course with two graded sets; the first also has wrong and empty submissions.
 
     A different student solves each set, so that all can be graded in one run.
     """
@@ -84,7 +84,7 @@ def row(course, name, student):
 
 
 @pytest.mark.parametrize("name", [FIRST, LAST])
-def test_the_reference_gets_all_points_and_the_release_is_the_one_of_nbgrader(course, name):
+def test_the_reference_gets_all_points(course, name):
     """For the other sets, test_problems.py checks that the reference passes."""
     tests, words = points(name)
     student = f"solved {name}"
@@ -102,8 +102,8 @@ def test_the_reference_gets_all_points_and_the_release_is_the_one_of_nbgrader(co
     assert made == release(name, course)[f"{name}.ipynb"]
 
 
-def test_wrong_answers_get_hints_and_no_points_and_feedback_shows_no_hidden_lines(course):
-    """For the other sets, test_problems.py checks that their tests fail, and how."""
+def test_wrong_answers_get_hints_but_no_points(course):
+    """For the other sets, test_problems.py checks the hints."""
     untouched = row(course, FIRST, "untouched")
     assert float(untouched["total"]) == float(untouched["automatic"]) == 0
     assert (untouched["by hand"], untouched["remarks"]) == ("", "")
@@ -120,7 +120,7 @@ def test_wrong_answers_get_hints_and_no_points_and_feedback_shows_no_hidden_line
 
 
 def files_in(content, place=""):
-    """Yield every file of a zip, and of the zips and wheels in it."""
+    """Yield every file in a zip, and in the zips and wheels inside it."""
     with ZipFile(io.BytesIO(content)) as archive:
         for name in archive.namelist():
             inner = archive.read(name)

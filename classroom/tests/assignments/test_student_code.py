@@ -1,4 +1,4 @@
-"""A student's function is called; borrowed functions and errors are reported."""
+"""Test the call of a student's function; errors and forbidden library functions are reported."""
 
 from textwrap import dedent
 
@@ -8,7 +8,7 @@ from rbclassroom.assignments.student_code import NotYet, call_student
 
 
 def student(source, name="answer"):
-    """Return a function as a notebook defines it."""
+    """Return a function that is defined as in a notebook."""
     space = {"__name__": "__main__"}
     exec(compile(dedent(source), "<cell>", "exec"), space)
     return space[name]
@@ -38,20 +38,20 @@ BORROWED = {
 
 
 @pytest.mark.parametrize("source", BORROWED.values(), ids=BORROWED)
-def test_borrowed_functions_of_libraries_are_reported(source):
+def test_library_functions_that_solve_the_problem_are_reported(source):
     library = "scipy" if "scipy" in source else r"rb(course|classroom)\."
     with pytest.raises(NotYet, match=rf"Your function uses {library}.*Write it yourself"):
         call_student(student(source), ([0.1, 0.2, 0.3],), ())
 
 
 @pytest.mark.parametrize("name", ["under a name", "through its module", "by way of a helper"])
-def test_only_the_function_that_the_problem_allows_may_be_used(name):
+def test_an_allowed_library_function_may_be_used(name):
     call_student(student(BORROWED[name]), ([0.1, 0.2, 0.3],), ("exp_so3",))
     with pytest.raises(NotYet, match=r"rbcourse\.exp_so3"):
         call_student(student(BORROWED[name]), ([0.1, 0, 0],), ("log_so3",))
 
 
-def test_numpy_python_and_printing_are_allowed(capsys):
+def test_numpy_and_the_standard_library_are_allowed(capsys):
     source = """
         import math
         import numpy as np
@@ -83,14 +83,14 @@ def test_the_libraries_that_matplotlib_loads_are_allowed():
     call_student(student(source), (), ())
 
 
-def test_the_error_of_a_function_is_reported():
+def test_errors_in_a_function_are_reported():
     with pytest.raises(NotYet, match=r"stops.*ZeroDivisionError: division by zero"):
         call_student(student("def answer(x): return 1 / 0"), (1,), ())
     with pytest.raises(NotYet, match="stops: TypeError: 'float' object is not callable"):
         call_student(1.5, (1,), ())
 
 
-def test_a_notebook_shows_only_the_hint_in_lines_that_fit():
+def test_a_notebook_shows_the_hint_in_short_lines():
     lines = NotYet("a long hint " * 30)._render_traceback_()
     assert max(map(len, lines)) <= 80
     assert "\n".join(lines).split() == ["a", "long", "hint"] * 30

@@ -1,4 +1,4 @@
-"""The sources of the book, and the folder to which it is written."""
+"""Test the sources of the book and the folder of the finished book."""
 
 import json
 import re
@@ -22,7 +22,7 @@ FIGURES = ROOT / "figures"
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Return the folders of the sources, with code pages for only two files."""
+    """Return the folder with the book's sources; only two files have code pages."""
     folder = tmp_path_factory.mktemp("book")
     with pytest.MonkeyPatch.context() as patch:
         code = ["rbcourse/so3.py", "tests/test_so3.py"]
@@ -37,7 +37,7 @@ def source(written):
     return lambda page: (written / "sources" / page).read_text("utf-8")
 
 
-def test_the_sources_have_all_parts(written):
+def test_the_sources_of_the_book_are_complete(written):
     sources, extra = (
         {path.relative_to(written / place).as_posix() for path in (written / place).rglob("*")}
         for place in ("sources", "extra")
@@ -57,7 +57,7 @@ def test_the_sources_have_all_parts(written):
     assert "figures/explorers" not in extra
 
 
-def test_problem_sets_come_without_solutions(source):
+def test_problem_sets_have_no_solutions(source):
     original = (ROOT / "notebooks/assignments/source/ps1/ps1.ipynb").read_text("utf-8")
     assert "BEGIN SOLUTION" in original
     for number in range(1, 8):
@@ -68,7 +68,7 @@ def test_problem_sets_come_without_solutions(source):
         assert not LEFTOVER.search(text)
 
 
-def test_the_course_is_included_without_outputs_and_without_notebooks_for_teachers(written, source):
+def test_the_course_is_included_without_outputs(written, source):
     with ZipFile(written / "extra/course.zip") as archive:
         names = {name.removeprefix("rbcourse/") for name in archive.namelist()}
         lesson = json.loads(archive.read("rbcourse/notebooks/06_geodesics.ipynb"))
@@ -99,14 +99,14 @@ def test_stray_files_are_not_included(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["https://github.com/us/course", "us", "us/a b"])
-def test_a_repository_must_be_an_owner_and_a_name(name, monkeypatch, capsys):
+def test_a_repository_is_given_as_owner_and_name(name, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["build", "--repository", name])
     with pytest.raises(SystemExit):
         build.main()
     assert "owner/name is wanted" in capsys.readouterr().err
 
 
-def test_a_folder_that_is_not_a_book_is_left_alone(tmp_path):
+def test_a_folder_that_is_not_a_book_is_not_changed(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(ValueError, match="is not a book made by this command"):
         build.build(ROOT, tmp_path)
@@ -114,7 +114,7 @@ def test_a_folder_that_is_not_a_book_is_left_alone(tmp_path):
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_the_page_of_a_lesson_has_all_of_it_except_its_run_sheet(path, source):
+def test_the_page_of_a_lesson_omits_only_the_run_sheet(path, source):
     stored = nbformat.read(path, as_version=4).cells
     cells = nbformat.reads(source(f"lessons/{path.name}"), as_version=4).cells
     code, page_code = (
@@ -140,7 +140,7 @@ def test_the_page_of_a_lesson_has_all_of_it_except_its_run_sheet(path, source):
         assert stored[-1].source.split()[-1] in sheet
 
 
-def test_mentions_of_lessons_are_links_and_explorers_are_interactive(source):
+def test_mentions_of_lessons_become_links(source):
     text = source("lessons/06_geodesics.ipynb")
     assert "([lesson 3](03_rotations_in_space.ipynb))" in text
     assert "Go on to [lesson 1](01_plane.ipynb)" in source("lessons/00_start_here.ipynb")
@@ -159,7 +159,7 @@ def test_the_ledger_has_a_row_for_every_key(source):
     assert "code/tests/test_projected_line.html#" in cells[3]
     assert "lessons/06_geodesics.html#s6" in cells[4]
     assert "figures.html#lesson06_chord" in cells[5]
-    # the entries for figures of the texts list their own pictures
+    # these keys name figures of the texts, so the ledger lists their pictures
     for key, names in {
         "bk-fig-4": ["paper_fig4a", "paper_fig4b", "paper_fig4c"],
         "bk-fig-5": ["paper_fig5a", "paper_fig5b"],
@@ -170,7 +170,6 @@ def test_the_ledger_has_a_row_for_every_key(source):
 
 
 def row(page, anchor):
-    """Return the cells of a row of the ledger."""
     cells = page[page.index(f'id="{anchor}"') :].split("\n* - ")[0]
     return re.split(r"\n  - ", cells)
 
@@ -187,7 +186,7 @@ def test_the_gallery_has_all_figures_with_their_files(source):
     assert '<a href="lessons/06_geodesics.html#s1">' in page[places[0] : page.index("Figure 2a")]
 
 
-def test_works_are_listed_once_with_all_their_lessons(source):
+def test_each_work_is_listed_once_with_its_lessons(source):
     listed = dict(re.findall(r"^- (.*?) Lesson (<a.*)\.$", source("references.md"), re.MULTILINE))
     cited = defaultdict(str)
     for path in LESSONS:
@@ -209,9 +208,7 @@ def test_answers_to_questions_are_folded(source):
     )
 
 
-def test_pages_of_the_package_begin_with_functions_and_maintainers_modules_have_none(
-    source, written
-):
+def test_pages_of_the_package_begin_with_a_list_of_functions(source, written):
     page = source("package/index.md")
     assert "| [so3](so3.rst) | " in page
     assert "```{toctree}\n:hidden:\n\nso3\nquaternion\n" in page

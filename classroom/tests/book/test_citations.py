@@ -1,4 +1,4 @@
-"""Citations as links, from the keys of works."""
+"""Test that keys of works become links."""
 
 import re
 from pathlib import Path
@@ -26,7 +26,7 @@ def test_a_work_is_cited_by_its_authors_and_year():
         names("@book{Nobody2000,\n year = {2000}\n}")
 
 
-def test_a_citation_links_to_the_list_of_its_page_or_else_to_the_page_of_references():
+def test_a_citation_links_to_the_references_on_its_page():
     known = {"Arvo1992": "Arvo (1992)", "Miles1965": "Miles (1965)"}
     text = "As in [Arvo1992; Miles1965].\n\n- [Arvo1992] James Arvo, *Fast*."
     assert listed(text) == {"Arvo1992"}

@@ -1,4 +1,4 @@
-"""Lessons as pages: folded, removed and added parts."""
+"""Test the pages of lessons: which parts are folded, removed or added."""
 
 import base64
 import io
@@ -20,7 +20,7 @@ def markdown(*texts):
 OPENING = '<details class="answer" id="answer-to-{0}"><summary>Answer to {1}</summary>'
 
 
-def test_an_answer_is_folded_up_to_the_next_heading_or_the_end():
+def test_an_answer_is_folded_until_the_next_heading():
     cells = markdown("### Poll 1", "### Answer to poll 1\n\n**B**", "Why", "## 2")
     cells.insert(2, new_code_cell("1 + 1"))
     cells += markdown("### Answer to exercise 1", "A", "### Answer to exercise 2")
@@ -34,7 +34,7 @@ def test_an_answer_is_folded_up_to_the_next_heading_or_the_end():
     ]
 
 
-def test_pictures_become_files_and_figures_are_not_written_twice(tmp_path):
+def test_pictures_become_files(tmp_path):
     contents, shown = [], []
     for size in ((3, 2), (4, 5)):
         content = io.BytesIO()
@@ -52,7 +52,7 @@ def test_pictures_become_files_and_figures_are_not_written_twice(tmp_path):
     assert "base64" not in found
 
 
-def test_interactive_pictures_share_their_scripts_and_equal_ones_share_their_states(tmp_path):
+def test_interactive_pictures_share_their_scripts(tmp_path):
     root = Path(__file__).parents[3]
     cube, arm = (living(name, root) for name in ("cube", "arm"))
     found = lessons.with_script_files(cube + arm + cube, tmp_path, "there")
@@ -73,7 +73,7 @@ def test_interactive_pictures_share_their_scripts_and_equal_ones_share_their_sta
     assert f'"{sources[1].removesuffix(".js")}"</script>' in found
 
 
-def test_a_caption_links_to_its_files_and_a_still_to_its_picture():
+def test_a_caption_links_to_its_files():
     small = "<figcaption>A turn. <small>turn.png, .csv</small></figcaption></figure>"
     image = '<img width="3" src="../figures/turn.png"/>'
     linked = '<small><a href="../figures/turn.png">turn.png</a>, '
@@ -100,7 +100,7 @@ def test_the_figures_of_a_lesson_are_listed_with_their_sections():
 
 
 @pytest.mark.parametrize("repository", ["", "us/course"])
-def test_a_lesson_can_be_downloaded_and_can_be_run_if_a_repository_is_given(repository):
+def test_a_lesson_page_offers_a_download(repository):
     ran = new_code_cell("1", outputs=[new_output("stream", text="1")])
     notebook = new_notebook(cells=[*markdown("# T\n\ntext"), ran])
     lessons.add_buttons(notebook, "01_plane.ipynb", repository)
@@ -113,7 +113,7 @@ def test_a_lesson_can_be_downloaded_and_can_be_run_if_a_repository_is_given(repo
     assert lessons.without_outputs(notebook).cells[1].outputs == []
 
 
-def test_a_wide_still_is_cut_between_its_panels_and_other_stills_are_not_cut():
+def test_wide_stills_are_cut_only_between_their_panels():
     def still(*panels, size=(900, 400)):
         shown = Image.new("RGB", size, "white")
         for left, right in panels:
@@ -128,7 +128,7 @@ def test_a_wide_still_is_cut_between_its_panels_and_other_stills_are_not_cut():
     assert lessons.cuts_of(still((10, 430), (470, 690), size=(700, 400))) == []
 
 
-def test_imports_come_last_and_all_code_except_answers_to_exercises_is_folded():
+def test_code_is_folded_except_in_answers_to_exercises():
     shown = [new_output("stream", text="2")]
     cells = markdown("# A", "## 1", "### Answer to poll 1", "### Answer to exercise 1", "## 2")
     cells.insert(1, new_code_cell("import numpy as np"))

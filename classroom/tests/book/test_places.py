@@ -10,7 +10,7 @@ def test_each_key_has_its_own_anchor():
     assert anchor("BK 1") != anchor("BK (1)")
 
 
-def test_only_keys_in_a_text_become_links_to_the_ledger():
+def test_only_keys_in_running_text_become_links():
     assert with_keys("<small>BK 6.1, BK (16)</small>", "lessons/06_geodesics.ipynb") == (
         '<small><a href="../ledger.html#bk-6-1">BK 6.1</a>, '
         '<a href="../ledger.html#bk-eq-16">BK (16)</a></small>'
@@ -36,7 +36,7 @@ def test_links_between_files_become_links_between_pages():
         assert relinked(text, *place) == wanted
 
 
-def test_modules_with_a_page_have_a_source():
+def test_each_module_finds_the_source_of_its_page():
     for module in ("draw.save", "surveys.atlas", "optimum"):
         assert source_of(file_of(module)) == f"package/{module}.rst"
     assert full_name("draw.save") == "rbcourse.draw.save"

@@ -1,4 +1,4 @@
-"""Polls of the book: each option has its own line."""
+"""Polls in the book: each option has its own explanation."""
 
 import re
 from pathlib import Path
@@ -21,7 +21,7 @@ OPTION = re.compile(
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_each_option_has_its_own_line_and_the_right_one_agrees_with_the_slides(
+def test_each_poll_option_has_its_own_explanation(
     path,
 ):
     verdicts = {slide.poll: slide for slide in deck_of(path).shown if slide.kind == "verdict"}
@@ -43,7 +43,7 @@ def test_each_option_has_its_own_line_and_the_right_one_agrees_with_the_slides(
             assert not any(f"**{other}**" in line for other in others), line
 
 
-def test_a_poll_whose_answer_leaves_an_option_out_is_an_error():
+def test_an_answer_that_omits_a_poll_option_is_an_error():
     question = "### Poll 2\n\nWhich?\n\n- **A** · one\n- **B** · two"
     for answer, match in (
         ("It is **A**.", "Poll 2: the answer does not explain B"),

@@ -1,4 +1,4 @@
-"""The modules, code and tests that the pages about the package show."""
+"""Test which modules, code and tests the pages about the package show."""
 
 import ast
 import html
@@ -10,7 +10,7 @@ from rbclassroom.book import reference
 ROOT = Path(__file__).parents[3]
 
 
-def test_every_public_module_has_a_page_except_those_for_maintainers():
+def test_only_modules_for_maintainers_have_no_page():
     packages = ROOT / "rbcourse", ROOT / "classroom/rbclassroom"
     paths = {path.relative_to(package) for package in packages for path in package.rglob("*.py")}
     names = {".".join(path.with_suffix("").parts) for path in paths if path.stem[0] != "_"}
@@ -25,7 +25,7 @@ def test_every_public_module_has_a_page_except_those_for_maintainers():
     assert not any(name.startswith("classroom/tests/assignments") for name in shown)
 
 
-def test_the_tests_listed_for_a_function_are_those_that_use_it():
+def test_only_tests_that_use_a_function_are_listed_for_it():
     named = reference.naming(ROOT)
     for name, home in {"so3.hat_so3": "test_so3.py", "draw.save.save_figure": "draw/test_"}.items():
         found = reference.tests_of(name, named)
@@ -54,7 +54,7 @@ def test_a_test_is_listed_for_the_functions_that_it_uses(tmp_path):
     assert not any("split" in name or "vee" in name for name in found)
 
 
-def test_code_has_an_anchor_for_each_definition_and_is_complete():
+def test_a_page_of_code_has_an_anchor_for_each_definition():
     source = (ROOT / "rbcourse/so3.py").read_text("utf-8")
     page = reference.coloured(source)
     names = [node.name for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]

@@ -1,4 +1,4 @@
-"""A headless Chromium for each worker, and a JupyterLab for the tests that need one."""
+"""Fixtures: a headless Chromium for each worker, and a JupyterLab where a test needs it."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
-PATIENCE = 600_000  # milliseconds; this is long enough for a slow machine
+PATIENCE = 600_000  # in milliseconds, enough for a slow machine
 QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
 
@@ -32,7 +32,7 @@ def pytest_sessionstart(session):
 
 @pytest.fixture(scope="session")
 def context():
-    """Return the browser context that the pages of a worker share, with its cache."""
+    """Return the browser context that all pages of a worker share, to use its cache."""
     expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         path = os.environ["CHROMIUM"]
@@ -45,7 +45,7 @@ def context():
 
 @pytest.fixture(scope="session")
 def home(tmp_path_factory):
-    """Return the course folder in a new home directory, with copies of the lessons, and the
+    """Return the course folder, in a new home directory with copies of the lessons, and the
     environment variables."""
     home = tmp_path_factory.mktemp("home")
     kept = ("PATH", "SYSTEMROOT", "LANG")
@@ -61,7 +61,7 @@ def home(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def lab(home):
-    """Return a function ``lab(path)``, which gives the address of a path in JupyterLab, with the
+    """Return a function ``lab(path)`` that gives the JupyterLab address of a path, with the
     token."""
     course, env = home
     words = ["jupyterlab", "--no-browser", "--ServerApp.port=0", "--expose-app-in-browser"]
@@ -83,9 +83,9 @@ def page(context):
 
 @pytest.fixture
 def timed(context):
-    """Return a page whose clock the test controls, in a context of its own.
+    """Return a page with a clock that the test controls.
 
-    Playwright sets the clock of all pages of a context, also of later ones.
+    It has its own context, because Playwright sets the clock of a whole context.
     """
     own = context.browser.new_context()
     own.set_default_timeout(PATIENCE)

@@ -1,4 +1,4 @@
-// faults of all slides with all steps: what is cut, text that is too small, thin slides
+// Return the faults of all slides (cut parts, small text), and the numbers of slides with little text.
 async () => {
   const faults = [], thin = [], sections = [...document.querySelectorAll(".slides section section")];
   const frame = () => new Promise(requestAnimationFrame);
@@ -20,7 +20,7 @@ async () => {
       const { left, right, bottom } = box(part), margin = part.parentElement.dataset.crop ? 1e9 : 3 * scale;
       return seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin);
     });
-    for (let wait = 0; wait < 120 && cut().length; wait++) await frame();  // a living picture gets its size late
+    for (let wait = 0; wait < 120 && cut().length; wait++) await frame();  // an interactive picture gets its size late
     for (const part of cut()) say(`picture cut: ${part.tagName}`);
     const texts = document.createTreeWalker(section, NodeFilter.SHOW_TEXT);
     while (texts.nextNode()) {

@@ -1,4 +1,4 @@
-// What is wrong with the page as it is laid out now: a list of texts.
+// Return a list of faults in the layout of the page.
 () => {
   const faults = [], content = document.querySelector(".content"), page = document.documentElement;
   const shown = (element) => element.checkVisibility({ visibilityProperty: true }) && element.getClientRects().length;

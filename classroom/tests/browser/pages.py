@@ -7,7 +7,7 @@ from pixels import shown
 from playwright.sync_api import expect
 
 IDLE = re.compile(r"\| Idle$")
-# A function of the page that returns the faults of its pictures and players.
+# A JavaScript function that returns the faults of the pictures and players on a page.
 SEEN = """() => {
   const faults = [], parts = ":is(.jp-Cell figure, .rbcourse-explorer) :is(img, canvas)";
   for (const picture of document.querySelectorAll(parts)) {
@@ -43,7 +43,7 @@ def watched(context):
     # JupyterLab shows why it cannot save, and then throws this error
     meant = "is an original, and is not saved"
     page.on("pageerror", lambda error: meant in str(error) or faults.append(f"error {error}"))
-    # JupyterLab gets a 403 for an original, which cannot be saved. Widgets report that they cannot
+    # JupyterLab gets status 403 when it tries to save an original. Widgets report that they cannot
     # send the values of their sliders to a kernel that has ended.
     known = re.compile("^(?!error)|403|Could not send widget sync message")
     page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
@@ -68,17 +68,17 @@ def wait_for(explorer):
     """Wait until an explorer has its picture and its numbers; return it."""
     explorer.locator(".widget-readout", has_text=re.compile(r"\d")).last.wait_for()
     explorer.locator("table").wait_for()
-    explorer.get_by_role("img").wait_for()  # a canvas has this role after it is drawn
+    explorer.get_by_role("img").wait_for()  # a canvas gets this role once it is drawn
     return explorer
 
 
 def centre(explorer):
-    """Bring an explorer to the middle of the screen."""
+    """Scroll an explorer to the middle of the screen."""
     explorer.evaluate("(explorer) => explorer.scrollIntoView({ block: 'center' })")
 
 
 def move_every_control(explorer):
-    """Move each slider by key and by mouse, and choose options by both; time is moved first.
+    """Move each slider and choose each option by keys and by mouse; move the time first.
 
     The numbers must change immediately; the picture and the text may follow later.
     """

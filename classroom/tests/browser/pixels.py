@@ -8,7 +8,7 @@ from PIL import Image
 
 
 def pixels(png):
-    """Return a PNG as numbers, shape (rows, columns, 3)."""
+    """Return the pixels of a PNG, shape (rows, columns, 3)."""
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
 
 
@@ -18,9 +18,9 @@ def shown(canvas):
 
 
 def check_alike(drawn, want, background):
-    """Check that under 1 % of all pixels, and at most half of the moving ones, differ by over 64.
+    """Check that few pixels differ by over 64: under 1 % of all, at most half of the moving ones.
 
-    An empty canvas would pass the first condition alone, since thin lines cover little.
+    Because thin lines cover little, an empty canvas would pass the first condition.
     """
     drawn, want, background = map(pixels, (drawn, want, background))
     assert drawn.shape == want.shape == background.shape

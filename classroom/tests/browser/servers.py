@@ -11,8 +11,7 @@ import psutil
 
 @contextmanager
 def serving(words, folder, env, pattern):
-    """Run a Python module that prints an address; yield the match, and print the module's
-    output."""
+    """Run a Python module that prints an address; yield the match of this address."""
     words = [sys.executable, "-m", *words]
     output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
     lines = []
@@ -31,11 +30,11 @@ def serving(words, folder, env, pattern):
             _end(job)
             if rest.ident:
                 rest.join()
-            print("".join(lines)[-5000:])  # shown if a test fails
+            print("".join(lines)[-5000:])  # pytest shows this text if a test fails
 
 
 def _end(job):
-    """End a program and all processes that it has started, at the latest after a minute."""
+    """End a program and all processes that it started, within a minute."""
     family = [psutil.Process(job.pid)] if job.poll() is None else []
     family += [child for parent in family for child in parent.children(recursive=True)]
     for process in family:

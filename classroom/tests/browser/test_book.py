@@ -1,4 +1,4 @@
-"""The book as a reader opens it, from files, without a server and without a network."""
+"""Test the book as a reader opens it: from files, without a server or network."""
 
 import posixpath
 import re
@@ -30,7 +30,7 @@ KINDS = [
 
 
 class Page(HTMLParser):
-    """The anchors of a page, its links, the files that it loads, its formulas, and its faults."""
+    """A parser that collects the anchors, links, loaded files, formulas and faults of a page."""
 
     def __init__(self, name):
         super().__init__()
@@ -110,7 +110,7 @@ def test_the_book_is_small():
     assert live < 45e6
 
 
-def test_the_book_is_the_same_each_time_also_without_python_in_its_pages(tmp_path):
+def test_the_book_has_the_same_bytes_each_time(tmp_path):
     again = tmp_path / "book"
     code = f"from rbclassroom.book.build import *; build(Path(), Path({str(again)!r}))"
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
@@ -118,7 +118,7 @@ def test_the_book_is_the_same_each_time_also_without_python_in_its_pages(tmp_pat
     live = re.compile(rb' tag_try-[\w-]+|\s*<[^>]*"\.\./_static/live/[^>]*>(?:</script>)?')
     there = {path.relative_to(BOOK) for path in BOOK.rglob("*") if path.is_file()}
     assert files == {path for path in there if not path.is_relative_to("_static/live")}
-    # The text above a problem set differs, and so do the words that the search indexes.
+    # Two differences are expected: the text above a problem set, and the search index.
     apart = {Path(f"problems/ps{k}.html") for k in range(1, 8)}
     apart |= {Path("_static/texts.js"), Path("searchindex.js")}
     for path in files - apart:
@@ -172,8 +172,8 @@ def test_the_first_picture_of_a_lesson_is_visible_without_scrolling(path, page):
     assert box["y"] + box["height"] < 800
 
 
-def test_an_option_of_a_poll_shows_its_own_line_and_no_other(page):
-    """The mouse and the keys are tested, with the names and states that screen readers use."""
+def test_a_poll_option_shows_only_its_own_explanation(page):
+    """Test the mouse, the keys, and the names and states that screen readers use."""
     page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
     poll = page.get_by_role("group", name="Poll 1")
     ideas = poll.locator(".idea")
@@ -201,7 +201,7 @@ def test_code_is_folded_until_the_reader_asks_for_it(page):
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
-def test_the_picture_of_the_start_page_plays_once_unless_the_reader_reduces_motion(motion, page):
+def test_the_picture_on_the_start_page_plays_once(motion, page):
     page.emulate_media(reduced_motion=motion)
     page.goto((BOOK / "index.html").as_uri())
     hero = page.locator("figure.hero")
@@ -209,9 +209,8 @@ def test_the_picture_of_the_start_page_plays_once_unless_the_reader_reduces_moti
     if motion == "no-preference":
         expect(play).to_have_text("❚❚")
         middle = str(int(time.get_attribute("max")) // 2)
-        expect(time).to_have_value(
-            middle
-        )  # the player passes this value and stops there at the end
+        # the player passes this value, and stops there at the end
+        expect(time).to_have_value(middle)
     expect(play).to_have_text("▶")
     if motion == "no-preference":
         assert time.input_value() == middle

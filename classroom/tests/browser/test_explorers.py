@@ -1,4 +1,4 @@
-"""In JupyterLab the pictures of explorers follow the keys; a table shows how fast."""
+"""Test that explorers in JupyterLab follow the keys, and measure how fast."""
 
 import re
 import statistics
@@ -11,9 +11,9 @@ from playwright.sync_api import expect
 from rbclassroom import explorers
 from rbclassroom.course.notebooks import KERNEL
 
-# These explorers represent all kinds: plane, with a menu, with buttons, and in space. Each has the
-# place and the name of a slider, which the test moves by keys and which changes the text. The last
-# explorer solves a problem for each picture.
+# One explorer of each kind: in the plane, with a menu, with buttons, and in space. Each is given
+# with the place and the name of the slider that the test moves. The last explorer solves a problem
+# for each picture.
 KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
 # A function that records when keys go down, and when the screen shows a new picture.
@@ -32,7 +32,7 @@ WIDE = """async (canvas) => {
 TIMES = "() => new Promise((done) => requestAnimationFrame(() => done([keys, pictures])))"
 
 
-def test_the_pictures_follow_the_keys(home, lab, page, record_property):
+def test_explorer_pictures_follow_the_keys(home, lab, page, record_property):
     cells = ["from rbclassroom import explorers"]
     cells += [f"explorers.{name}_explorer()" for name in KINDS]
     notebook = nbformat.v4.new_notebook(metadata={"kernelspec": KERNEL})
@@ -60,7 +60,7 @@ def test_the_pictures_follow_the_keys(home, lab, page, record_property):
             waits.append(pictures[0] - keys[0])
         keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
         after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
-        # one picture on its way, one being drawn, and one for the last position of the slider
+        # at most three more: one in transit, one being drawn, and one for the last position
         assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
         rate = 1000 * len(pictures) / (max(*pictures, keys[-1]) - keys[0])
         kind = "3-D" if explorer.display.rooms else "2-D"

@@ -1,4 +1,4 @@
-"""A lesson in JupyterLab: as stored, run by a user, as an original, and without Python."""
+"""Test a lesson in JupyterLab: as stored, run by a user, as an original, and without Python."""
 
 import html
 import re
@@ -13,8 +13,7 @@ from playwright.sync_api import expect
 
 PANEL = "jupyterapp.shell.currentWidget"
 DIRTY = f"{PANEL}.context.model.dirty"
-# A function that tests whether exactly the pictures with these descriptions are shown, and whether
-# they have states.
+# A function that tests whether exactly the pictures with these descriptions are shown, with states.
 WHOLE = """(wanted) => {
   const pictures = [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")];
   const found = pictures.filter((picture) => picture.complete ?? true)
@@ -23,12 +22,12 @@ WHOLE = """(wanted) => {
     && !document.querySelector("img[data-read]")
     && [...new Set(found)].sort().join() === [...wanted].sort().join();
 }"""
-# A function that returns the classes and heights of the boxes that scroll up and down.
+# A function that returns the class and height of each box with vertical scrolling.
 SCROLLING = """(explorer) => [explorer, ...explorer.querySelectorAll("*")]
   .filter((box) => box.scrollHeight > box.clientHeight + 0.5)
   .filter((box) => ["auto", "scroll"].includes(getComputedStyle(box).overflowY))
   .map((box) => [box.className, box.scrollHeight, box.clientHeight])"""
-# A function that stops an explorer when it plays. It runs in the page, so a slow test is not late.
+# A function that stops a playing explorer. It runs in the page, where a slow test cannot delay it.
 PAUSE = """async (explorer) => {
   const number = [...explorer.querySelectorAll(".widget-readout")].at(-1);
   while (parseFloat(number.innerText) < 0.1) await new Promise(requestAnimationFrame);
@@ -58,7 +57,7 @@ def opened(home, lab, page):
 def show_all(page, path):
     """Wait until the last cell is shown.
 
-    On a busy machine JupyterLab may stop early, until its window gets another height.
+    On a busy machine, JupyterLab may stop rendering early; a new window height restarts it.
     """
     number = len(nbformat.read(path, as_version=4).cells) - 1
     last = page.locator(f".jp-Cell[data-windowed-list-index='{number}']")
@@ -70,7 +69,7 @@ def show_all(page, path):
 
 
 def run_explorer(page, path):
-    """Run only the cell of the explorer, as the text on its still asks the reader to do."""
+    """Run only the explorer's cell, as the text on the still picture tells the reader to do."""
     cells = nbformat.read(path, as_version=4).cells
     number = next(i for i, cell in enumerate(cells) if "_explorer()" in cell.source)
     page.evaluate(f"{PANEL}.content.activeCellIndex = {number}")
@@ -86,9 +85,9 @@ def descriptions(path):
     return sorted(set(map(html.unescape, re.findall(r'<img[^>]* alt="([^"]*)"', text))))
 
 
-def test_a_stored_lesson_is_complete_and_its_explorer_works_until_its_kernel_ends(opened, page):
-    """When Python has ended, the explorer reports this. When the lesson is opened again, the
-    explorer is a still."""
+def test_a_stored_lesson_is_complete_and_its_explorer_works(opened, page):
+    """The explorer reports that Python has ended. When the lesson is opened again, the explorer is
+    a still picture."""
     path = opened("06_geodesics", "stored")
     stored = descriptions(path)
     assert len(stored) > 3
@@ -116,7 +115,7 @@ def test_a_stored_lesson_is_complete_and_its_explorer_works_until_its_kernel_end
 
 
 def settled(page, text):
-    """Return a text when the kernel is idle and no more pictures come."""
+    """Wait until the kernel is idle and no more pictures arrive; return the text."""
     now = None
     while now != (now := text.inner_text()):
         page.get_by_text(IDLE).wait_for()
@@ -124,7 +123,7 @@ def settled(page, text):
     return now
 
 
-def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(opened, page):
+def test_keys_play_pause_and_reset_an_explorer(opened, page):
     explorer = run_explorer(page, opened("02_two_link_arm", "play"))
     assert page.evaluate(SEEN) == []
     time, play = explorer.locator(".widget-readout").last, explorer.locator("button").first
@@ -159,7 +158,7 @@ def test_keys_play_pause_and_reset_and_a_click_sets_the_goal(opened, page):
     assert page.evaluate(SEEN) == []
 
 
-def test_a_changed_original_is_not_saved_and_the_message_names_the_copy(home, lab, page):
+def test_a_changed_original_is_not_saved(home, lab, page):
     work = home[0] / "work"
     original = work / "notebooks" / "01_plane.ipynb"
     for folder in ("notebooks", "work"):

@@ -1,4 +1,4 @@
-"""Python runs in the pages of the book, from a web server, for lessons and problem sets."""
+"""Test Python in the pages of the book, for lessons and problem sets."""
 
 import base64
 import csv
@@ -61,7 +61,7 @@ def address():
 
 @pytest.fixture(scope="module")
 def run(context, address):
-    """Return a function that runs a cell by the engine and returns its outputs.
+    """Return a function that runs a cell and returns its outputs.
 
     It is called as ``run(above, source, page)``.
     """
@@ -91,9 +91,8 @@ def told(outputs):
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
-def test_each_cell_gives_its_stored_text_except_for_those_left_out(run, path):
-    """Cells on the list of exceptions must give another text, so that the list is exact. Slow cells
-    are not run."""
+def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
+    """Cells on the list of exceptions must really give another text. Slow cells are not run."""
     notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
     stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
     differ = set()
@@ -110,7 +109,7 @@ def test_each_cell_gives_its_stored_text_except_for_those_left_out(run, path):
     assert differ == listed.keys()
 
 
-def test_at_least_250_cells_can_be_tried():
+def test_at_least_250_cells_can_be_run():
     pages = [path.read_text("utf-8") for path in (BOOK / "lessons").glob("[0-9]*.html")]
     assert sum(len(re.findall(r"\btag_try-", page)) for page in pages) >= 250
 
@@ -134,7 +133,7 @@ def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
             for body in mistake["code"]:
                 wrong = start + indent(body.strip(), "    ")
                 found = run([*setup, *code], f"{wrong}\n\n{visible}", name)
-                # the first one makes as many draws as a sampler of a student
+                # the first sampler makes as many draws as a student's
                 if "law" in TABLES[name][slug]:
                     visible = "\n".join([visible.split("assert")[0], *fewer])
                 if ["hint", mistake["hint"]] not in found:
@@ -148,7 +147,7 @@ def opened(page, address, name):
     return page
 
 
-def test_nothing_is_loaded_before_the_reader_acts_and_little_afterwards(page, address):
+def test_nothing_is_loaded_before_the_reader_acts(page, address):
     """The first result loads at most 10 MB, and the first figure at most 20 MB, all from this
     server."""
     asked = []
@@ -170,7 +169,7 @@ def test_nothing_is_loaded_before_the_reader_acts_and_little_afterwards(page, ad
     expect(page.locator(".differences")).to_contain_text("32 bits")
 
 
-def test_a_cell_can_be_changed_stopped_and_reset_and_its_stored_output_stays(page, address):
+def test_a_cell_can_be_changed_stopped_and_reset(page, address):
     opened(page, address, "lessons/10_rigid_body_motion.html")
     page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
     part = page.locator(".tag_try-cell-16")
@@ -200,7 +199,7 @@ def test_outputs_appear_below_their_own_cells(page, address):
     for number, code in enumerate(("import time\ntime.sleep(2)\nprint('one')", "print('two')")):
         write(page, number, code)
     checks = page.get_by_role("button", name="Check")
-    for _ in range(2):  # while Python is loading, and afterwards
+    for _ in range(2):  # both while Python is loading and afterwards
         checks.nth(0).click()
         page.wait_for_timeout(500)
         checks.nth(1).click()
@@ -209,7 +208,7 @@ def test_outputs_appear_below_their_own_cells(page, address):
             expect(shown).to_have_text(said)
 
 
-def test_a_second_visit_uses_the_files_stored_by_the_first_and_loads_scipy(context, address):
+def test_a_second_visit_uses_stored_files(context, address):
     codes = "import scipy.linalg as la; print(la.expm([[0.0]]))", "import rbcourse; print(1)"
     for visit in range(2):
         with watched(context) as page:
@@ -221,7 +220,7 @@ def test_a_second_visit_uses_the_files_stored_by_the_first_and_loads_scipy(conte
             assert "rbcourse engine" in page.evaluate(kept)
 
 
-def test_the_buttons_on_pages_opened_as_files_explain_what_is_missing(page):
+def test_pages_opened_as_files_explain_what_is_missing(page):
     page.goto((BOOK / "problems/ps1.html").as_uri())
     page.get_by_role("button", name="Check").first.click()
     expect(page.locator(".outputs .error").first).to_contain_text("web server")
@@ -240,9 +239,7 @@ def write(page, number, text):
     page.keyboard.insert_text(text)
 
 
-def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
-    page, address, tmp_path, capsys
-):
+def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys):
     """The answer is wrong once, then right. `check`, `collect` and `grade` accept the file."""
     sources = {key: cell.source for key, cell in cells("ps1").items() if key.endswith("-answer")}
     right = [re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text) for text in sources.values()]
@@ -290,7 +287,8 @@ def test_a_set_is_solved_kept_downloaded_checked_collected_and_graded(
     submitted = check(tmp_path / "ps1.ipynb")
     assert "7 of 7 visible tests passed" in capsys.readouterr().out
     uploaded = tmp_path / "downloads" / "Ada Lovelace_123_assignsubmission_file" / "ps1.ipynb"
-    for file in (tmp_path / "ps1.ipynb", submitted):  # without and with a check
+    # first the file without a check, then the checked file
+    for file in (tmp_path / "ps1.ipynb", submitted):
         uploaded.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(file, uploaded)
         collect(tmp_path / "downloads", tmp_path / "course")

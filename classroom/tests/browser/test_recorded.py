@@ -1,4 +1,4 @@
-"""Players, and recorded explorers of each kind, run in Chromium without a kernel or a server."""
+"""Test players and recorded explorers of each kind in Chromium, without a kernel or server."""
 
 import html
 import io
@@ -20,7 +20,7 @@ HOUR = 3_600_000  # ms
 
 
 @plt.style.context(["default", "rbcourse.rbcourse"])
-def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpacked(timed):
+def test_a_player_shows_the_drawing(timed):
     """The drawing has holes, dashes, corners, and lines that are cut at the edges of the axes."""
     fig, ax = plt.subplots(figsize=(9, 4), dpi=80)
     ax.set(xlim=(0, 9), ylim=(0, 4))
@@ -62,7 +62,7 @@ def test_a_player_equals_the_drawing_plays_and_is_a_still_if_it_cannot_be_unpack
 
 
 @pytest.mark.parametrize("name", ["planar", "chain", "random", "minimum_acceleration", "cube"])
-def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, timed):
+def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
     timed.set_viewport_size({"width": 1400, "height": 1000})
     timed.goto((FOLDER / f"{name}.html").as_uri())
     explorer, (moved, stride) = getattr(explorers, f"{name}_explorer")(), recorded.MOVED[name]
@@ -113,7 +113,7 @@ def test_a_page_shows_the_same_as_the_explorer_and_keys_and_mouse_move_it(name, 
     assert time.input_value() == "3"
 
 
-def test_few_steps_are_shown_if_the_reader_reduces_motion(timed):
+def test_few_steps_are_shown_if_motion_is_reduced(timed):
     timed.emulate_media(reduced_motion="reduce")
     timed.goto((FOLDER / "theta.html").as_uri())
     timed.clock.pause_at(HOUR)
@@ -123,7 +123,7 @@ def test_few_steps_are_shown_if_the_reader_reduces_motion(timed):
         assert timed.locator("input").last.input_value() == str(step)
 
 
-def test_a_page_without_scripts_is_its_still_and_says_what_is_missing(context):
+def test_a_page_without_scripts_shows_a_still_picture(context):
     file = FOLDER / "theta.html"
     plain = context.browser.new_context(java_script_enabled=False)
     page = plain.new_page()

@@ -1,4 +1,4 @@
-"""Compare scenes that are turned in Chromium with Python's drawings from the same sides."""
+"""Compare scenes that are turned in Chromium with Python's drawings from the same viewpoints."""
 
 import io
 import re
@@ -20,7 +20,7 @@ SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
 STYLES = ["default", "rbcourse.rbcourse"]
 SIZE = {"figsize": (4, 4), "dpi": 100, "subplot_kw": {"projection": "space"}}
 
-# A function that returns the parts of a state in the order of drawing, for each of some views.
+# A function that returns, for each view, the parts of a state in drawing order.
 SEEN = """({ state, styles, room, views }) => {
   const all = rbcourseDisplay.decode(Int16Array.from(state), styles);
   const pieces = all.map(({ style, runs }) =>
@@ -30,7 +30,6 @@ SEEN = """({ state, styles, room, views }) => {
 
 
 def sphere(ax):
-    """Draw a sphere with points, and a line that goes through it."""
     spheres.draw_sphere(ax)
     ax.plot(*rb.sample_rotation(80, rng=np.random.default_rng(2))[:, :, 0].T, "o", color="red")
     ax.plot([-1.2, 1.2], [0.3, -0.3], [0, 0], color="blue", lw=3)
@@ -46,7 +45,7 @@ def far(ax):
 
 
 def crossing(ax):
-    """Draw two boxes that pass through one another, dashes through both, and letters."""
+    """Draw two boxes that intersect, a dashed line through both, and letters."""
     ax.plot([-0.7, 0.7], [0.3, 0.3], [0.15, 0.15], color="green", lw=5)  # the line lies on the box
     bodies.draw_box(ax, np.eye(4), np.array([1.6, 0.8, 0.3]))
     bodies.draw_box(ax, rb.pose_from_coordinates([0.5, 0.4, 1.0, 0.2, 0.1, 0.1]), 0.7)
@@ -105,8 +104,7 @@ def test_a_turned_scene_equals_the_drawing_from_the_same_side(
 def test_the_browser_cuts_and_orders_parts_as_python_does(page):
     """The parts, their order, their places, and the phases of their dashes are the same.
 
-    The parts do not overlap in this test. Otherwise, rounding would decide whether the next plane
-    cuts a piece that lies beyond it.
+    The parts do not overlap in this test. Otherwise, rounding would decide how pieces are cut.
     """
     fig, ax = plt.subplots(**SIZE)
     crossing(ax)
@@ -130,7 +128,7 @@ def test_the_browser_cuts_and_orders_parts_as_python_does(page):
 
 
 @plt.style.context(STYLES)
-def test_buttons_and_keys_set_the_view_which_is_stated_and_can_be_saved(timed, tmp_path):
+def test_buttons_and_keys_set_the_view(timed, tmp_path):
     fig, axes = plt.subplots(1, 2, dpi=80, subplot_kw={"projection": "space"})
     motion = rb.screw_se3(np.eye(4), GOAL)(np.linspace(0, 1, 5))
     update = bodies.moving_boxes(axes, {"one": motion, "other": motion}, edges=1)

@@ -1,4 +1,4 @@
-"""Test every slide of the book, from files, with its keys, votes, notes and PDF."""
+"""Test every slide of the book, opened as files: keys, votes, notes and PDF."""
 
 import re
 import subprocess
@@ -47,7 +47,7 @@ def test_every_slide_fits_and_is_legible_from_the_last_row(context, path):
             assert faults == []
             assert len(thin) <= 3, thin
     cells = nbformat.read(path, as_version=4).cells
-    small = {  # numbers of 13.5 points at 100 pixels per inch, letters of 14.5 points at 80
+    small = {  # numbers have 13.5 points at 100 pixels per inch; letters have 14.5 points at 80
         output.data["text/plain"].partition(": ")[2]
         for cell in cells
         for output in cell.get("outputs", [])
@@ -86,7 +86,7 @@ def until(page, selector, key="PageDown"):
     raise AssertionError(f"no slide {selector}")
 
 
-def test_a_remote_control_goes_through_all_steps_even_after_a_slider_was_moved(deck):
+def test_a_remote_control_goes_through_all_steps(deck):
     seen, steps = [], 0
     until(deck, ":has(figure input)")
     slider = deck.locator("section.present > section.present figure input").first
@@ -112,7 +112,7 @@ def test_a_remote_control_goes_through_all_steps_even_after_a_slider_was_moved(d
     assert "Questions?" in deck.evaluate(HERE)
 
 
-def test_keys_change_the_display_and_the_dark_scheme_is_never_automatic(context):
+def test_the_dark_scheme_is_never_automatic(context):
     with watched(context) as page:
         page.emulate_media(color_scheme="dark")
         opened(page, of(LESSONS[6]))
@@ -160,7 +160,7 @@ def lecture(home, *words):
         yield found[1]
 
 
-def test_phones_vote_and_the_count_is_shown_on_the_poll_and_on_its_verdict(context, home):
+def test_the_poll_and_its_verdict_show_the_votes_of_phones(context, home):
     with lecture(home, "--votes", "127.0.0.1") as address, watched(context) as page:
         opened(page, address)
         page.keyboard.press("t")  # this slide has no poll
@@ -196,7 +196,7 @@ def test_phones_vote_and_the_count_is_shown_on_the_poll_and_on_its_verdict(conte
         page.goto("about:blank")  # leave the page before the server ends
 
 
-def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck, context):
+def test_the_speaker_view_shows_the_run_sheet_and_the_answers(deck, context):
     with context.expect_page() as found:
         deck.keyboard.press("s")
     speaker = found.value
@@ -219,7 +219,7 @@ def test_the_speaker_view_has_the_run_sheet_the_answers_and_the_next_slide(deck,
     speaker.close()
 
 
-def test_t_in_the_speaker_view_opens_the_vote(context, home):
+def test_the_key_t_in_the_speaker_view_opens_the_vote(context, home):
     with lecture(home, "--votes", "127.0.0.1") as address, watched(context) as page:
         opened(page, address)
         until(page, ".poll")
@@ -234,7 +234,7 @@ def test_t_in_the_speaker_view_opens_the_vote(context, home):
         page.goto("about:blank")  # leave the page before the server ends
 
 
-def test_on_paper_each_title_is_above_its_text_and_picture(page):
+def test_in_print_each_title_is_above_its_text(page):
     opened(page, of(LESSONS[6]) + "?print-pdf")
     page.locator(".pdf-page section h2").last.wait_for(state="attached")
     pairs = page.evaluate(

@@ -1,4 +1,4 @@
-"""A new run and its stored results agree up to rounding; every real change is detected."""
+"""New and stored results may differ by rounding; every other change is detected."""
 
 import base64
 import io
@@ -23,7 +23,7 @@ PAGE = (Path(__file__).parents[3] / "figures/explorers/random.html").read_text("
 
 
 def changed(change, page=None):
-    """Return the picture after its states, styles, texts and settings were changed in place."""
+    """Return a page after `change` was applied to its states, styles, texts and settings."""
     data = json.loads(re.search(agreement.LIVING, page or LIVING)[1])
     states, known = (zlib.decompress(base64.b64decode(data[key])) for key in ("states", "known"))
     states, (styles, texts) = [x.copy() for x in agreement.split(states)], json.loads(known)
@@ -43,7 +43,7 @@ LIVING = changed(shortened, PAGE)
 
 
 def moved(states, styles, texts, data, by=1, at=-1):
-    """Move the last point, or with ``at=2`` all of the first polygon, which is in space."""
+    """Move the last point; with ``at=2``, move the first polygon, which is in space."""
     states[0][at] += by
 
 
@@ -78,13 +78,13 @@ CHANGES = [
 
 
 @pytest.mark.parametrize("change", [*ROUNDING, *CHANGES])
-def test_in_an_interactive_picture_rounding_is_ignored_and_a_change_is_detected(change):
+def test_rounding_in_an_interactive_picture_is_ignored(change):
     again = changed(change)
     assert again != LIVING
     assert reconciled(LIVING, again) == (LIVING if change in ROUNDING else again)
 
 
-def test_positions_are_compared_in_the_unit_of_the_display():
+def test_positions_are_compared_in_display_units():
     assert agreement.UNIT == 1 / PARTS
 
 
@@ -132,14 +132,14 @@ def notebook(*pages, ids=True):
 
 
 @pytest.mark.parametrize("ids", [True, False])
-def test_a_notebook_that_was_run_again_keeps_its_bytes(ids):
+def test_running_a_notebook_again_does_not_change_its_bytes(ids):
     stored, again = (notebook(page, page, ids=ids) for page in (LIVING, changed(moved)))
     assert again != stored
     assert reconciled_notebook(stored, again) == stored
     assert list(agreement.changed_lines(stored, again)) == []
 
 
-def test_the_other_cells_are_recognised_after_a_new_cell_and_only_real_changes_are_listed():
+def test_cells_after_a_new_cell_are_still_recognised():
     stored, again = notebook("It is 1.", LIVING), notebook("It is 2.", changed(moved))
     lines = list(agreement.changed_lines(stored, again))
     assert [line.strip() for line in lines[3:]] == ['-       "It is 1."', '+       "It is 2."']

@@ -28,7 +28,7 @@ def test_the_stored_ledger_is_up_to_date_and_legible(found):
     assert "| BK (16) | the angle θ(t) | projected_line, explorers | 06 |" in entries
 
 
-def test_every_entry_has_function_test_and_lesson(found):
+def test_every_entry_names_a_function_a_test_and_a_lesson(found):
     assert {key: lacks for key in ENTRIES if (lacks := found[key].lacks())} == {}
     beyond = [f"beyond BK {i}" for i in range(1, 17)]
     assert list(ledger.SOURCES["beyond"]) == beyond
@@ -38,7 +38,7 @@ def test_every_entry_has_function_test_and_lesson(found):
 
 
 def test_all_parts_of_both_texts_are_listed():
-    """Check equations, propositions, corollaries, remarks, figures and sections, by their
+    """Check equations, propositions, corollaries, remarks, figures and sections by their
     numbers."""
     counts = {
         **{"BK ({})": 21, "BK Prop. {}": 7, "BK Cor. {}": 2, "BK Remark {}": 7, "BK Fig. {}": 5},
@@ -88,7 +88,7 @@ def not_a_test():
 """
 
 
-def test_keys_are_collected_and_an_unknown_key_is_refused(tmp_path):
+def test_an_unknown_key_is_refused(tmp_path):
     """The keys come from one function, one constant, one test and one lesson."""
     for folder in ("rbcourse", "tests", "notebooks"):
         (tmp_path / folder).mkdir()
@@ -116,7 +116,7 @@ def test_keys_are_collected_and_an_unknown_key_is_refused(tmp_path):
 
 
 @pytest.mark.source("errata 4")
-def test_the_printed_numbers_of_the_propositions_repeat_one_and_skip_one(found):
+def test_one_proposition_number_is_printed_twice(found):
     printed = [1, 2, 2, 4, 5, 6, 7]
     corrected = [int(key.split()[-1]) for key in ENTRIES if key.startswith("BK Prop.")]
     assert len(set(printed)) < len(printed)

@@ -1,4 +1,4 @@
-"""The modules that run, store and copy lessons."""
+"""Test the modules that run, store and copy lessons."""
 
 import os
 import runpy
@@ -23,7 +23,7 @@ def notebook_at(path, *sources):
     return path
 
 
-def test_the_kernel_that_runs_a_lesson_listens_at_files(tmp_path):
+def test_the_kernel_that_runs_a_lesson_opens_no_port(tmp_path):
     sources = [
         "print('one', flush=True)\nprint('two')",
         "import ipykernel, json\nprint(json.loads(ipykernel.get_connection_info())['transport'])",
@@ -38,7 +38,7 @@ def test_the_kernel_that_runs_a_lesson_listens_at_files(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kernels listen at ports on Windows")
-def test_the_kernel_that_tests_a_lesson_listens_at_files(monkeypatch, request):
+def test_the_kernel_that_tests_a_lesson_opens_no_port(monkeypatch, request):
     monkeypatch.setattr(nbval.kernel, "KernelManager", KernelManager)
     conftest = Path(__file__).parents[3] / "notebooks/conftest.py"
     runpy.run_path(str(conftest))["pytest_configure"](request.config)
@@ -88,9 +88,9 @@ def test_nothing_is_rewritten_if_a_lesson_fails(tmp_path):
     assert [file.name for file in figures.iterdir()] == ["old.png"]
 
 
-def test_one_lesson_is_stored_again_without_a_change_of_other_files(tmp_path, monkeypatch):
+def test_storing_one_lesson_changes_no_other_file(tmp_path, monkeypatch):
     def execute(path, figures):
-        """Draw a figure with the lesson's name, and return the lesson with another source."""
+        """Save a figure named after the lesson; return the lesson with a new source."""
         name = path.stem[3:]
         (figures / f"{name}.png").write_text(name)
         return nbformat.writes(new_notebook(cells=[new_code_cell(name, id="cell-0")])) + "\n"
@@ -98,7 +98,7 @@ def test_one_lesson_is_stored_again_without_a_change_of_other_files(tmp_path, mo
     monkeypatch.setattr(notebooks, "execute", execute)
     figures = tmp_path / "figures"
     figures.mkdir()
-    for file in ("arm.png", "old.png", "plane.png"):  # the last one is damaged
+    for file in ("arm.png", "old.png", "plane.png"):  # the last file is damaged
         (figures / file).write_text("as it was")
     paths = [notebook_at(tmp_path / f"{name}.ipynb", "1") for name in ("01_plane", "02_arm")]
     before = paths[1].read_text()
@@ -136,7 +136,7 @@ def new_version(folders, source="2"):
     return sorted(path.name for path in folders[1].glob("*.ipynb"))
 
 
-def test_copies_are_trusted_and_assignments_are_not_copied(folders):
+def test_copies_of_lessons_are_trusted(folders):
     notebooks.copy_lessons(*folders)
     (copy,) = folders[1].glob("*.ipynb")
     assert copy.name == "01_plane.ipynb"
@@ -180,7 +180,7 @@ def test_a_copy_that_was_edited_is_never_changed(folders, capsys, there, work):
     assert "your copy is kept, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
 
 
-def test_a_lesson_that_is_not_a_notebook_is_named_and_not_copied(folders, monkeypatch):
+def test_a_lesson_that_is_not_a_notebook_is_reported(folders, monkeypatch):
     closed, close = [], SQLiteSignatureStore.close
     monkeypatch.setattr(SQLiteSignatureStore, "close", lambda s: closed.append(close(s)))
     (folders[0] / "02_arm.ipynb").write_text("<<<<<<< HEAD")
@@ -200,7 +200,7 @@ def test_a_copy_that_cannot_be_signed_is_still_made(folders, monkeypatch, capsys
     assert "not marked as trusted: read-only home" in capsys.readouterr().out
 
 
-def test_stills_of_widgets_are_saved_without_the_widgets():
+def test_only_the_stills_of_widgets_are_saved():
     widget = {"application/vnd.jupyter.widget-view+json": {"model_id": "1"}}
     still, alone = {"text/html": "<img>", **widget}, {"text/plain": "IntSlider()", **widget}
     outputs = [{"data": still}, {"name": "stdout", "text": "1"}, {"data": alone}]
@@ -212,9 +212,7 @@ def test_stills_of_widgets_are_saved_without_the_widgets():
     assert alone == {"text/plain": "IntSlider()", **widget}
 
 
-def test_an_original_keeps_its_bytes_after_a_run_and_a_changed_one_is_not_saved(
-    folders, monkeypatch, request
-):
+def test_an_original_keeps_its_bytes_after_a_run(folders, monkeypatch, request):
     lesson, (place, _) = "notebooks/01_plane.ipynb", folders
     notebooks.copy_lessons(*folders)
     manager = LargeFileManager(root_dir=str(place.parent))

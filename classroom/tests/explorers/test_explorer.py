@@ -1,4 +1,4 @@
-"""The properties of all explorers: the protocol of a small one, and checks of each of them."""
+"""Test the protocol with a small explorer, and the properties of every explorer."""
 
 import io
 import json
@@ -52,18 +52,18 @@ def explorer():
 
 
 def sent(explorer):
-    """Return the states that were sent last: the places of the dot in each state, and the texts."""
+    """Return the last states that were sent: the places of the dot, and the texts."""
     run = explorer.picture.run
     drawn = [polygons(state, run["styles"]) for state in split(run["states"])]
     return [[place for _, _, ((*place,),) in state] for state in drawn], run["texts"]
 
 
 def at(x, y):
-    """Return where the dot is in the picture, in pixels from the upper left."""
+    """Return the place of the dot, in pixels from the upper left corner."""
     return pytest.approx([560 * (0.1 + 0.08 * x), 380 * (0.85 - 0.8 * (y + 1) / 3)], abs=0.07)
 
 
-def test_the_picture_follows_the_controls_and_reset_restores_everything(explorer):
+def test_the_picture_follows_the_controls(explorer):
     assert sent(explorer) == ([[at(2, 0)]], [FIRST])  # before any control is moved
     assert explorer.picture.run["index"] == 4
     assert (explorer.play.min, explorer.play.value, explorer.play.max) == (0, 4, 20)
@@ -86,7 +86,7 @@ def test_the_picture_follows_the_controls_and_reset_restores_everything(explorer
     assert list(explorer._fig.axes[0].lines) == [explorer.artists["dot"]]
 
 
-def test_the_browser_receives_the_states_that_it_asks_for_in_order(explorer):
+def test_requested_states_are_sent_in_order(explorer):
     version, known = explorer.picture.run["version"], 0
     while known < 21:
         tell(explorer, index=known)
@@ -105,7 +105,7 @@ def test_the_browser_receives_the_states_that_it_asks_for_in_order(explorer):
     assert explorer.picture.run["version"] > version
 
 
-def test_settings_that_fail_and_warnings_are_reported(explorer):
+def test_errors_and_warnings_are_reported(explorer):
     explorer.put(x=FAR)
     said = "Nothing to show here: x: too <far>"
     assert sent(explorer) == ([[]], [[[], said, f"A dot. {said}"]])
@@ -123,7 +123,7 @@ def test_settings_that_fail_and_warnings_are_reported(explorer):
         explorer.controls["kind"].value = "high"
 
 
-def test_a_click_sets_controls_or_states_the_reason_of_its_refusal(explorer):
+def test_a_refused_click_states_the_reason(explorer):
     tell(explorer, place=[0.5, 0.5])
     assert explorer.values == {"x": 4.0, "kind": "high"}
     for _ in range(2):  # both clicks are at the same place
@@ -138,7 +138,7 @@ def test_a_click_sets_controls_or_states_the_reason_of_its_refusal(explorer):
     assert shown == [True, True, False]
 
 
-def test_a_drawing_is_the_same_at_each_zoom_with_letters_of_18_pixels(explorer):
+def test_the_zoom_does_not_change_a_drawing(explorer):
     shown = explorer.state(x=7.0).shown
     for zoom in (1, 2, 3):
         drawn = np.asarray(Image.open(io.BytesIO(explorer.draw(shown, zoom))).convert("L"))
@@ -153,7 +153,7 @@ def test_a_drawing_is_the_same_at_each_zoom_with_letters_of_18_pixels(explorer):
     assert mpl.rcParams["xtick.labelsize"] == "medium"  # the style is not changed
 
 
-def test_the_output_has_a_still_for_readers_without_a_kernel_and_can_be_serialised(explorer):
+def test_the_output_has_a_still_for_readers_without_a_kernel(explorer):
     bundle = explorer._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in bundle
     assert 'alt="A dot. place: 2.0 low"' in bundle["text/html"]
@@ -162,7 +162,7 @@ def test_the_output_has_a_still_for_readers_without_a_kernel_and_can_be_serialis
     for widget in (explorer, explorer.picture, *explorer.controls.values(), explorer.play):
         state, _, parts = _remove_buffers(widget.get_state())
         json.dumps(state)
-        # the background, and the states
+        # one part for the background, and one for the states
         assert len(parts) == (2 if widget is explorer.picture else 0)
     assert explorer.picture.made["background"].startswith(b"\x89PNG")
 
@@ -180,7 +180,7 @@ LESSONS = lesson_paths(Path(__file__).parents[3] / "notebooks")
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
-def test_the_cell_of_an_explorer_needs_no_other_cell_and_shows_numbers_at_once(path):
+def test_the_cell_of_an_explorer_needs_no_other_cell(path):
     cells = nbformat.read(path, as_version=4).cells
     (cell,) = [cell for cell in cells if re.search(r"^explorers\.\w+\(", cell.source, re.MULTILINE)]
     *lines, last = cell.source.splitlines()
@@ -202,7 +202,7 @@ WITHOUT_UNIT = "time t", "seed", "rotations", "y leans", "z leans", "z stretched
 
 
 @pytest.mark.parametrize("name", explorers.__all__)
-def test_each_explorer_has_units_large_letters_its_own_artists_and_a_range_to_play(name):
+def test_each_explorer_has_units_and_large_letters(name):
     explorer = made(name.removesuffix("_explorer"))
     for control in explorer.controls.values():
         if isinstance(control, ipywidgets.FloatSlider | ipywidgets.SelectionSlider):

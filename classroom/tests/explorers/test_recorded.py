@@ -22,7 +22,7 @@ from rbclassroom.explorers import recorded
 FOLDER = Path(__file__).parents[3] / "figures" / "explorers"
 
 
-def test_every_explorer_is_recorded_and_together_they_are_small():
+def test_every_explorer_is_recorded():
     pages = sorted(FOLDER.iterdir())
     assert [f"{page.stem}_explorer" for page in pages] == explorers.__all__
     assert sorted(recorded.MOVED) == [page.stem for page in pages]
@@ -30,7 +30,7 @@ def test_every_explorer_is_recorded_and_together_they_are_small():
 
 
 @pytest.mark.parametrize("name", sorted(recorded.MOVED))
-def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
+def test_recorded_states_equal_those_of_the_explorer(name):
     """Compare states at random settings."""
     explorer, (moved, stride) = made(name), recorded.MOVED[name]
     explorer.restart()
@@ -81,7 +81,7 @@ def test_a_page_is_complete_and_its_states_are_those_of_the_explorer(name):
             assert np.abs(points - found).max() < 0.2  # in pixels
 
 
-def test_a_record_has_its_states_in_order_and_the_same_bytes_each_time():
+def test_records_have_the_same_bytes_each_time():
     theta = made("theta")
     theta.restart()
     moved = {"angle": [60.0, 120.0]}

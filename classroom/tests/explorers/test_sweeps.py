@@ -24,7 +24,7 @@ def off(found, wanted):
 
 
 def assert_box(box, R, half, place=(0, 0, 0), turned=1e-11, placed=1e-11):
-    """Check that a box with these half edges has this orientation and place, within tolerances."""
+    """Check the orientation and the place of a box with these half edges."""
     faces = box.corners[:6]
     assert off(faces.mean(axis=(0, 1)), place) < placed
     assert off(faces.mean(axis=1)[:3] - place, (half * R).T) < turned
@@ -36,7 +36,7 @@ def assert_within(places, *limits):
 
 
 def assert_seen(ax, places, *limits):
-    """Check that places in space, shape (..., 3), are seen between these limits, in pixels."""
+    """Check that points in space, shape (..., 3), appear within these limits, in pixels."""
     x, y, _ = proj3d.proj_transform(*np.reshape(places, (-1, 3)).T, ax.get_proj())
     assert_within(ax.transData.transform(np.stack([x, y], axis=-1)), *limits)
 
@@ -60,7 +60,7 @@ def assert_seen(ax, places, *limits):
         ("flip", {"axis": "axis 2", "t": 8.0}, "turned over", "2 times"),
         ("flip", {"axis": "axis 2", "t": 3.0}, "turned over", "once"),
         ("flip", {"axis": "axis 3", "t": 8.0}, "turned over", "0 times"),
-        # The axis is √(1 + cot²(angle/2)) m away, 3.07 and 2.996 m; the picture shows up to 3 m.
+        # The axis is √(1 + cot²(angle/2)) m away: 3.07 m, then 2.996 m. The picture ends at 3 m.
         ("screw", {"angle": 38.0, "z": 0.0}, "its axis through", "(1.0, 2.9, 0.0) m, not in sight"),
         ("screw", {"angle": 39.0, "z": 0.0}, "its axis through", "(1.0, 2.8, 0.0) m"),
         ("screw", {"angle": 0.0}, "its axis through", "none"),
@@ -73,16 +73,14 @@ def assert_seen(ax, places, *limits):
         ("random", {"number": 80.0}, "p-values", "from 100 rotations on"),
     ],
 )
-def test_texts_are_right_in_examples_of_the_lessons_and_at_singular_settings(
-    name, values, key, text
-):
+def test_texts_are_right_in_examples_of_the_lessons(name, values, key, text):
     made(name).restart()
     made(name).put(**values)
     assert read_off(made(name)).get(key) == text
     assert notice(made(name)) == ""
 
 
-def test_no_answer_to_a_poll_is_visible_before_a_slider_is_moved():
+def test_no_poll_answer_is_visible_before_a_slider_is_moved():
     for name in ("theta", "planar", "arm", "cube", "projection", "flip"):
         made(name).restart()
     theta, plan, arm = (made(name) for name in ("theta", "planar", "arm"))
@@ -105,10 +103,7 @@ PANELS = {"as if a ball": (-15, 202), "least acceleration": (172, 389), "least t
 
 @cache
 def turned_books(about, turn, thickness):
-    """Return the three curves, the inertia, and the ratios of their costs to the least costs.
-
-    Each problem is solved once.
-    """
+    """Return three curves, the inertia, and the ratio of each cost to the least one."""
     (axis,) = (np.array(x, float) for name, x in AXES.items() if about.startswith(name))
     G = rb.metrics.box_inertia([0.3, 0.2, thickness / 100])
     goal = rb.exp_so3(np.radians(turn) * axis / np.linalg.norm(axis))
@@ -120,7 +115,7 @@ def turned_books(about, turn, thickness):
 
 
 @pytest.mark.source("beyond BK 3", "beyond BK 4")
-def test_the_three_books_their_torques_and_their_costs_agree_with_the_package():
+def test_the_three_books_agree_with_the_package():
     artists = made("body").artists
     for v, said in sweep("body", thickness=30.0, t=0.4):
         curves, G, costs = turned_books(v["about"], v["turn"], v["thickness"])
@@ -139,7 +134,7 @@ def test_the_three_books_their_torques_and_their_costs_agree_with_the_package():
 
 
 @pytest.mark.source("BK Prop. 6", "BK Cor. 1")
-def test_the_projected_line_its_dots_and_its_chord_agree_with_the_package():
+def test_the_projected_line_agrees_with_the_package():
     t, f = np.linspace(0, 1, 101), rb.projected_line
     for v, said in sweep("theta", angle=100.0, t=0.3):
         a, now = np.radians(v["angle"]), v["t"]
@@ -162,7 +157,7 @@ def test_the_projected_line_its_dots_and_its_chord_agree_with_the_package():
 
 
 @pytest.mark.source("BK (10)", "BK (14)")
-def test_the_screw_the_geodesic_and_the_axis_agree_with_the_package():
+def test_the_screw_and_the_geodesic_agree_with_the_package():
     artists = made("screw").artists
     for v, said in sweep("screw", tilt=35.0, t=0.6):
         tilt, angle, d = np.radians(v["tilt"]), abs(v["angle"]), np.array([v["x"], 0, v["z"]])
@@ -195,7 +190,7 @@ def test_the_screw_the_geodesic_and_the_axis_agree_with_the_package():
 
 @cache
 def spun(axis, tilt):
-    """Return the motion of the book, integrated independently; the momentum starts upright."""
+    """Return the motion of the book, integrated independently; its momentum is vertical."""
     w0 = np.full(3, 4 * np.sin(np.radians(tilt)) / np.sqrt(2))
     w0[int(axis[-1]) - 1] = 4 * np.cos(np.radians(tilt))
     momentum = MOMENTS * w0 / np.linalg.norm(MOMENTS * w0)
@@ -233,7 +228,7 @@ def test_the_book_and_its_angular_velocity_agree_with_the_package():
         assert list(artists["now"].get_xdata()) == [v["t"], v["t"]]
 
 
-def test_the_numbers_on_the_book_are_visible_at_first_and_a_new_axis_restarts_the_motion():
+def test_a_new_axis_restarts_the_motion():
     book = made("flip")
     eye = book.artists["book"].axes.sight().eye
     for axis in ("axis 1", "axis 2", "axis 3"):
@@ -252,10 +247,8 @@ KNOWN = {}
 
 
 def solved(optimum, rival, ends):
-    """Return both curves for these ends, and the costs of their rotations.
-
-    Each problem is solved once.
-    """
+    """Return both curves for these ends and the costs of their rotations; keep them for later
+    calls."""
     key = rival.__name__, str(ends)
     if key not in KNOWN:
         curves = optimum(*ends), rival(*ends)
@@ -276,7 +269,7 @@ def assert_compared(said, curves, costs, t, rival="projection"):
 
 
 @pytest.mark.source("BK (19)", "BK (21)", "BK Fig. 4")
-def test_the_optimum_its_rivals_and_their_costs_agree_with_the_package():
+def test_the_optimum_and_its_rivals_agree_with_the_package():
     artists = made("minimum_acceleration").artists
     for v, said in sweep("minimum_acceleration", k=3.0):
         sigma = v["size"] * np.pi / 6 * np.array([1, 2, 3])
@@ -298,7 +291,7 @@ def test_the_optimum_its_rivals_and_their_costs_agree_with_the_package():
 
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
-def test_both_cubes_their_paths_and_their_costs_agree_with_the_package():
+def test_both_cubes_agree_with_the_package():
     artists = made("cube").artists
     for v, said in sweep("cube", spin=2.0, t=0.4):
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
@@ -325,7 +318,7 @@ def test_a_motion_plays_for_its_duration_in_seconds(name, seconds):
 
 
 def curve_of(name, knots):
-    """Return a curve of the explorer of four poses."""
+    """Return the named curve through the four poses of the explorer."""
     rest = np.zeros((2, 6))
     if name == "geodesics":
         return rb.chain(knots, POSES, leg=rb.geodesic_se3)
@@ -338,7 +331,7 @@ def curve_of(name, knots):
     return rb.minimum_acceleration_spline_se3(knots, POSES, tuple(rest))
 
 
-def test_the_box_its_path_and_its_speeds_are_those_of_the_chain():
+def test_the_box_follows_the_chain():
     artists = made("chain").artists
     assert np.array_equal(points(artists["poses"]), POSES[:, :3, 3])
     for v, said in sweep("chain", curve="cubics, parabolas", duration=4.0, t=0.4):
@@ -369,7 +362,7 @@ def test_the_box_its_path_and_its_speeds_are_those_of_the_chain():
 
 
 @pytest.mark.source("beyond BK 13")
-def test_both_curves_pass_through_the_orientations_and_show_their_accelerations():
+def test_both_curves_pass_through_the_orientations():
     artists = made("spline").artists
     for v, said in sweep("spline", pitch=15.0, third=2.3, t=1.4):
         times, angles = np.array([0, 1, v["third"], 4]), ANGLES.copy()
@@ -429,7 +422,7 @@ def test_the_timing_stays_below_the_limits_of_its_path():
 
 
 def planned(v, t, frame):
-    """Return the last pose of a plan of two commands, up to a time."""
+    """Return the pose at time t of a plan of two commands."""
     first, second = ([v[f"vx{i}"], v[f"vy{i}"], np.radians(v[f"omega{i}"])] for i in (1, 2))
     commands = [(first, min(t, 2.0)), (second, max(t - 2.0, 0.0))]
     return rb.planar.propagate_planar([0, 0, 0], commands, frame=frame)[-1]
@@ -463,7 +456,7 @@ def hand(q):
 
 
 @pytest.mark.source("RR (20)", "RR (21)")
-def test_the_arm_and_the_path_of_its_hand_agree_with_the_package():
+def test_the_arm_agrees_with_the_package():
     artists = made("arm").artists
     for v, said in sweep("arm", theta0=77.0, theta1=-40.0):
         goal = np.radians([v["theta0"], v["theta1"]])
@@ -478,7 +471,7 @@ def test_the_arm_and_the_path_of_its_hand_agree_with_the_package():
 
 
 @pytest.mark.parametrize("elbow", [110.0, -70.0])
-def test_the_arm_moves_to_its_angles_or_to_a_click_or_states_why_it_cannot(elbow):
+def test_a_click_moves_the_arm_or_states_why_not(elbow):
     arm = made("arm")
     arm.restart()
     arm.controls["theta1"].value = elbow
@@ -506,7 +499,7 @@ def tips(explorer, name):
 
 
 @pytest.mark.source("RR (7)", "RR (8)", "RR 2.1")
-def test_box_axes_turns_and_gimbal_lock_agree_with_the_angles():
+def test_the_drawn_box_agrees_with_the_angles():
     orientation, (x, y, z) = made("rotation"), np.eye(3)
     artists = orientation.artists
     for v, said in sweep("rotation"):

@@ -1,7 +1,7 @@
-"""The parts of the lessons' figures that are not in a CSV, and their descriptions.
+"""Test the descriptions of the lessons' figures, and the parts that are not in a CSV.
 
-When a lesson draws a figure, the figure is compared with the stored one. Its artists must hold the
-numbers of the CSV under their names, have labels, and not be clipped (tests/shown.py).
+When a lesson draws a figure, the figure is compared with the stored one. tests/shown.py checks that
+the artists hold the numbers of the CSV, are labelled, and are not clipped.
 """
 
 import matplotlib.pyplot as plt
@@ -46,7 +46,7 @@ def axes():
 
 
 def check_held(axes, held):
-    """Check that artists hold the given numbers, which are listed by title of axes and by label."""
+    """Check that artists hold the given numbers, listed by the titles of axes and by labels."""
     for (title, label), columns in held.items():
         artists = [x for ax in axes if ax.get_title() == title for x in ax.get_children()]
         found = list(numbers_of([x for x in artists if str(x.get_label()).startswith(label)]))
@@ -96,7 +96,7 @@ def test_descriptions_of_projected_matrices_state_their_numbers():
 @pytest.mark.source("RR 2")
 def test_histograms_count_all_draws_and_show_the_exact_distributions(axes):
     many = {"a": rb.sample_rotation(5000, rng=2), "b": rb.exp_so3(np.zeros((10, 3)))}
-    # rounding takes some heights beyond 1
+    # rounding makes some heights exceed 1
     many["b"][:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)
     bins, axes = lesson05.histograms(many), axes(None, None, None)
     lesson05.draw_histograms(axes, bins)
@@ -127,7 +127,7 @@ def test_the_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
         chosen = faces[..., 1].min(axis=1) == angle[row, 0]
         colours = space.collections[0]._facecolor3d[chosen]
         assert np.array_equal(colours, np.tile(line.get_color(), (4, 1)))
-    for line in ax.lines:  # the contrast of WCAG against white
+    for line in ax.lines:  # the WCAG contrast with white
         rgb = np.array(line.get_color()[:3])
         linear = np.where(rgb > 0.04045, ((rgb + 0.055) / 1.055) ** 2.4, rgb / 12.92)
         assert 1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05) > 3
@@ -141,7 +141,7 @@ def test_the_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
 
 
 @pytest.mark.source("BK Fig. 4")
-def test_lines_that_are_not_in_a_table_have_their_labels(axes):
+def test_lines_that_are_not_in_the_table_are_labelled(axes):
     chord, torques, sigma = map(numbers, ("lesson06_chord", "lesson13_torques", "paper_fig4c"))
     first, second, *others = axes(None, None, None, None, None)
     lesson06.draw_chord(first, chord)
@@ -228,7 +228,7 @@ def test_descriptions_of_the_atlas_state_its_numbers(axes):
     check_said(said, f"Bézier d {1 / 16 / 12 / 9:.1e}")
 
 
-def test_each_problem_has_the_mark_of_its_family(axes):
+def test_each_problem_has_the_marker_of_its_family(axes):
     axes, line, held = axes(None, None), np.array([0.02, 0.7]), {}
     atlas_figures.draw_margins(axes, MARGINS)
     for way in ("projection", "quaternion"):
@@ -239,7 +239,7 @@ def test_each_problem_has_the_mark_of_its_family(axes):
     check_held(axes, held | {("projection", "slope −3"): [line, line**-3]})
 
 
-def test_profiles_show_the_times_of_poses_and_their_axes_contain_the_data(axes):
+def test_profiles_show_the_times_of_poses(axes):
     axes = axes(None, None)
     data = {"t [s]": [0, 1, 2], "speed [m/s]": [0, 2.5, 1], "turn [rad/s]": [1, 0, 0.25]}
     lesson14.draw_profiles(axes, data, [0, 1.5])
@@ -281,8 +281,7 @@ def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
     kinds = "exponential coordinates", "normal coordinates"
 
     def off(inertia, size):
-        """Return the deviations of the two motions from their lines in the plane, in both
-        coordinates."""
+        """Return how far the two motions are from straight lines, in both kinds of coordinates."""
         lines = vectors("{} {} [rad]", lesson13.normal_table(t, size * w, inertia), "xy")
         for k in (1, 2):
             assert np.allclose(lines[f"straight {k}"], t[:, None] * size * w[k - 1, :2], 1e-15)
@@ -308,7 +307,7 @@ def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
     check_said(lesson13.describe_normal(data), *words)
 
 
-def test_the_turns_are_natural_splines_through_the_angles_and_their_bends_end_at_0():
+def test_the_turns_are_natural_splines_through_the_angles():
     data = lesson14.turns_table({"one": (0, 0), "two": (4, 6)})
     t = data["t [s]"]
     for name, goal in (("one", 0.3), ("two", 0.3 + 20 * np.pi)):
@@ -320,7 +319,7 @@ def test_the_turns_are_natural_splines_through_the_angles_and_their_bends_end_at
         assert np.abs(curvature[[0, -1]]).max() < 0.05 * np.abs(curvature).max()
 
 
-def test_limit_curves_are_the_largest_rates_for_any_change_of_the_rate():
+def test_limit_curves_are_the_largest_admissible_rates():
     """The test tries many changes of the rate at each place."""
     path = rb.minimum_acceleration_se3(
         np.eye(4),
@@ -344,7 +343,7 @@ def test_limit_curves_are_the_largest_rates_for_any_change_of_the_rate():
 
 
 def test_two_passes_give_the_largest_squared_rates_below_all_limits():
-    """x_i is the minimum of highest_j + step |i − j|, with 0 at both ends."""
+    """The squared rate x_i is the minimum of highest_j + step |i − j|; it is 0 at both ends."""
     highest = np.random.default_rng(3).uniform(0.5, 6, 12)
     highest[[0, -1]] = 0
     apart = np.abs(np.subtract.outer(np.arange(12), np.arange(12)))
@@ -354,7 +353,7 @@ def test_two_passes_give_the_largest_squared_rates_below_all_limits():
     assert back == pytest.approx(later.min(axis=1))
 
 
-def test_the_used_shares_are_norms_over_limits(axes):
+def test_used_shares_are_norms_divided_by_limits(axes):
     path = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
     data = lesson15.share_table(path, {"angular_speed": 4.0, "speed": 5.0})
     assert data["angular speed [1]"] == pytest.approx(0.5)

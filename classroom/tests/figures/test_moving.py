@@ -26,7 +26,7 @@ def places(artist):
     return np.array(artist.get_data_3d() if hasattr(artist, "get_data_3d") else artist.get_data())
 
 
-def test_the_book_turns_with_its_pin(axes):
+def test_the_book_and_its_pin_turn_together(axes):
     edges, turned = np.array([2.0, 1, 0.5]), rb.exp_so3(np.outer(np.linspace(0, 6, 9), [1, 2, 3]))
     times = np.linspace(0, 24, 9)
     update = lesson08.moving_book(axes[1], times, turned, edges)
@@ -42,7 +42,7 @@ def test_the_book_turns_with_its_pin(axes):
         assert tip @ foot > foot @ foot
 
 
-def test_the_description_of_the_book_states_when_it_turns_over():
+def test_the_description_states_when_the_book_turns_over():
     t = np.linspace(0, 4, 41)
     over = rb.exp_so3(np.outer(np.where(t > 1.95, np.pi, 0), [1, 0, 0]))
     upright, still = rb.exp_so3([np.pi / 2, 0, 0]), np.broadcast_to(np.eye(3), over.shape)
@@ -56,7 +56,7 @@ def test_the_description_of_the_book_states_when_it_turns_over():
 
 @pytest.fixture(scope="module")
 def level():
-    """Return a function of a name and k that gives the points of level k of the construction.
+    """Return a function: ``level(name, k)`` gives the points of level k of the construction.
 
     The points have the shape (4 - k, 2 or 3, times).
     """
@@ -70,7 +70,7 @@ def level():
     return points
 
 
-def test_casteljaus_construction_gives_bernsteins_cubic_and_beziers_curve(level):
+def test_de_casteljaus_construction_gives_beziers_curve(level):
     s = 1 - T
     bernstein = np.array([s**3, 3 * s**2 * T, 3 * s * T**2, T**3])
     assert np.abs(level("plane", 3)[0] - POINTS.T @ bernstein).max() < 1e-12
@@ -81,7 +81,7 @@ def test_casteljaus_construction_gives_bernsteins_cubic_and_beziers_curve(level)
     assert np.array_equal(level("plane", 0)[:, :, 3], POINTS)
 
 
-def test_the_construction_moves_along_lines_and_geodesics_as_in_its_table(axes, level):
+def test_the_construction_moves_along_lines_and_geodesics(axes, level):
     update = lesson11.moving_casteljau(axes, T, POINTS, ENDS, V)
     for i in (0, 4, 20, 7):
         clock, *artists = update(i)

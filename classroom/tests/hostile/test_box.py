@@ -1,4 +1,4 @@
-"""Processes in a sandbox end after their time, and with the process that grades."""
+"""Sandboxed processes end after their time limit, or when the grading process ends."""
 
 import os
 import sys
@@ -14,9 +14,7 @@ from rbclassroom.assignments.grade import grade
 ROOT = Path(__file__).parents[3]
 
 
-def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(
-    tmp_path, template, monkeypatch
-):
+def test_a_submission_that_takes_too_long_is_ended(tmp_path, template, monkeypatch):
     course, places = Class(tmp_path, template), Path(tempfile.mkdtemp())
     with (tmp_path / "nbgrader_config.py").open("a") as config:
         config.write("c.BoxedExecute.seconds = 9\n")
@@ -28,7 +26,7 @@ def test_a_submission_that_takes_too_long_is_ended_and_leaves_no_folder(
     assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
 
 
-def test_a_sandbox_and_its_worker_end_with_the_process_that_grades(tmp_path, template):
+def test_a_sandbox_ends_with_the_process_that_grades(tmp_path, template):
     course = Class(tmp_path, template)
     asleep = f"8{os.getpid():08d}"
     course.submit("ann", half=f"import subprocess\nsubprocess.run(['sleep', '{asleep}'])")

@@ -1,4 +1,4 @@
-"""Malicious and broken submissions, graded in one run: no other submission is affected."""
+"""Grade malicious and broken submissions in one run; no other submission is affected."""
 
 import base64
 import codecs
@@ -33,7 +33,8 @@ REFUSALS = {"AssertionError", "CalledProcessError", "OperationalError"}
 KINDS = [OSError, *OSError.__subclasses__(), *ConnectionError.__subclasses__()]
 REFUSALS |= {kind.__name__ for kind in KINDS}
 
-# Each is the beginning of a student's answer to the second problem; the right answer follows it.
+# Each attack is the beginning of a student's answer to the second problem; the right answer
+# follows.
 HONEST = {
     "widgets": "from ipywidgets import FloatSlider, HBox, Output, interact, interactive_output\n"
     "interact(lambda x: print(x), x=(0.0, 3.0));\nout = Output()\nwith out:\n    print('in')\n"
@@ -154,8 +155,7 @@ CELL_5 = "cell 5, answer of “A tiny set”"
 TRANSFORMS = "import sys\nsys.modules['IPython'].get_ipython().input_transformers_post.append(abs)"
 CHANGES = {"writes words": write_words, "adds a cell": add_cell, "forges remarks": forge_remarks}
 SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
-# Each row has a student, an answer, points (none if refused), and the beginning of the remark or of
-# the refusal.
+# Each row has a student, an answer, points (none if refused), and how the remark begins.
 OTHERS = [
     *((student, "half = 0.5", "2 1", "") for student in ("tells", "writes words", "adds a cell")),
     ("forges remarks", "half = 0.5", "2 1", "cell 1, locked cell of “A tiny set” was changed; it"),
@@ -230,7 +230,7 @@ def hand_in_all(course, port):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory, template):
-    """Grade all submissions in one run, while a server and a socket wait for connections."""
+    """Grade all submissions in one run while a server and a socket wait for connections."""
     assert sandbox.missing() == ""
     course = Class(tmp_path_factory.mktemp("course"), template)
     asked = []
@@ -265,7 +265,7 @@ def state(folder):
 
 @pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
 def test_each_submission_has_its_points_and_a_clear_remark(course, rows, student, wanted, remark):
-    """Large outputs cost no points. A remark that is None may have any text."""
+    """Large outputs cost no points. If a row gives None as the remark, any text is accepted."""
     row = rows["'" * student.startswith("=") + student]
     assert f"{row['square-test']} {row['half-test']}" == wanted, row
     assert row["remarks"].isprintable()
@@ -282,7 +282,7 @@ def test_attempts_to_leave_the_sandbox_fail(course, student):
     assert {output.get("ename") for output in answer.outputs} & REFUSALS, answer.outputs
 
 
-def test_nothing_outside_is_changed_and_no_process_is_left(course, rows):
+def test_nothing_outside_the_sandbox_is_changed(course, rows):
     assert state(course.folder) == course.before
     assert not (Path(rbcourse.__file__).parent / "mine.py").exists()
     assert {row["boxed"] for row in rows.values()} == {"yes"}
@@ -294,7 +294,7 @@ def pages(course):
     return {p.parts[-3]: p.read_text("utf-8") for p in course.folder.glob("feedback/*/ps0/*.html")}
 
 
-def test_pages_have_no_content_of_students_that_runs_or_loads(pages):
+def test_feedback_pages_contain_no_active_content_of_students(pages):
     for student, page in pages.items():
         body = page.split("<body>", 1)[1]
         assert "<script" not in body, student
@@ -309,7 +309,7 @@ def test_pages_have_no_content_of_students_that_runs_or_loads(pages):
     assert "gone (attachment:b.png is missing)" in words
 
 
-def test_pages_have_no_hidden_test_in_any_encoding_and_no_environment(pages):
+def test_feedback_pages_show_no_hidden_test(pages):
     for student, page in pages.items():
         text = html.unescape(re.sub(r"<[^>]*>", "", page))
         for line in HIDDEN:
@@ -340,7 +340,7 @@ def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, m
         ("ann", "The points of ann changed during the grading of bob"),
     ],
 )
-def test_points_that_a_submission_writes_are_detected(tmp_path, template, who, said, monkeypatch):
+def test_points_written_by_a_submission_are_detected(tmp_path, template, who, said, monkeypatch):
     """A submission gives itself points above the maximum, or changes those of another student."""
     course = Class(tmp_path, template)
     course.submit("ann")

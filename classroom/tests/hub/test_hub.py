@@ -1,4 +1,4 @@
-"""A real JupyterHub on this machine: two users open lesson 00 and run lesson 06 by its API."""
+"""Test a real JupyterHub on this machine: two users open lesson 00 and run lesson 06 by its API."""
 
 import asyncio
 import json
@@ -71,7 +71,7 @@ def hub(tmp_path_factory):
     for name, value in {**replaced, "DEFAULT": url}.items():
         text = re.sub(rf"\b{name}\b", str(value), text)
     (folder / "jupyterhub_config.py").write_text(text)
-    # The lessons are copied as the hook in values.yaml copies them.
+    # Copy the lessons like the hook in values.yaml.
     (command,) = [VALUES["singleuser"]["lifecycleHooks"]["postStart"]["exec"]["command"]]
     paths = os.pathsep.join(map(str, (site, ROOT, ROOT / "classroom")))
     env = {**os.environ, "PYTHONPATH": paths}
@@ -167,7 +167,7 @@ async def work(hub, token, user):
     return texts
 
 
-def test_two_users_open_the_first_lesson_and_run_another_at_the_same_time(hub):
+def test_two_users_run_lessons_at_the_same_time(hub):
     async def both():
         await answer(f"{hub[0]}/hub/api/", hub[1])
         return await asyncio.gather(*(work(*hub, user) for user in ("ada", "emmy")))

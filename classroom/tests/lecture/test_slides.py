@@ -1,4 +1,4 @@
-"""Slides: the generator with small lessons, and the rules for authors in all lessons."""
+"""Test the slide generator with small lessons, and the rules for authors with all lessons."""
 
 import base64
 import io
@@ -56,7 +56,7 @@ def shown(deck):
     return [(slide.title, slide.kind, slide.parts) for slide in deck.shown]
 
 
-def test_slides_show_only_the_text_that_an_author_wrote_for_them_and_notes_have_the_rest(tmp_path):
+def test_slides_show_only_the_text_written_for_them(tmp_path):
     deck = tiny(
         tmp_path,
         text("## 1 · One\n\nLong.", "Short.\n\n. . .\n\nThen.\n\n---\n\nNext."),
@@ -90,7 +90,7 @@ def test_slides_show_only_the_text_that_an_author_wrote_for_them_and_notes_have_
             tiny(tmp_path, cell)
 
 
-def test_a_picture_is_shown_with_the_text_of_its_cell_and_can_be_borrowed(tmp_path):
+def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
     matrix = new_code_cell("print(R)", metadata={"slide": r"$$R = \printed$$"})
     matrix.outputs = [new_output("stream", text="[[ 1.   0.5 ]\n [-0.25 1.  ]]\n")]
     deck = tiny(
@@ -140,7 +140,7 @@ def poll(question="Which?", answer=ANSWER, slide=None):
     )
 
 
-def test_a_poll_comes_before_the_evidence_and_its_verdict_after_it(tmp_path):
+def test_the_verdict_of_a_poll_comes_after_the_evidence(tmp_path):
     deck = tiny(tmp_path, *poll(slide="- **C** Short.\n\nAfter."))
     _, asked, evidence, verdict, after, _ = deck.shown
     assert (asked.kind, asked.parts, asked.poll) == ("poll", ["Which?"], "Poll 1")
@@ -160,7 +160,7 @@ def test_a_poll_comes_before_the_evidence_and_its_verdict_after_it(tmp_path):
     assert "Right: **B**." in asked.notes
 
 
-def test_slides_after_the_end_are_grouped_and_long_tables_are_split(tmp_path):
+def test_long_tables_are_split(tmp_path):
     rows = "".join(f"| row {i} | x |\n" for i in range(7))
     deck = tiny(
         tmp_path,
@@ -181,7 +181,7 @@ def test_slides_after_the_end_are_grouped_and_long_tables_are_split(tmp_path):
     assert deck.shown[-2].title == "Recap"
 
 
-def test_each_row_of_the_run_sheet_begins_at_its_slide_with_its_share_of_the_time(tmp_path):
+def test_each_row_of_the_run_sheet_begins_at_its_slide(tmp_path):
     sheet = """| 0 | question | Ask. | |
 | 2 | poll 1, a vote | | the second |
 | 12 | recap, homework | | |
@@ -209,7 +209,7 @@ def test_each_row_of_the_run_sheet_begins_at_its_slide_with_its_share_of_the_tim
     assert slides.starts_of(deck.shown, slides.rows_of(two)) == [0, 1, 2, len(deck.shown) - 1]
 
 
-def test_no_line_break_separates_a_number_from_its_unit_or_leaves_a_short_word_alone():
+def test_no_line_break_separates_a_number_from_its_unit():
     text = "[In](01.ipynb#s2) 5 % of 12 m, pages 3–9, it is so – or 1 : 2 of *it* is."
     whole = "In 5_% of 12_m, pages 3~–~9, it is so_– or 1_: 2 of <em>it</em>_is."
     marks = {"_": "\N{NO-BREAK SPACE}", "~": "\N{WORD JOINER}"}
@@ -228,7 +228,7 @@ def test_a_question_of_the_run_sheet_is_asked_after_the_vote(tmp_path):
     assert "**Ask:** Why B?" in deck.shown[2].notes
 
 
-def test_words_are_counted_without_formulas_and_marks():
+def test_words_are_counted_without_formulas_and_markup():
     assert words_of("*Two* words $a + b$:\n\n$$c = d$$\n\n. . .\n\n- 5 % of [it](x)") == 7
 
 
@@ -272,7 +272,7 @@ def plain(tex):
 
 
 def pieces(formula):
-    """Return the parts of a formula between its signs "=", gaps and line breaks."""
+    """Split a formula at signs "=", gaps and line breaks."""
     return [part for part in re.split(r"\\q?quad|=|\\\\", formula) if part.strip()]
 
 

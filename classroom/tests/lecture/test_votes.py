@@ -34,7 +34,7 @@ def test_a_lesson_is_found_by_its_number(tmp_path, monkeypatch):
         main()
 
 
-def test_votes_are_counted_when_the_vote_is_closed_and_phones_are_forgotten():
+def test_votes_are_counted_when_the_vote_is_closed():
     ballot = Ballot()
     for options in (["one"], ["some"] * 27):
         with pytest.raises(ValueError, match="2 to 26"):
@@ -85,7 +85,7 @@ def test_the_class_votes_by_hand_without_a_network(monkeypatch, capsys):
     assert "show of hands" in capsys.readouterr().out
 
 
-def test_the_address_that_is_found_belongs_to_this_machine():
+def test_the_address_found_belongs_to_this_machine():
     try:
         address = find_address()
     except OSError:
@@ -112,7 +112,7 @@ def vote(url, letters):
     return page, cookie
 
 
-def test_thirty_phones_vote_and_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
+def test_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
     lesson_at(
         tmp_path,
         new_markdown_cell("# Tiny"),

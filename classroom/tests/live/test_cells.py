@@ -21,7 +21,7 @@ def run(above, source, known=()):
 
 
 def kept(above, source):
-    """Return the statements above that are kept, as text."""
+    """Return the earlier statements that are kept, as text."""
     parts = cells.needed([cells.parsed(each, "<cell>") for each in above], cells.parsed(source, ""))
     return [ast.unparse(each) for some in parts for each in some]
 
@@ -29,7 +29,7 @@ def kept(above, source):
 ABOVE = ["import math, json\nfrom os import path, sep", "a = 1\nb = a + 1\nprint(b)", "a = 5"]
 
 
-def test_only_statements_that_a_cell_needs_are_kept_and_imports_are_kept_separately():
+def test_only_statements_that_a_cell_needs_are_kept():
     assert kept(ABOVE, "b") == ["a = 1", "b = a + 1"]
     assert kept(ABOVE, "a + math.pi") == ["import math", "a = 5"]
     assert kept(ABOVE, "a = sep\na") == ["from os import sep"]
@@ -68,7 +68,7 @@ def test_a_cell_prints_the_same_as_after_all_cells_above(above, source, wanted, 
         assert run(above, source)[1].strip() == wanted
 
 
-def test_texts_values_pages_and_figures_are_shown():
+def test_results_of_all_kinds_are_shown():
     assert run([], "print(1)\n2")[1] == "1\n2"
     page = "class P:\n    def _repr_html_(self):\n        return '<b>x</b>'"
     assert run([page], "P()")[2] == [("html", "<b>x</b>")]
@@ -82,7 +82,7 @@ def test_texts_values_pages_and_figures_are_shown():
     assert len(run([], f"print('x' * {cells.CUT + 5})")[1]) < cells.CUT + 60
 
 
-def test_errors_state_their_place_and_a_hint_is_shown_alone():
+def test_errors_state_their_place():
     _, text, found = run(["def f(x):\n    return 1 / x"], "print(1)\nf(0)")
     assert text == "1\n"
     kind, said = found[-1]
@@ -96,7 +96,7 @@ def test_errors_state_their_place_and_a_hint_is_shown_alone():
     assert run([], hint)[2] == [("hint", str(NotYet("Turn it round.")))]
 
 
-def test_a_missing_package_is_named_if_it_can_be_loaded_and_is_an_error_otherwise():
+def test_a_missing_package_is_named_if_it_can_be_loaded():
     assert run([], "import not_there.part", ["not_there"])[0] == "not_there"
     missing, _, found = run([], "import not_there")
     assert missing == ""

@@ -1,4 +1,4 @@
-"""The files of Pyodide: fetched once, checked, and refused if they are not the official ones."""
+"""Test that Pyodide's files are fetched once, checked, and refused if they are not official."""
 
 import gzip
 import hashlib
@@ -11,7 +11,7 @@ from rbclassroom.live import engine
 
 @pytest.fixture
 def made_up(monkeypatch, tmp_path):
-    """Make a lock for two files, and the sources that have them."""
+    """Make a lock file for two files, and the sources that provide them."""
     contents = {"a.js": b"1", "b.whl": b"2"}
     digests = {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
     monkeypatch.setattr(engine, "files", lambda: digests)
@@ -40,7 +40,7 @@ def test_each_file_is_fetched_once_from_the_first_place_that_has_it(made_up, tmp
     assert (tmp_path / "cache" / "a.js").read_bytes() == b"1"
 
 
-def test_a_file_that_is_not_the_official_one_is_refused_and_not_kept(made_up, tmp_path):
+def test_a_file_that_is_not_official_is_refused(made_up, tmp_path):
     _, let = made_up
     let({"a.js": b"not the official one"})
     with pytest.raises(engine.EngineError, match=r"a\.js, fetched .*, is not the official file"):
@@ -48,7 +48,7 @@ def test_a_file_that_is_not_the_official_one_is_refused_and_not_kept(made_up, tm
     assert list((tmp_path / "cache").iterdir()) == []
 
 
-def test_the_lock_has_the_files_that_the_pages_load_and_their_version():
+def test_the_lock_has_the_files_that_the_pages_load():
     lock = engine.lock()
     assert lock["info"]["version"] == engine.VERSION
     assert set(lock["core"]) == set(engine.CORE)
@@ -56,7 +56,7 @@ def test_the_lock_has_the_files_that_the_pages_load_and_their_version():
     assert all(len(digest) == 64 for digest in engine.files().values())
 
 
-def test_a_site_has_its_packed_files_and_the_code_of_the_course(monkeypatch, tmp_path):
+def test_a_site_includes_the_code_of_the_course(monkeypatch, tmp_path):
     (tmp_path / "have").mkdir()
     for name in engine.files():
         (tmp_path / "have" / name).write_bytes(name.encode())
@@ -65,7 +65,8 @@ def test_a_site_has_its_packed_files_and_the_code_of_the_course(monkeypatch, tmp
     one, two = tmp_path / "one", tmp_path / "two"
     assert all(path.read_bytes() == (two / path.name).read_bytes() for path in one.iterdir())
     packed = (one / "pyodide.asm.wasm.packed").read_bytes()
-    assert packed[4:8] == bytes(4)  # the packed file has no time, so that it is the same each time
+    # the packed file stores no time, so that its bytes are always the same
+    assert packed[4:8] == bytes(4)
     assert gzip.decompress(packed) == b"pyodide.asm.wasm"
     served = json.loads((one / "pyodide-lock.json").read_text())
     assert "pytz" not in served["packages"]["matplotlib"]["depends"]

@@ -1,4 +1,4 @@
-"""The atlas: its problems, the costs of curves, and the quantiles."""
+"""Test the atlas: its problems, the costs of curves, and the quantiles."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def norms(x):
     return np.linalg.norm(x, axis=-1)
 
 
-def test_each_cell_has_its_displacements_and_end_velocities_in_the_directions_of_its_family():
+def test_each_cell_has_problems_of_its_family():
     ends = atlas.atlas_problems(DRAWS, rng=1)
     family, turn, speed, _ = np.indices((2, 10, 10, DRAWS)).reshape(4, -1)
     sigma, w = turns(ends), np.stack([ends.w0, ends.w1])
@@ -36,7 +36,7 @@ def test_each_cell_has_its_displacements_and_end_velocities_in_the_directions_of
 def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
-        share = (norms(x) / radius) ** 3  # this share of the volume of the ball is uniform
+        share = (norms(x) / radius) ** 3  # this share of the ball's volume is uniform
         assert share.max() < 1 + 1e-9
         assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
@@ -69,7 +69,7 @@ def about_the_identity(R0, R1, w0, w1):
 
 
 @pytest.mark.source("BK Prop. 3")
-def test_moved_ends_move_all_closed_forms_and_exchanged_ends_reverse_some():
+def test_all_closed_forms_move_with_their_ends():
     reversible = "projection", "Bézier", "corrected", "quaternion", "about the identity"
     for way, make in {**atlas.WAYS, "about the identity": about_the_identity}.items():
         off = atlas.defects(make, SOME, rng=1)
@@ -95,7 +95,7 @@ def test_the_excess_is_nan_if_the_optimum_is_near_zero():
     assert excess["other"] == pytest.approx([np.nan, 1, 1, 1], nan_ok=True)
 
 
-def test_a_quantile_is_a_number_of_the_sample_rounded_to_four_digits():
+def test_quantiles_are_values_of_the_sample_rounded_to_four_digits():
     x = np.random.default_rng(7).random((3, 50))
     x[0, ::2] = np.nan
     for share in (0.1, 0.5, 0.9, 1):

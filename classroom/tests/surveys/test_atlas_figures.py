@@ -1,4 +1,5 @@
-"""Heat maps of the atlas show the cells of their tables. Its other figures are in test_drawn.py."""
+"""Heat maps of the atlas show the cells of their tables. Its other figures are tested in
+test_drawn.py."""
 
 import matplotlib.pyplot as plt
 import numpy as np

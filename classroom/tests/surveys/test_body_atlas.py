@@ -1,4 +1,4 @@
-"""The atlas of real bodies: its curves, its domains, and the intervals of quantiles."""
+"""Test the atlas of real bodies: its curves, its domains, and the intervals of quantiles."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_a_domain_has_the_limits_that_its_description_states(name, turn, speed, 
 
 
 @pytest.mark.parametrize("body", ["ball", "book"])
-def test_the_chosen_curves_are_the_cheapest_of_two_and_of_three(body):
+def test_the_chosen_curves_are_the_cheapest(body):
     ends, inertia = body_atlas.body_problems(1, 3).take(slice(0, None, 5)), body_atlas.BODIES[body]
     costs = survey.survey(ends, inertia=inertia, ways=body_atlas.curves_for(body))
     excess = body_atlas.with_choices(atlas.excesses(ends, costs, inertia))
@@ -58,7 +58,7 @@ def test_the_chosen_curves_are_the_cheapest_of_two_and_of_three(body):
 
 @pytest.fixture
 def excess():
-    """Return made-up excesses of 50 problems in each cell; seven in the small domain are near
+    """Return invented excesses of 50 problems in each cell; in the small domain, seven are near
     zero."""
     rng = np.random.default_rng(2)
     x = {curve: 0.2 * rng.random(5000) for curve in CURVES}
@@ -76,7 +76,7 @@ def test_the_maps_have_a_row_for_each_cell_of_each_body(excess):
         assert table[f"three {name} [1]"] == pytest.approx(both, rel=5e-4)
 
 
-def test_intervals_are_binomial_for_quantiles_and_clopper_pearson_for_shares(excess):
+def test_intervals_of_quantiles_are_binomial(excess):
     table = body_atlas.intervals(excess, 50)
     assert table["curve"].tolist() == 3 * list(CURVES)
     cheapest = np.min([excess[curve] for curve in CLOSED_FORMS], axis=0)

@@ -1,4 +1,4 @@
-"""Surveys: the costs of curves on any executor, and the tables of the atlas."""
+"""Test surveys: the costs of curves on any executor, and the tables of the atlas."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 
 @pytest.mark.source("BK (18)", "beyond BK 1", "beyond BK 2")
 @pytest.mark.parametrize("inertia", [None, BOOK], ids=["ball", "book"])
-def test_a_survey_has_the_optimum_and_the_integral_for_every_curve(inertia):
+def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(inertia):
     assert rb.projected_cubic_so3(*SHARP).margin < 0.004
     found = survey.survey(FEW, inertia=inertia)
     # this call uses several threads; a survey uses one
@@ -56,7 +56,8 @@ def test_an_optimum_that_is_not_found_is_nan_without_a_warning():
 
 @pytest.mark.source("BK (19)")
 def test_the_optimum_costs_no_more_than_those_from_several_starts():
-    """From the projected cubic, the solver turns in the wrong direction in many of the problems."""
+    """A solver that starts from the projected cubic turns the wrong way in many of these
+    problems."""
     used, found = rb.minimum_acceleration_so3(*SOME).cost, several_starts(SOME)
     left_out = "corrected", "Cayley"
     assert list(found) == [*(way for way in atlas.WAYS if way not in left_out), "long way round"]
@@ -80,7 +81,7 @@ class Backwards(Executor):
         return future
 
 
-def test_every_executor_gives_the_same_bytes_and_reports_its_progress(monkeypatch):
+def test_every_executor_gives_the_same_bytes(monkeypatch):
     monkeypatch.setattr(survey, "CHUNK", 5)
     monkeypatch.setattr(survey, "processes", partial(survey.processes, 1))
     known, told, found = {"inertia": BOOK, "ways": {"Bézier": rb.bezier_so3}}, [], []
@@ -98,7 +99,7 @@ def refuses(*ends):
 
 
 @pytest.mark.parametrize(("chunk", "first"), [(20, "0|20|40"), (60, "0")])
-def test_an_error_ends_a_survey_and_names_the_curve(monkeypatch, chunk, first):
+def test_an_error_in_a_survey_names_the_curve(monkeypatch, chunk, first):
     monkeypatch.setattr(survey, "CHUNK", chunk)
     said = rf"^chunk from problem ({first}) on: none: no curve"
     ways = {"projection": atlas.projection, "none": refuses}
@@ -126,7 +127,7 @@ def test_bad_arguments_are_refused_before_anything_is_computed(bad, said):
         survey.survey(**{"problems": SOME, **bad}, report=reported)
 
 
-def test_functions_that_cannot_be_sent_to_processes_are_refused_or_run_in_this_process(monkeypatch):
+def test_functions_that_cannot_be_pickled_run_only_in_this_process(monkeypatch):
     ways = {"own": lambda *ends: atlas.projection(*ends)}
     found = survey.survey(SOME, ways=ways)
     assert np.array_equal(found["own"], costs(atlas.projection, SOME))
@@ -149,7 +150,7 @@ def test_functions_that_cannot_be_sent_to_processes_are_refused_or_run_in_this_p
         lambda *ends: None,
     ],
 )
-def test_a_maker_that_does_not_return_one_curve_for_each_problem_is_refused(make):
+def test_a_maker_must_return_one_curve_for_each_problem(make):
     with pytest.raises(ValueError, match=r"^make: one curve on SO\(3\) and \[0, 1\] per"):
         costs(make, SOME)
 
@@ -175,7 +176,7 @@ def test_processes_end_when_their_parent_is_killed(tmp_path):
         assert job.communicate(timeout=600)[0] == ""
 
 
-def test_the_maps_are_made_from_the_first_seed_and_the_intervals_from_all(tmp_path, monkeypatch):
+def test_only_the_first_seed_is_used_for_the_maps(tmp_path, monkeypatch):
     surveyed = []
 
     def made_up(problems, executor, *, inertia, ways, report):
@@ -194,7 +195,7 @@ def test_the_maps_are_made_from_the_first_seed_and_the_intervals_from_all(tmp_pa
     assert body_atlas.stored("intervals")["seed [1]"].tolist() == [5] * 33 + [6] * 33
 
 
-def test_a_progress_bar_grows_and_ends_as_a_line(monkeypatch):
+def test_a_progress_bar_grows(monkeypatch):
     stages = []
     handle = SimpleNamespace(update=lambda stage, raw: stages.append(stage))
     shown = {"display": lambda stage, **_: stages.append(stage) or handle}
