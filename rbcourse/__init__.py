@@ -1,26 +1,29 @@
 """Rigid-body motion: rotations, poses, projections, and curves through them.
 
-The package exports the names for everyday use. Its modules have more: inner products are in
-`rbcourse.metrics`, the connection in `rbcourse.connection`, the plane in `rbcourse.planar` and
-`rbcourse.arm`, the naive samplers and the tests of uniformity in `rbcourse.sampling`, the timings
-θ and f in `rbcourse.projected_line`, and the main algorithms as on the board in
-`rbcourse.textbook`.
+The package exports the names for everyday use. Other names are only in its modules: inner products
+in `rbcourse.metrics`, the connection in `rbcourse.connection`, planar motions and arms in
+`rbcourse.planar` and `rbcourse.arm`, naive samplers and tests of uniformity in `rbcourse.sampling`,
+and the timings θ and f in `rbcourse.projected_line`. The module `rbcourse.textbook` has the main
+algorithms, written as on the board.
 
-The line "Source" of a docstring has the equation: BK is Belta and Kumar (2002), RR the report by
-Samayamantula and Zou, and "beyond BK 12" an entry of docs/ledger.md, which is in neither text.
+In a docstring, the line "Source" cites the equation. BK is Belta and Kumar (2002), and RR is the
+report by Samayamantula and Zou. Entries of docs/ledger.md, such as "beyond BK 12", are in neither
+text.
 
-The constants are `BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), the standard bases
-of the Lie algebras; `METRIC_SO3` and `METRIC_SE3`, the matrices of the metrics that the trace
-induces (BK (12), (14)); and `CLOSED_FORMS`, a dict of the functions that approximate the optimum in
-closed form, by name.
+`BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), are the standard bases of the Lie
+algebras. `METRIC_SO3` and `METRIC_SE3` are the matrices of the metrics that the trace induces (BK
+(12), (14)). The dict `CLOSED_FORMS` contains the functions that approximate the optimum in closed
+form, by name.
 
-Every function raises ValueError, and names the argument, if an argument is not what its description
-says: not finite, of another shape, outside the stated range, not symmetric or not positive definite
-where that is stated, or if batch shapes do not broadcast. The docstrings name the other errors.
+Every function raises ValueError, and names the argument, if an argument is not finite, has the
+wrong shape, is outside the stated range, or is not symmetric or positive definite where that is
+stated. Batch shapes that do not broadcast also raise ValueError. The docstrings name the other
+errors.
 
-Validity of rotation matrices and poses is not checked unless a docstring says so: `project_so` and
-`project_se` return the nearest valid ones. The last row of a pose is not read. Angles are in rad,
-lengths in m; angular velocities and twists (ω, v) are in the body frame, per unit of time.
+Unless a docstring says so, functions do not check that rotation matrices and poses are valid;
+`project_so` and `project_se` return the nearest valid ones. The last row of a pose is not read.
+Angles are in rad, and lengths in m. Angular velocities and twists (ω, v) are in the body frame, per
+unit of time.
 """
 
 from rbcourse import arm, connection, files, metrics, planar, projected_line, quaternion, sampling
@@ -135,7 +138,7 @@ from rbcourse.velocities import bessel_velocities, spline_velocities
 
 __version__ = "0.34.0"
 
-__all__ = [  # noqa: RUF022 - by subject, not by alphabet
+__all__ = [  # noqa: RUF022 - sorted by subject
     # rotations
     "BASIS_SO3",
     "hat_so3",

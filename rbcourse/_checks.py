@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array
 
-Rng: TypeAlias = "np.random.Generator | int | None"  # a string: numpy.random is not imported
+Rng: TypeAlias = "np.random.Generator | int | None"  # a string avoids importing numpy.random
 
 
 def as_array(
     name: str, value: ArrayLike, *core: int | str, stacked: bool = True, copy: bool = True
 ) -> Array:
-    """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity pass.
+    """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity are allowed.
 
     A letter in `core` matches any size ≥ 1, repeated letters match the same size, and "n+1" matches
     any size ≥ 2. For example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All
@@ -33,7 +33,7 @@ def as_array(
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]
-    ma = sys.modules.get("numpy.ma")  # if it is not loaded, no array is masked
+    ma = sys.modules.get("numpy.ma")  # if numpy.ma is not loaded, no array is masked
     if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
         raise ValueError(
             f"{name}: an array without a mask is wanted, got a masked array; fill or compress it"
@@ -93,8 +93,8 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
     Raises
     ------
     ValueError
-        For the same reasons as in `as_symmetric`; or if a matrix is not positive definite, or the
-        squares of its eigenvalues overflow or underflow. The message names the first such
+        As for `as_symmetric`; also if a matrix is not positive definite, or if the squares of its
+        eigenvalues overflow or underflow. The message names the first such
         matrix.
     """
     G = as_symmetric(name, value, 3)
@@ -128,8 +128,8 @@ def as_time(
 ) -> Array:
     """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
 
-    A time that is outside the domain only by rounding, by 8 eps of the larger end, is replaced by
-    the nearer end. The end of the domain is a number, or an array that broadcasts with the times.
+    A time that is outside the domain by at most 8 eps of the larger end is replaced by the nearer
+    end. The end of the domain is a number, or an array that broadcasts with the times.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
     if not (np.all(times >= start) and np.all(times <= end)):
@@ -184,12 +184,12 @@ def as_count(name: str, value: int) -> int:
 
 
 def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
-    """Return the batch shape: () for None, (n,) for n; raise ValueError if it is invalid."""
+    """Return `size` as a batch shape; None gives (), and n gives (n,)."""
     given: Any = () if size is None else size
     lengths = given if isinstance(given, tuple | list) else [given]
     try:
         if any(isinstance(length, bool) for length in lengths):
-            raise TypeError("True and False are integers to Python")
+            raise TypeError("a bool is not a length")
         shape = tuple(map(index, lengths))
     except TypeError as error:
         raise ValueError(f"size: None, an integer or a tuple is wanted, got {size!r}") from error
@@ -199,7 +199,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
 
 
 def as_generator(rng: Rng) -> np.random.Generator:
-    """Return a generator of random numbers; raise ValueError if `rng` does not define it."""
+    """Return a generator of random numbers; raise ValueError if `rng` is invalid."""
     try:
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
@@ -207,7 +207,7 @@ def as_generator(rng: Rng) -> np.random.Generator:
 
 
 def check_order(order: int, most: int) -> int:
-    """Return the `order` of a derivative; raise ValueError unless it is an integer, 0 to `most`."""
+    """Return the order of a derivative; it must be an integer from 0 to `most`."""
     known = isinstance(order, int | np.integer) and not isinstance(order, bool)
     if not known or not 0 <= order <= most:
         wanted = ", ".join(map(str, range(most)))
@@ -232,7 +232,7 @@ def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
 
 
 def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
-    """Return the name of the first chosen entry: ``R[0, 2]``, or ``R`` for a single value."""
+    """Name the first chosen entry, such as ``R[0, 2]``, or ``R`` for a single value."""
     first = ", ".join(str(i) for i in np.argwhere(chosen)[0])
     return f"{name}[{first}]" if first else name
 

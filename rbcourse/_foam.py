@@ -1,4 +1,4 @@
-"""The nearest rotations to 3 × 3 matrices, by Markley's fast optimal attitude matrix, FOAM.
+"""The nearest rotations to 3 × 3 matrices, by Markley's FOAM (fast optimal attitude matrix).
 
 Let R be the nearest rotation to M, so that S = RᵀM is symmetric, with eigenvalues s₁ ≥ s₂ ≥ |s₃|.
 The cofactor matrix of R f(S) is R cof f(S) for every function f. So three matrices are products of
@@ -10,7 +10,7 @@ R and a symmetric matrix:
 
 where λ = s₁ + s₂ + s₃ and ζ = (s₁ + s₂)(s₂ + s₃)(s₃ + s₁). Here s₁² is the largest root of
 x³ − ‖M‖² x² + ‖cof M‖² x − det² = 0, computed by Viète's formula, and
-(s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁. With an error in λ or ζ, the result is R times another symmetric
+(s₂ + s₃)² = ‖M‖² − s₁² + 2 det/s₁. If λ or ζ has an error, the result is R times another symmetric
 matrix near λζ I. One step of Newton's method for the polar factor, X ← (X + X⁻ᵀ)/2, squares the
 relative distance of this matrix from λζ I.
 
@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
-LEAST_ZETA = 3e-3  # times s₁ ‖M‖²; smaller ζ lose digits, and are rare
-_BLOCK = 5128  # matrices that fit into the cache; rows of 4096 bytes would collide there
+LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; smaller ζ are rare and lose digits
+_BLOCK = 5128  # number of matrices that fit into the cache; rows of 4096 bytes would collide there
 
 
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
-    """Write the nearest rotations to M into R, both of shape (3, 3, N); return which are valid.
+    """Write the nearest rotations to M, shape (3, 3, N), into R; return a mask of the valid ones.
 
     A rotation is not valid if ζ is less than `LEAST_ZETA` s₁ ‖M‖², which means that M is near the
     singular set of `project_so`. It is also not valid if an entry of M is not finite or ‖M‖ is
@@ -49,7 +49,7 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
 
 
 def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
-    """Write the nearest rotations to M into C, return which are valid, and overwrite M and X."""
+    """Do the work of `nearest_rotations` for one block; write into C, and overwrite M and X."""
     norm2 = _dots(M, M)
     if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # so that its sixth power does not overflow
         M[...] = scaled(M, axis=(0, 1))

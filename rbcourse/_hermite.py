@@ -11,18 +11,18 @@ from rbcourse._numerics import Array
 
 
 def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
-    """Return the polynomial of least degree with these ends, or a derivative, at the times t.
+    """Evaluate the polynomial of least degree with these ends, or a derivative, at the times t.
 
-    The ends at t = 0 and 1 are x0, x1, for a cubic also v0, v1, and for a quintic also a0, a1; t
-    broadcasts with them. The polynomial meets both ends exactly. The line has the least ∫ ‖x'‖² dt,
-    the cubic the least ∫ ‖x''‖² dt, the quintic the least ∫ ‖x'''‖² dt.
+    The ends at t = 0 and 1 are x0, x1. For a cubic, they include v0, v1, and for a quintic, also
+    a0, a1. The times broadcast with the ends. The polynomial meets both ends exactly. The line
+    minimizes ∫ ‖x'‖² dt, the cubic ∫ ‖x''‖² dt, and the quintic ∫ ‖x'''‖² dt.
     Source: BK 6, BK 6.2.
     """
     return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
 
 
 def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
-    """Return the values of `hermite` for a stack, from its `stack_terms`.
+    """Evaluate `hermite` for a stack of ends, given the result of `stack_terms`.
 
     The components are on the first axes. The terms have the shape (n + 1, ..., count). If t has the
     shape (T, count) or (T, 1), the result has the shape (..., T, count). If `by_curve`, t has the
@@ -39,25 +39,24 @@ def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False)
 
 
 def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
-    """Return the weighted sum of the last terms, as many as there are weights."""
+    """Return the weighted sum of the terms; surplus terms at the front are not used."""
     first, *others = (w * x for w, x in zip(weights, terms[-len(weights) :], strict=True))
     return sum(others, first)
 
 
 def stack_terms(ends: Array) -> Array:
-    """Return the terms, shape (n + 1, ..., count), of a stack of ends, shape (count, n, ...)."""
+    """Return terms of the shape (n + 1, ..., count) for ends of the shape (count, n, ...)."""
     terms = _terms(np.moveaxis(ends, 1, 0))
     return np.stack([np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in terms])
 
 
 def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
-    """Return the terms of a polynomial: x0, x1, x1 − x0 and the derivatives at the ends."""
     x0, x1, *rates = map(np.asarray, ends)
     return [x0, x1, x1 - x0, *rates]
 
 
 def _weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of the terms; for derivatives, the first weight is that of x1 − x0."""
+    """Return the weights of the terms; for derivatives, x0 and x1 themselves have no weight."""
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
     weights = [weight for pair in rates for weight in pair]
@@ -68,7 +67,7 @@ def _weights(count: int, t: Array, order: int) -> list[Array]:
 
 
 def _start_weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of x0, v0, a0; up to signs, x1, v1, a1 have these weights at 1 − t."""
+    """Return the weights of x0, v0, a0. Up to signs, x1, v1, a1 have the same weights at 1 − t."""
     s = 1 - t
     match count, order:
         case 2, 0:

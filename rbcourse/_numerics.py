@@ -23,12 +23,12 @@ def sine_gap_ratio(x: Array) -> Array:
 
 
 def matvec(A: Array, x: Array) -> Array:
-    """Return matrices times vectors: A of shape (..., m, n), x of shape (..., n)."""
+    """Return A x for matrices A of shape (..., m, n) and vectors x of shape (..., n)."""
     return (A @ x[..., None])[..., 0]
 
 
 def cross(x: Array, y: Array, axis: int = -1) -> Array:
-    """Return x × y several times faster than NumPy; the components are on the axis 0 or −1."""
+    """Return x × y, several times faster than `numpy.cross`; `axis` is 0 or −1."""
     product = np.empty(np.broadcast(x, y).shape)
     (a, b, c), (u, v, w), parts = (z if axis == 0 else z.T for z in (x, y, product))
     parts[0], parts[1], parts[2] = b * w - c * v, c * u - a * w, a * v - b * u
@@ -36,7 +36,7 @@ def cross(x: Array, y: Array, axis: int = -1) -> Array:
 
 
 def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
-    """Return matrices, or columns, divided by powers of two: largest entries are in [0.5, 1)."""
+    """Divide matrices or columns by powers of two, so that the largest entries are in [0.5, 1)."""
     _, exponent = np.frexp(np.abs(matrix).max(axis=axis, keepdims=True))
     return np.ldexp(matrix, -exponent)
 
@@ -48,7 +48,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 def at_cache_line(*shape: int) -> Array:
-    """Return an uninitialised array that is aligned to a cache line, on which NumPy is faster."""
+    """Return an uninitialised array, aligned to a cache line because this makes NumPy faster."""
     raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
     start = -raw.ctypes.data % 64
     return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)

@@ -1,6 +1,6 @@
 """Quaternions (w, x, y, z) as functions of time: products, exp and slerp with their derivatives.
 
-A jet is the list of a function of time and its first derivatives: [x, x', x'', x'''] or fewer.
+A jet lists the values of a function of time and its derivatives: [x, x', x'', x'''] or fewer.
 Components are on the first axis: a quaternion has the shape (4, ...), a vector (3, ...).
 """
 
@@ -15,15 +15,15 @@ from rbcourse._numerics import cross as cross_product
 
 Jet = list[Array]
 
-# Coefficients of power series, the highest first: of the second derivatives of sin(√s)/√s, in s,
-# and of arccos(x)², in (1 − x)/2, and of both third derivatives.
+# Polynomial coefficients, highest power first, of the second and third derivatives of two
+# functions: sin(√s)/√s, in powers of s, and arccos(x)², in powers of (1 − x)/2.
 _SINC_BEND = [n * (n - 1) * (-1) ** n / math.factorial(2 * n + 1) for n in range(9, 1, -1)]
 _ANGLE_BEND = [k * math.prod(j / (j + 0.5) for j in range(1, k + 1)) for k in range(13, 0, -1)]
 _SINC_THIRD, _ANGLE_THIRD = np.polyder(_SINC_BEND), -np.polyder(_ANGLE_BEND) / 2
 
 
 def product(p: Jet, q: Jet) -> Jet:
-    """Return the jet of Hamilton's product p q of two jets of one length, by Leibniz's rule."""
+    """Return the jet of Hamilton's product p q of two jets of the same length."""
     return _leibniz(multiply, p, q)
 
 
@@ -68,22 +68,22 @@ def slerp(a: Jet, b: Jet, share: Jet) -> Jet:
 
 
 def times(share: Jet, x: Jet) -> Jet:
-    """Return the jet of a number times a number or a vector, by Leibniz's rule."""
+    """Return the jet of a number, `share`, times a number or vector x."""
     return _leibniz(np.multiply, share, x)
 
 
 def dot(x: Jet, y: Jet) -> Jet:
-    """Return the jet of the inner product of two vectors, by Leibniz's rule."""
+    """Return the jet of the inner product of two vectors."""
     return _leibniz(_dot, x, y)
 
 
 def cross(x: Jet, y: Jet) -> Jet:
-    """Return the jet of the cross product of two vectors, by Leibniz's rule."""
+    """Return the jet of the cross product of two vectors."""
     return _leibniz(partial(cross_product, axis=0), x, y)
 
 
 def matrix(q: Array, scale: float | Array = 1.0) -> Array:
-    """Return `scale` times the matrix that rotates by q and scales by ‖q‖²: shape (..., 3, 3)."""
+    """Return `scale` ‖q‖² times the rotation matrix of q, shape (..., 3, 3)."""
     w, x, y, z = q
     sw, sx, sy, sz = scale * w, scale * x, scale * y, scale * z
     ww, xx, yy, zz = sw * w, sx * x, sy * y, sz * z
@@ -101,9 +101,9 @@ def rotation(q: Array) -> Array:
 
 
 def angular_velocity(q: Jet) -> Array:
-    """Return w for a jet [q, q'], w' for [q, q', q''], and w'' if there is a third derivative.
+    """Return w for a jet [q, q'], w' for [q, q', q''], and w'' for [q, q', q'', q'''].
 
-    q has any norm except 0, and the result is in the body frame. With n = ‖q‖², n w = 2 im(q̄ q').
+    q must not be 0. The result is in the body frame. With n = ‖q‖², n w = 2 im(q̄ q').
     So n w' + n' w = 2 im(q̄ q'') and n w'' + 2 n' w' + n'' w = 2 im(q̄ q''' + q̄' q'').
     """
     n = _dot(q[0], q[0])
@@ -135,7 +135,6 @@ def _dot(x: Array, y: Array) -> Array:
 
 
 def _leibniz(op: Callable[[Array, Array], Array], x: Jet, y: Jet) -> Jet:
-    """Return the jet of a product of any kind."""
     jet = [op(x[0], y[0])]
     if len(x) > 1:
         jet.append(op(x[1], y[0]) + op(x[0], y[1]))
@@ -159,7 +158,7 @@ def _chain(f: list[Array], x: Jet) -> Jet:
 
 
 def _over(x: Jet, y: Jet) -> Jet:
-    """Return the jet of the quotient of two numbers, from x = quotient times y."""
+    """Return the jet of the quotient x/y of two numbers."""
     quotient: Jet = [x[0] / y[0]]
     if len(x) > 1:
         quotient.append((x[1] - quotient[0] * y[1]) / y[0])
@@ -178,7 +177,7 @@ def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
     4 s k''' + 10 k'' + k' = 0 give the other derivatives.
     """
     root = np.sqrt(s)
-    tangent = np.tan(root / 2)  # tan is the fastest in NumPy
+    tangent = np.tan(root / 2)  # tan is NumPy's fastest trigonometric function
     sine = 2 * tangent / (1 + tangent * tangent)
     c, k = 1 - tangent * sine, np.where(root == 0, 1.0, sine / np.where(root == 0, 1.0, root))
     if order == 0:
@@ -197,8 +196,8 @@ def _cosine_and_sinc(s: Array, order: int) -> tuple[list[Array], list[Array]]:
 def _squared_angle(x: Array, order: int) -> list[Array]:
     """Return h = arccos(x)² and its derivatives with respect to x.
 
-    Near x = 1, power series give h'' and h'''. Elsewhere, (1 − x²) h'' = 2 + x h' and
-    (1 − x²) h''' = 3 x h'' + h' give them.
+    Near x = 1, power series give h'' and h'''. Elsewhere, they follow from (1 − x²) h'' = 2 + x h'
+    and (1 − x²) h''' = 3 x h'' + h'.
     """
     x = np.clip(x, -1.0, 1.0)
     angle, z = np.arccos(x), (1 - x) * (1 + x)

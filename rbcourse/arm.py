@@ -1,4 +1,4 @@
-"""An arm in the plane: a chain of links, each turned by its joint relative to the previous one."""
+"""A planar arm: a chain of links, each turned by its joint relative to the previous link."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ class Posture(NamedTuple):
     Parameters
     ----------
     joints : ndarray, shape (..., n + 1, 2)
-        The positions of the joints in order, from the first one at the origin, and then the tip.
+        The positions of the joints in order (the first is at the origin), and then of the tip.
     frames : ndarray, shape (..., n, 3)
-        The frames of the links: poses (x, y, theta) at their centres, x along the link.
+        The poses (x, y, theta) of the frames of the links: each frame is at the centre of its link,
+        with its x axis along the link.
     """
 
     joints: Array
@@ -77,7 +78,7 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the matrix that maps joint velocities to the velocity of the tip in the world frame.
 
-    Singular set: all links lie on one line, stretched or folded; the rank is then 1.
+    Singular set: all links lie on one line, stretched or folded. The rank is then 1.
     Source: RR 4.
 
     Parameters
@@ -105,8 +106,8 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the two sets of joint angles that bring the tip of a two-link arm to a position.
 
-    Singular set: the links lie on one line, where both solutions are the same up to full turns. If
-    equal links are folded, any first angle puts the tip at the base; one of them is returned.
+    Singular set: the links lie on one line. Both solutions are then the same up to full turns. If
+    equal links are folded, the tip is at the base for any first angle; one such angle is returned.
     Source: RR 4.
 
     Parameters
@@ -131,7 +132,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     tip, lengths = as_finite("tip", tip, 2), _lengths(lengths, 2)
     size = 2.0 ** np.frexp(lengths.max())[1]  # so that the unit of length does not matter
     (a, b), r = lengths / size, np.hypot(tip[..., 0], tip[..., 1]) / size
-    slack = 4 * EPS * (a + b)  # for the rounding errors of a computed tip
+    slack = 4 * EPS * (a + b)  # allows for rounding errors of the tip
     out = (r > a + b + slack) | (r < abs(a - b) - slack)
     if out.any():
         reach = f"{abs(a - b) * size:.15g} to {(a + b) * size:.15g} m from the base"
@@ -147,7 +148,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
 
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
-    """Return the path (1 − t) start + t goal of joint angles, t equally spaced, with full turns.
+    """Return joint angles interpolated linearly in equal steps; full turns are kept.
 
     Source: RR 4.1, RR (20), RR (21), with errata 19.
 
@@ -174,7 +175,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
 
 
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
-    """Return the start and the joint angles after each command of a plan; turns are summed.
+    """Return the joint angles at the start and after each command of a plan; full turns are kept.
 
     Source: RR 4.2, RR (22), RR (23), with errata 20.
 
@@ -182,7 +183,7 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     ----------
     start : array_like, shape (..., n)
     plan : iterable of (velocity, duration)
-        Velocities of the n joints in rad/s, and durations of at least 0 in s. The plan may be
+        Pairs of n joint velocities, in rad/s, and a duration of at least 0, in s. The plan may be
         empty.
 
     Returns

@@ -32,7 +32,7 @@ Legs = tuple[Array, Array, Array]
 def bezier_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> Bezier:
-    """Return the cubic Bézier curve with these ends: de Casteljau's construction by geodesics.
+    """Return the cubic Bézier curve with these ends, by de Casteljau's algorithm with geodesics.
 
     Source: BK 1, its references 3 to 5.
 
@@ -49,7 +49,7 @@ def bezier_so3(
 
     Notes
     -----
-    Singular set: the two inner control points a half-turn apart; `log_so3` then chooses the
+    Singular set: the two inner control points are a half-turn apart. `log_so3` then chooses the
     geodesic between them. By the triangle inequality, no other leg can become a half-turn. The
     curve does not depend on the choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
 
@@ -68,9 +68,9 @@ def bezier_long_so3(
 ) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
-    If the end velocities are large, it may cost less than `bezier_so3`. Change of frames, reversal
-    and singular set: as for `bezier_so3`. The singular set also contains ends with equal inner
-    control points, for which the two curves are the same.
+    If the end velocities are large, it may cost less than `bezier_so3`. The singular set and the
+    symmetries are as for `bezier_so3`. Ends with equal inner control points are also singular; they
+    give the same curve as `bezier_so3`.
     Source: beyond BK 10.
 
     Parameters
@@ -111,14 +111,15 @@ def cumulative_bezier_so3(
     Returns
     -------
     CumulativeBezier
-        The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ between them, and
-        β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four boundary conditions.
+        The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ from R0 exp(ŵ0/3) to R1
+        exp(−ŵ1/3), and β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four boundary
+        conditions.
 
     Notes
     -----
-    Singular set: R0 exp(ŵ0/3) and R1 exp(−ŵ1/3) a half-turn apart, where `log_so3` chooses v₂. The
-    curve itself is smooth everywhere. It does not depend on the choice of frames, but the reversed
-    ends do not give the reversed curve.
+    Singular set: v₂ is a half-turn. `log_so3` then chooses its axis. The curve itself is smooth
+    everywhere. It does not depend on the choice of frames, but the reversed ends do not give the
+    reversed curve.
 
     Examples
     --------
@@ -152,14 +153,14 @@ def corrected_bezier_so3(
 
     Notes
     -----
-    R_m = R0 exp(σ̂/2) is the rotation half-way. Of all logarithms of R0ᵀ R1, of any length, σ is
-    the nearest to the sum of the three legs of the Bézier curve.
-    The curve is near-optimal for small excursions: for an excursion s times as large, the relative
-    excess over the optimum is about s⁸ times as large (s⁴ or s² for the other closed forms). δ is
-    of third order in the excursion. Large end velocities make δ large, and the curve may then cost
-    more than the Bézier curve (see docs/near_optimal.md). Singular set, change of frames and
-    reversal: as for `bezier_so3`. The singular set also contains ends for which two logarithms are
-    equally near.
+    R_m = R0 exp(σ̂/2) is the half-way rotation. Among all logarithms of R0ᵀ R1, including long
+    ones, σ is the nearest to the sum of the three legs of the Bézier curve.
+    The curve is near-optimal for small excursions: if the excursion is multiplied by s, the
+    relative excess over the optimum is multiplied by about s⁸ (s⁴ or s² for the other closed
+    forms). δ is of third order in the excursion. Large end velocities make δ large, and the curve
+    may then cost more than the Bézier curve (see docs/near_optimal.md). The singular set and the
+    symmetries are as for `bezier_so3`. Ends for which two logarithms are equally near are also
+    singular.
 
     Examples
     --------
@@ -191,7 +192,7 @@ def bezier_legs(ends: Ends) -> Legs:
 def _slow_ends(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
 ) -> tuple[Ends, Array, Legs]:
-    """Return ends for times from 0 to 1, the duration, and the Bézier legs; check ‖w0‖ and ‖w1‖."""
+    """Check ‖w0‖ and ‖w1‖; return the ends rescaled to unit time, the duration and the legs."""
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     for name, w in (("w0", ends.w0), ("w1", ends.w1)):
         angle = np.linalg.norm(w, axis=-1)
@@ -204,11 +205,11 @@ def _slow_ends(
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
-    """Return e, the mean of two end velocities minus σ = log(R0ᵀ R1), and d, their difference.
+    """Return e = (u0 + u1)/2 − σ and d = u1 − u0, from σ = log(R0ᵀ R1) and end velocities.
 
-    Both velocities are parallel transported to the rotation half-way, R0 exp(σ̂/2), in a
-    bi-invariant metric. On each half, the body axes turn by σ/2, and parallel vectors by σ/4. For
-    the geodesic, e and d are 0.
+    The vectors u0 and u1 are w0 and w1, parallel transported to the half-way rotation R0 exp(σ̂/2)
+    in a bi-invariant metric. On each half, the body axes turn by σ/2, and parallel vectors by σ/4.
+    For the geodesic, e and d are 0.
     """
     quarter = exp_so3(sigma / 4)
     u0, u1 = matvec(quarter.mT, w0), matvec(quarter, w1)
@@ -237,7 +238,7 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
 
 
 def nearest_turn(turn: Array, way: Array) -> Array:
-    """Return the turns nearest to `way` that differ from the given turns by full turns."""
+    """Return `turn` plus the full turns that bring it nearest to `way`."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     axis = turn / np.where(angle == 0, 1, angle)
     more = (np.sum(way * axis, axis=-1, keepdims=True) - angle) / (2 * np.pi)
@@ -245,7 +246,7 @@ def nearest_turn(turn: Array, way: Array) -> Array:
 
 
 class CumulativeBezier(QuaternionCurve):
-    """The `Curve` R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃) of cumulative Bernstein polynomials β."""
+    """The `Curve` of `cumulative_bezier_so3`."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return the product of exp(βᵢ vᵢ/2)."""
@@ -266,7 +267,7 @@ class Bezier(QuaternionCurve):
     """The `Curve` of de Casteljau's construction with geodesics in place of straight lines."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return the point of the construction, from four control points."""
+        """Return the point constructed from four control points."""
         share = [identity(t, k) for k in range(order + 1)]
         points = [[point, *[np.zeros_like(point)] * order] for point in controls]
         while len(points) > 1:
@@ -288,7 +289,7 @@ def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
 class CorrectedBezier(Bezier):
     """The `Curve` of de Casteljau's construction minus its leading deviation from the optimum.
 
-    In the frame of the rotation half-way, the curve is multiplied by exp(−δ̂/2) on both sides.
+    In the frame of the half-way rotation, the curve is multiplied by exp(−δ̂/2) on both sides.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:

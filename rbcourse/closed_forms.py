@@ -1,8 +1,8 @@
 """Other closed forms, with the same boundary conditions as the projected cubic (BK section 1).
 
 Each curve is a fixed rotation times the rotation of a quaternion Q(t) of any norm. `CLOSED_FORMS`
-lists the closed forms for two rotations and two angular velocities that the course compares. Add a
-new one to this list.
+lists the closed forms that the course compares; each takes two rotations and two angular
+velocities. Add new closed forms to this list.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ def exponential_cubic_so3(
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses σ(1). The curve itself is
-    smooth everywhere. For velocities along the geodesic, it is the optimum among all curves that
-    turn by σ(1). The curve does not depend on the choice of frames, but the reversed ends do not
-    give the reversed curve.
+    Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ(1). The curve itself is
+    smooth everywhere. If both velocities are along the geodesic, it is the optimum among all curves
+    that turn by σ(1). The curve does not depend on the choice of frames, but the reversed ends do
+    not give the reversed curve.
 
     Examples
     --------
@@ -81,8 +81,8 @@ def exponential_cubic_long_so3(
 ) -> ExponentialCubic:
     """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
 
-    Singular set: that of `exponential_cubic_so3`, and R0 = R1, for which the two curves are the
-    same.
+    Singular set: as for `exponential_cubic_so3`; also R0 = R1, where both functions give the same
+    curve.
     Source: beyond BK 10.
 
     Parameters
@@ -111,7 +111,7 @@ def exponential_cubic_long_so3(
 def quaternion_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> QuaternionCubic:
-    """Return the projection of a cubic in R⁴ on the unit quaternions: BK's method in another space.
+    """Return the cubic in R⁴ with these ends, projected onto the unit quaternions.
 
     Source: BK 1, BK Remark 7.
 
@@ -128,11 +128,12 @@ def quaternion_cubic_so3(
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart, where the `canonical_quaternion` of R0ᵀ R1 is used;
-    and times at which the cubic is zero, where a call of the curve raises ValueError. Near a small
-    ``margin``, the body turns by up to a full turn in a short time. The curve is then accurate to
-    eps over ``margin``, and its derivatives to eps over the square and the cube of ``margin``. The
-    curve does not depend on the choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
+    Singular set: R0 and R1 are a half-turn apart. The `canonical_quaternion` of R0ᵀ R1 is then
+    used. The curve is also singular at times at which the cubic is zero; a call at such a time
+    raises ValueError. If ``margin`` is small, the body turns by up to a full turn in a short time.
+    The error of the curve is then about eps/``margin``. The errors of its first and second
+    derivatives are about eps/``margin``² and eps/``margin``³. The curve does not depend on the
+    choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
@@ -147,7 +148,7 @@ def quaternion_cubic_so3(
 def quaternion_cubic(
     ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
 ) -> QuaternionCubic:
-    """Return the quaternion cubic of checked ends; if `long` is True, it turns the long way."""
+    """Return the quaternion cubic of checked ends; if `long`, it turns the long way round."""
     turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
     turn = np.where(np.expand_dims(long, -1), -turn, turn)
     return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
@@ -168,14 +169,16 @@ def cayley_cubic_so3(
     Returns
     -------
     CayleyCubic
-        A curve whose quaternion is (1, g) over its norm. The Cayley parameters of a turn by a about
-        the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w + (g·w) g.
+        A curve whose quaternion is (1, g) over its norm. The Cayley parameters of a turn by the
+        angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w + (g·w)
+        g.
 
     Notes
     -----
     Singular set: half-turns, which have no Cayley parameters. No such curve contains a half-turn
-    from R0, so near half-turns it is long, and its cost grows without bound. The curve does not
-    depend on the choice of frames, but the reversed ends do not give the reversed curve.
+    from R0. As R1 approaches a half-turn, the curve therefore becomes long, and its cost grows
+    without bound. The curve does not depend on the choice of frames, but the reversed ends do not
+    give the reversed curve.
 
     Examples
     --------
@@ -203,7 +206,7 @@ def normal_cubic_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> NormalCubic:
-    """Return the cubic with these ends in normal coordinates of a body's metric, to second order.
+    """Return the cubic with these ends in second-order normal coordinates of a body's metric.
 
     Source: beyond BK 7; R. Zimmermann, Hermite interpolation and data processing errors on
     Riemannian matrix manifolds, SIAM Journal on Scientific Computing 2020.
@@ -211,7 +214,7 @@ def normal_cubic_so3(
     Parameters
     ----------
     R0, R1, w0, w1, inertia, duration
-        As for `minimum_acceleration_so3`; `inertia` is not optional.
+        As for `minimum_acceleration_so3`; `inertia` is required.
 
     Returns
     -------
@@ -221,18 +224,19 @@ def normal_cubic_so3(
 
     Notes
     -----
-    To second order, x is the Riemannian normal coordinate of R0 exp(ŷ), the initial velocity of the
-    geodesic from R0. Zimmermann interpolates in normal coordinates; for the second-order map we
-    know no source. The curve is not the optimum, which is a Riemannian cubic. It is near-optimal
-    for small excursions: for an excursion s times as large, the relative excess over the optimum is
-    about s⁴ times as large. If G is a multiple of I, the curve is `exponential_cubic_so3`.
+    To second order, x is the Riemannian normal coordinate of R0 exp(ŷ), which is the initial
+    velocity of the geodesic from R0 to R0 exp(ŷ). Zimmermann interpolates in normal coordinates; we
+    know no source of the second-order map. The curve is not the optimum, which is a Riemannian
+    cubic. It is near-optimal for small excursions: if the excursion is multiplied by s, the
+    relative excess over the optimum is multiplied by about s⁴. If G is a multiple of I, the curve
+    is `exponential_cubic_so3`.
 
-    Singular set: R0 and R1 a half-turn apart, where `log_so3` chooses y(1); and ends for which x ↦
-    y is singular at x(1). The latter raise ValueError, as do ends for which no x(1) is found. For
-    y(1) up to π, the map is never singular for the moments 1, 2, 2.9. For thin bodies with three
-    different moments, it is singular somewhere beyond about 2 rad about the middle axis. Near such
-    ends, the curve is long. The curve does not depend on the choice of frames, but the reversed
-    ends do not give the reversed curve.
+    Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses y(1). Ends are also
+    singular if the map x ↦ y is singular at x(1). They raise ValueError, as do ends for which no
+    x(1) is found. With the moments of inertia 1, 2, 2.9, the map is never singular for ‖y(1)‖ up to
+    π. For thin bodies with three different moments, it is singular at some turns of more than about
+    2 rad about the middle axis. Near such ends, the curve is long. The curve does not depend on the
+    choice of frames, but the reversed ends do not give the reversed curve.
 
     Examples
     --------
@@ -266,7 +270,7 @@ def exponential_quintic_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ExponentialQuintic:
-    """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic: near-optimal minimum jerk.
+    """Return R0 exp(σ̂(t)) with these ends and a quintic σ(t), near-optimal for minimum jerk.
 
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
 
@@ -284,8 +288,8 @@ def exponential_quintic_so3(
     Notes
     -----
     The curve is near-optimal for small excursions (see docs/near_optimal.md). From rest to rest, it
-    is the optimum (`minimum_jerk_so3`). Singular set and change of frames: as
-    for `exponential_cubic_so3`.
+    is the optimum (`minimum_jerk_so3`). The singular set is that of `exponential_cubic_so3`, and
+    the curve does not depend on the choice of frames.
 
     Examples
     --------
@@ -342,7 +346,7 @@ class NormalCubic(QuaternionCurve):
     """The `Curve` R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with a cubic x."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return exp(y/2), from the ends of x, G and G⁻¹."""
+        """Return exp(y/2); `controls` contains the ends of x, G and G⁻¹."""
         x, G, inverse = polynomial_jet(controls[:4], t, order), controls[4:7], controls[7:]
         bent = cross(x, [np.einsum("ij...,j...->i...", G, each) for each in x])
         return exp(
@@ -354,7 +358,7 @@ class NormalCubic(QuaternionCurve):
 
 
 def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Array]:
-    """Return x with x − ½ G⁻¹(x × G x) = y, and ∂y/∂x, by Newton's method for y/4, y/2, 3y/4, y."""
+    """Solve x − ½ G⁻¹(x × G x) = y by Newton's method, in four steps of y; return x and ∂y/∂x."""
     x = np.zeros_like(y)
     for share in (0.25, 0.5, 0.75, 1):
         goal = share * y
@@ -381,7 +385,7 @@ def _check_normal(lost: Array, why: str) -> None:
 class NormalizedCubic(QuaternionCurve):
     """The `Curve` of a cubic of quaternions with norm 1 at its start and any norm at its end.
 
-    The components are relative to the goal, where Q(1) is real, so that w1 is not lost to rounding.
+    Quaternions are relative to the goal, so that Q(1) is real and w1 is not lost to rounding.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
@@ -392,7 +396,7 @@ class NormalizedCubic(QuaternionCurve):
 def _cubic_from_the_goal(
     ends: Ends, T: Array, turn: Array, norm: Array, growth: Array
 ) -> dict[str, Array]:
-    """Return the arrays of a `NormalizedCubic`, from the norm at its goal and the norm's growth."""
+    """Return the arrays of a `NormalizedCubic`; `growth` is the rate of the norm at the goal."""
     start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
     end_rate = growth[..., None] * one + _rate(one, ends.w1)
     cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
@@ -403,9 +407,8 @@ def _cubic_from_the_goal(
 class QuaternionCubic(NormalizedCubic):
     """The `Curve` of the unit quaternions nearest to a cubic that joins two unit quaternions.
 
-    Its ``margin`` is the least norm of the cubic, and ``margin_time`` is the time at which it is
-    reached; both have the shape (...). If the margin is 0, the nearest unit quaternion is not
-    unique.
+    Its ``margin`` is the least norm of the cubic, reached at ``margin_time``; both have the shape
+    (...). If the margin is 0, the nearest unit quaternion is not unique.
     """
 
     def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
@@ -452,5 +455,4 @@ class CayleyCubic(NormalizedCubic):
 
 
 def _rate(q: Array, w: Array) -> Array:
-    """Return q' = q (0, w)/2."""
     return quaternion_multiply(q, np.concatenate([np.zeros_like(w[..., :1]), w], axis=-1)) / 2

@@ -1,6 +1,6 @@
 """The connection of a left-invariant metric, in components, and its geodesics (BK section 2).
 
-Components are those of `rbcourse.metrics`, that is, of angular velocities or twists.
+Components are those of angular velocities or twists, as in `rbcourse.metrics`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def structure_constants(basis: ArrayLike) -> Array:
     Parameters
     ----------
     basis : array_like, shape (m, n, n)
-        The basis L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``. The matrices are linearly
-        independent, to one part in a million, and their commutators are, to rounding, combinations
-        of the basis.
+        The basis L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``. The matrices must be linearly
+        independent, to one part in a million. Their commutators must be combinations of the basis,
+        to rounding.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def structure_constants(basis: ArrayLike) -> Array:
         raise ValueError(f"basis: shape (m, n, n) is wanted, got {L.shape}")
     m = len(L)
     _, exponents = np.frexp(np.abs(L).max(axis=(1, 2)))
-    N = scaled(L)  # so that their sizes do not matter
+    N = scaled(L)  # so that the sizes of the matrices do not matter
     columns = N.reshape(m, -1).T
     condition = np.linalg.cond(columns)
     if not condition < 1e6:
@@ -55,7 +55,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     products = N[:, None] @ N
     brackets = (products - products.swapaxes(0, 1)).reshape(m * m, -1).T
     C = np.zeros((m, m * m))
-    for _ in range(3):  # normal equations, exact for the standard bases, then refinement
+    for _ in range(3):  # normal equations (exact for the standard bases), then refinement
         C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
     if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
         raise ValueError("basis: a commutator of two of the matrices is not a combination of them")
@@ -66,10 +66,10 @@ def structure_constants(basis: ArrayLike) -> Array:
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
-    At all points ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. To a few eps times the condition
-    number of G, the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and Γ with its first
-    index lowered by G is antisymmetric in i and k. Γ is *not* symmetric in j and k. Γ follows from
-    Koszul's formula,
+    At all points ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. Two identities hold to a few eps
+    times the condition number of G: the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and
+    Γ with its first index lowered by G is antisymmetric in i and k. But Γ is *not* symmetric in j
+    and k. Γ follows from Koszul's formula,
     2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
     Source: BK 2.4, BK (8).
 
@@ -107,8 +107,8 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
 def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
     """Return the covariant derivative x_dot[i] + gamma[i, j, k] v[j] x[k] of a field along a curve.
 
-    The sum is over j and k. For x = v, the result is the acceleration (9), which vanishes along
-    geodesics, (8). For x_dot = 0, it is ∇_v x of left-invariant fields.
+    The sum is over j and k. For x = v, the result is the acceleration BK (9), which vanishes along
+    geodesics (BK (8)). For x_dot = 0, the result is ∇_v x of left-invariant fields.
     Source: BK 2.4, BK (8), BK (9).
 
     Parameters
@@ -141,8 +141,8 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
 def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
     """Return A and v at the times t for the geodesics that start at A0 with the velocity v0.
 
-    Source: BK 2.4, BK (8), where the paper prints second derivatives of coordinates, which need
-    other symbols than those of the left-invariant frame.
+    Source: BK 2.4, BK (8). The second derivatives of coordinates that the paper prints need other
+    Christoffel symbols than those of the left-invariant frame.
 
     Parameters
     ----------
@@ -152,24 +152,24 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     A0, v0 : array_like, shapes (..., 3, 3) and (..., 3), or (..., 4, 4) and (..., 6)
         Rotations and angular velocities, or poses and twists, at t = 0.
     t : array_like, any shape
-        Times in any order, which may be negative.
+        Times in any order; they may be negative.
 
     Returns
     -------
     A, v : ndarray, shapes t.shape + A0.shape and t.shape + v0.shape
-        The shapes are those after broadcasting of the batches of G, A0 and v0. Along each geodesic
-        vᵀ G v is constant.
+        Here A0.shape and v0.shape are the shapes after broadcasting the batches of G, A0 and v0.
+        Along each geodesic, vᵀ G v is constant.
 
     Notes
     -----
     Singular set: none. For an indefinite metric on SE(3), the velocity may grow exponentially,
     beyond the range of the floating-point numbers. If the integration fails, FloatingPointError is
     raised.
-    The equations A' = A hat(v), v'_i = −Γ_ijk v_j v_k, which on SO(3) are Euler's equations, are
-    solved by an eighth-order Runge–Kutta method with a relative tolerance of 3e-14. The N members
-    of a batch share the tolerance, so the error of a single member may be up to √N times larger.
-    `screw_se3` is a closed form for the metric (10), and `geodesic_so3` and `geodesic_se3` are
-    closed forms, between given ends, for (12) and (14).
+    An eighth-order Runge–Kutta method with a relative tolerance of 3e-14 solves A' = A hat(v), v'_i
+    = −Γ_ijk v_j v_k. On SO(3), these are Euler's equations. The N members of a batch share the
+    tolerance, so the error of a single member may be up to √N times larger. `screw_se3` is a closed
+    form for the metric (10). Between given ends, `geodesic_so3` and `geodesic_se3` are closed forms
+    for (12) and (14).
 
     Examples
     --------
@@ -200,7 +200,7 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
 
 
 def _scales(A0: Array, v0: Array, last: float) -> tuple[Array, Array]:
-    """Return typical sizes of the entries of A and v, separately for ω, v and d."""
+    """Return typical sizes of the entries of A and v; ω, v and d have separate sizes."""
     speeds = np.abs(v0).reshape(*v0.shape[:-1], v0.shape[-1] // 3, 3).max(axis=-1)
     speeds = np.where(speeds == 0, speeds.max(axis=-1, keepdims=True), speeds)
     speeds = np.where(speeds < 1e-200, 1.0, speeds)  # at rest

@@ -38,9 +38,9 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
 def quaternion_from_matrix(R: ArrayLike) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
-    The result is the normalised row of 4 q qᵀ (linear in R) with the largest diagonal entry,
-    accurate to a few eps. Singular set: half-turns, where `canonical_quaternion` chooses between q
-    and −q.
+    Among the rows of 4 q qᵀ, which is linear in R, the row with the largest diagonal entry is
+    normalised. The result is accurate to a few eps. Singular set: half-turns, where
+    `canonical_quaternion` chooses between q and −q.
     Source: BK Remark 7.
 
     Parameters
@@ -63,7 +63,7 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
 
 
 def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
-    """Return the quaternion of the rotation by ‖w‖ about w: (cos a/2, sin(a/2) w/a), a = ‖w‖.
+    """Return the quaternion (cos(a/2), sin(a/2) w/a) of the rotation by a = ‖w‖ about w.
 
     Source: BK 2.5, RR 2.2.
 
@@ -87,7 +87,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
 
 
 def axis_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n and a of rotation vectors w = a n, shapes (..., 3) and (..., 1); both are 0 if w is.
+    """Return n, shape (..., 3), and a, shape (..., 1), of w = a n; both are 0 if w is 0.
 
     ValueError is raised if the norm overflows.
     """
@@ -154,7 +154,7 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
 
 
 def zyx_from_matrix(R: ArrayLike) -> Array:
-    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), like `zyx_from_quaternion`.
+    """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), as `zyx_from_quaternion` does.
 
     Source: RR 2.1, RR (7), RR (8).
 
@@ -165,7 +165,7 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        The angles reproduce R to a few eps, or in gimbal lock to 40 eps.
+        The angles reproduce R to a few eps (in gimbal lock, to 40 eps).
 
     Examples
     --------
@@ -204,9 +204,9 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
-    Singular set: gimbal lock, β = ±π/2 to 16 eps. Only α − γ (for β = −π/2, only α + γ) is
-    determined then, and γ = 0 is returned. Near gimbal lock, α and γ are accurate to eps over the
-    distance from it, but α ∓ γ is accurate to eps.
+    Singular set: gimbal lock, where β is ±π/2 to 16 eps. Then only α − γ (for β = −π/2, only α + γ)
+    is determined, and γ = 0 is returned. Near gimbal lock, α and γ are accurate to eps divided by
+    the distance of β from ±π/2, but α ∓ γ is accurate to eps.
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
 
@@ -218,8 +218,8 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        α and γ in (−π, π], β in [−π/2, π/2]. The angles reproduce q to a few eps, or in gimbal lock
-        to 20 eps.
+        α and γ are in (−π, π], and β is in [−π/2, π/2]. The angles reproduce q to a few eps (in
+        gimbal lock, to 20 eps).
 
     Examples
     --------
@@ -236,7 +236,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
 
 
 def _wrapped(angle: Array) -> Array:
-    """Return angles from (−2π, 2π) wrapped to (−π, π]; −π to rounding becomes π."""
+    """Wrap angles in (−2π, 2π) to (−π, π]; an angle that is −π to rounding becomes π."""
     angle = np.where(angle > np.pi, angle - 2 * np.pi, angle)
     angle = np.where(angle < -np.pi * (1 - 4 * EPS), angle + 2 * np.pi, angle)
     return np.minimum(angle, np.pi)

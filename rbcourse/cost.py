@@ -1,4 +1,4 @@
-"""Costs of curves: integrals of the squared acceleration, BK (18), torque, and jerk."""
+"""Costs of curves: integrals of the squared acceleration (BK (18)), torque or jerk."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.paths import smooth_parts
 
-_TOGETHER = 2000  # panels that are evaluated together
+_TOGETHER = 2000  # number of panels evaluated together
 _HALVINGS = 30
-_MOST = 50_000  # panels that may be halved in one pass
+_MOST = 50_000  # number of panels that may be halved in one pass
 Index: TypeAlias = NDArray[np.intp]
 Density: TypeAlias = Callable[[Curve, Array, Index], Array]
 
@@ -31,7 +31,7 @@ def acceleration_cost(
     *,
     rtol: float = 1e-10,
 ) -> Array:
-    """Return L_a, the integral of the squared acceleration in metric (12), (14) or a body's metric.
+    """Return L_a, the integral of the squared acceleration in the metric of BK or of a body.
 
     Source: BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for
     other inertias beyond BK 1.
@@ -41,37 +41,38 @@ def acceleration_cost(
     curve : Curve
         A curve on SO(3) or SE(3), or a stack of curves.
     inertia : array_like, shape (..., 3, 3), optional
-        As for `minimum_acceleration_so3`, about the centre of mass: one matrix for all curves, or
-        one for each curve.
+        The inertia about the centre of mass, as for `minimum_acceleration_so3`: one matrix for all
+        curves, or one for each curve.
     mass, centre : float above 0; array_like, shape (3,); optional
         The mass of the body, and its centre of mass in the body frame; for SE(3) only.
     rtol : float, optional
-        The relative error, from 1e-12 to 0.1. From 1e-8 on, the quadrature starts from two panels
-        instead of 16 or more. It is then 3 to 40 times as fast, but may miss a peak narrower than a
-        hundredth of the interval.
+        The relative error, from 1e-12 to 0.1. If it is at least 1e-8, the quadrature starts with
+        two panels instead of 16 or more. The quadrature is then 3 to 40 times as fast, but may miss
+        a peak narrower than a hundredth of the interval.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
         ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w. On SE(3), ∫ m ‖d_c''‖² dt is added, where
         d_c is the position of the centre of mass. By default, the cost is ∫ 2 ‖w'‖² dt, and on
-        SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. The relative error is `rtol`, or the absolute error is 1e-20
-        times a third of the trace of G (1e-20 by default). This holds unless the acceleration has
-        peaks or ripples within a hundredth of the interval, for example with an abrupt ``f`` of a
-        `projected_line_so3`.
+        SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. The relative error is `rtol`. For tiny costs, the absolute
+        error is 1e-20 times a third of the trace of G (1e-20 by default). The errors may be larger
+        if the acceleration has peaks or ripples within a hundredth of the interval, for example
+        with an abrupt ``f`` of a `projected_line_so3`.
 
     Raises
     ------
     RuntimeError
-        If the integral does not converge, ``margin`` is below 1e-6, the curve is NaN, the velocity
-        of a `chain` jumps, or the curve is `Timed`.
+        If the integral does not converge, if ``margin`` is below 1e-6, if the curve is NaN or
+        `Timed`, or if the velocity of a `chain` jumps.
 
     Notes
     -----
     A curve does not remember the body for which it was made: give the same inertia, mass and centre
-    again. G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ its square. Free motions
-    have the cost 0. On SE(3), the sum, and any ratio of sums, depends on the unit of length unless
-    inertia and mass are those of a body; see `acceleration_cost_parts`.
+    again. G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ is its square. Free
+    motions have the cost 0. On SE(3), the cost is a sum of two parts (`acceleration_cost_parts`).
+    It depends on the unit of length, and so does any ratio of costs, unless inertia and mass are
+    those of a body.
 
     Examples
     --------
@@ -106,7 +107,8 @@ def acceleration_cost_parts(
     Returns
     -------
     rotation, translation : ndarray, shape curve.batch_shape
-        ∫ τᵀ G⁻¹ τ dt, by default ∫ 2 ‖w'‖² dt; and ∫ m ‖d_c''‖² dt, which is 0 on SO(3).
+        The rotation costs ∫ τᵀ G⁻¹ τ dt, by default ∫ 2 ‖w'‖² dt. The translation costs ∫ m
+        ‖d_c''‖² dt, or 0 on SO(3).
 
     Examples
     --------
@@ -192,7 +194,7 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
 
 
 def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
-    """Raise ValueError unless the argument is a `Curve`, which must be on SO(3) if `on_so3`."""
+    """Raise ValueError unless the argument is a `Curve` (on SO(3), if `on_so3` is True)."""
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve is wanted, got {curve!r}")
     if on_so3 and curve.size != 3:
@@ -200,19 +202,18 @@ def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
 
 
 def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
-    """Return the inertia for each leg, shape (legs.count, 3, 3)."""
     G = as_inertia("inertia", inertia)
     batch = check_broadcast(curve=(np.empty(curve.batch_shape), 0), inertia=(G, 2))
     if batch != curve.batch_shape:
         raise ValueError(
-            f"inertia: one, or one for each curve of a stack of shape {curve.batch_shape}, is "
-            f"wanted, got shape {G.shape}"
+            f"inertia: a single matrix or a stack of shape {curve.batch_shape} is wanted, "
+            f"got shape {G.shape}"
         )
     return np.broadcast_to(G, (*legs.batch_shape, 3, 3)).reshape(-1, 3, 3)
 
 
 def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
-    """Return the costs of curves, from costs of legs over times from 0 to 1; sum a chain's legs."""
+    """Scale the legs' costs from unit time to their durations; sum them for a chain."""
     with np.errstate(over="ignore"):
         costs = costs / legs.flat.duration**power
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
@@ -241,12 +242,12 @@ def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Arr
 
 
 def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
-    """Return the integral for each curve of a stack, for times from 0 to 1, by halving panels.
+    """Integrate `density` over unit time for each curve of a stack, by halving panels.
 
     Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
     nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
-    integrand at the times t, shape (T, K), for the K curves `some` with the numbers `index`.
-    Error messages begin with `name`.
+    integrand at the times t, shape (T, K), for the K curves `some`, which have the indices `index`
+    in the stack. Error messages begin with `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")
@@ -274,7 +275,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
                 error[part] = np.abs(value[part] - rest)
         expected = cost + np.bincount(index, value, curve.count)
         coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN counts as coarse
-        lost = coarse & (width < 256 * EPS * (start + width))  # below the resolution of times
+        lost = coarse & (width < 256 * EPS * (start + width))  # lost in the rounding of times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
         cost += np.bincount(index[~coarse], value[~coarse], curve.count)
@@ -284,6 +285,6 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
         if not len(index):
             return cost
     raise RuntimeError(
-        f"{name}: halved panels leave an uncertainty of {error.sum():.1e} "
-        f"in {expected.max():.6g} (see margin)"
+        f"{name}: the integral {expected.max():.6g} still has an uncertainty of "
+        f"{error.sum():.1e} (see margin)"
     )

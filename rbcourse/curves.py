@@ -25,7 +25,7 @@ from rbcourse._numerics import Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
 from rbcourse.so3 import hat, log_so3
 
-BLOCK = 5128  # rotations evaluated together, as many as a block of `rbcourse._foam`
+BLOCK = 5128  # number of rotations evaluated together, as in `rbcourse._foam`
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
 AnyCurve = TypeVar("AnyCurve", bound="Curve")
 
@@ -38,9 +38,9 @@ class _Ends(NamedTuple):
 
 
 class Ends(_Ends):
-    """Boundary conditions: rotations and angular velocities at both ends, with one batch shape.
+    """Boundary conditions: rotations and angular velocities at both ends, in a common batch shape.
 
-    The class is a tuple, so a function that makes curves takes it as ``make(*ends)``.
+    Ends are a tuple: a function ``make`` that makes curves is called as ``make(*ends)``.
     Source: BK 6.2.
 
     Parameters
@@ -59,7 +59,7 @@ class Ends(_Ends):
     __slots__ = ()
 
     def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
-        """Check the arguments, and give them one batch shape."""
+        """Check the arguments, and broadcast them to a common batch shape."""
         R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
         w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
         batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
@@ -71,7 +71,7 @@ class Ends(_Ends):
         return np.swapaxes(self.R0, -1, -2) @ self.R1
 
     def over(self, duration: ArrayLike) -> tuple[Self, Array]:
-        """Return the ends for times rescaled to [0, 1], and the durations, with one batch shape."""
+        """Return the ends rescaled to unit time, and the durations, in a common batch shape."""
         T = as_duration("duration", duration)
         batch = check_broadcast(ends=(self.R0, 2), duration=(T, 0))
         T, (R0, R1, w0, w1) = np.broadcast_to(T, batch), self.broadcast_to(batch)
@@ -93,14 +93,14 @@ class Ends(_Ends):
 
 
 def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
-    """Return the boundary conditions and the inertia of bodies, with one batch shape."""
+    """Return the boundary conditions and the inertia in a common batch shape."""
     G = as_inertia("inertia", inertia)
     batch = check_broadcast(ends=(ends.R0, 2), inertia=(G, 2))
     return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
 
 
 class SingularTime(ValueError):
-    """The error raised at a time at which the curve number `curve` of a stack is undefined."""
+    """The error for a time at which curve number `curve` of a stack is undefined."""
 
     def __init__(
         self, time: float, curve: int, reason: str, batch_shape: tuple[int, ...] = ()
@@ -116,18 +116,19 @@ class SingularTime(ValueError):
 class Curve:
     """A rotation or a pose over time: ``c(t)``, with derivatives ``c(t, 1)`` and ``c(t, 2)``.
 
-    On SO(3), ``c(t)`` is the rotation matrix R, ``c(t, 1)`` the angular velocity w, ``c(t, 2)``
-    the angular acceleration w' and ``c(t, 3)`` the angular jerk w'', all three in the body frame:
-    R' = R hat_so3(w).
+    On SO(3), ``c(t)`` is the rotation matrix R. Its derivatives are in the body frame: ``c(t, 1)``
+    is the angular velocity w, with R' = R hat_so3(w), ``c(t, 2)`` is the angular acceleration w',
+    and ``c(t, 3)`` is the angular jerk w''.
 
-    On SE(3), ``c(t)`` is the pose A, ``c(t, 1)`` the twist S = (w, v), A' = A hat_se3(S), and
-    ``c(t, 2)`` the covariant acceleration in metric (14), (w', Rᵀ d''). It is *not* the
-    derivative of the twist, which is `twist_rate`, with v' = Rᵀ d'' − w × v.
+    On SE(3), ``c(t)`` is the pose A, and ``c(t, 1)`` is the twist S = (w, v), with A' = A
+    hat_se3(S). ``c(t, 2)`` is the covariant acceleration (w', Rᵀ d'') in metric (14). It is *not*
+    the derivative (w', v') of the twist, which `twist_rate` returns.
 
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
-    give results of shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``; on SE(3)
-    ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed like an array of its
-    shape: ``c[2]`` is its third curve. All array attributes begin with the axes of the stack.
+    give results of the shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``. On SE(3), the
+    shapes are ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed like an
+    array of its shape: ``c[2]`` is its third curve. All array attributes begin with the axes of the
+    stack.
 
     Source: BK (1), BK (9), BK 6.
 
@@ -168,9 +169,9 @@ class Curve:
     def breakpoints(self) -> Array:
         """The ends of panels for a quadrature, as fractions of the duration, shape (n,).
 
-        The panels are sixteenths. They are finer where a curve may turn fast: at its ends,
-        depending on velocity and acceleration there, and near times of small margin. A margin below
-        1e-6 raises RuntimeError.
+        The panels are sixteenths. They are divided further where a curve may turn fast: near an end
+        with a large velocity or acceleration, and near times of small margin. A margin below 1e-6
+        raises RuntimeError.
         """
         ends = np.array([[0.0], [1.0]])
         w, a = (np.linalg.norm(self.flat.values(ends, k)[..., :3], axis=-1) for k in (1, 2))
@@ -180,7 +181,7 @@ class Curve:
     def __call__(self, t: ArrayLike, order: int = 0) -> Array:
         """Return the curve, or a derivative, at times of any shape in the domain.
 
-        `order` is from 0 to 3, or on SE(3) from 0 to 2. Times may exceed the domain by 8 eps of its
+        `order` is from 0 to 3, or from 0 to 2 on SE(3). Times may exceed the domain by 8 eps of its
         larger end.
 
         Examples
@@ -195,9 +196,9 @@ class Curve:
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
     def twist_rate(self, t: ArrayLike) -> Array:
-        """Return the derivative of ``c(t, 1)``: on SE(3) (w', v') with v' = Rᵀ d'' − w × v.
+        """Return the derivative of ``c(t, 1)``.
 
-        On SO(3) it is ``c(t, 2)``.
+        On SO(3), it is ``c(t, 2)``. On SE(3), it is (w', v') with v' = Rᵀ d'' − w × v.
 
         Examples
         --------
@@ -213,10 +214,10 @@ class Curve:
         return rate
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
-        """Return each curve of the stack, or a derivative, at its own times, up to its duration.
+        """Return each curve of the stack, or a derivative, at its own times within its duration.
 
-        `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or
-        t.shape + (3,), or with 4 and 6 on SE(3).
+        `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or t.shape
+        + (3,); on SE(3), t.shape + (4, 4) or t.shape + (6,).
         """
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
@@ -229,7 +230,7 @@ class Curve:
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
-        """Return one curve of the stack, or a smaller stack, by an index as for NumPy arrays."""
+        """Return one curve or a smaller stack; the index is used as for NumPy arrays."""
         if not self.batch_shape:
             raise TypeError("a single curve is not a stack and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
@@ -244,7 +245,7 @@ class Curve:
         return type(self).__name__
 
     def take(self, index: Any) -> Self:
-        """Return a stack of those curves that have these indices in the flattened stack."""
+        """Return the stack of the curves with these indices in the flattened stack."""
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         stacked = len(self.batch_shape)
         for name, value in parts.items():
@@ -260,11 +261,11 @@ class Curve:
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return all curves of a stack with one axis, or a derivative, for times from 0 to 1.
+        """Return all curves, or a derivative, at times from 0 to 1; the stack must have one axis.
 
         Subclasses implement this method. `t` has the shape (T, count) or (T, 1). The result has the
-        shape (T, count, 3, 3) or (T, count, 3), or with 4 and 6 on SE(3). SingularTime is raised if
-        a curve is not defined at one of the times.
+        shape (T, count, 3, 3) or (T, count, 3); on SE(3), (T, count, 4, 4) or (T, count, 6).
+        SingularTime is raised if a curve is not defined at one of the times.
         """
         raise NotImplementedError
 
@@ -290,7 +291,6 @@ class Curve:
         return self if len(self.batch_shape) == 1 else self.take(np.arange(self.count))
 
     def _check_order(self, order: int) -> int:
-        """Return the order of a derivative; raise ValueError if the curve does not have it."""
         return check_order(order, 3 if self.size == 3 else 2)
 
     def _core(self, order: int) -> tuple[int, ...]:
@@ -333,7 +333,7 @@ class QuaternionCurve(Curve):
 
 
 def other_way(turn: Array) -> Array:
-    """Return the turns to the same rotations the other way round, by 2π − angle; 0 is kept."""
+    """Return the turns to the same rotations the other way round; a zero turn is kept."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
 
@@ -345,18 +345,18 @@ def polynomial_jet(ends: Array, t: Array, order: int) -> Jet:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class AlongGeodesic(Curve):
-    """The `Curve` R0 exp(σ̂ p(t)) on the geodesic from R0 to R0 exp(σ̂); here p(t) = t.
+    """The `Curve` R0 exp(σ̂ p(t)) on the geodesic from R0 to R0 exp(σ̂); by default, p(t) = t.
 
     Source: BK 6.1.
 
     Attributes
     ----------
     R0, rotation_vector : ndarray, shapes (..., 3, 3) and (..., 3)
-        The start, and the rotation vector σ that turns it into the goal, in the body frame.
+        The start, and the rotation vector σ from the start to the goal, in the body frame.
     """
 
     rotation_vector: Array
-    terms: Array  # R0, R0 K and R0 K², for R0 (I + sin a K + (1 − cos a) K²), Rodrigues' formula
+    terms: Array  # R0, R0 K and R0 K², for Rodrigues' formula R0 (I + sin a K + (1 − cos a) K²)
 
     @property
     def R0(self) -> Array:
@@ -372,7 +372,7 @@ class AlongGeodesic(Curve):
         progress, count = self._progress(t, order), self.count
         if order:
             values = np.empty((len(t), count, 3))
-            for i in range(3):  # a loop is four times as fast as one product
+            for i in range(3):  # four times as fast as one product
                 np.multiply(progress, self.rotation_vector[:, i], out=values[..., i])
             return values
         weights = np.empty((3, count, len(t)))
@@ -386,7 +386,7 @@ class AlongGeodesic(Curve):
 
 
 def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
-    """Write sin a and 1 − cos a, a = 2 `half` times `progress`, from tan(a/2), which is fastest."""
+    """Write sin a and 1 − cos a for a = 2 `half` `progress`, by the fastest way: from tan(a/2)."""
     tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
     np.multiply(tangent, tangent, out=sine)
     sine += 1
@@ -425,9 +425,9 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
 
     Notes
     -----
-    Singular set: rotations a half-turn apart. Two geodesics are then shortest. The one returned has
-    a ``rotation_vector`` whose component of largest magnitude (the first, if several are equal) is
-    positive.
+    Singular set: R0 and R1 are a half-turn apart. Two geodesics are then shortest. The returned
+    geodesic has a ``rotation_vector`` whose component of largest magnitude (the first, if several
+    are equal) is positive.
 
     Examples
     --------
@@ -482,14 +482,13 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     T = as_duration("duration", duration)
     if check_broadcast(curve=(curve.duration, 0), duration=(T, 0)) != curve.batch_shape:
         raise ValueError(
-            f"duration: one, or one for each curve of a stack of shape {curve.batch_shape}, is "
-            f"wanted, got shape {T.shape}"
+            f"duration: a single number or shape {curve.batch_shape} is wanted, got shape {T.shape}"
         )
     return curve.lasting(np.broadcast_to(T, curve.batch_shape))
 
 
 def identity(t: Array, order: int) -> Array:
-    """Return t, or its derivative."""
+    """Return t or, for order > 0, its derivative."""
     return t if order == 0 else np.full_like(t, order == 1)
 
 
@@ -513,7 +512,7 @@ def check_defined(
 
 
 def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
-    """Return points `graded` near small margins; raise RuntimeError for a margin below 1e-6."""
+    """Refine `points` near small margins; raise RuntimeError for a margin below 1e-6."""
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
         raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
@@ -522,7 +521,7 @@ def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
 
 
 def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Return breakpoints in [0, 1], at distances from 1/32 down to `widths` from the times."""
+    """Add breakpoints in [0, 1] to `points`, at distances 1/32, 1/64, …, `widths` from `times`."""
     cuts = [points]
     for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
@@ -534,7 +533,7 @@ def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
 def least_over_time(
     value: Callable[[Array], Array], batch_shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Return the time when a function is least, and the least value, of shape batch_shape.
+    """Return the time of a function's minimum, and the minimum, both of shape batch_shape.
 
     The function takes times of the shape (N,) + batch_shape and returns values of this shape.
     """

@@ -47,7 +47,7 @@ VELOCITIES = {
 }
 """The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
-_TOLERANCE = 1e-3  # for norms of quaternions in files: some programs write four decimals
+_TOLERANCE = 1e-3  # for quaternion norms in files, because some programs write four decimals
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -56,11 +56,11 @@ def write_path(
 ) -> None:
     """Write a path of poses or rotations as CSV or as a TUM trajectory, by the file extension.
 
-    The first line has the names of the columns, with units in CSV, or as a comment in TUM. Each
-    further line has a time, position, quaternion, ω and v. Quaternions are (w, x, y, z) in CSV and
-    (x, y, z, w) in TUM. The first quaternion has w ≥ 0, and every other has the sign that makes it
-    nearer to the previous one. Numbers are written with all digits. An existing file is replaced.
-    If an argument is malformed, nothing is written.
+    The first line has the names of the columns. In CSV, the names have units; in TUM, the line is a
+    comment. Each further line has a time, position, quaternion, ω and v. Quaternions are (w, x, y,
+    z) in CSV and (x, y, z, w) in TUM. The first quaternion has w ≥ 0. The signs of the others are
+    chosen so that each quaternion is near the previous one. Numbers are written with all digits. An
+    existing file is replaced. If an argument is malformed, nothing is written.
 
     Parameters
     ----------
@@ -168,8 +168,8 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     ----------
     file : str or Path
     plan : iterable of (velocity, duration)
-        Velocities have three numbers in the plane, and any number for joints. Durations are at
-        least 0, in s.
+        A planar velocity has three numbers, and joint velocities have one for each joint. Durations
+        are at least 0, in s.
     kind : {"world", "body", "joints"}
         The kind of velocities: planar in the world or the body frame, or of joints. It determines
         the names of the columns.
@@ -191,8 +191,8 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
 def load_plan(file: File, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote.
 
-    A malformed file is rejected as a whole: other content or another kind raises ValueError, with
-    the line and the reason.
+    A malformed file is rejected as a whole: other content or another kind raises ValueError. The
+    message names the line and the reason.
     Source: RR 3.2, RR 4.2.
 
     Parameters
@@ -205,7 +205,7 @@ def load_plan(file: File, kind: str) -> Commands:
     Returns
     -------
     list of (ndarray, float)
-        Commands (velocity, duration). The example of `save_plan` reads them.
+        Commands (velocity, duration), as in the example of `save_plan`.
     """
     lines = csv_lines(file)
     place, header = next(lines, (f"{file}, line 1", []))
@@ -217,7 +217,6 @@ def load_plan(file: File, kind: str) -> Commands:
 
 
 def _is_tum(file: File) -> bool:
-    """Return whether a file is TUM, not CSV, by its ending."""
     suffix = os.path.splitext(file)[1].lower()
     if suffix not in (".csv", ".tum", ".txt"):
         raise ValueError(f"file: a name that ends in .csv, .tum or .txt is wanted, got {file}")

@@ -60,7 +60,7 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
 
 
 def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
-    """Return tr(XᵀY) of tangent vectors R hat_so3(x), R hat_so3(y): 2 x · y.
+    """Return tr(XᵀY) = 2 x · y for tangent vectors X = R hat_so3(x), Y = R hat_so3(y).
 
     It is invariant under rotations on both sides. For X = Y it is twice the kinetic energy of a
     ball with moment of inertia 2.
@@ -104,11 +104,11 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
 
 
 def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
-    """Return tr(XᵀY) of tangent vectors A hat_se3(x), A hat_se3(y): 2 ω_x · ω_y + v_x · v_y.
+    """Return tr(XᵀY) = 2 ω_x · ω_y + v_x · v_y for X = A hat_se3(x), Y = A hat_se3(y).
 
     It is invariant under poses on the left, but on the right only under rotations. For X = Y it is
-    twice the kinetic energy of a ball of mass 1 and moment of inertia 2 whose centre is the body's
-    origin.
+    twice the kinetic energy of a ball around the body's origin, with mass 1 and moment of inertia
+    2.
     Source: BK 3.2, BK (14), BK Remark 3, BK Remark 4, BK Remark 5.
 
     Parameters
@@ -168,8 +168,8 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     Parameters
     ----------
     alpha, beta : float
-        Positive numbers. alpha, in m² for an energy per mass, is the weight of rotation, and beta,
-        in m, couples rotation to translation.
+        Positive numbers. alpha is the weight of rotation, and beta couples rotation to translation.
+        If the result is an energy per mass, their units are m² and m.
 
     Returns
     -------
@@ -189,7 +189,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
 
 
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
-    """Return the tangent vector X = A hat(x) at A, a value of the left-invariant field of x.
+    """Return the tangent vector X = A hat(x), the value at A of the left-invariant field of x.
 
     Source: BK 2.2, BK (4), BK (5).
 
@@ -215,7 +215,7 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
 
 
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
-    """Return the components x of tangent vectors X at A: vee(A⁻¹ X), with Rᵀ for R⁻¹.
+    """Return the components x = vee(A⁻¹ X) of tangent vectors X at A, using Rᵀ for R⁻¹.
 
     The part of X that is normal to the tangent space is dropped.
     Source: BK 2.2, BK (1), BK (5).
@@ -275,7 +275,7 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
 
 
 def inertia_from_weight(W: ArrayLike) -> Array:
-    """Return tr(W) I − W: the matrix of the metric that tr(XᵀY W) induces on SO(3).
+    """Return tr(W) I − W, the matrix of the metric that tr(XᵀY W) induces on SO(3).
 
     Source: BK 3, for the metrics that the paper leaves to a later publication.
 
@@ -287,7 +287,7 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        For a body, its inertia about the origin.
+        For a body, this is its inertia about the origin.
 
     Examples
     --------
@@ -301,7 +301,7 @@ def inertia_from_weight(W: ArrayLike) -> Array:
 
 
 def weight_from_inertia(G: ArrayLike) -> Array:
-    """Return the weight W with tr(W) I − W = G: tr(G)/2 I − G.
+    """Return the weight W = tr(G)/2 I − G, which satisfies tr(W) I − W = G.
 
     The inertia of every body satisfies the condition on G below. For any other G, W has a negative
     eigenvalue. The eigenvalues of a body's W are ∫ x² dm along the axes. W has rank 2 for a flat
@@ -358,7 +358,9 @@ def _trace(X: ArrayLike, Y: ArrayLike, size: int | str) -> Array:
     X, Y = as_finite("X", X, size, size), as_finite("Y", Y, size, size)
     check_broadcast(X=(X, 2), Y=(Y, 2))
     if X.shape[-1] != Y.shape[-1]:
-        raise ValueError(f"X and Y: matrices of one size are wanted, got {X.shape} and {Y.shape}")
+        raise ValueError(
+            f"X and Y: matrices of the same size are wanted, got {X.shape} and {Y.shape}"
+        )
     product: Array = (X * Y).sum(axis=(-2, -1))
     return product
 

@@ -1,4 +1,4 @@
-"""Motions of a rigid body: independent rotations and paths of the origin, and screw motions."""
+"""Motions of a rigid body: screw motions, and motions with independent rotation and path."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class RigidMotion(Curve):
     ----------
     rotation : Curve on SO(3)
     path : ndarray, shape (..., n, 3)
-        d(0) and d(1), for a cubic also d'(0) and d'(1), for a quintic also d''(0) and d''(1). They
-        are in m, in the fixed frame, for times from 0 to 1.
+        d(0) and d(1). A cubic also has d'(0) and d'(1), and a quintic also d''(0) and d''(1). All
+        are in m, in the fixed frame, with time from 0 to 1.
     centre : ndarray, shape (..., 3)
         The point of the body that follows the path, in the body frame, in m; 0 is the origin.
     """
@@ -110,7 +110,7 @@ class ProjectedMotion(RigidMotion):
 def rigid_motion(
     kind: type[Motion], rotation: Curve, *path: Array, centre: Array | None = None
 ) -> Motion:
-    """Return the motion with this rotation and path; velocities are per unit of its time."""
+    """Return the motion with this rotation and path; velocities are per unit of the duration."""
     batch = np.broadcast_shapes(rotation.batch_shape, *(x.shape[:-1] for x in path))
     numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
     turning = rotation.take(np.broadcast_to(numbers, batch))
@@ -174,7 +174,7 @@ def projected_cubic_se3(
     A0, A1 : array_like, shape (..., 4, 4)
         Poses at the start and at the end.
     w0, w1, d0_dot, d1_dot : array_like, shape (..., 3)
-        Angular velocities there in the body frame, and velocities of the origin there in the
+        Angular velocities at both ends in the body frame, and velocities of the origin in the
         *fixed* frame.
     duration : array_like, shape (...), optional
         The duration of the motion; velocities are per unit of this time.
@@ -211,10 +211,10 @@ def minimum_acceleration_se3(
     centre: ArrayLike = (0.0, 0.0, 0.0),
     duration: ArrayLike = 1.0,
 ) -> RigidMotion:
-    """Return the minimum-acceleration motion of a ball or a body: an optimum and a cubic path.
+    """Return the minimum-acceleration motion of a ball or a body, whose centre follows a cubic.
 
-    Of all motions with these ends, it has the least `acceleration_cost` with the same `inertia`,
-    `mass` and `centre`, provided that its rotation has the least cost.
+    If its rotation has the least cost, the motion has the least `acceleration_cost` of all motions
+    with these ends, for the same `inertia`, `mass` and `centre`.
     Source: BK 6.3; for bodies beyond BK 9.
 
     Parameters
@@ -222,8 +222,8 @@ def minimum_acceleration_se3(
     A0, A1, w0, w1, d0_dot, d1_dot, duration
         As for `projected_cubic_se3`.
     inertia : array_like, shape (..., 3, 3), optional
-        As for `minimum_acceleration_so3`, about the centre of mass. The default is 2 I, metric
-        (14).
+        As for `minimum_acceleration_so3`, about the centre of mass. The default is 2 I, as in
+        metric (14).
     mass : float, optional
         The mass of the body, above 0. It changes the cost of the motion, but not the motion.
     centre : array_like, shape (3,), optional
@@ -233,12 +233,12 @@ def minimum_acceleration_se3(
     -------
     RigidMotion
         Its ``rotation`` is `minimum_acceleration_so3`, with the same error and warning. Its
-        ``path`` is a cubic, the path of the centre of mass.
+        ``path``, which the centre of mass follows, is a cubic.
 
     Notes
     -----
-    Rotation and translation are independent in metric (14). They are also independent in the metric
-    of the kinetic energy, for the position d + R r of the centre of mass r. So each has its own
+    Rotation and translation are independent in metric (14). In the metric of the kinetic energy,
+    rotation and the position d + R r of the centre of mass r are independent. So each has its own
     optimum. The end velocities of the centre are d_c' = d' + R (w × r). `projected_cubic_se3` is
     near-optimal and has a closed form.
 
@@ -265,8 +265,8 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
 
     Its covariant acceleration is (0, ω × v). Every point of the body moves on a helix about the
     axis (see `screw_from_pose`). A screw motion is a geodesic of the indefinite metric (10), not of
-    metric (14) (see `geodesic_se3`). Singular set: poses a half-turn apart, where `log_so3` chooses
-    one of two ω. Additional full turns give other screw motions, with other twists.
+    metric (14) (see `geodesic_se3`). Singular set: A0 and A1 are a half-turn apart. `log_so3` then
+    chooses one of two ω. Additional full turns give other screw motions, with other twists.
     Source: BK 2.6.
 
     Parameters
@@ -347,8 +347,8 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     -----
     Singular set: half-turns, which have two screws (`log_so3` chooses the axis), and poses without
     a turn, which have no unique axis. A turn by less than 8 eps counts as a pure slide. For small
-    angles, axis, slide and pitch have a relative error of a few eps over the angle. The point is
-    then far away, and its error is a few eps ‖d‖ over the square of the angle.
+    angles, axis, slide and pitch have a relative error of a few eps divided by the angle. The point
+    is then far away, and its error is a few eps ‖d‖ divided by the square of the angle.
 
     Examples
     --------
@@ -374,8 +374,8 @@ class Screw(NamedTuple):
     Attributes
     ----------
     axis : ndarray, shape (..., 3)
-        The unit vector along the axis. Without a turn, it is the direction of the slide; without a
-        motion, it is 0.
+        The unit vector along the axis. If there is no turn, it is the direction of the slide; if
+        there is no motion, it is 0.
     point : ndarray, shape (..., 3)
         The point of the axis nearest to the origin, in m; 0 if there is no turn.
     angle, slide : ndarray, shape (...)
@@ -410,7 +410,6 @@ def _cubic_ends(
     d0_dot: ArrayLike,
     d1_dot: ArrayLike,
 ) -> tuple[Ends, tuple[Array, ...]]:
-    """Return the checked ends of the rotation, and the cubic path of the origin."""
     poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
     v = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)

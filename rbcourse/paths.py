@@ -1,7 +1,7 @@
 """Curves through many poses, composed of two-point curves.
 
-The splines have the velocities for which the accelerations are continuous (see
-`rbcourse.velocities`). The optimum is in `rbcourse.optimum.splines`.
+The velocities of the splines make the accelerations continuous (see `rbcourse.velocities`). Optimal
+splines are in `rbcourse.optimum.splines`.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def chain(
         Twists or angular velocities at the poses. By default they are the `spline_velocities`, with
         velocity 0 at both ends and where two successive poses are equal to rounding.
     leg : callable, optional
-        The function that makes the legs, from this package or your own. It returns a stack of
+        A function, from this package or your own, that makes the legs. It returns a stack of
         two-point curves, and is called once for all legs. Its arguments are the keyword
-        ``duration`` and others among R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1 (d0_dot and
-        d1_dot in the fixed frame). A function for rotations can also join poses: the origin then
-        moves on the polynomial with the same number of boundary conditions. The default is
+        ``duration`` and some of R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1 (d0_dot and d1_dot
+        in the fixed frame). A function for rotations can also join poses: the origin then moves on
+        the polynomial with the same number of boundary conditions. The default is
         `projected_cubic_so3`, or for poses `projected_cubic_se3`.
 
     Returns
@@ -73,26 +73,26 @@ def chain(
     Raises
     ------
     ValueError
-        For the same reasons as in `bessel_velocities`; if `velocities` are given, but `leg` takes
-        none; or if `leg` needs other arguments, raises ValueError, or misses the next pose by more
-        than 1e-6. The message names the first place. Warnings and other errors are those of `leg`.
+        As for `bessel_velocities`; also if `velocities` are given, but `leg` takes none, or if
+        `leg` needs other arguments, raises ValueError, or misses the next pose by more than 1e-6.
+        The message names the first such place. Warnings and other errors are those of `leg`.
 
     Notes
     -----
     At the joints, a chain is C⁰ (the velocity jumps) with `geodesic_so3`, `geodesic_se3`,
-    `screw_se3` and `projected_line_so3`. It is C² with the default legs and velocities, except at
-    inner poses where it rests, and with `projected_quintic_so3`, `exponential_quintic_so3` and
-    `minimum_jerk_so3`. It is C¹ (the acceleration jumps) with all other legs, which take
-    velocities. At the joints of projected legs, velocities agree to a few eps of the largest ‖w‖,
-    and accelerations to a few eps of ‖w‖² + ‖w'‖.
-    The accelerations a0, a1 are those of the default chain, even if velocities are given, but they
-    are 0 at both ends and where the curve rests.
-    Rest at both ends costs more than the natural ends of `projected_spline_se3`. If each leg turns
-    by 60°, a chain costs 5 % more than `minimum_acceleration_spline_se3` with the same ends, and if
-    each leg turns by 90°, a third more. With legs of `quaternion_spline_so3`, it costs 0.4 % and
-    2 % more.
-    Singular set: that of the legs, and half-turns between successive poses, which raise ValueError.
-    For a larger turn, insert a pose.
+    `screw_se3` and `projected_line_so3`. With the default legs and velocities, it is C², except at
+    inner poses where it rests. It is also C² with `projected_quintic_so3`,
+    `exponential_quintic_so3` and `minimum_jerk_so3`. All other legs take velocities, and the chain
+    is C¹ (the acceleration jumps). At the joints of projected legs, velocities agree to a few eps
+    of the largest ‖w‖, and accelerations to a few eps of ‖w‖² + ‖w'‖.
+    The accelerations a0, a1 are 0 at both ends and where the curve rests. At other poses they are
+    those of the default chain, even if velocities are given.
+    A chain at rest at both ends costs more than one with natural ends (`projected_spline_se3`).
+    Compared with `minimum_acceleration_spline_se3` for the same ends, a chain costs 5 % more if
+    each leg turns by 60°, and a third more if each leg turns by 90°. For legs of
+    `quaternion_spline_so3`, these figures are 0.4 % and 2 %.
+    Singular set: that of the legs. Half-turns between successive poses raise ValueError. For a
+    larger turn, insert a pose.
 
     Examples
     --------
@@ -154,16 +154,16 @@ def projected_spline_so3(
     Returns
     -------
     Chain
-        A chain of `projected_cubic_so3`, or with an inertia of `weighted_cubic_so3`, with the
+        A chain of `projected_cubic_so3` (`weighted_cubic_so3` if an inertia is given) with the
         `spline_velocities`.
 
     Notes
     -----
     For two rotations and given velocities, the result is the projected cubic. If the rotations are
     moved, the spline moves with them; if the times are reversed, the spline is reversed. Its
-    relative excess over the optimum, `minimum_acceleration_spline_so3`, is about 0.05 θ⁴, where θ
+    relative excess over the optimum (`minimum_acceleration_spline_so3`) is about 0.05 θ⁴, where θ
     is the angle of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
-    `quaternion_spline_so3` is 16 times smaller. For rotations about one axis by (0, θ, 0), at
+    `quaternion_spline_so3` is 16 times smaller. For three rotations by 0, θ, 0 about one axis, at
     equally spaced times and with natural ends, the excess is 20711/180180 θ⁴.
     Singular set: that of the legs.
 
@@ -214,7 +214,8 @@ def quaternion_spline_so3(
 ) -> Chain:
     """Return a twice differentiable chain of normalised quaternion cubics through many rotations.
 
-    Among the closed forms of this package, it is the nearest to `minimum_acceleration_spline_so3`.
+    Among the closed forms of this package, this spline is the nearest to
+    `minimum_acceleration_spline_so3`.
     Source: beyond BK 13, beyond BK 14.
 
     Parameters
@@ -226,8 +227,8 @@ def quaternion_spline_so3(
     -------
     Chain
         A chain of `quaternion_cubic_so3` with the velocities for which successive legs have the
-        same acceleration at each rotation. They solve a linear system that is positive definite for
-        all rotations.
+        same acceleration at each rotation. These velocities solve a linear system that is positive
+        definite for all rotations.
 
     Notes
     -----
@@ -310,14 +311,14 @@ class Chain(Curve):
     def jumps(self, order: int) -> Array:
         """Return the jumps of the curve, or of a derivative, at the inner poses, (N − 2, ...).
 
-        A jump is the value after a pose minus the value before it; `order` is from 0 to 3, or on
-        SE(3) from 0 to 2.
+        A jump is the value after a pose minus the value before it; `order` is from 0 to 3, or from
+        0 to 2 on SE(3).
         """
         starts, ends = _at_ends(self.legs, self.legs._check_order(order))
         return starts[1:] - ends[:-1]
 
     def evaluate(self, t: Array, order: int) -> Array:
-        """Return the values at the times t, shape (T, 1), each from the leg at this time."""
+        """Return the values at the times t, shape (T, 1), each from the leg at that time."""
         times = t[:, 0]
         values = np.empty((len(t), 1, *self._core(order)))
         if np.any(times[1:] < times[:-1]):
@@ -346,11 +347,11 @@ class Chain(Curve):
         return values
 
     def check_smooth(self, name: str, order: int) -> None:
-        """Raise RuntimeError for the cost `name` if a derivative up to `order` jumps."""
+        """Raise a RuntimeError that begins with `name` if a derivative up to `order` jumps."""
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
         for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
-            if k == 2:  # also relative to the velocity divided by the shortest duration
+            if k == 2:  # the size includes the velocity over the shortest duration
                 sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
             for half in (slice(3), slice(3, None)):  # the rotation in rad and the translation in m
                 jump = jumps[:, half].max(initial=0)
@@ -359,7 +360,7 @@ class Chain(Curve):
 
 
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Divide successive runs of rows, `counts` rows each, into parts of equal length.
+    """Divide successive runs of `counts` rows into parts of equal length.
 
     Return the run of each part, shape (parts,), and its rows, shape (parts, length). Shorter parts
     are filled up by repeating their last row.
@@ -374,7 +375,7 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
 
 
 def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
-    """Return the curve, or the legs of a chain, which must pass `Chain.check_smooth`."""
+    """Return the curve; for a chain, call `Chain.check_smooth` and return its legs."""
     if isinstance(curve, Chain):
         curve.check_smooth(name, order)
         return curve.legs
@@ -382,12 +383,10 @@ def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
 
 
 def _at_ends(legs: Curve, order: int) -> Array:
-    """Return the values of the legs, or of a derivative, at their starts and at their ends."""
     return legs.at_own_times(np.stack([0 * legs.duration, legs.duration]), order)
 
 
 def _ends(name: str, values: Array) -> dict[str, Array]:
-    """Return a dict of the values at the starts and at the ends of the legs, by name."""
     return {name.format(0): values[:-1], name.format(1): values[1:]}
 
 
@@ -409,7 +408,7 @@ def _arguments(leg: Leg) -> list[str]:
 
 
 def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
-    """Return the stack of legs; its warnings show the line that calls `chain`."""
+    """Make the stack of legs; warnings are shown for the line that calls `chain`."""
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
             legs = leg(**ends, duration=duration)
@@ -429,7 +428,6 @@ def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
 
 
 def _check_arrival(legs: Curve, poses: Array) -> None:
-    """Raise ValueError for the first leg that does not join the poses at its ends."""
     starts, ends = _at_ends(legs, 0)
     missed = np.abs(np.stack([starts - poses[:-1], ends - poses[1:]]))
     missed[..., :3, 3:] -= 64 * EPS * np.abs(poses[1:, :3, 3:])

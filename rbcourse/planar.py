@@ -1,9 +1,9 @@
 """Rigid bodies in the plane: poses (x, y, theta), the group SE(2), plans and paths.
 
-Poses are in m, m and rad, in the frame of the world unless a docstring says otherwise. Angles count
-full turns: theta and theta + 2π are the same orientation, but the latter has one turn more. A twist
-is (vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A path is
-an array with one row for each state.
+Poses are in m, m and rad. Unless a docstring says otherwise, they are in the world frame. Angles
+count full turns: theta and theta + 2π are the same orientation, but the latter has one more turn. A
+twist is (vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A
+path is an array with one row for each state.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
 
 
 def planar_from_matrix(A: ArrayLike) -> Array:
-    """Return the planar poses (x, y, theta) of matrices, −π ≤ theta ≤ π.
+    """Return the planar poses (x, y, theta) of matrices, with −π ≤ theta ≤ π.
 
     The angle is that of the rotation nearest to the upper left block. Singular set: blocks [[a, b],
     [b, −a]], to which all rotations are equally near; theta is then 0. At θ = ±π, rounding decides
@@ -120,7 +120,7 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
 
 
 def inverse_planar(pose: ArrayLike) -> Array:
-    """Return the pose of the world in the body frame; `compose_planar` of the two is (0, 0, 0).
+    """Return the pose of the world in the body frame; composed with `pose`, it gives (0, 0, 0).
 
     Source: RR 3.2.
 
@@ -144,10 +144,10 @@ def inverse_planar(pose: ArrayLike) -> Array:
 
 
 def exp_planar(S: ArrayLike) -> Array:
-    """Return the pose that the constant body twist S reaches from (0, 0, 0) in unit time.
+    """Return the pose to which the constant body twist S leads from (0, 0, 0) in unit time.
 
-    Its matrix is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]]. There is no
-    singular set; omega = 0 gives the translation exactly.
+    The matrix of this pose is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]].
+    There is no singular set; omega = 0 gives the translation exactly.
     Source: RR 3.2.
 
     Parameters
@@ -158,8 +158,8 @@ def exp_planar(S: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Poses (x, y, omega). The point (x, y) is the end of an arc of the angle omega. It is
-        (vx, vy) turned by omega/2, times sin(omega/2) / (omega/2).
+        Poses (x, y, omega). The point (x, y) is the end of an arc of the angle omega. It is (vx,
+        vy), turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
 
     Examples
     --------
@@ -173,10 +173,10 @@ def exp_planar(S: ArrayLike) -> Array:
 
 
 def log_planar(pose: ArrayLike) -> Array:
-    """Return the body twist that reaches a pose from (0, 0, 0) in unit time, −π ≤ omega ≤ π.
+    """Return the body twist, −π ≤ omega ≤ π, that leads from (0, 0, 0) to a pose in unit time.
 
-    Singular set: half-turns, which two twists reach. theta = π gives omega = π, and −π gives −π. If
-    full turns are added to these angles, rounding decides the sign.
+    Singular set: half-turns, to which two twists lead. theta = π gives omega = π, and −π gives −π.
+    If full turns are added to these angles, rounding decides the sign.
     Source: RR 3.1.
 
     Parameters
@@ -187,7 +187,7 @@ def log_planar(pose: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Twists (vx, vy, omega); `exp_planar` of them is the pose, up to full turns.
+        Twists (vx, vy, omega); `exp_planar` maps them to the poses, up to full turns.
 
     Examples
     --------
@@ -203,11 +203,12 @@ def log_planar(pose: ArrayLike) -> Array:
 def interpolate_planar(
     start: ArrayLike, goal: ArrayLike, steps: int = 10, *, shortest: bool = False
 ) -> Array:
-    """Return the path (1 − t) start + t goal of poses (x, y, theta), t equally spaced in [0, 1].
+    """Return poses (x, y, theta) interpolated linearly, in equal steps, from start to goal.
 
-    The path depends on the point of the body that has the position (x, y).
+    The path depends on which point of the body has the position (x, y).
     Singular set of `shortest`: angles that differ by half a turn. If the given angles differ by π
-    or −π, the turn is this difference; otherwise rounding decides its sign.
+    or −π, the turn is this difference. If they also differ by full turns, rounding decides its
+    sign.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Parameters
@@ -216,8 +217,8 @@ def interpolate_planar(
     steps : int, optional
         The number of equal steps, at least 1.
     shortest : bool, optional
-        Whether to turn by at most π (to rounding). The last theta may then differ from the goal's
-        by full turns. By default, theta changes from its given start to its given goal.
+        Whether to turn by at most π (to rounding). The last theta may then differ from that of
+        `goal` by full turns. By default, theta changes from its given start to its given goal.
 
     Returns
     -------
@@ -241,7 +242,7 @@ def interpolate_planar(
 
 
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
-    """Return the start and the poses (x, y, theta) after each command of a plan; turns are summed.
+    """Return the poses at the start and after each command of a plan; full turns are kept.
 
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
@@ -257,7 +258,8 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     Returns
     -------
     ndarray, shape (commands + 1, ..., 3)
-        The path has only the ends of the commands. To see poses in between, divide a command.
+        The path has a pose only at the end of each command. To see poses in between, divide a
+        command.
 
     Examples
     --------
@@ -276,7 +278,6 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
 
 
 def _rotated(theta: Array, vector: Array) -> Array:
-    """Return the vectors (x, y), turned by the angles theta."""
     c, s, x, y = np.cos(theta), np.sin(theta), vector[..., 0], vector[..., 1]
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
@@ -287,7 +288,7 @@ def _short(angle: Array) -> Array:
 
 
 def as_plan(plan: Plan, size: int | str) -> Commands:
-    """Return a plan as a list of checked commands whose velocities have `size` numbers ("n": any).
+    """Return a list of checked commands; velocities have `size` numbers ("n": any number).
 
     ValueError names the malformed command and the reason.
     """
@@ -316,7 +317,7 @@ def as_states(path: ArrayLike) -> Array:
 
 
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
-    """Return (1 − t) start + t goal for steps + 1 equally spaced t; equal entries are exact."""
+    """Return (1 − t) start + t goal for steps + 1 equally spaced t; keep equal entries exactly."""
     t = np.linspace(0, 1, as_count("steps", steps) + 1)
     batch = check_broadcast(start=(start, 1), goal=(goal, 1))
     t = t.reshape(-1, *[1] * (len(batch) + 1))

@@ -33,13 +33,13 @@ class ProjectedPolynomial(Curve):
     Attributes
     ----------
     ends : ndarray, shape (..., n, 3, 3)
-        M(0), M(1), M'(0), M'(1), and for a quintic M''(0), M''(1), for times from 0 to 1. With a
-        weight, all of them are multiplied by W.
+        M(0), M(1), M'(0), M'(1), and for a quintic also M''(0), M''(1), with time from 0 to 1. If
+        there is a weight W, all matrices are multiplied by it.
     margin, margin_time : ndarray, shape (...)
-        The least value over t of the sum of the two smallest eigenvalues of RᵀM, where R is the
-        projection of M, and its time. If the margin is 0, the nearest rotation is not unique. A
-        small margin indicates a poor curve, but a large margin does not guarantee a good curve (see
-        docs/near_optimal.md).
+        The minimum over t of the sum of the two smallest eigenvalues of RᵀM, where R is the
+        projection of M; and the time of this minimum. If the margin is 0, the nearest rotation is
+        not unique. A small margin indicates a poor curve, but a large margin does not guarantee a
+        good curve (see docs/near_optimal.md).
     """
 
     ends: Array
@@ -77,7 +77,7 @@ class ProjectedPolynomial(Curve):
         return least_over_time(lambda t: gap(hermite(ends, t[..., None, None])), self.batch_shape)
 
     def may_jump(self) -> bool:
-        """Return whether the gap may vanish between 9 sample times and, if so, also between 65."""
+        """Return whether the gap may vanish, judged by 9 sample times and, if in doubt, by 65."""
         may = np.ones(self.count, bool)
         ends = np.moveaxis(self.take(np.arange(self.count)).ends, 1, 0)
         for count in (9, 65):
@@ -96,14 +96,14 @@ class ProjectedPolynomial(Curve):
 def projected_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ProjectedPolynomial:
-    """Return the projection of the cubic with these ends: near-optimal minimum acceleration.
+    """Return the projected cubic with these ends, near-optimal for minimum acceleration.
 
     Source: BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
 
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        Rotation matrices at the start and at the end, and angular velocities there in the body
+        Rotation matrices at the start and at the end, and angular velocities at both, in the body
         frame.
     duration : array_like, shape (...), optional
         The duration of the motion; velocities are per unit of this time.
@@ -111,21 +111,22 @@ def projected_cubic_so3(
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`, with ``margin``: the nearest rotations to the cubic M(t) with the values R and
-        first derivatives R ŵ at both ends. It meets all four boundary conditions exactly.
+        A `Curve` with ``margin``. It consists of the nearest rotations to the cubic M(t) that has
+        the values R and the derivatives R ŵ at both ends. It meets all four boundary conditions
+        exactly.
 
     See Also
     --------
-    rbcourse.textbook.projected_cubic_so3 : The same for a single curve.
+    rbcourse.textbook.projected_cubic_so3 : A short version for a single curve.
 
     Notes
     -----
     Singular set: times at which the two smallest eigenvalues of RᵀM sum to 0. The curve jumps at
-    such a time, and a call raises ValueError there; before and after, the curve is correct. A
-    ``margin`` below 1e-6 gives a RuntimeWarning that names the time. Near a small ``margin``, the
-    curve turns by up to π in a time of about ``margin`` over the speed of M. The curve is accurate
-    to a few eps ‖M‖ over the sum at that time, and its derivatives to a few eps over the square and
-    the cube of the sum.
+    such a time, and a call at this time raises ValueError. At other times, the curve is correct. A
+    ``margin`` below 1e-6 gives a RuntimeWarning that names the time. If ``margin`` is small, the
+    curve turns by up to π in a time of about ``margin`` divided by the speed of M. At each time,
+    the curve is accurate to a few eps ‖M‖ divided by the sum of the two eigenvalues, and its
+    derivatives to a few eps divided by the square and the cube of this sum.
     The curve does not depend on the choice of frames: for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 it is
     L R(t) Q. The optimum is `minimum_acceleration_so3`. For the inertia of a body, see
     `weighted_cubic_so3`.
@@ -149,7 +150,7 @@ def weighted_cubic_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ProjectedPolynomial:
-    """Return the projection of the cubic with these ends in the metric of a body's inertia.
+    """Return the cubic with these ends, projected in the metric of a body's inertia.
 
     Source: BK 6.2, BK Prop. 3; beyond BK 6: the paper leaves such metrics to a later publication.
 
@@ -164,17 +165,18 @@ def weighted_cubic_so3(
     Returns
     -------
     ProjectedPolynomial
-        The projection, by `project_so_weighted`, of the cubic of `projected_cubic_so3`, with the
-        weight W of `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is
-        that of M W, with W scaled to trace 3.
+        The cubic of `projected_cubic_so3`, projected by `project_so_weighted` with the weight W of
+        `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is that of M W,
+        with W scaled to trace 3.
 
     Notes
     -----
-    The curve is near-optimal for small excursions: for an excursion s times as large, the relative
-    excess over the optimum is about s⁴ times as large (s² times for `projected_cubic_so3`). For
+    The curve is near-optimal for small excursions: if the excursion is multiplied by s, the
+    relative excess over the optimum is multiplied by about s⁴ (s² for `projected_cubic_so3`). For
     large excursions, the excess may be large. `normal_cubic_so3` is a closed form for any inertia.
-    If G is a multiple of I, the curve is `projected_cubic_so3`. Singular set, warning and change of
-    frames (which maps G to Qᵀ G Q): as for `projected_cubic_so3`, with M W in place of M.
+    If G is a multiple of I, the curve is `projected_cubic_so3`. The singular set, the warning and
+    the symmetries are as for `projected_cubic_so3`, with M W in place of M; a change of frames maps
+    G to Qᵀ G Q.
 
     Examples
     --------
@@ -201,7 +203,7 @@ def projected_quintic_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ProjectedPolynomial:
-    """Return the projection of the quintic with these ends: a curve with given accelerations.
+    """Return the projected quintic with these ends, which include accelerations.
 
     Source: BK 6, BK Prop. 3.
 
@@ -215,16 +217,16 @@ def projected_quintic_so3(
     Returns
     -------
     ProjectedPolynomial
-        A `Curve`, with ``margin``: the nearest rotations to the quintic M(t) with R, R ŵ and
-        R (ŵ² + â) as values, first and second derivatives at both ends. It meets all six boundary
-        conditions exactly.
+        A `Curve` with ``margin``. It consists of the nearest rotations to the quintic M(t) that has
+        the values R, the first derivatives R ŵ and the second derivatives R (ŵ² + â) at both ends.
+        It meets all six boundary conditions exactly.
 
     Notes
     -----
     In general, this curve is not near the curve of least jerk, `minimum_jerk_so3`. From rest to
     rest, it costs 1.17 times the optimum for a turn by 60°, and 11.6 times for 120°.
-    `exponential_quintic_so3` is near the optimum. Singular set and change of frames: as
-    for `projected_cubic_so3`.
+    `exponential_quintic_so3` is near the optimum. The singular set and the symmetries are as for
+    `projected_cubic_so3`.
 
     Examples
     --------
@@ -249,7 +251,7 @@ def ends_of_quintic(
     a1: ArrayLike,
     duration: ArrayLike,
 ) -> tuple[Ends, Array, Array, Array]:
-    """Return `Ends`, a0 and a1 for times from 0 to 1, and the duration, with one batch shape."""
+    """Return `Ends`, a0 and a1 rescaled to unit time, and the duration, in a common batch shape."""
     ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     ends, T = ends.broadcast_to(batch).over(duration)
@@ -258,7 +260,7 @@ def ends_of_quintic(
 
 
 def projected_cubic(ends: Ends, duration: Array) -> ProjectedPolynomial:
-    """Return `projected_cubic_so3` of ends for times from 0 to 1, without a warning."""
+    """Return `projected_cubic_so3` for ends rescaled to unit time, without a warning."""
     R0, R1, w0, w1 = ends
     M = np.stack([R0, R1, R0 @ hat(w0), R1 @ hat(w1)], axis=-3)
     return ProjectedPolynomial(ends=M, duration=duration)
@@ -272,7 +274,7 @@ def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
 
 
 def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
-    """Return w, w', w'', one for each of the derivatives M', M'', M''' that are given.
+    """Return w, w', w'', one for each given derivative M', M'', M'''.
 
     R is the nearest rotation to M, and the components are on the first axes of all arrays.
 
@@ -318,7 +320,7 @@ def _skew(A: Array) -> Array:
 
 
 def _solve(S: Array, b: Array) -> Array:
-    """Return x with (tr(S) I − S) x = b, by the factors L D Lᵀ of this positive definite matrix."""
+    """Solve (tr(S) I − S) x = b by the L D Lᵀ factors of this positive definite matrix."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = S
     d1 = yy + zz
     l21, l31 = -xy / d1, -xz / d1

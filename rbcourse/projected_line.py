@@ -37,16 +37,16 @@ _PI_REST = 1.2246467991473532e-16  # π − np.pi
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ProjectedLine(AlongGeodesic):
-    """The projection of a straight line between two rotations: p(t) = θ(f(t)).
+    """The projection of a straight line between two rotations, with p(t) = θ(f(t)).
 
     Source: BK Prop. 6, BK (15), BK (17).
 
     Attributes
     ----------
     margin : ndarray, shape (...)
-        2 cos(‖σ‖/2), the least value on the line of the sum of the two smallest eigenvalues of RᵀM,
-        for M on the line and its projection R. If the margin is 0, the projection of the middle is
-        not unique.
+        2 cos(‖σ‖/2). This is the least sum of the two smallest eigenvalues of RᵀM for all M on the
+        line, with the projection R of M. If the margin is 0, the middle of the line has no unique
+        projection.
     """
 
     timing: Progress
@@ -79,7 +79,7 @@ class ProjectedLine(AlongGeodesic):
         return third + 3 * bend * speed * push + slope * self.on_line(t, 3)
 
     def on_line(self, t: Array, order: int) -> Array:
-        """Return f or a derivative of the curves of a stack, shape (T, count) or (T, 1)."""
+        """Return f or a derivative for the curves of a stack, shape (T, count) or (T, 1)."""
         if self.timing is identity:
             return identity(t, order)
         if t.shape[1] == 1 and t.size:
@@ -123,10 +123,10 @@ def projected_line_so3(
     R0, R1, duration
         As for `projected_cubic_so3`.
     f : callable, optional
-        The function ``f(t, order)`` returns the position on the line at time t, with f(0) = 0 and
-        f(1) = 1 to 1e-12, for order 0, and its derivatives for order 1 and 2. The jerk ``c(t, 3)``
-        also needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch
-        axis. By default f(t) = t.
+        For order 0, ``f(t, order)`` returns the position on the line at time t, with f(0) = 0 and
+        f(1) = 1 to 1e-12. For order 1 and 2, it returns the derivatives. The jerk ``c(t, 3)`` also
+        needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch axis.
+        By default f(t) = t.
 
     Returns
     -------
@@ -135,11 +135,11 @@ def projected_line_so3(
 
     Notes
     -----
-    Singular set: R0 and R1 a half-turn apart. At f(t) = 1/2, the projection then jumps from R0 to
-    R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a few eps;
-    below 1e-6 there is a RuntimeWarning. The projection is accurate to eps over the sum of the two
-    smallest eigenvalues of RᵀM, which ``margin`` bounds from below. A call of the curve also raises
-    ValueError if `f` returns non-finite values or another shape.
+    Singular set: R0 and R1 are a half-turn apart. At f(t) = 1/2, the projection then jumps from R0
+    to R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a few
+    eps; below 1e-6 there is a RuntimeWarning. The projection is accurate to eps divided by the sum
+    of the two smallest eigenvalues of RᵀM. This sum is at least ``margin``. A call of the curve
+    also raises ValueError if `f` returns non-finite values or another shape.
 
     Examples
     --------
@@ -176,13 +176,14 @@ def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     """Return s(t) for the line (1 − t) I + t R2, whose singular values are 1, s(t), s(t).
 
-    s vanishes only at the angle π and t = 1/2, where the nearest rotation is not unique.
+    s vanishes only for the angle π at t = 1/2, where the nearest rotation is not unique.
     Source: BK (17).
 
     Parameters
     ----------
     t, angle : array_like, shape (...)
-        The positions on the line, any real numbers, and the angle ‖ω₀‖ of R2, in [0, π].
+        The positions on the line, which may be any real numbers, and the angle ‖ω₀‖ of R2 in [0,
+        π].
 
     Returns
     -------
@@ -198,18 +199,18 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
 
 
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return θ or a derivative: the nearest rotation to (1 − t) I + t exp(ω̂₀) is exp(ω̂₀ θ(t)).
+    """Return θ(t), or a derivative, where exp(ω̂₀ θ(t)) is nearest to (1 − t) I + t exp(ω̂₀).
 
     For the angle 0, the limit θ(t) = t is returned. The angle π is singular: θ is 0 before t = 1/2,
     1/2 at this time and 1 after it. Since `numpy.pi` is less than π by 1.2e-16, the jump has the
     finite slope 1e16 for `numpy.pi`.
-    Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², where the paper
-    prints s, with s from BK (17).
+    Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², with s from BK
+    (17); the paper prints s.
 
     Parameters
     ----------
     t, angle : array_like, shape (...)
-        The positions on the line, any real numbers, and the angle ‖ω₀‖, in [0, π].
+        The positions on the line, which may be any real numbers, and the angle ‖ω₀‖ in [0, π].
     order : {0, 1, 2, 3}, optional
         The order of the derivative with respect to t.
 
@@ -234,7 +235,7 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
 
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return the position on the line for a projection of constant speed, or a derivative.
+    """Return the position on the line whose projection has constant speed, or a derivative.
 
     It is the inverse of `theta`: theta(f(t)) = t. The rounding of f changes theta(f(t)) by up to
     eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.

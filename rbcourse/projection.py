@@ -18,7 +18,7 @@ from rbcourse._checks import (
 from rbcourse._foam import nearest_rotations
 from rbcourse._numerics import EPS, Array, scaled
 
-MANY = 20  # from this number of matrices on, FOAM is faster than the SVD
+MANY = 20  # for this many matrices or more, FOAM is faster than the SVD
 NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see margin)"
 
 
@@ -30,7 +30,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        For non-finite entries the result is False; they raise no error.
+        Matrices with non-finite entries give False and raise no error.
     atol : float, optional
         The largest accepted error of any entry of MᵀM − I and of det M − 1.
 
@@ -58,7 +58,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     A : array_like, shape (..., n + 1, n + 1)
-        For non-finite entries the result is False; they raise no error.
+        Matrices with non-finite entries give False and raise no error.
     atol : float, optional
         As for `is_so`, with R for M. It is also the largest accepted error of the last row.
 
@@ -95,16 +95,16 @@ def project_so(M: ArrayLike) -> Array:
 
     See Also
     --------
-    rbcourse.textbook.project_so : The same in three lines, with the SVD.
+    rbcourse.textbook.project_so : A version in three lines, with the SVD.
     distance_to_so : The distance of M from R.
 
     Notes
     -----
-    Singular set: matrices M for which the two smallest eigenvalues of RᵀM sum to 0 (rank n − 2 or
-    less; or the smallest singular value of M repeated and det M < 0). Several rotations are then
-    equally near, and one of them is returned. Near this set, R is accurate to a few eps ‖M‖ over
-    the sum. FOAM (see `rbcourse._foam`) projects large stacks of 3 × 3 matrices, except near the
-    singular set; the SVD projects all others.
+    Singular set: matrices M for which the two smallest eigenvalues of RᵀM sum to 0. Their rank is n
+    − 2 or less, or their smallest singular value is repeated and det M < 0. Several rotations are
+    then equally near, and one of them is returned. Near this set, R is accurate to a few eps ‖M‖
+    divided by this sum. FOAM (see `rbcourse._foam`) projects large stacks of 3 × 3 matrices, except
+    near the singular set; the SVD projects all others.
 
     Examples
     --------
@@ -138,9 +138,9 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     -----
     L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L. On
     SO(3), W induces the left-invariant metric tr(W) I − W, which is the inertia of the body.
-    Singular set: that of `project_so`, for M W. A W of rank n − 1, such as that of a flat body,
-    determines R if M W has the same rank. A W of rank n − 2 or less, such as that of a thin rod,
-    never determines R.
+    Singular set: M W is in the singular set of `project_so`. A W of rank n − 1, such as that of a
+    flat body, determines R if M W has the same rank. A W of rank n − 2 or less, such as that of a
+    thin rod, never determines R.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
 
 
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
-    """Return the columns of M orthonormalised from left to right, by the Gram–Schmidt method.
+    """Orthonormalise the columns of M from left to right by the Gram–Schmidt method.
 
     The result Q has QᵀQ = I, and QᵀM is upper triangular with a positive diagonal. So Q is a
     reflection if det M < 0. Q is not the rotation nearest to M, since the first column keeps its
@@ -258,7 +258,7 @@ def _signed_singular_values(M: Array) -> Array:
 
 
 def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
-    """Return the small skew Ω that makes Uᵀ M V symmetric: Ω d + d Ω = K − Kᵀ, K = Uᵀ M V.
+    """Return the small skew-symmetric Ω that corrects K = Uᵀ M V: Ω d + d Ω = K − Kᵀ.
 
     After an SVD, K − Kᵀ is about ten eps ‖M‖. If d_i + d_j nearly vanishes, Ω_ij is set to 0.
     """

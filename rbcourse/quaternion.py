@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z): points of the unit sphere in R⁴; q and −q give one rotation."""
+"""Unit quaternions (w, x, y, z) as rotations; q and −q give the same rotation."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Candidates. For non-finite entries the result is False; they raise no error.
+        Candidates. Non-finite entries give False and raise no error.
     atol : float, optional
         The largest accepted difference of the norm from 1.
 
@@ -131,7 +131,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
 
 
 def project_quaternion(q: ArrayLike) -> Array:
-    """Return the unit quaternion nearest to q, which is q over its norm.
+    """Return the unit quaternion nearest to q, which is q/‖q‖.
 
     Singular set: q = 0, to which all unit quaternions are equally near; it raises ValueError.
     Source: RR 1.5, RR (6), RR Fig. 2.
@@ -155,9 +155,9 @@ def project_quaternion(q: ArrayLike) -> Array:
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return q or −q, whichever has w ≥ 0: a unique unit quaternion for each rotation.
 
-    Singular set: half-turns, where w = 0 to 4 eps. Of q and −q, the one whose component of largest
-    magnitude is positive is then returned, with w = 0. If several components are largest, to 1e-8,
-    the first of them is made positive.
+    Singular set: half-turns, where w = 0 to 4 eps. Then w is set to 0, and the sign is chosen so
+    that the component of largest magnitude is positive. If several magnitudes are largest, to 1e-8,
+    the first of these components is made positive.
     Source: BK Remark 7.
 
     Parameters
@@ -184,11 +184,11 @@ def canonical_quaternion(q: ArrayLike) -> Array:
 
 
 def continuous_quaternions(q: ArrayLike) -> Array:
-    """Return quaternions along a path, each with the sign that makes it nearer to the previous one.
+    """Choose the signs of quaternions along a path so that each is near to the previous one.
 
     Unlike the quaternions of `quaternion_from_matrix`, they do not jump where w passes through 0.
-    Singular set: successive rotations a half-turn apart; the sign is then changed if the previous
-    sign was changed.
+    Singular set: successive rotations are a half-turn apart. The sign is then changed if the
+    previous sign was changed.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     If `slerp` turns by the angle a about an axis, this function turns by 2π − a about the opposite
     axis. If `slerp` ends at q1, this function ends at −q1, and vice versa. Singular set: q0 and q1
     are the same rotation, to 4 eps; ValueError is raised. Near this set, the axis is accurate to
-    eps over ‖q1 − q0‖.
+    eps/‖q1 − q0‖.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Parameters

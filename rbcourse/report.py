@@ -1,4 +1,4 @@
-"""The functions of the report RR, under its own names and with its signatures.
+"""The functions of the report RR, with the names and signatures of the report.
 
 Arguments that the report does not have are keyword-only. For inputs of a wrong shape or with
 non-finite entries, a check returns False, and a correction raises ValueError.
@@ -96,7 +96,7 @@ def check_SEn(m: ArrayLike, epsilon: float = 0.01) -> bool:
 
 
 def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
-    """Return a copy of m if it passes `check_SOn`, or else the rotation matrix nearest to it.
+    """Return a copy of m if it passes `check_SOn`, otherwise the nearest rotation matrix.
 
     m is any square matrix, which may be singular or a reflection.
     Source: RR 1.4, RR (4), RR (5), RR Fig. 1.
@@ -112,7 +112,7 @@ def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
-    """Return a copy of v ≠ 0, (w, x, y, z), if it passes `check_quaternion`, else v over its norm.
+    """Return a copy of v = (w, x, y, z) ≠ 0 if it passes `check_quaternion`, otherwise v/‖v‖.
 
     Source: RR 1.5, RR (6), RR Fig. 2.
 
@@ -125,7 +125,7 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
-    """Return a copy of m if it passes `check_SEn`, or else the pose nearest to it.
+    """Return a copy of m if it passes `check_SEn`, otherwise the nearest pose.
 
     m has the shape (n + 1, n + 1), n ≥ 1. Its translation is kept, and its last row becomes 0, …,
     0, 1.
@@ -172,9 +172,9 @@ def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
 def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure, Animation]:
     """Show how a rotation moves v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) over the sphere.
 
-    `rotation` is a rotation matrix (3, 3) or a unit quaternion (4,), within 0.01. The figure shows
-    the nearest rotation, which is reached in `steps` equal steps about one axis. Return the figure
-    with all images, and an animation of them. A notebook shows the animation as a player;
+    `rotation` is a rotation matrix (3, 3) or a unit quaternion (4,), valid to 0.01. The figure
+    shows the nearest rotation, which is reached in `steps` equal steps about one axis. Return the
+    figure with all images, and an animation of them. A notebook shows the animation as a player;
     ``animation.save(path)`` writes a GIF.
     Source: RR 2.2.
 
@@ -196,8 +196,8 @@ def visualize(
 ) -> tuple[Figure, Animation]:
     """Show the images of v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) under `steps` random rotations.
 
-    If `quaternion` is True, the rotations v ↦ q v q⁻¹ are those of `random_quaternion`, otherwise
-    those of `random_rotation_matrix`. Return a figure and an animation as `visualize_rotation`
+    If `quaternion` is True, `random_quaternion` gives the rotations v ↦ q v q⁻¹, otherwise
+    `random_rotation_matrix` gives them. Return a figure and an animation as `visualize_rotation`
     does.
     Source: RR 2.2, RR Fig. 4, RR Fig. 5.
 
@@ -223,7 +223,7 @@ def interpolate_rigid_body(
     """Return the path from one planar pose to another on which x, y and theta change linearly.
 
     Poses are (x, y, theta), and the path has the shape (steps + 1, 3). With `shortest`, the body
-    turns the short way.
+    turns the short way round.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Examples
@@ -241,8 +241,8 @@ def forward_propagate_rigid_body(
     """Return the path of a planar body that follows a plan, shape (commands + 1, 3).
 
     The plan is a list of (velocity, duration). A velocity is (vx, vy, vtheta) in m/s, m/s and
-    rad/s; a duration is at least 0 in s. vx and vy are along the axes of `frame`, which is "world",
-    as in the report, or "body".
+    rad/s, and a duration is at least 0 in s. vx and vy are along the axes of `frame`, which is
+    "world", as in the report, or "body".
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
@@ -256,7 +256,7 @@ def forward_propagate_rigid_body(
 
 
 def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Figure, Animation]:
-    """Show a path of planar poses: a rectangle at these poses, and the path of its centre.
+    """Show a path of planar poses: a rectangle at each pose, and the path of its centre.
 
     The path has poses (x, y, theta), shape (states, 3). The `length` of the rectangle is by default
     a fifth of the larger extent of the path, or 1 if the body does not move. Straight lines join

@@ -31,11 +31,11 @@ __all__ = [
 ]
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
-_BLOCK = 6136  # draws at a time: their arrays fit into the cache; arrays of 6144 would collide
+_BLOCK = 6136  # number of draws that fit into the cache; arrays of 6144 would collide
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
-    """Return Arvo's rotation −M B of three numbers; it is uniform if the numbers are.
+    """Return Arvo's rotation −M B for three numbers; uniform numbers give uniform rotations.
 
     B turns by 2π x₁ about the z axis, and −M is a half-turn about V = (√z cos 2π x₂, √z sin 2π x₂,
     √(1 − z)): M = I − 2 V Vᵀ. The printed M B has determinant −1.
@@ -67,7 +67,7 @@ def arvo_rotation(x: ArrayLike) -> Array:
 
 
 def shoemake_quaternion(x: ArrayLike) -> Array:
-    """Return Shoemake's quaternion of three numbers; it is uniform if the numbers are.
+    """Return Shoemake's quaternion for three numbers; uniform numbers give uniform rotations.
 
     Source: RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid
     body path planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
@@ -201,7 +201,7 @@ def _in_blocks(
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return draws of a kernel; it computes entries, (…, m), from uniform numbers, (3, m)."""
+    """Return random draws; the kernel maps uniform numbers, (3, m), to entries, (…, m)."""
     shape, generator = as_size(size), as_generator(rng)
     draws = np.empty((math.prod(shape), math.prod(core)))
     width = min(len(draws), _BLOCK)
@@ -215,7 +215,7 @@ def _in_blocks(
 
 
 def _arvo(x: Array, entries: Array) -> None:
-    """Write `arvo_rotation` with its products expanded in the angles φ and ψ = φ − θ."""
+    """Write the entries of `arvo_rotation`, expanded in the angles φ and ψ = φ − θ."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = entries
     (c, cos_psi), (s, sin_psi) = _cos_sin(np.stack([x[1], x[1] - x[0]]))
     height, radius = 2 * x[2] - 1, 2 * np.sqrt(x[2] * (1 - x[2]))
@@ -307,16 +307,16 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
             Means of the trace and of its square. For large n, they are normal with means 0, 1 and
             variances 1/n, 2/n.
         angle
-            The largest distance of the angle's distribution from `angle_law`, with Kolmogorov's
+            The largest distance of the angle's distribution from `angle_law`. It has Kolmogorov's
             distribution.
         image of e₁, image of e₃
-            χ² of the first and of the last column, on 20 cells of the sphere that have equal areas,
-            4 in height by 5 in longitude. For large n, its distribution is χ² with 19 degrees of
-            freedom.
+            χ² of the first and of the last column on 20 cells of the sphere. The cells have equal
+            areas: 4 in height by 5 in longitude. For large n, the distribution is χ² with 19
+            degrees of freedom.
         angle to next, angle to half
-            The statistic of the row "angle" for the turns from each draw with an even index to the
-            next draw, and from each draw of the first half to its partner in the second half. Both
-            detect draws that depend on each other.
+            The statistic of the row "angle" for two sets of turns: from each draw with an even
+            index to the next draw, and from each draw of the first half to its partner in the
+            second half. Both detect draws that depend on each other.
 
     Examples
     --------
@@ -357,7 +357,7 @@ def _angle_test(R: Array) -> UniformityTest:
 
 
 def _cell_test(points: Array) -> UniformityTest:
-    """Return the χ² of points of the sphere; by Archimedes, equal heights have equal areas."""
+    """Return the χ² of points of the sphere; zones of equal height have equal areas."""
     from scipy.stats import chisquare
 
     x, y, z = points.T

@@ -50,7 +50,7 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
 
 
 def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
-    """Return the rotation R and the position d, in the fixed frame, of a pose [[R, d], [0, 1]].
+    """Return R and d of a pose [[R, d], [0, 1]]; d is the position in the fixed frame.
 
     Source: BK 2.1.
 
@@ -212,10 +212,11 @@ BASIS_SE3.flags.writeable = False
 
 
 def exp_se3(S: ArrayLike) -> Array:
-    """Return the pose that the constant twist S = (ω, v) reaches from I in unit time.
+    """Return the pose to which the constant twist S = (ω, v) leads from I in unit time.
 
-    It is [[exp_so3(ω), J v], [0, 1]] with J = ``right_jacobian_so3(ω).mT``, accurate to a few eps
-    (1 + ‖ω‖) (1 + ‖v‖). There is no singular set; ω = 0 gives the translation by v exactly.
+    The pose is [[exp_so3(ω), J v], [0, 1]] with J = ``right_jacobian_so3(ω).mT``. It is accurate to
+    a few eps (1 + ‖ω‖) (1 + ‖v‖). There is no singular set; ω = 0 gives the translation by v
+    exactly.
     Source: BK 2.6.
 
     Parameters
@@ -241,9 +242,9 @@ def exp_se3(S: ArrayLike) -> Array:
 
 
 def log_se3(A: ArrayLike) -> Array:
-    """Return the twist (ω, v) that reaches A from I in unit time: exp_se3((ω, v)) = A, ‖ω‖ ≤ π.
+    """Return the twist (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π.
 
-    The result is accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists reach
+    The result is accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists give
     A. The returned ω is that of `log_so3`.
     Source: BK 2.6.
 

@@ -25,7 +25,7 @@ BASIS_SO3.flags.writeable = False
 
 
 def hat(w: Array) -> Array:
-    """Return `hat_so3` of vectors without checks, as combinations of the basis."""
+    """Return `hat_so3` of vectors without checks."""
     return (w @ BASIS_SO3.reshape(3, 9)).reshape(*w.shape, 3) + 0.0
 
 
@@ -107,9 +107,9 @@ def exp_so3(w: ArrayLike) -> Array:
 def log_so3(R: ArrayLike) -> Array:
     """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, to rounding.
 
-    The result is accurate to a few eps. Singular set: half-turns, to 8 eps in the angle, where w
-    and −w are equally short. Of these two, the one whose component of largest magnitude is positive
-    is returned (see `canonical_quaternion`).
+    The result is accurate to a few eps. Singular set: half-turns (to 8 eps in the angle), where w
+    and −w are equally short. The sign is then chosen so that the component of largest magnitude is
+    positive (see `canonical_quaternion`).
     Source: BK 2.5.
 
     Parameters
@@ -178,10 +178,10 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
 
 
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
-    """Return the inverse of `right_jacobian_so3`: w' = J⁻¹ times the body angular velocity.
+    """Return the inverse of `right_jacobian_so3`, which maps body angular velocities to w'.
 
-    Singular set: ‖w‖ = 2π, 4π, …, where J has no inverse, and the result is finite and huge. Near
-    this set, the entries grow like 1 over the distance from it.
+    Singular set: ‖w‖ = 2π, 4π, …. J then has no inverse, and the result is finite and huge. Near
+    this set, the entries are inversely proportional to the distance from it.
     Source: BK 2.5.
 
     Parameters
@@ -205,6 +205,6 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
 
 
 def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n̂ and a of w = a n; a has two axes of length 1 at the end, to multiply matrices."""
+    """Return n̂ and a of w = a n; a has two trailing axes of length 1."""
     axis, angle = axis_and_angle(w)
     return hat(axis), angle[..., None]

@@ -1,8 +1,9 @@
-"""Textbook versions of the fast functions, short and slow, as on the board; read them first.
+"""Textbook versions of the fast functions: short, slow, and written as on the board.
 
-Each function has the name, units, frames and singular set of its fast counterpart. It returns the
-same result, to rounding or, for an optimum, to a tolerance. Arguments are not checked. R0, R1 have
-the shape (3, 3), and w0, w1 (3,). The times t have the shape (N,), R (N, 3, 3), w and w' (N, 3).
+Read them first. Each function has the name, units, frames and singular set of its fast counterpart.
+The results agree to rounding or, for an optimum, to a tolerance. Arguments are not checked. R0 and
+R1 have the shape (3, 3), and w0 and w1 the shape (3,). The times t have the shape (N,); R has the
+shape (N, 3, 3), and w and w' the shape (N, 3).
 """
 
 import ast
@@ -34,7 +35,7 @@ __all__ = [
 
 
 def show(function: Callable[..., Any]) -> None:
-    """Print the code of a function without its docstring; raise ValueError if it has none.
+    """Print the code of a function, which must have a docstring, without the docstring.
 
     Examples
     --------
@@ -111,8 +112,9 @@ def projected_cubic_so3(
 def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
 
-    x0, x1, v0, v1 have the same shape. The result, the coefficients of 1, t, t², t³, has the shape
-    (4, ...). Of all curves with these boundary conditions, the cubic has the least ∫ ‖x''‖² dt.
+    x0, x1, v0, v1 have the same shape. The result has the coefficients of 1, t, t², t³ and the
+    shape (4, ...). Of all curves with these boundary conditions, the cubic has the least ∫ ‖x''‖²
+    dt.
     Source: BK 6.2.
 
     Examples
@@ -125,10 +127,10 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
 
 
 def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
-    """Return a polynomial, or if order > 0 its derivative of this order, at the times t.
+    """Evaluate a polynomial or, if order > 0, its derivative of this order at the times t.
 
-    The coefficients, shape (degree + 1, ...), are those of 1, t, t², …; t broadcasts with each of
-    them.
+    The coefficients, shape (degree + 1, ...), are those of 1, t, t², …; t broadcasts with each
+    coefficient.
 
     Examples
     --------
@@ -148,12 +150,12 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
 def minimum_torque_so3(
     R0: Array, R1: Array, w0: Array, w1: Array, G: Array, t: Array, tol: float = 1e-9
 ) -> tuple[Array, Array]:
-    """Return R and w of the body's motion of least torque at the times t, by SciPy's `solve_bvp`.
+    """Return R and w of the least-torque motion at the times t, by SciPy's `solve_bvp`.
 
-    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), Euler's G w' = τ − w × G w, and R p = c,
-    with p = G (τ' + w × τ) − G w × τ, for an unknown constant c. ‖σ‖ must be below 2π. If the
-    solver fails, a RuntimeError names the reason. The solver may find a stationary curve that is
-    not the cheapest.
+    The equations are σ' = J(σ)⁻¹ w with R = R0 exp(σ̂), Euler's equation G w' = τ − w × G w, and R
+    p = c. Here p = G (τ' + w × τ) − G w × τ, and c is an unknown constant. ‖σ‖ must be below 2π. If
+    the solver fails, a RuntimeError names the reason. The solver may find a stationary curve that
+    is not the cheapest.
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
 
     Examples
@@ -261,11 +263,11 @@ def minimum_acceleration_so3(
 
 
 def spline_velocities(times: Array, R: Array) -> Array:
-    """Return the velocities at rotations R, shape (N, 3, 3), for which w' is continuous.
+    """Return the velocities at rotations R, shape (N, 3, 3), that make w' continuous.
 
     Let Q = R_iᵀ R_{i+1}, s = vee skew Q, and B = ½ (tr Q I − Qᵀ). A projected cubic of duration h
     has h² w'(0) = 6 s − 4 h w_i − 2 h B w_{i+1} and h² w'(1) = −6 s + 2 h Bᵀ w_i + 4 h w_{i+1}. At
-    both ends of the path w' = 0.
+    both ends of the path, w' = 0.
     Source: beyond BK 13.
 
     Examples
@@ -290,7 +292,7 @@ def spline_velocities(times: Array, R: Array) -> Array:
 def minimum_acceleration_spline_so3(
     times: Array, R: Array, ends: tuple[Array, Array] | None = None, tol: float = 1e-10
 ) -> tuple[Array, Array]:
-    """Return w and w' at the rotations R for the optimum through them, by SciPy's `solve_bvp`.
+    """Return w and w' of the optimum through the rotations R, by SciPy's `solve_bvp`.
 
     All legs are solved together, each with its own time from 0 to 1. The equations are those of
     `minimum_acceleration_so3`. At the inner rotations, w and w' are continuous. At both ends, w is
@@ -339,9 +341,9 @@ def fastest(turn: Array, inertia: Array, torque: float, cells: int) -> tuple[Arr
     """Return the fractions of a turn and the least times to reach them with bounded torque.
 
     Let σ be the rotation vector `turn` and R = exp(σ̂ s). In a cell of length h, x = s'² changes
-    linearly, and u = s'' = (x_i+1 − x_i)/2h. The torque G σ u + (σ × G σ) x has perpendicular
-    terms. The larger x of the two ends of a cell satisfies ‖G σ‖² u² + ‖σ × G σ‖² x² = τ². One pass
-    goes backwards from the end, and one forwards from the start.
+    linearly, and u = s'' = (x_i+1 − x_i)/2h. The two terms of the torque G σ u + (σ × G σ) x are
+    perpendicular. The larger x of the two ends of a cell satisfies ‖G σ‖² u² + ‖σ × G σ‖² x² = τ².
+    The first pass goes backward from the end, the second forward from the start.
     Source: beyond BK 16.
 
     Examples

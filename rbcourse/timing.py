@@ -4,8 +4,8 @@ The timing s(t) moves the body along a path c(s). Let x = s'² and u = s'' = ½ 
 V = c(s, 1) = (ω, v) and A = c(s, 2) = (α, β), the motion has the velocity V s' and the acceleration
 V u + A x in the body frame. The torque is G ω u + (G α + ω × G ω) x. The acceleration of the point
 r of the body is (v + ω × r) u + (β + α × r + ω × (ω × r)) x. The force on a mass m at this point is
-m times this acceleration, minus m Rᵀ g. So a limit on a speed is x ≤ X(s), and every other limit is
-‖a u + b x + k‖ ≤ 1.
+m times this acceleration, minus m Rᵀ g. So a limit on a speed has the form x ≤ X(s), and every
+other limit has the form ‖a u + b x + k‖ ≤ 1.
 
 The path is divided into cells of length h. In a cell, u is constant, x changes linearly from x_i to
 y = x_i+1, and u = (y − x_i)/2h. Each limit is imposed at both ends of the cell. Since a, b and k
@@ -47,7 +47,7 @@ from rbcourse.curves import Curve
 from rbcourse.paths import Chain
 
 FINER = 1, 2, 4, 8
-TOLERANCE = 1e-4  # a limit may be exceeded by this share inside a cell
+TOLERANCE = 1e-4  # the share by which a limit may be exceeded inside a cell
 _REPEATS = 12
 _INSIDE = np.linspace(0, 1, 6)[:, None, None]
 _BETWEEN = np.linalg.solve(
@@ -81,17 +81,17 @@ def fastest(
     Parameters
     ----------
     curve : Curve
-        A single curve. Of a `Timed` curve, only the path is used. The times of the curve do not
-        matter.
+        A single curve. Only its path is used; its times do not matter.
     angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
         The largest norms of ω, of the velocity of the point `centre` of the body, of ω', and of the
         acceleration of this point. Three numbers limit the magnitudes of the components in the body
         frame instead. For rotations, only ω, ω' and the torque can be limited.
     torque, force : float or array_like, shape (3,)
-        The largest norms of G ω' + ω × G ω, and of `mass` times the acceleration of `centre`, minus
-        the weight. At least one limit on an acceleration, the torque or the force is required.
+        The largest norms of the torque G ω' + ω × G ω and of the force, which is `mass` times the
+        acceleration of `centre`, minus the weight. At least one limit on an acceleration, the
+        torque or the force is required.
     inertia : array_like, shape (3, 3), optional
-        G, about the centre of mass; required for a limit on the torque.
+        The inertia G about the centre of mass; required for a limit on the torque.
     mass, centre, gravity : float; array_like, shape (3,); optional
         For a limit on the force, these are the mass, the centre of mass in the body frame, and the
         acceleration of free fall in the fixed frame. Without such a limit, `centre` may be any
@@ -108,8 +108,8 @@ def fastest(
     Raises
     ------
     ValueError
-        If the path stands still, no limit bounds the speed, the force cannot hold the body at rest,
-        or the `rates` are out of reach. The message names the first place on the path.
+        If the path stands still, if no limit bounds the speed, if the force cannot hold the body at
+        rest, or if the `rates` are out of reach. The message names the first place on the path.
 
     Warns
     -----
@@ -118,11 +118,11 @@ def fastest(
 
     Notes
     -----
-    The grid has 1,000 cells, or for chains 250 for each leg (25 if there are many legs). It is
-    refined up to eight times until the limits hold between its points to 1e-4. T is then about 1e-3
-    above the shortest time. The motion stops where the velocity of the path jumps. Its acceleration
-    jumps where the acceleration of the path jumps, at both ends, and between cells; the jerk is not
-    limited. A thousand cells take about 50 ms.
+    The grid has 1,000 cells or, for a chain, 250 for each leg (25 if there are many legs). It is
+    refined, up to eight times, until the limits hold to 1e-4 between its points. T is then about
+    1e-3 above the shortest time. The motion stops where the velocity of the path jumps. Its
+    acceleration jumps where the acceleration of the path jumps, at both ends, and between cells;
+    the jerk is not limited. A thousand cells take about 50 ms.
 
     Examples
     --------
@@ -218,8 +218,8 @@ class Timed(Curve):
     curve : Curve
         The path c(s).
     s, rate, times : ndarray, shape (N + 1,)
-        The grid points, the values of s' there, and the times at which the curve passes them. It
-        passes the pose c(s0) of the path at ``times[np.searchsorted(s, s0)]``.
+        The grid points, the values of s' there, and the times at which the curve passes them. The
+        curve passes the pose c(s0) of the path at ``times[np.searchsorted(s, s0)]``.
     """
 
     curve: Curve
@@ -259,8 +259,8 @@ class Timed(Curve):
         return c[0] * u + c[1] * v**2 if order == 2 else 3 * c[0] * u * v + c[1] * v**3
 
     def values(self, t: Array, order: int) -> Array:
-        """Raise RuntimeError, since costs are integrals of smooth curves."""
-        raise RuntimeError("curve: a Timed curve has no cost here, as its acceleration jumps")
+        """Raise RuntimeError, because costs require smooth curves."""
+        raise RuntimeError("curve: a Timed curve has no cost here, because its acceleration jumps")
 
     @property
     def flat(self) -> Self:
@@ -309,9 +309,9 @@ def _limits(
         if name not in _SPEEDS + _BENDS:
             raise TypeError(f"{name}: no limit has this name")
         if x.shape not in ((), (3,)) or x.min() <= 0:
-            raise ValueError(f"{name}: a number above 0, or three, is wanted, got {x.tolist()}")
+            raise ValueError(f"{name}: one or three numbers above 0 are wanted, got {x.tolist()}")
         if curve.size == 3 and name in ("speed", "acceleration", "force"):
-            raise ValueError(f"{name}: a curve on SO(3) has none")
+            raise ValueError(f"{name}: a curve on SO(3) has no such limit")
     if not most:
         raise ValueError(f"limits: none of {', '.join(_SPEEDS + _BENDS)} is given")
     if "torque" in most and inertia is None:
@@ -324,7 +324,7 @@ def _limits(
 class _Grid(NamedTuple):
     """The grid points, shape (N + 1,), and V, A, R at six points of each cell, shape (6, N, ...).
 
-    `stops` contains the numbers of the grid points at which x = 0.
+    `stops` contains the indices of the grid points at which x = 0.
     """
 
     s: Array
@@ -455,7 +455,7 @@ def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
 
 
 def _tops(Q: Array, caps: Array) -> Array:
-    """Return, for each cell, the y up to which x + y increases, if x is the largest value allowed.
+    """Return, for each cell, the y with the largest x + y, where x is as large as y allows.
 
     This y is found by bisection of its logarithm.
     """

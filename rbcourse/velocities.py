@@ -1,4 +1,4 @@
-"""Velocities at the poses of a path, from parabolas or splines with a continuous acceleration.
+"""Velocities at poses of a path, from parabolas or from splines of continuous acceleration.
 
 A cubic leg of duration h joins R₀ to R₁ = R₀ Q. At its ends, the ambient cubic M(t) of BK 6 has
 M = R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities.
@@ -77,8 +77,8 @@ def spline_velocities(
     Notes
     -----
     If the poses are moved, the velocities move with them; if the times are reversed, the velocities
-    are those of the reversed path. For rotations about one axis by small angles, they are those of
-    SciPy's ``CubicSpline``. Singular set: successive poses that are a half-turn apart to
+    are those of the reversed path. For rotations about one axis by small angles, the velocities are
+    those of SciPy's ``CubicSpline``. Singular set: successive poses that are a half-turn apart to
     within 1e-6 raise ValueError, since no leg joins them.
 
     Examples
@@ -101,10 +101,10 @@ def spline_velocities(
 
 
 class KnotSystem(NamedTuple):
-    """A quadratic function ½ xᵀ H x − xᵀ b of unknowns x at N knots, a sum over the legs.
+    """A quadratic function ½ xᵀ H x − xᵀ b of unknowns x at N knots, summed over the legs.
 
     Each leg adds its element [[A, B], [Bᵀ, D]] to H and (b0, b1) to b at its two knots. The blocks
-    have the shape (N − 1, m, m), and the loads (N − 1, m).
+    have the shape (N − 1, m, m), and the loads the shape (N − 1, m).
     """
 
     A: Array
@@ -178,7 +178,7 @@ def rotation_system(times: Array, R: Array, G: Array | None = None) -> KnotSyste
 
 
 def quaternion_system(times: Array, R: Array, long: NDArray[np.bool_]) -> KnotSystem:
-    """Return the system for unit quaternions; legs with `long` True turn the long way."""
+    """Return the system for unit quaternions; legs for which `long` is True turn the long way."""
     k, q = 1 / np.diff(times)[:, None, None], quaternion_from_matrix(R[:-1].mT @ R[1:])
     q = np.where(long[:, None], -q, q)
     same, load = 4 * k * np.eye(3), 12 * k[:, 0] ** 2 * q[:, 1:]
@@ -198,7 +198,7 @@ def _skew(X: Array) -> Array:
 
 
 def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], Array]:
-    """Return a mask of the poses with given velocities, and these velocities, 0 elsewhere."""
+    """Return a mask of the poses with given velocities, and the velocities, 0 if not given."""
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "periodic"):
@@ -246,13 +246,13 @@ def _accelerations(system: KnotSystem, x: Array) -> Array:
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
-    """Return the velocities of parabolas, each through a pose of a path and its two neighbours.
+    """Return velocities from parabolas, each through a pose of a path and its two neighbours.
 
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
-    acceleration jumps at the poses, and between random poses the motion costs 12 % more than the
+    acceleration jumps at the poses. Between random poses, the motion costs 12 % more than the
     optimum, in the median, no matter how small the steps are. The `spline_velocities` have neither
-    drawback. If the poses are samples of a smooth motion, twice as many samples reduce the excess
-    over the optimum with the same velocities at both ends by a factor of 4.
+    drawback. If the poses are samples of a smooth motion, twice as many samples divide the excess
+    over the optimum (with the same end velocities) by 4.
 
     Parameters
     ----------
@@ -269,8 +269,8 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     -----
     This is Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). The parabola of the
     origin is in R³. The parabola of the rotation is in exponential coordinates about the middle
-    pose, so that the velocities move with the poses. The first and the last velocity are those of
-    the neighbours' parabolas. For two poses, the velocity is constant.
+    pose, so that the velocities move with the poses. At the first and the last pose, the parabola
+    of the neighbour gives the velocity. For two poses, the velocity is constant.
     Singular set: neighbours that are a half-turn apart to within 1e-6 raise ValueError.
 
     Examples
@@ -295,7 +295,6 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
 
 def _slopes_of_parabolas(h: Array, slopes: Array) -> Array:
-    """Return the first derivatives of the parabolas at the knots, from the slopes of the chords."""
     bend = np.zeros((len(h) + 1, slopes.shape[1]))
     if len(h) > 1:
         bend[1:-1] = 2 * np.diff(slopes, axis=0) / (h[1:] + h[:-1])
@@ -317,7 +316,7 @@ def checked_path(
         i = np.argmax(odd)
         raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too close or too far")
     R = poses[:, :3, :3]
-    far = np.sum(R[:-1] * R[1:], axis=(1, 2)) + 1 < _NEAR_HALF_TURN**2  # 2 + 2 cos of the angle
+    far = np.sum(R[:-1] * R[1:], axis=(1, 2)) + 1 < _NEAR_HALF_TURN**2  # 2 + 2 cos(angle)
     if far.any():
         i = np.argmax(far)
         raise ValueError(

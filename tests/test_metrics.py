@@ -140,7 +140,7 @@ def test_the_metrics_are_read_only():
     one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
     inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
     for name, arguments, message in (
-        ("inner_gl", (np.eye(2), one), "X and Y: matrices of one size are wanted"),
+        ("inner_gl", (np.eye(2), one), "X and Y: matrices of the same size are wanted"),
         ("inner_ga", ([[1]], [[1]]), "X: shape (..., n+1, n+1) is wanted"),
         (
             "tangent_from_components",

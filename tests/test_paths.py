@@ -242,7 +242,7 @@ UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
         (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
         (rb.retime, (np.sin, 1), "curve: a Curve is wanted, got"),
         (rb.retime, (UNEVEN[0], 0), "duration is 0.0, a duration from 1e-100"),
-        (rb.retime, (UNEVEN[0], [1, 2]), "duration: one, or one for each curve"),
+        (rb.retime, (UNEVEN[0], [1, 2]), "duration: a single number or shape"),
         (rb.retime, (LATE, 1e-9), "duration is 1e-09: it vanishes by rounding when added"),
     ],
 )
