@@ -1,4 +1,4 @@
-"""Animations: GIFs, and players for notebooks that work without a network."""
+"""Animations: GIFs, and players that work in notebooks without a network."""
 
 import io
 import os
@@ -27,7 +27,7 @@ Update = Callable[[int], Sequence[Any]]
 
 @dataclass(frozen=True, repr=False)
 class Animation(Player):
-    """A player of a figure over time, and its frames as pictures.
+    """A player of a moving figure, which also has the frames as pictures.
 
     Parameters
     ----------
@@ -97,9 +97,10 @@ def save_animation(
     seconds: float = 4.0,
     still: int = -1,
 ) -> Animation:
-    """Save an animation as GIF, its still as PNG and PDF, its numbers as CSV; close the figure.
+    """Save an animation as GIF, its still frame as PNG and PDF, and its numbers as CSV.
 
-    The files go to the folder of `save_figure`. The same input gives the same bytes.
+    The files go to the folder of `save_figure`. The same input always gives the same bytes. The
+    figure is closed.
     """
     csv_text(data)  # checks the data before anything is written
     animation = animate(fig, name, alt, update, frames, seconds, still)
@@ -146,7 +147,7 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
 
 
 def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return pictures as an endless GIF of this duration, in multiples of 10 ms."""
+    """Return pictures as a GIF without end; the durations of frames are multiples of 10 ms."""
     content = io.BytesIO()
     ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)
     durations = [int(10 * step) for step in np.diff(ends)]

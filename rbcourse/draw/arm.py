@@ -20,7 +20,7 @@ _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], 
 
 
 def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
-    """Return a path as a table of the joint angles and the ends of the links, with the tip last."""
+    """Return a table of a path: joint angles, then ends of links; the last end is the tip."""
     path = np.asarray(path)
     table = {f"theta{i} [rad]": angle for i, angle in enumerate(path.T)}
     for i, end in enumerate(np.moveaxis(_joints(path, lengths)[:, 1:], 1, 0), start=1):
@@ -31,7 +31,7 @@ def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
 def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     """Draw an arm at joint angles q, shape (n,), and the frames at the centres of its links.
 
-    Return the artists of the links, and then those of the two axes of each frame (RR 4).
+    Return the artists of the links, then the two axes of each frame (RR 4).
     """
     joints, headings = _joints(q, lengths), np.append(0, np.cumsum(q))
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=5, ms=11, alpha=0.75)
@@ -53,10 +53,10 @@ def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
 
 
 def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
-    """Draw an arm, and at its tip the columns of the Jacobian as arrows.
+    """Draw an arm, and arrows at its tip that show the columns of the Jacobian.
 
-    Return the artists of the links, and then an arrow for each joint. An arrow is half as long as
-    the distance that the tip moves per radian of the joint (RR 4).
+    Return the artists of the links, then an arrow for each joint. An arrow is half as long as the
+    distance that the tip moves per radian of the joint (RR 4).
     """
     show_reach(ax, lengths)
     joints = _joints(q, lengths)
@@ -70,7 +70,7 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
 def moving_arm(
     ax: Axes, path: Array, shown: Iterable[int], lengths: ArrayLike = LINKS
 ) -> Callable[[int], list[Any]]:
-    """Draw an arm in a pale colour in some of its states; return a function that moves the arm.
+    """Draw some states of an arm in a pale colour; return a function that moves the arm.
 
     The axes show all points that the arm can reach. ``update(i)`` moves the arm to state i, draws
     the path of the tip up to this state, and returns the moving artists (RR 4.3, RR Fig. 8, RR Fig.
@@ -92,7 +92,7 @@ def moving_arm(
 
 
 def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> list[Any]:
-    """Draw at most three paths of the tip of an arm, and the arm on the last path in a pale colour.
+    """Draw up to three paths of an arm's tip, and, in a pale colour, the arm on the last path.
 
     Return the lines of the paths (RR 4.3).
     """
@@ -111,7 +111,7 @@ def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LIN
 
 
 def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
-    """Draw at most three paths of a two-link arm in the plane of the joint angles (RR 4.1)."""
+    """Draw up to three paths of a two-link arm in the plane of its joint angles (RR 4.1)."""
     lines = [
         ax.plot(*np.degrees(path).T, color=colour, ls=ls, label=name)[0]
         for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)

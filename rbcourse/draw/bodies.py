@@ -16,7 +16,7 @@ from rbcourse.draw.space import Faces
 
 
 def pose_table(first: Table, poses: Array) -> Table:
-    """Return a table of poses: the given columns, such as times, then positions and matrices.
+    """Return a table of poses: given columns, such as times, then positions and rotations.
 
     Examples
     --------
@@ -29,10 +29,11 @@ def pose_table(first: Table, poses: Array) -> Table:
 
 
 def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Table:
-    """Return a table of a motion: times, which of them are drawn, poses, twists, accelerations.
+    """Return a table of a motion with times, poses, twists and accelerations.
 
-    The twists (w, v) and the accelerations (w', a), a = Rᵀ d'', are in the body frame (BK 6.3).
-    `unit` is the unit of time: "1", or "s" for the curves of `chain` and `retime`.
+    A column marks the times at which the body is drawn. The twists (w, v) and the accelerations
+    (w', a), where a = Rᵀ d'', are in the body frame (BK 6.3). `unit` is the unit of time: "1", or
+    "s" for the curves of `chain` and `retime`.
 
     Examples
     --------
@@ -71,7 +72,7 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
 def draw_cube_motion(
     ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
 ) -> list[Any]:
-    """Draw a cube at each pose, and in front of the cubes stars at their centres.
+    """Draw a cube at each pose, and stars at the centres of the cubes, in front of them.
 
     The edges of the cubes have the length `side` in m. Further cubes, at the poses `compared`, are
     drawn behind these as blue outlines. Return the artists of the cubes, and then the stars (BK
@@ -105,7 +106,7 @@ def set_space(
 
 
 def set_turning(ax: Any, reach: float) -> None:
-    """Fit the axes to a body that turns about the origin and reaches `reach` in m from it.
+    """Fit the axes to a body that turns about the origin; no point is farther than `reach` in m.
 
     Draw the axes of the fixed frame, with their names, in a pale colour.
     """
@@ -117,7 +118,7 @@ def set_turning(ax: Any, reach: float) -> None:
 
 
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor between two corners, with a line at each number on its axes in `draw_room`."""
+    """Draw a floor between two corners, with lines at the numbers that `draw_room` writes."""
     pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
     for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
         ax.plot([x, x], [low[1], high[1]], low[2], **pale)
@@ -126,13 +127,13 @@ def draw_ground(ax: Any, low: Array, high: Array) -> None:
 
 
 def draw_room(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor, and three axes with names and numbers in m, between two corners.
+    """Draw a floor between two corners, and three axes with names and numbers in m.
 
     The vertical axis is at the corner that is farthest to the left.
     """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
-    # the start of each axis, and the offset of its numbers: beside it, and for x and y also below
+    # the start of each axis, and the offset of its numbers (for x and y, also downwards)
     azimuth = np.radians(ax.azim)
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
@@ -148,7 +149,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # beyond the numbers, in the last of the largest gaps between them
+        else:  # the name is beyond the numbers, in the last of the largest gaps
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
@@ -174,7 +175,7 @@ def describe_cube_motion(poses: Array) -> str:
 def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
     """Draw the paths of a frame's origin in up to three motions, and the frame at their ends.
 
-    The motions begin at the same pose. There, letters mark the axes of the frame. Return a line for
+    The motions begin at the same pose, where letters mark the axes of the frame. Return a line for
     each motion (BK 2.6).
     """
     looks: list[dict[str, Any]] = [
@@ -216,11 +217,11 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
 def moving_boxes(
     axes: Sequence[Any], motions: Mapping[str, Array], edges: float | Array
 ) -> Callable[[int], list[Any]]:
-    """Draw a box at the start of each motion, on axes of its own; return a function that moves all.
+    """Draw a box for each motion, on separate axes; return a function that moves all boxes.
 
     The motions have the same number of poses. `edges` are the lengths of the edges of a box, or the
-    edge of a cube, in m. Boxes that stay at the origin are drawn larger, with the axes of the fixed
-    frame in place of a floor. Return ``update(i)``, which moves all boxes to pose i of their
+    edge of a cube, in m. Boxes that stay at the origin are drawn larger; they have the axes of the
+    fixed frame instead of a floor. Return ``update(i)``, which moves all boxes to pose i of their
     motions and returns their artists.
     """
     ways = list(motions.values())
@@ -276,7 +277,7 @@ def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> None:
 
 
 def _box_faces(pose: Array, edges: float | Array) -> Array:
-    """Return the corners of the six faces, and of a rectangle on the +z face, shape (7, 4, 3)."""
+    """Return the corners of the six faces and of a rectangle on the +z face, shape (7, 4, 3)."""
     around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     faces = np.empty((7, 4, 3))
     for k in range(6):

@@ -45,18 +45,17 @@ class Display(RendererBase):
     Parameters
     ----------
     fig : Figure
-        The figure, of at most 1500 pixels in each direction. Its size is that of the canvas.
+        The figure, of at most 1500 pixels in each direction. The canvas has the same size.
 
     Attributes
     ----------
     size : tuple of int
         Width and height in pixels.
     styles : dict of tuple to int
-        The number of each style. A style has the fill colour, the colour of the line, its width,
-        its dashes, its ends and corners, the clip rectangle, and the marker, whose polygons are
-        written as in `record`. Missing parts are None or empty. Lengths are in pixels, except those
-        of the marker. The style of a piece in space also has the number of its `Space`, its kind,
-        and its zorder.
+        The number of each style. A style has the fill colour, the line (its colour, width, dashes,
+        ends and corners), the clip rectangle, and the marker, whose polygons are written as in
+        `record`. Missing parts are None or empty. Lengths are in pixels, except for markers. The
+        style of a piece in space also has the number of its `Space`, its kind, and its zorder.
     rooms : list of dict
         For each `Space` of the figure: ``origin`` (where its centre appears, in pixels from the
         upper left corner) and ``view`` (azimuth and elevation, in degrees).
@@ -66,7 +65,7 @@ class Display(RendererBase):
         super().__init__()
         self._fig = fig
         self.width, self.height = self.size = tuple(round(x) for x in fig.bbox.size)
-        if max(self.size) > 1500:  # larger coordinates would not fit
+        if max(self.size) > 1500:  # larger coordinates would not fit into int16
             raise ValueError(f"fig: at most 1500 × 1500 pixels are wanted, got {self.size}")
         self.styles: dict[tuple[Any, ...], int] = {}
         places = [scene.axes.sight().origin * [1, -1] + [0, self.height] for scene in scenes(fig)]
@@ -80,12 +79,12 @@ class Display(RendererBase):
     def record(self, artists: Iterable[Any]) -> NDArray[np.int16]:
         """Return the drawing of these artists.
 
-        The result is a sequence of polygons. Each polygon has its style, its number of points, and
-        the positions of the points in parts of a pixel from the upper left, each as the difference
-        from the previous one. A negative number of points means that the polygon is filled together
-        with the previous one, for example as a hole. If the style has a marker, the marker is drawn
-        at the points. All visible artists in a `Space` are recorded, too, with their positions in
-        space.
+        The result is a sequence of polygons. Each polygon has a style, a number of points, and
+        their positions. Positions are in parts of a pixel from the upper left, and are stored as
+        differences from the previous position. A negative number of points means that the polygon
+        is filled together with the previous one, for example as a hole. If the style has a marker,
+        the marker is drawn at the points. All visible artists in a `Space` are recorded, too, with
+        their positions in space.
         """
         self._drawn = [np.zeros(0, np.int16)]
         for room, scene in enumerate(scenes(self._fig)):
@@ -109,11 +108,11 @@ class Display(RendererBase):
         return self.width, self.height
 
     def points_to_pixels(self, points: Any) -> Any:
-        """Return a length in points as one in pixels."""
+        """Convert a length from points to pixels."""
         return points * self._fig.dpi / 72
 
     def draw_path(self, gc: Any, path: Any, transform: Any, rgbFace: Any = None) -> None:
-        """Keep a path as polygons; Matplotlib calls this method for all drawings."""
+        """Record a path as polygons; Matplotlib calls this method for all drawings."""
         clip = None if rgbFace is not None else (-400, -400, self.width + 400, self.height + 400)
         simple = path.should_simplify and rgbFace is None
         clean = path.cleaned(transform, remove_nans=True, clip=clip, simplify=simple, curves=True)
@@ -131,7 +130,7 @@ class Display(RendererBase):
         trans: Any,
         rgbFace: Any = None,
     ) -> None:
-        """Keep the marker with the style, and the points at which it is drawn."""
+        """Record the marker, as a part of the style, and the points at which it is drawn."""
         points = trans.transform(path.vertices)
         points = points[np.isfinite(points).all(axis=1)] * [1, -1] + [0, self.height]
         outlines = marker_path.to_polygons(marker_trans, closed_only=False)
@@ -192,7 +191,7 @@ def joined(states: Sequence[NDArray[np.int16]]) -> bytes:
 
 @dataclass(frozen=True)
 class Player:
-    """A figure that readers can move without Python; without scripts, it is a still picture.
+    """A figure that readers can move without Python. Without scripts, it is a still picture.
 
     Parameters
     ----------
@@ -227,7 +226,6 @@ class Player:
     texts: Sequence[Any] = ()
 
     def __repr__(self) -> str:
-        """Return the name and the description."""
         return f"{self.name}: {self.alt}"
 
     def _repr_html_(self) -> str:

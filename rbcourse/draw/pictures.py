@@ -17,10 +17,10 @@ Paint = Callable[[Sequence[Any] | None], Image.Image]
 def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
     """Draw the fixed artists once; return a function that draws moving artists over them.
 
-    The function also draws the scenes of the figure. With None instead of artists, it draws
-    nothing.
+    The function also draws the scenes of the figure. With None instead of artists, it gives the
+    background alone.
     """
-    canvas: Any = FigureCanvasAgg(fig)  # its methods have no types
+    canvas: Any = FigureCanvasAgg(fig)  # Matplotlib does not annotate its methods
     for artist in [*scenes(fig), *not_in_space(moving)]:
         artist.set_animated(True)
     canvas.draw()
@@ -38,9 +38,9 @@ def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
 def drawn(
     fig: Figure, moving: Sequence[Any], artists: Sequence[Any] | None, zoom: float = 2
 ) -> bytes:
-    """Return a PNG of a figure with only these moving artists and `zoom` times the resolution.
+    """Return a PNG of a figure with these moving artists, at `zoom` times the resolution.
 
-    With None instead of artists, the PNG is the background alone, without scenes.
+    With None instead of artists, the PNG shows the background alone, without scenes.
     """
     before, dpi = fig.canvas, fig.dpi
     fig.set_dpi(zoom * dpi)

@@ -28,9 +28,9 @@ def path_table(path: Array) -> Table:
 def draw_route(ax: Axes, path: Array, length: float, shown: Iterable[int]) -> list[Any]:
     """Draw the path of a rectangle's centre, and the rectangle at some of its poses.
 
-    The rectangle has a `length` in m, is half as wide, and has a mark on its front. The axes are
-    fitted, with equal units. Return the line of the path, and then the outline and the mark of each
-    rectangle (RR 3.3).
+    The rectangle has a `length` in m, is half as wide, and has a mark on its front. The axes fit
+    the path and have equal units. Return the line of the path, then the outline and the mark of
+    each rectangle (RR 3.3).
     """
     artists: list[Any] = ax.plot(*path[:, :2].T, color=COLOURS["path"], zorder=2)
     for i in shown:
@@ -48,11 +48,11 @@ def draw_compared(
     shown: Iterable[int],
     points: Sequence[ArrayLike] = ((0, 0), (0, 0)),
 ) -> list[Any]:
-    """Draw two rectangles on their paths at the same states, the second dashed.
+    """Draw two rectangles at the same states of their paths; the second one is dashed.
 
-    `points` are the points, in the frame of each body, whose paths are drawn; by default the
-    centres. Return for each body the line of the path, with dots at the states, and then the
-    outline and the mark at each state (RR 3.3).
+    `points` gives for each body the point, in its frame, whose path is drawn; the default is the
+    centre. Return for each body the line of the path, with dots at the states, then the outline and
+    the mark at each state (RR 3.3).
     """
     artists: list[Any] = []
     looks = (COLOURS["z"], _FILL, "-"), (COLOURS["x"], "none", "--")
@@ -70,7 +70,7 @@ def draw_compared(
 def moving_route(
     ax: Axes, path: Array, length: float, shown: Iterable[int]
 ) -> Callable[[int], list[Any]]:
-    """Draw a rectangle in a pale colour at some poses; return a function that moves a rectangle.
+    """Draw some poses of a rectangle in a pale colour; return a function that moves the rectangle.
 
     ``update(i)`` moves the rectangle to state i, draws the path of its centre up to this state, and
     returns the moving artists (RR 3.3, RR Fig. 6, RR Fig. 7).
@@ -94,7 +94,7 @@ def moving_route(
 def draw_body(
     ax: Axes, pose: Array, length: float, colour: str, *, fill: str = _FILL, ls: str = "-"
 ) -> list[Any]:
-    """Draw a rectangle with a mark on its front at a pose; `move_body` moves it."""
+    """Draw a rectangle at a pose, with a mark on its front; `move_body` moves it."""
     corners, nose = _placed(pose, length)
     outline = ax.fill(*corners.T, facecolor=fill, edgecolor=colour, lw=1.5, ls=ls, zorder=1.5)
     return [*outline, *ax.plot(*nose.T, color=colour, lw=1.5, ls=ls, zorder=1.6)]
@@ -157,7 +157,7 @@ def describe_compared(panels: Mapping[str, Mapping[str, Array]]) -> str:
 
 
 def describe_routes(paths: Mapping[str, Array]) -> str:
-    """Return a description of the motions of rectangles, with the names of their paths."""
+    """Return a description of several motions of a rectangle, with the names of their paths."""
     said = " ".join(f"{name}: {describe_route(path)}" for name, path in paths.items())
     return f"Paths of a rectangle from start to goal: {', '.join(paths)}. In turn, {said}"
 

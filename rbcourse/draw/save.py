@@ -1,6 +1,6 @@
-"""Figures as files: the picture and its numbers, with the same bytes each time.
+"""Figures as files with reproducible bytes: the pictures and their numbers.
 
-A table is a dict of columns of one shape, with units in their names:
+A table is a dict of columns of equal shape, with units in their names:
 ``{"t [1]": ..., "angle [rad]": ..., "theta [1]": ...}``.
 """
 
@@ -77,7 +77,7 @@ class Picture:
     alt : str
         The alternative text, which describes the figure.
     png : bytes
-        The picture, with a higher resolution than shown, so that it is sharp on fine and on large
+        The picture. Its resolution is higher than displayed, so that it is sharp on fine and large
         screens.
     width : int
         The displayed width in pixels.
@@ -89,7 +89,6 @@ class Picture:
     width: int
 
     def __repr__(self) -> str:
-        """Return the name and the description."""
         return f"{self.name}: {self.alt}"
 
     def _repr_html_(self) -> str:
@@ -117,10 +116,10 @@ def caption(alt: str, files: str = "") -> str:
 def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Player:
     """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
 
-    Artists in a `Space` can be turned in the notebook; the files show the initial view. The files
-    go to the folder that the environment variable ``RBCOURSE_FIGURES`` names, by default to
+    Artists in a `Space` can be turned in the notebook; the files show the initial view. The
+    environment variable ``RBCOURSE_FIGURES`` names the folder of the files; the default is
     ``figures`` in the current folder. If the variable is empty, no files are written. The same
-    input gives the same bytes. The PNG has 256 colours, which makes it a third as large without a
+    input always gives the same bytes. With 256 colours, the PNG is a third as large, without a
     visible difference.
     """
     save_table(name, data)
@@ -153,7 +152,7 @@ def save_table(name: str, data: Table) -> None:
 
 
 def figures_folder() -> Path | None:
-    """Return the folder for figures (see `save_figure`), which is created if it does not exist."""
+    """Return the folder for figures (see `save_figure`); create it if it does not exist."""
     named = os.environ.get("RBCOURSE_FIGURES", "figures")
     if not named:
         return None

@@ -27,11 +27,11 @@ class Piece:
     Parameters
     ----------
     kind : str
-        A filled "face"; a "line"; a "mark", which always faces the viewer, as letters do; or a
-        "ball", a mark with a plane that separates the other pieces.
+        A filled "face"; a "line"; a "mark", such as a letter, which always faces the viewer; or a
+        "ball", a mark whose plane separates the other pieces.
     places : ndarray, shape (n, 3) or (n, 4)
         The positions relative to the middle of the axes, in pixels. For lines, the fourth number is
-        the visible length along the line, which places the dashes.
+        the visible length from the start, which places the dashes.
     gc : GraphicsContextBase
         The look of the piece.
     fill : tuple of float, optional
@@ -62,7 +62,7 @@ class Piece:
         return replace(self, kind="line", places=ends, fill=None, normal=None)
 
     def cut(self, height: Array, overlap: float = 0.0) -> "list[tuple[int, Piece]]":
-        """Return the parts above a plane (1), in it (0), and below (-1).
+        """Return the parts above a plane (1), in the plane (0), and below the plane (-1).
 
         `height` has the heights of the positions over the plane, shape (n,). Pieces above the plane
         are extended below it by `overlap` pixels, except for transparent or dashed ones.
@@ -124,7 +124,7 @@ def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
     eye, shape (3,).
     """
     drawn: list[Piece] = []
-    todo = [(False, pieces)]  # (whether in order, pieces); the last pair is next
+    todo = [(False, pieces)]  # (whether the pieces are in order, pieces); the last pair is next
     while todo:
         ready, group = todo.pop()
         wall = _wall(group, eye)
@@ -150,7 +150,7 @@ def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
 
 
 def _wall(group: list[Piece], eye: Array) -> Piece | None:
-    """Return the face whose plane cuts the fewest faces and lines, if there is a face."""
+    """Return the face whose plane cuts the fewest faces and lines, or None if there is no face."""
     walls = [piece for piece in group if piece.kind in ("face", "ball")]
     if len(walls) < 2:
         return walls[0] if walls else None
@@ -167,7 +167,8 @@ def _wall(group: list[Piece], eye: Array) -> Piece | None:
 def whole_pixels(depth: Any) -> Any:
     """Return depths as whole numbers, so that rounding errors do not determine their order.
 
-    The limits between them are at 0.7 pixels, since depths in symmetric scenes are rarely there.
+    Fractions of 0.7 and more are rounded up, since depths in symmetric scenes rarely have a
+    fraction of 0.7.
     """
     return np.floor(depth + 0.3)
 

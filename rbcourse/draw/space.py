@@ -1,4 +1,4 @@
-"""Axes for drawings in space, in which lines, letters, marks and faces of bodies are one scene.
+"""Axes for drawings in space; their lines, letters, marks and faces of bodies form one scene.
 
 Matplotlib draws one artist in space after the other, so a line is entirely in front of a body or
 behind it. In this module, all artists become pieces of a scene, which are cut where they pass
@@ -122,7 +122,7 @@ class Scene(Artist):
     def __init__(self) -> None:
         super().__init__()
         self.set_in_layout(False)
-        # the pieces of lines and letters, kept as long as these do not change
+        # the pieces of lines and letters, kept until these change
         self._known: WeakKeyDictionary[Artist, tuple[Any, list[Piece]]] = WeakKeyDictionary()
 
     @property
@@ -137,7 +137,7 @@ class Scene(Artist):
     def pieces(self, renderer: Any) -> list[Piece]:
         """Return all visible pieces, uncut, in the view of the axes.
 
-        If two bodies intersect, the pieces include the lines in which they intersect.
+        The pieces include the lines in which two bodies intersect.
         """
         found: list[Piece] = []
         bodies: list[list[Piece]] = []
@@ -166,7 +166,7 @@ class Scene(Artist):
         overlap = renderer.points_to_pixels(OVERLAP)
         for piece in in_sight(self.pieces(renderer), sight.eye, overlap):
             if piece.text:
-                if piece.text not in written:  # draws all lines of its text together
+                if piece.text not in written:  # this draws all lines of the text
                     piece.text.draw(renderer)
                 written.add(piece.text)
                 continue
@@ -189,8 +189,7 @@ class Scene(Artist):
 class Looks(RendererBase):
     """A renderer that records the look of an artist: context, filling, and outlines in pixels.
 
-    For letters, it records their outlines. For a line, whose positions are known, it records the
-    outlines of its marker.
+    The outlines are those of letters or, for a line, those of its marker.
     """
 
     def __init__(self, renderer: Any, letters: bool) -> None:
@@ -199,7 +198,7 @@ class Looks(RendererBase):
         self.found: list[tuple[GraphicsContextBase, Any, tuple[Path, ...]]] = []
 
     def points_to_pixels(self, points: Any) -> Any:
-        """Return a length in points as one in pixels."""
+        """Convert a length from points to pixels."""
         return self.renderer.points_to_pixels(points)
 
     def get_canvas_width_height(self) -> Any:
@@ -261,7 +260,7 @@ class Sight:
         return np.concatenate([[self.scale], *parts]).tobytes()
 
     def flat(self, places: Array) -> Array:
-        """Return the images, shape (n, 2), of positions in pixels from the middle."""
+        """Return the images, shape (n, 2), of positions relative to the middle, in pixels."""
         return self.origin + places @ np.stack([self.right, self.up], axis=-1)
 
 
@@ -269,8 +268,8 @@ class Space(Axes3D):  # type: ignore[misc]
     """Axes in space with equal units and parallel projection.
 
     The axes are the Matplotlib projection "space": ``plt.subplots(subplot_kw={"projection":
-    "space"})``. The methods ``plot`` and ``text``, and ``add_artist`` with `Faces` or a `Ball`, add
-    artists. Elevations are from -90° to 90°, and the roll is 0.
+    "space"})``. Artists are added by ``plot`` and ``text``, and by ``add_artist`` with `Faces` or a
+    `Ball`. Elevations are from -90° to 90°, and the roll is 0.
 
     Attributes
     ----------
@@ -317,7 +316,7 @@ class Space(Axes3D):  # type: ignore[misc]
         if not self.get_visible():
             return
         inside = [artist for artist in self.scene.artists if artist.get_visible()]
-        for artist in inside:  # otherwise each of them would be drawn again
+        for artist in inside:  # otherwise Matplotlib would draw them, too
             artist.set_visible(False)
         try:
             super().draw(renderer)
@@ -374,7 +373,7 @@ def _marked(every: Any) -> Any:
 
 
 def _runs(places: Array) -> list[Array]:
-    """Return the parts of a line between points that are not finite."""
+    """Split a line at points that are not finite."""
     gaps = np.flatnonzero(~np.isfinite(places).all(axis=1))
     parts = np.split(places, gaps)
     kept = (part[np.isfinite(part).all(axis=1)] for part in parts)

@@ -38,7 +38,7 @@ def draw_sphere(ax: Any) -> None:
 
 
 def image_table(images: Images) -> Table:
-    """Return the images of two vectors under rotations as a table with one row per rotation."""
+    """Return a table of the images of two vectors, with one row per rotation."""
     return {
         f"{name} {vector} {axis} [1]": column
         for name, pair in images.items()
@@ -48,7 +48,7 @@ def image_table(images: Images) -> Table:
 
 
 def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[Any]]:
-    """Draw a sphere for each sample; return a function that shows images of v0 and v1 on it.
+    """Draw a sphere for each sample; return a function that draws images of v0 and v1 on them.
 
     A dot is the image of v0. The stroke from the dot ends at the image of v1, so that a turn about
     v0 is visible, too. ``update(i)`` shows the first i rotations and returns

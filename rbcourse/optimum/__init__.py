@@ -1,4 +1,4 @@
-"""Optima on SO(3): least acceleration, BK (19), of a ball or any body; least torque; least jerk."""
+"""Curves on SO(3) with the least acceleration (BK (19)), the least torque or the least jerk."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def minimum_acceleration_so3(
 ) -> Optimum:
     """Return the minimum-acceleration curve with these ends, for a ball or for any body.
 
-    Source: BK (19), BK 6.2, BK Prop. 7; for bodies beyond BK 3 (see
+    Source: BK (19), BK 6.2, BK Prop. 7; beyond BK 3 (for bodies, see
     `rbcourse.optimum.functionals.Effort`).
 
     Parameters
@@ -47,16 +47,15 @@ def minimum_acceleration_so3(
     R0, R1, w0, w1, duration
         As for `projected_cubic_so3`.
     inertia : array_like, shape (..., 3, 3), optional
-        G, the metric or the inertia of a body in the body frame, symmetric and positive definite.
+        G, the inertia of a body in its frame, or a metric; a symmetric, positive definite matrix.
         The default is 2 I, the metric (12).
 
     Returns
     -------
     Optimum
-        A `Curve` that meets all four boundary conditions, with the least ∫ 2 ‖w'‖² dt that was
-        found; ``c`` is the constant R w''. With an inertia, it has the least ∫ τᵀ G⁻¹ τ dt that was
-        found, with the torque τ = G w' + w × G w; ``c`` is then the constant R p of
-        `Optimum.costate`. The attributes report how the curve was found.
+        A `Curve` that meets all four boundary conditions. Its cost, ∫ 2 ‖w'‖² dt, is the lowest
+        that was found, and ``c`` is the constant R w''. With an inertia, the cost is ∫ τᵀ G⁻¹ τ dt,
+        where τ = G w' + w × G w is the torque, and ``c`` is the constant R p of `Optimum.costate`.
 
     Raises
     ------
@@ -66,30 +65,31 @@ def minimum_acceleration_so3(
     Warns
     -----
     RuntimeWarning
-        If Newton's method does not converge for some problems of a stack; their curves are then
-        NaN. Also if a starting curve costs less than the curve that is returned. In both cases,
-        ``converged`` is False for the problem.
+        If Newton's method does not converge for some problems of a stack (their curves are NaN), or
+        if a starting curve costs less than the returned curve. In both cases, ``converged`` is
+        False for the problem.
 
     See Also
     --------
     rbcourse.textbook.minimum_acceleration_so3 : The equation, solved by SciPy's `solve_bvp`.
     shoot_minimum_acceleration_so3 : The same optimum by shooting.
-    corrected_bezier_so3, excess_estimate : A formula near the optimum, and how near a curve is.
+    corrected_bezier_so3, excess_estimate : A near-optimal formula; an estimate of the excess.
 
     Notes
     -----
     Singular set: none is known in closed form. Equation (19) is a necessary condition, not a
-    sufficient one, and has several solutions. If two costs have a relative difference below 1e-9,
-    rounding does not affect which of the two curves is returned.
+    sufficient one, and has several solutions. Costs with a relative difference below 1e-9 count as
+    equal, so that rounding does not decide which curve is returned.
 
     The starting curves turn the short way and the long way, with additional full turns if
-    ‖w0‖ + ‖w1‖ > 6π. For a body, the optimum of the ball and curves between free motions are
-    starting curves, too. Gauss–Newton steps lower their costs; then Newton's method solves R p = c
-    from the cheapest ones. The result is stationary, and `is_local_minimum` tells whether it is
-    proven to be a local minimum. It is not proven that no other curve costs less
-    (docs/near_optimal.md reports tests on random problems). For very thin rods, the method may not
-    converge. If the end velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where p
-    is a cubic and σ is a logarithm of R0ᵀR1, not always the shortest one.
+    ‖w0‖ + ‖w1‖ > 6π. For a body, the search also starts from the optimum of the ball and from
+    curves that lead from one free motion to another. Gauss–Newton steps lower the costs of all
+    these curves. Then Newton's method solves R p = c, starting from the cheapest curves. The result
+    is stationary, and `is_local_minimum` tells whether it is proven to be a local minimum. It is
+    not proven that no other curve costs less (docs/near_optimal.md reports tests on random
+    problems). For very thin rods, the method may not converge. If the end velocities are along the
+    geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a logarithm of R0ᵀR1 (not
+    always the shortest logarithm).
 
     Examples
     --------
@@ -117,7 +117,7 @@ def minimum_torque_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> Optimum:
-    """Return the curve with these ends that moves a body with the least squared torque.
+    """Return the curve with these ends and the least integral of squared torque.
 
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`).
 
@@ -131,15 +131,15 @@ def minimum_torque_so3(
     Returns
     -------
     Optimum
-        A `Curve` that meets all four boundary conditions, with the least ∫ ‖τ‖² dt that was found,
-        where τ = G w' + w × G w is the torque; ``c`` is the constant R p of `Optimum.costate`.
+        A `Curve` that meets all four boundary conditions. Its cost, ∫ ‖τ‖² dt with the torque τ = G
+        w' + w × G w, is the lowest that was found; ``c`` is the constant R p of `Optimum.costate`.
 
     Notes
     -----
-    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. For thin rods,
-    the method often does not converge. A turn about a principal axis is stationary. A turn about
-    the axis of the largest moment may be a saddle; a curve that leaves the axis then costs less.
-    The search tries such curves, too. With J = R G Rᵀ and H = R G w, the equation is
+    The method, errors, warnings and singular set are those of `minimum_acceleration_so3`. For thin
+    rods, the method often does not converge. A turn about a principal axis is a stationary curve. A
+    turn about the axis of the largest moment may be a saddle; a curve that leaves the axis then
+    costs less. The search also tries such curves. With J = R G Rᵀ and H = R G w, the equation is
     J H'' + H' × H = c; see `rbcourse.textbook.minimum_torque_so3`.
 
     Examples
@@ -176,15 +176,16 @@ def minimum_jerk_so3(
     Returns
     -------
     Optimum
-        A `Curve` that meets all six boundary conditions. It has the least integral of the squared
-        covariant jerk, ∫ 2 ‖w'' + ½ w × w'‖² dt, that was found; ``c`` is the constant R p of
-        `Optimum.costate`.
+        A `Curve` that meets all six boundary conditions. Its cost, the integral of the squared
+        covariant jerk ∫ 2 ‖w'' + ½ w × w'‖² dt, is the lowest that was found; ``c`` is the constant
+        R p of `Optimum.costate`.
 
     Notes
     -----
-    Method, errors, warnings and singular set: as for `minimum_acceleration_so3`. From rest to rest
-    without acceleration, the optimum is on the geodesic, R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), and
-    costs 1440 ‖σ‖². `exponential_quintic_so3` is near-optimal and has a closed form.
+    The method, errors, warnings and singular set are those of `minimum_acceleration_so3`. If all
+    end velocities and accelerations are 0, the optimum is R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)). It
+    follows the geodesic, and costs 1440 ‖σ‖². `exponential_quintic_so3` is near-optimal and has a
+    closed form.
 
     Examples
     --------
@@ -200,7 +201,7 @@ def minimum_jerk_so3(
 
 
 def stationary_so3(guess: Curve) -> Optimum:
-    """Return the stationary curve that Newton's method finds from a curve with the same ends.
+    """Return the stationary curve that Newton's method finds from a guess with the same ends.
 
     Source: BK (19).
 
@@ -212,9 +213,9 @@ def stationary_so3(guess: Curve) -> Optimum:
     Returns
     -------
     Optimum
-        A `Curve` along which R w'' is constant, with the rotations and velocities of the guess at
-        both ends. It may not be the cheapest such curve. If no curve is found, it is NaN (see
-        ``converged``).
+        A `Curve` along which R w'' is constant. At both ends it has the rotation and the velocity
+        of the guess. It may not be the cheapest such curve. If no curve is found, the result is NaN
+        (see ``converged``).
 
     Examples
     --------
@@ -238,7 +239,7 @@ def stationary_so3(guess: Curve) -> Optimum:
 
 
 class ConvergenceError(RuntimeError):
-    """The error raised if no curve is found, with the `residual` after `iterations` steps."""
+    """The error raised if no curve is found; it gives the `residual` after `iterations` steps."""
 
     def __init__(self, residual: float, iterations: int) -> None:
         reason = "the end velocities may be too large, or the principal moments too different"
@@ -251,35 +252,35 @@ class ConvergenceError(RuntimeError):
         self.iterations = iterations
 
     def __reduce__(self) -> tuple[type, tuple[float, int]]:
-        """Return the class and its arguments for pickle, whose default passes only the message."""
+        """Return the class and its arguments, so that pickle restores both attributes."""
         return type(self), (self.residual, self.iterations)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Optimum(Curve):
-    """A `Curve` on SO(3) along which R p is constant, or a stack of them, as Chebyshev series.
+    """A `Curve` on SO(3), or a stack of curves, along which R p is constant.
 
-    Source: beyond BK 2; BK (19), which says that R w'' is constant: (R w'')' = R (w''' + w × w'').
+    Source: beyond BK 2; BK (19). By (19), R w'' is constant, since (R w'')' = R (w''' + w × w'').
 
     Attributes
     ----------
     functional : Functional
         The functional that defines the cost and p.
     converged : bool, or ndarray of bool, shape (...)
-        Whether a solution was found that costs no more than any other curve that was tried. If no
+        True if a solution was found and every curve that was tried costs at least as much. If no
         solution was found, the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
         The constant R p in the fixed frame. Without an inertia, p is w''; with the inertia
         2 I, p is 2 w''.
     cost, residual : float or ndarray, shape (...)
-        The `acceleration_cost`, `torque_cost` or `jerk_cost`, and the largest error of the
-        equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for times from 0 to 1.
+        The `acceleration_cost`, `torque_cost` or `jerk_cost`. The residual is the largest error of
+        R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for times from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
         The number of steps of the solver, and the number of nodes that represent the curve.
     """
 
     functional: Functional
-    series: Array  # coefficients of R, w, w', …, one entry a column; (..., most nodes, columns)
+    series: Array  # Chebyshev coefficients of R, w, w', …, with a column for each entry
     constant: Array  # c for times from 0 to 1
     found: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
 
@@ -295,7 +296,7 @@ class Optimum(Curve):
 
     @property
     def converged(self) -> Any:
-        """Whether a solution was found that costs no more than any other curve that was tried."""
+        """True if a solution was found and every curve that was tried costs at least as much."""
         return self._told(self.found["converged"])
 
     @property
@@ -317,12 +318,12 @@ class Optimum(Curve):
         return values if self.batch_shape else values.item()
 
     def take(self, index: Any) -> Self:
-        """Return a stack of those curves that have these indices in the flattened stack."""
+        """Return the stack of the curves that have these indices in the flattened stack."""
         functional = self.functional.take(np.reshape(index, -1))
         return replace(super().take(index), functional=functional)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return R or a derivative at the times t; R is orthogonal to rounding."""
+        """Return R or a derivative at the times t; R is orthogonal up to rounding."""
         columns = slice(9) if order == 0 else slice(6 + 3 * order, 9 + 3 * order)
         terms = self.series[..., columns]
         weights = chebyshev(t, terms.shape[1])
@@ -345,13 +346,12 @@ class Optimum(Curve):
         return self.functional.name
 
     def __repr__(self) -> str:
-        """Return the kind of curve, its cost, and the residual of the equations."""
         cost = "" if self.batch_shape else f", cost {self.cost:.6g}"
         return f"{super().__repr__()[:-1]}{cost}, residual {np.max(self.residual, initial=0):.1e}>"
 
 
 def solve(task: Task, duration: Array) -> Optimum:
-    """Return the cheapest curve found for each problem, as `minimum_acceleration_so3` does."""
+    """Return the cheapest curve found for each problem; see `minimum_acceleration_so3`."""
     solutions = cheapest(task)
     if not task.batch and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])

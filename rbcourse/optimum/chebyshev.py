@@ -1,4 +1,4 @@
-"""Functions of time, as values at Chebyshev–Lobatto nodes on [0, 1] or as Chebyshev series."""
+"""Functions on [0, 1], given by values at Chebyshev–Lobatto nodes or by Chebyshev series."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from rbcourse._numerics import Array
 class Grid(NamedTuple):
     """Nodes, and matrices that act on values at the nodes.
 
-    `derivative` and `integral` give the derivative, and the integral from 0, at the nodes; `series`
-    gives the Chebyshev coefficients.
+    The matrix `derivative` gives the derivative at the nodes, `integral` the integral from 0 to
+    each node, and `series` the Chebyshev coefficients.
     """
 
     t: Array
@@ -42,7 +42,7 @@ class Primitives(NamedTuple):
 
 
 def chebyshev(t: Array, count: int) -> Array:
-    """Return the first Chebyshev polynomials on [0, 1] at the times t, shape (..., count)."""
+    """Return the first `count` Chebyshev polynomials on [0, 1] at the times t."""
     from numpy.polynomial.chebyshev import chebvander
 
     return chebvander(2 * t - 1, count - 1)
@@ -50,7 +50,7 @@ def chebyshev(t: Array, count: int) -> Array:
 
 @lru_cache
 def grid(n: int) -> Grid:
-    """Return the grid of n nodes; its bits do not depend on the number of BLAS threads."""
+    """Return the grid of n nodes, bitwise the same for any number of BLAS threads."""
     from numpy.polynomial.chebyshev import chebder, chebint
 
     k = np.arange(n)
@@ -64,7 +64,7 @@ def grid(n: int) -> Grid:
 
 
 def _product(A: Array, B: Array) -> Array:
-    """Return A B, computed without BLAS, whose rounding depends on its number of threads."""
+    """Return A B without BLAS, since the rounding of BLAS depends on its number of threads."""
     return np.einsum("ij,jk->ik", A, B)
 
 
@@ -96,7 +96,7 @@ def primitives(n: int, m: int) -> Primitives:
 
 
 def _shared(matrix: Array) -> Array:
-    """Return the matrix made read-only, since all callers share it."""
+    """Make the matrix read-only, since all callers share it."""
     matrix.flags.writeable = False
     return matrix
 
@@ -108,13 +108,13 @@ def interpolation(few: int, many: int) -> Array:
 
 
 def along(matrix: Array, values: Array) -> Array:
-    """Return a matrix applied to values at the nodes, of any shape (N, n, ...)."""
+    """Return the matrix times values at the nodes, shape (N, n, ...)."""
     count, n, *core = values.shape
     columns = values.reshape(count, n, math.prod(core))
     return (matrix @ columns).reshape(count, len(matrix), *core)
 
 
 def tails(values: Array) -> Array:
-    """Return the larger of the last two Chebyshev coefficients, which estimates the truncation."""
+    """Estimate the truncation error by the larger of the last two Chebyshev coefficients."""
     last = np.abs(along(grid(values.shape[1]).series[-2:], values))
     return last.max(axis=tuple(range(1, last.ndim)))

@@ -1,7 +1,7 @@
 """Newton's method for R p = c, with the values at all Chebyshev nodes of a curve as unknowns.
 
 `Stationary` is the equation for any functional. `BallStationary` is the equation R w'' = c for a
-ball, which has fewer unknowns and faster steps.
+ball; it has fewer unknowns and faster steps.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rbcourse.so3 import hat, vee
 
 STEPS = 25
 EXACT = 3e-12  # bound on the residual and on the last Chebyshev coefficients of R
-SHARE = 0.03  # times EXACT: bound on relative residual of p, last coefficients of k
+SHARE = 0.03  # times EXACT: bound on the relative residual of p and on the last coefficients of k
 LONGEST_STEP = 0.5  # rad: no step turns a node by more than this
 ROUGH = 1e-2  # rad: after a step shorter than this, the method continues on more nodes
 FAILED, FINER, SOLVED = range(3)
@@ -27,9 +27,10 @@ Arrays: TypeAlias = tuple[Array, ...]
 
 
 class Solution(NamedTuple):
-    """A solution: R and the highest derivative k of w at the nodes, c = R p, the cost ∫ ‖u‖² dt.
+    """A solution of R p = c, with R and the highest derivative k of w at the nodes.
 
-    `beaten` is True if some curve costs less, but Newton's method reached no solution from it.
+    The cost is ∫ ‖u‖² dt. `beaten` is True if a curve costs less, but Newton's method found no
+    solution from this curve.
     """
 
     R: Array
@@ -54,12 +55,15 @@ def cost_of(one: Solution | Failure) -> float:
 
 
 class Equations(Protocol):
-    """The equations R' = R ŵ and R p = c for a stack; unknowns are R at n nodes, c, and maybe k."""
+    """The equations R' = R ŵ and R p = c of a stack of problems.
+
+    The unknowns are R at n nodes, c and, for `Stationary`, k.
+    """
 
     R0: Array
     R1: Array
     ends: Array  # w0, w1 (and a0, a1), shape (N, m, 3)
-    together: int  # number of problems that are solved together in the cache
+    together: int  # number of problems that are solved together, so that they fit into the cache
 
     def take(self, index: Any) -> Self:
         """Return the equations of some of the problems."""
@@ -68,13 +72,13 @@ class Equations(Protocol):
         """Return initial values of the other unknowns, from rotations of shape (N, n, 3, 3)."""
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return the numbers of nodes to use in turn; they increase from n."""
+        """Return the increasing numbers of nodes on which to work; the first number is n."""
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest error of each problem, and the data for a step."""
 
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
-        """Return the turns of the nodes, in the fixed frame, and the changes of the other unknowns.
+        """Return the turns of R, in the fixed frame, and the changes of the other unknowns.
 
         On the last axis, the first column is a Newton step. If `by_ends`, the other columns are the
         responses to a unit change of each end value.
@@ -94,7 +98,7 @@ class Equations(Protocol):
 
 
 def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
-    """Solve a stack of problems by Newton's method, from rotations R at nodes, (N, n, 3, 3).
+    """Solve a stack of problems by Newton's method, starting from R at nodes, (N, n, 3, 3).
 
     The method works on these nodes until the steps are short, and then on more nodes until the last
     Chebyshev coefficients have decayed. A problem that is singular or overflows gives a `Failure`.
@@ -104,13 +108,13 @@ def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
 
 
 def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
-    """Return the solutions of `relax` for balls, with linear systems on the nodes of R."""
+    """Solve problems of balls as `relax` does, with linear systems on the nodes of the given R."""
     parts = equations.R0, equations.R1, equations.ends
     return relax(BallStationary(*parts, R.shape[1]), R)
 
 
 def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
-    """Solve a stack; if this raises an error, solve each problem alone, or return a failure."""
+    """Solve a stack; if this raises an error, solve its problems one by one."""
     try:
         return _relax(equations, R)
     except (FloatingPointError, np.linalg.LinAlgError, ValueError):
@@ -210,14 +214,14 @@ def _verdicts(tail: Array, left: Array, before: Array, size: Array) -> NDArray[n
 
 
 def cayley(turn: Array) -> Array:
-    """Return rotations about the vectors `turn` by 2 atan(‖turn‖/2), Cayley's formula."""
+    """Return the rotations by 2 atan(‖turn‖/2) about the vectors `turn`, by Cayley's formula."""
     H = hat(turn)
     share = 1 / (1 + np.sum(turn**2, axis=-1) / 4)
     return np.eye(3) + share[..., None, None] * (H + H @ H / 2)
 
 
 def orthogonal(R: Array) -> Array:
-    """Return R made orthogonal to rounding by one Newton–Schulz step."""
+    """Return R after a Newton–Schulz step, which makes it orthogonal up to rounding."""
     return R @ (1.5 * np.eye(3) - 0.5 * (R.mT @ R))
 
 
@@ -248,7 +252,7 @@ def mending_turns(R: Array, E: Array, W: Array) -> Array:
 
 
 def costs(functional: Functional, ends: Array, k: Array) -> Array:
-    """Return ∫ ‖u‖² dt by a quadrature with twice as many nodes."""
+    """Return ∫ ‖u‖² dt, integrated on twice as many nodes as k has."""
     fine = grid(2 * k.shape[1] - 1)
     up = interpolation(k.shape[1], len(fine.t))
     rates = rates_at_nodes(ends, up @ k)
@@ -275,7 +279,7 @@ class Stationary:
         return type(self)(self.functional.take(index), *parts)
 
     def first(self, R: Array) -> tuple[Array, Array]:
-        """Return k, fitted to w by half as many polynomials as nodes, and c = 0.
+        """Return k and c = 0; k fits w with half as many polynomials as there are nodes.
 
         The mean of R p is a worse initial value of c than 0.
         """
@@ -304,8 +308,8 @@ class Stationary:
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the changes of k and c.
 
-        Let Kᵢ be the integrals that give w, w', … from k, and Pᵢ the derivatives of p with respect
-        to these rates. Then
+        Let Kᵢ be the integrals that give the rates w, w', … from k, and let Pᵢ be the derivatives
+        of p with respect to these rates. Then
 
             p + Σ Pᵢ Kᵢ δk = Rᵀ(c + ĉ ε + δc),    ε = d + ∫ R K₀ δk dt,    ε(1) = 0.
 
@@ -349,7 +353,7 @@ class Stationary:
         return responses[1]
 
     def tails(self, unknowns: Arrays) -> Array:
-        """Return the last coefficients of R, or those of k relative to k if they are larger."""
+        """Return the last coefficients of R, or the relative ones of k if these are larger."""
         R, k, _ = unknowns
         return np.maximum(tails(R), tails(k) / (SHARE * (1 + np.abs(k).max(axis=(1, 2)))))
 
@@ -360,7 +364,7 @@ class Stationary:
 
 
 def _by_ends(from_ends: Array, matrices: Array) -> Array:
-    """Return matrices (N, n, 3, 3) times the rates due to each unit end value, (N, n, 3, 3 m)."""
+    """Return the matrices times the rate that each unit end value causes, (N, n, 3, 3 m)."""
     products = matrices[..., None, :] * from_ends[:, None, :, None]
     return products.reshape(*products.shape[:3], -1)
 
@@ -419,8 +423,8 @@ class BallStationary:
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the change of c.
 
-        The unknowns are R and c, with w'' = Rᵀc and so w = (1 − t) w0 + t w1 + K Rᵀc. When ε turns
-        R, Rᵀc changes by Rᵀ(ĉ ε + δc), and to first order
+        The unknowns are R and c, with w'' = Rᵀc and so w = (1 − t) w0 + t w1 + K Rᵀc. If ε turns R,
+        then Rᵀc changes by Rᵀ(ĉ ε + δc). To first order,
 
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
@@ -467,8 +471,8 @@ class BallStationary:
 def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
     """Return ĉ ε at the nodes for each column of d, and for a unit of each component of δc.
 
-    Only the two components of ε perpendicular to c matter. They solve one linear system for each
-    problem.
+    Only the two components of ε perpendicular to c matter. For each problem, they are the solution
+    of one linear system.
     """
     count, n = R.shape[:2]
     nodes, twice, (across, ahead) = grid(n), primitives(n, 2).from_k[0], _across(c)
@@ -484,9 +488,9 @@ def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
 
 
 def _across(c: Array) -> tuple[Array, Array]:
-    """Return two unit vectors perpendicular to c as rows, (N, 2, 3), and c × each as columns.
+    """Return unit vectors e₁, e₂ perpendicular to c as rows, and c × e₁, c × e₂ as columns.
 
-    The vectors are rows of the Householder reflection that maps c to the third axis.
+    The rows, shape (N, 2, 3), belong to the Householder reflection that maps c to the third axis.
     """
     v = scaled(c, axis=-1)  # so that squares of small numbers do not underflow
     v[:, 2] += np.copysign(np.sqrt(np.sum(v * v, axis=-1)), v[:, 2])

@@ -12,7 +12,7 @@ curve is stationary if and only if
 
     R p = c    is constant.
 
-This is Noether's theorem: R p is conserved, since a rotation of the fixed frame does not change the
+This is Noether's theorem: R p is conserved, since rotations of the fixed frame do not change the
 cost.
 """
 
@@ -44,7 +44,7 @@ class Functional(Protocol):
     needs : tuple of int
         The orders of the derivatives ``c(t, order)`` on which the deviation u depends.
     scale, unit : float or ndarray, shape (N,)
-        The factors of ∫ ‖u‖² dt and of `p`.
+        The cost is `scale` times ∫ ‖u‖² dt, and the costate is `unit` times `p`.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Functional(Protocol):
         """The function of w, w', … that returns the momenta, and their derivatives.
 
         The momenta have the shape (N, n, 3), or for the jerk (N, n, 6). If the end values of an
-        optimum change, ∫ ‖u‖² dt changes by momenta · change at t = 1, minus the same at t = 0.
+        optimum change by δ, ∫ ‖u‖² dt changes by momenta · δ at t = 1, minus momenta · δ at t = 0.
         """
 
     @property
@@ -97,7 +97,7 @@ class BallAcceleration:
         return self
 
     def deviation(self, *rates: Array) -> Array:
-        """Return w', the last of the rates."""
+        """Return w'."""
         return rates[-1]
 
     def deviation_by(self, w: Array, a: Array) -> list[Array]:
@@ -128,8 +128,8 @@ class Effort:
 
         p = G (v' + w × v) − h × v.
 
-    Source: beyond BK 1, beyond BK 2; BK 3 leaves these metrics to a later publication. With M = G⁻¹
-    the equation is that of Noakes, Heinzinger and Paden 1989 and of Crouch and Silva Leite 1995.
+    Source: beyond BK 1, beyond BK 2; BK 3 leaves these metrics to a later publication. The equation
+    for M = G⁻¹ is in Noakes, Heinzinger and Paden 1989 and in Crouch and Silva Leite 1995.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Effort:
         The inertia, symmetric and positive definite. It is divided by a third of its trace, so that
         the unit of inertia does not matter.
     of_torque : bool
-        Whether M is I, rather than G⁻¹.
+        True if M is I, and False if M is G⁻¹.
     """
 
     ends = 2
@@ -161,7 +161,7 @@ class Effort:
         return chosen
 
     def torque(self, w: Array, a: Array) -> Array:
-        """Return τ = G w' + w × G w divided by a third of the trace of G."""
+        """Return the torque τ = G w' + w × G w of the scaled inertia G."""
         G = self.G[:, None]
         return matvec(G, a) + cross(w, matvec(G, w))
 
@@ -226,7 +226,7 @@ class Jerk:
         return [-hat(a) / 2, W / 2, np.broadcast_to(np.eye(3), W.shape)]
 
     def momenta(self, w: Array, a: Array, b: Array, d: Array) -> tuple[Array, list[Array]]:
-        """Return −2 j' − w × j for the change of w, and 2 j for w', with their derivatives."""
+        """Return the momenta −2 j' − w × j (of w) and 2 j (of w'), and their derivatives."""
         j, j_rate = self.deviation(w, a, b), d + cross(w, b) / 2
         W, one = hat(w), np.broadcast_to(np.eye(3), (*w.shape, 3))
         by_j = [-hat(a) / 2, W / 2, one, 0 * one]

@@ -1,4 +1,4 @@
-"""Starting curves for optima, at Chebyshev nodes, and steps that lower their costs."""
+"""Starting curves of the search, at Chebyshev nodes, and steps that lower their costs."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-LONGEST = 100.0  # rad: if the legs of a curve are longer, no more full turns are tried
-SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best is used
+LONGEST = 100.0  # rad: longer curves do not get more full turns
+SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
-_TOGETHER = 32  # curves that take their steps together in the cache
+_TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
 
 
 def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.intp], Array]:
-    """Return, for each starting curve, the number of its problem, and the curve at n nodes.
+    """Return a problem index for each starting curve, and the starting curves at n nodes.
 
-    Let v turn from the Bézier control point C₁ = R0 exp(ŵ0/3) to the control point R1 exp(−ŵ1/3),
-    the short way or the long way. Both v are also used with k additional full turns if the lengths
-    ‖w0‖/3 and ‖w1‖/3 and the `bend` due to the accelerations sum to 2k − 1 full turns or more.
-    With β = 3t² − 2t³, the curve
+    Let v be the rotation vector from the Bézier control point C₁ = R0 exp(ŵ0/3) to the control
+    point R1 exp(−ŵ1/3), for the short way or the long way. If ‖w0‖/3 + ‖w1‖/3 + `bend` is at least
+    2k − 1 full turns, both v are also used with k additional full turns. Accelerations at the ends
+    cause the `bend`. With β = 3t² − 2t³, the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
 
-    has the given ends. It does not depend on the choice of frames, and R1, R0, −w1, −w0 give the
-    reversed curve.
+    has the given ends. It does not depend on the choice of frames. The ends R1, R0, −w1, −w0 give
+    the reversed curve.
     """
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
@@ -41,7 +41,7 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
     # rounding must not choose between two turns by π
     other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
     v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
-    along_v = v + 1e-9 * (first + last)  # it has a direction even if v is 0
+    along_v = v + 1e-9 * (first + last)  # this has a direction even if v is 0
     full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
     length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
     problem, turns = [], []
@@ -57,14 +57,14 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
 
 
 def leading_sign(v: Array) -> Array:
-    """Return the sign of the largest component of v, or of the first one if several are equal."""
+    """Return the sign of the largest component of v (of the first one, if several are equal)."""
     size = np.abs(v)
     largest = np.argmax(size > (1 - SAME) * size.max(axis=-1, keepdims=True), axis=-1)
     return np.sign(np.take_along_axis(v, largest[..., None], axis=-1))
 
 
 def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp], Array]:
-    """Return two curves for each problem, at n nodes, that lead from one free motion to another.
+    """Return two curves for each problem, from one free motion to another, at n nodes.
 
     Let F be the free motion of a body of inertia G that starts at R0 with w0, and B the free motion
     that arrives at R1 with w1. With β = 3t² − 2t³ and a logarithm v of FᵀB that is continuous in
@@ -72,8 +72,8 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
 
         R = F exp(β v̂)
 
-    has the given ends. One v is the shortest logarithm at t = ½, and the other v turns the other
-    way round at this time. The indices of the problems are returned with the curves.
+    has the given ends. At t = ½, one v is the shortest logarithm, and the other v turns the other
+    way round. A problem index for each curve is returned before the curves.
     """
     fine, t = grid(2 * n - 1).t, grid(n).t
     R0, w0 = np.stack([ends.R0, ends.R1]), _bounded(np.stack([ends.w0, -ends.w1]))
@@ -122,10 +122,10 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
 
 
 def _continuous_log(R: Array) -> Array:
-    """Return two logarithms v of R that are continuous along the first axis, of odd length.
+    """Return two logarithms of R that are continuous along the first axis.
 
-    In the middle of this axis, one is the shortest logarithm, and the other turns the other way
-    round.
+    The length of this axis is odd. In its middle, one logarithm is the shortest, and the other
+    turns the other way round.
     """
     shortest = log_so3(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
@@ -145,11 +145,11 @@ def _bounded(w: Array) -> Array:
 
 
 def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
-    """Return the curves R with a full turn added about each principal axis of G, both ways.
+    """Return the curves R plus a full turn, in both directions, about each principal axis of G.
 
     With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes, the new curves are
-    R exp(±2π β ê), six for each curve, in six concatenated stacks. A full turn about the axis of a
-    small moment may lower the cost.
+    R exp(±2π β ê). The six stacks are concatenated. A full turn about the axis of a small moment
+    may lower the cost.
     """
     t = grid(R.shape[1]).t[:, None]
     axes = np.moveaxis(np.linalg.eigh(G)[1], -1, 0)[:, :, None]
@@ -159,12 +159,11 @@ def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
 
 
 def with_ends(R: Array, ends: Array) -> Array:
-    """Return the curves R times factors exp(η̂) that correct w0 and w1, or w0, w1, a0 and a1.
+    """Return the curves R times factors exp(η̂) that correct w0, w1 and, if given, a0, a1.
 
-    Δw₀ and Δw₁ are the differences between the given velocities and those of the polynomials
-    through R at the nodes. A fast curve that is sampled at too few nodes has such differences. The
-    factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁. For accelerations, a second
-    factor has η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁.
+    On too few nodes, the polynomials through R have other end velocities than w0 and w1; Δw₀ and
+    Δw₁ are the differences. The factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁. For
+    accelerations, a second factor has η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁.
     """
     t = grid(R.shape[1]).t[:, None]
     for order in range(1, 1 + ends.shape[1] // 2):
@@ -177,13 +176,14 @@ def with_ends(R: Array, ends: Array) -> Array:
 
 
 def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> tuple[Array, Array]:
-    """Return cheaper curves with the same ends, by Gauss–Newton steps, and their costs.
+    """Lower the costs of curves by Gauss–Newton steps; return the curves and their costs.
 
-    For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation
+    For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation u
     changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
-    the integral of the squared new deviation, among all polynomials tᵐ (1 − t)ᵐ p(t), where p has
-    half as many coefficients as there are nodes. A quarter of η, or three times η, is used if it
-    costs less. The steps end when a step lowers the cost by less than the share `worthwhile`.
+    the integral of the squared new deviation. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the ends, and
+    p has half as many coefficients as there are nodes. A quarter of η, or three times η, is used if
+    it costs less. The steps end when one of them lowers the cost by less than the fraction
+    `worthwhile`.
     """
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
@@ -198,7 +198,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Return the cheapest curve: R, or R after one of `SHARES` of the step, and its cost."""
+    """Return the cheapest curve, R or R after one of `SHARES` of the step, and its cost."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))

@@ -1,4 +1,4 @@
-"""The search for the cheapest curve, by Newton's method from many starting curves (starts)."""
+"""The search for the cheapest curve, by Newton's method from many starts (starting curves)."""
 
 from __future__ import annotations
 
@@ -47,34 +47,34 @@ NOTHING = Failure(np.inf, 0)
 
 @dataclass(frozen=True)
 class Limits:
-    """The parameters of the search. Ratios are costs over the lowest cost; angles are in rad.
+    """The parameters of the search. Ratios are costs divided by the lowest cost; angles are in rad.
 
-    A pair (steps, share) limits the Gauss–Newton steps that lower a cost: at most this number of
-    steps is made, and they end when a step lowers the cost by less than this share.
+    A pair (steps, share) limits the Gauss–Newton steps: at most `steps` steps are made, and they
+    end when one of them lowers the cost by less than the fraction `share`.
     """
 
     nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_turns: int = 25  # for bodies, if full turns are added to the curves
+    nodes_for_turns: int = 25  # for bodies, if full turns are added
     nodes_for_jerk: int = 29  # the jerk has higher derivatives
     nodes_for_all_starts: int = 33  # if a start costs less than all solutions
     nodes_for_very_fast: int = 65
-    followed: float = 1.1  # Newton's method is used from starts that cost up to this ratio
-    same_entries: float = 0.1  # starts with entries of R that differ by less count as equal
+    followed: float = 1.1  # Newton's method starts from curves that cost up to this ratio
+    same_entries: float = 0.1  # starts count as equal if all entries of R differ by less than this
     fast: float = 24.0  # if ‖w0‖ + ‖w1‖ is larger, all starts are tried
     very_fast: float = 80.0  # if ‖w0‖ + ‖w1‖ is larger, `nodes_for_very_fast` is used
     known_cost: float = 1.01  # largest accepted ratio of a solution's cost to a start's cost
     one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
-    flat: float = 0.1  # curves are bent if the part of w off one axis is a smaller share
+    flat: float = 0.1  # curves are bent if w deviates from one axis by a smaller fraction
     bend: float = 0.5  # rad: the size of this bend
     turned: float = 3.0  # full turns are added to curves that cost up to this ratio
-    turned_again: float = 1.2  # full turns are then added to new curves up to this ratio
-    worth_a_turn: float = 0.3  # turns are added if the least cost is a larger share of a turn's
-    promising_turn: float = 1.5  # curves with an added turn that cost more are dropped soon
+    turned_again: float = 1.2  # second full turns are added to curves that cost up to this ratio
+    worth_a_turn: float = 0.3  # no turn is added to costs below this fraction of a turn's cost
+    promising_turn: float = 1.5  # curves that cost more after `new_turns` are dropped
     starts: tuple[int, float] = (40, 5e-4)
     new_turns: tuple[int, float] = (3, 5e-4)
     on_more_nodes: tuple[int, float] = (40, 1e-4)
-    bent: tuple[int, float] = (40, 1e-6)  # for bent curves, which may start near a saddle
-    last: tuple[int, float] = (200, 0.0)  # if the steps of the other pairs do not suffice
+    bent: tuple[int, float] = (40, 1e-6)  # for bent curves, which may be near a saddle
+    last: tuple[int, float] = (200, 0.0)  # if the other pairs do not suffice
 
 
 LIMITS = Limits()
@@ -83,22 +83,22 @@ LIMITS = Limits()
 class Task(NamedTuple):
     """A stack of problems with one batch axis, and the functions that solve them.
 
-    If the functional is an `Effort`, the search also adds full turns to the starts. It also bends
-    solutions that turn about one axis, which may be saddles.
+    If the functional is an `Effort`, the search also adds full turns to the starts, and bends
+    solutions that turn about one axis, because these may be saddles.
     """
 
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
-    # takes numbers of problems and n; returns, for each start, its problem and the curve at n nodes
+    # from problem indices and n, makes the starts and, before them, a problem index for each
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = LIMITS.nodes  # of starting curves
-    known: Mapping[int, Solution] = MappingProxyType({})  # solutions that are known beforehand
+    known: Mapping[int, Solution] = MappingProxyType({})  # solutions that are already known
 
 
 def ball(given: Ends) -> Task:
-    """Return the problems of minimum acceleration of a ball."""
+    """Return the problems of minimum acceleration for a ball."""
     ends, rates = _flat(given, given.w0, given.w1)
     equations = BallStationary(ends.R0, ends.R1, rates)
     return Task(
@@ -112,12 +112,13 @@ def ball(given: Ends) -> Task:
 
 
 def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Return the solutions of problems with small σ, w0 and w1, by number, from one start each.
+    """Solve the problems with small σ, w0 and w1 from one start each; return solutions by index.
 
-    If the entries of σ, w0 and w1 are below ½, their norms are below 1. The optimum then costs
-    about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve that turns the long way between such ends has a
-    length of at least 2π − 1 and costs at least 12 (2π − 2)² > 200. This does not prove that only
-    one curve that turns the short way is stationary, but no second one was found.
+    If the entries of σ, w0 and w1 are below ½, their norms are below 1. With e = σ − (w0 + w1)/2
+    and d = w1 − w0, the optimum then costs about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve that turns
+    the long way between such ends has a length of at least 2π − 1 and costs at least
+    12 (2π − 2)² > 200. It is not proven that only one curve that turns the short way is stationary,
+    but no second one was found.
     """
     largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
     slow = np.flatnonzero(largest < LIMITS.one_start)
@@ -131,10 +132,10 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
 
 
 def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
-    """Return the problems of minimum acceleration, or torque, of bodies of inertia G.
+    """Return the problems of minimum acceleration, or of minimum torque, for bodies of inertia G.
 
     The starting curves include the optimum of a ball and curves between free motions. If G is a
-    multiple of I, the optimum is that of the ball.
+    multiple of I, the optimum of the ball is the solution.
     """
     ends, rates = _flat(given, given.w0, given.w1)
     functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
@@ -163,7 +164,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
 def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     """Return the problems of minimum jerk."""
     ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-    # the cheapest of all turns about one axis is by (w0 + w1)/2 + (a0 − a1)/12
+    # among turns about one axis, the turn by (w0 + w1)/2 + (a0 − a1)/12 costs least
     bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
     def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
@@ -177,7 +178,7 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
 def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
     """Return the ends with one batch axis and exact rotations, and the end values (N, m, 3)."""
     ends = given.flat()
-    R0, R1 = (nearest(R)[0] for R in ends[:2])  # Newton's method fails if R has few digits
+    R0, R1 = (nearest(R)[0] for R in ends[:2])  # Newton's method fails if R has few correct digits
     return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
 
 
@@ -187,11 +188,11 @@ def _on_nodes(R: Array, n: int) -> Array:
 
 
 def cheapest(task: Task) -> list[Solution | Failure]:
-    """Return the cheapest solution of each problem, from its cheapest starts or from all.
+    """Return the cheapest solution that is found for each problem.
 
-    Gauss–Newton steps first lower the costs of the starts. All starts are tried if no solution is
-    found, or if the solution costs more than a start, before or after these steps. If even this
-    does not suffice, more steps are made.
+    Gauss–Newton steps lower the costs of the starts, and Newton's method continues from the
+    cheapest ones. All starts are tried if no solution is found, or if a start costs less than the
+    solution, before or after the steps. If even this does not suffice, more steps are made.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _searched(task)
@@ -203,7 +204,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
     index = np.flatnonzero([one is NOTHING for one in found])
     if not len(index):
         return found
-    share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # of w and w' in a quintic's turn
+    share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # weights of w and w' in a quintic
     fast = np.linalg.norm(ends, axis=-1) @ share
     problem, R = _started(task, index, task.nodes)
     R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
@@ -270,10 +271,10 @@ def _with_more_turns(
 def _leave_the_axis(
     task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
 ) -> None:
-    """Bend solutions that turn nearly about one axis to four sides, and solve from cheaper curves.
+    """Bend solutions that turn about almost one axis; solve from bent curves that cost less.
 
-    Such a solution may be a saddle: all starts turn about the axis, and no step leaves it, although
-    a curve that leaves the axis costs less.
+    Such a solution may be a saddle: if all starts turn about the axis, no step leaves it, even if a
+    curve that leaves the axis costs less.
     """
     order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
     problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
@@ -294,10 +295,11 @@ def _leave_the_axis(
 
 
 def _across(w: Array, G: Array) -> Array:
-    """Return four directions perpendicular to the approximate axis of w (n, 3), shape (4, 3).
+    """Return four directions perpendicular to the approximate axis of w, shape (4, 3).
 
     They are the directions in which w deviates from its axis. If w does not deviate, the inertia
-    determines them; if the moments are equal, too, the order of the axes does.
+    determines the directions. If the moments are equal, the order of the axes determines the
+    directions.
     """
     leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
     axes = np.linalg.svd(leans, full_matrices=False)[2][1:]
@@ -313,7 +315,7 @@ def _follow_on(
     n: int,
     found: list[Solution | Failure],
 ) -> None:
-    """Solve some problems from more starts on n nodes, which give more accurate costs."""
+    """Solve some problems from more starts, on n nodes, for more accurate costs."""
     mine = np.isin(problem, index)
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, index, n)
@@ -354,13 +356,12 @@ def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
 
 
 def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
-    """Return, for each starting curve, the number of its problem, and the curve."""
     problem, R = task.starts(index, n)
     return index[problem], R
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Solve the problems from these curves, and store solutions that cost less in `found`.
+    """Solve the problems from these curves; solutions of lower cost replace those in `found`.
 
     If two solutions have the same cost, the first one is kept, so that rounding does not decide.
     """

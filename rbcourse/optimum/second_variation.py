@@ -1,16 +1,16 @@
-"""The second variation of the cost of an optimum between two poses, and proof of its positivity.
+"""The second variation of an optimum between two poses, and a proof that it is positive.
 
-Vary R(t) to R exp(s η̂), where η vanishes at both ends, with η' and for the jerk also η''. Let
+Vary R(t) to R exp(s η̂), where η and η' (for the jerk, also η'') vanish at both ends. Let
 x = η' + w × η and ε = R η, so that ε' = R x. Since R p = c, the second derivative of the cost with
 respect to s is
 
     ½ δ² ∫ L dt = ± ∫ δp · x + c · (ε' × ε) dt,    δp = Σ Pᵢ x⁽ⁱ⁾,  Pᵢ = ∂p/∂w⁽ⁱ⁾,
 
 where ± is − for the acceleration and the torque, and + for the jerk. It is the integral of
-L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾, with a constant positive definite M, plus terms with fewer derivatives.
-Each such x vanishes at both ends, with its first k − 1 derivatives, and ∫ R x dt = 0. If the second
-derivative is at least a positive multiple of ∫ L(x, x) dt for every such x, the curve is a strict
-local minimum.
+L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾ plus terms with fewer derivatives; M is constant and positive
+definite. Each such x and its first k − 1 derivatives vanish at both ends, and ∫ R x dt = 0. If the
+second derivative is at least a positive multiple of ∫ L(x, x) dt for every such x, the curve is a
+strict local minimum.
 
 Three steps prove this, up to rounding, quadrature and the error of the computed curve. (1) A
 penalty, `_PENALTY` ‖∫ R x dt‖², is added, and the form must be positive also for x that violate
@@ -57,7 +57,7 @@ def polynomials(m: int, k: int, nodes: int) -> list[Array]:
 
 
 def is_positive(curve: Optimum) -> NDArray[np.bool_]:
-    """Tell for which curves the second variation is proven to be positive, shape (count,)."""
+    """Tell for which curves of the stack the second variation is proven to be positive."""
     return np.array([_is_positive(curve.take([i])) for i in range(curve.count)], dtype=bool)
 
 
@@ -74,7 +74,7 @@ def _is_positive(curve: Optimum) -> bool:
 def least_eigenvalues(curve: Optimum, m: int) -> tuple[float, float]:
     """Return the least eigenvalues of Q and of Q − E/(1 − γ), with m polynomials for each axis.
 
-    The curve is a stack of one. The second value is −∞ if γ is 1 or more.
+    `curve` is a stack with one element. The second value is −∞ if γ is 1 or more.
     """
     functional, k = curve.functional, curve.functional.ends // 2
     sign, J = (-1) ** k, m + k
@@ -124,12 +124,11 @@ def _share(P: list[Array], c: float, nodes: Grid, J: int) -> float:
 
 
 def _largest(matrices: Array) -> float:
-    """Return the largest spectral norm of the matrices."""
     return float(np.linalg.norm(matrices, 2, axis=(-2, -1)).max())
 
 
 def on_each_axis(values: Array, root: Array) -> Array:
-    """Return functions of shape (n, m) times each column of a matrix, shape (n, 3, 3 m)."""
+    """Return the products of m functions, (n, m), and columns of a matrix, shape (n, 3, 3 m)."""
     return np.einsum("tj,ab->tajb", values, root).reshape(len(values), 3, -1)
 
 

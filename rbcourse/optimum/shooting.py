@@ -44,13 +44,13 @@ def shoot_minimum_acceleration_so3(
     Returns
     -------
     Optimum
-        The optimum, with the errors, warnings and singular set of `minimum_acceleration_so3`. If
+        The optimum. Errors, warnings and singular set are those of `minimum_acceleration_so3`. If
         both functions find the same solution of (19), their curves agree to about 1e-11.
 
     Notes
     -----
-    The method rarely fails for ‖w0‖, ‖w1‖ < 12. A failure takes seconds for ‖w‖ = 30, and minutes
-    for 1000.
+    The method rarely fails for ‖w0‖, ‖w1‖ < 12. A failure takes seconds if ‖w‖ = 30, and minutes if
+    ‖w‖ = 1000.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
 
 
 def _solution(equations: BallStationary, aim: Array, iterations: int) -> Solution | Failure:
-    """Return the curve that reaches its end, or a failure if it violates the equations."""
+    """Return the curve that reaches its end, or a failure if the curve violates the equations."""
     R, w, _ = _shot(equations, aim, grid(NODES).t)
     c = equations.R0[0] @ (aim[3:] - np.cross(w[0], aim[:3]))
     residual = float(equations.errors((R[None], c[None]))[0][0])
@@ -130,7 +130,7 @@ def _shot(equations: BallStationary, aim: Array, t: Array) -> tuple[Array, Array
 
 
 def _flow(_: float, state: Array, b: Array) -> Array:
-    """Return the rates of R, w and w', with w'' = b − w × w', and of their derivatives."""
+    """Return the rates of R, w and w', and of their derivatives with respect to the aim."""
     R, w, acceleration = state[:9].reshape(3, 3), state[9:12], state[12:15]
     turn, dw, da = state[15:].reshape(3, 3, 6)
     W = hat_so3(w)  # if the motion overflows, a ValueError ends the attempt

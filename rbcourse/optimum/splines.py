@@ -1,15 +1,15 @@
 """Optima through many poses: Newton's method solves for all legs together.
 
 Vary a curve R(t) to R exp(η̂), with η = 0 at the poses. On each leg of an optimum, R p = c, as
-between two poses (see `rbcourse.optimum.functionals`). The variation of ∫ ‖u‖² dt is then a sum
-over the ends of the legs, of the product of the momenta and the change of the end values: for a
-ball 4 w' · δw. So at an optimum the momenta are the same on both sides of each inner pose, and 0 at
-natural ends.
+between two poses (see `rbcourse.optimum.functionals`). The variation of the cost is then a sum over
+the ends of the legs. Each term is the product of the momenta and the change of the end values; for
+a ball, it is 4 w' · δw. So at an optimum the momenta are the same on both sides of each inner pose,
+and 0 at natural ends.
 
-In a step of Newton's method, each leg is linearised, and its response to a unit change of each of
-its end values is computed (`collocation`). The changes of its momenta form a symmetric element of
-the linear system for the values at the poses, a `rbcourse.velocities.KnotSystem`. The matrix of
-this system is the second derivative of the cost.
+In a Newton step, each leg is linearised, and its responses to unit changes of its end values are
+computed (`collocation`). The changes of the momenta of a leg form a symmetric element of the linear
+system for the values at the poses, a `rbcourse.velocities.KnotSystem`. The matrix of this system is
+the second derivative of the cost.
 
 If that matrix is positive definite, and each leg is a strict local minimum among the curves with
 its ends (`second_variation`), the whole spline is a strict local minimum.
@@ -82,9 +82,9 @@ def minimum_acceleration_spline_so3(
     inertia: ArrayLike | None = None,
     long: ArrayLike = False,
 ) -> OptimalChain:
-    """Return the curve of least acceleration through many rotations, of a ball or of any body.
+    """Return the curve of least acceleration through many rotations, for a ball or any body.
 
-    Each leg of the starting curve turns the short way, or the long way if this is requested.
+    Each leg of the starting curve turns the short way, or the long way if `long` requests it.
     Source: BK (18); beyond BK 12, beyond BK 15.
 
     Parameters
@@ -101,8 +101,8 @@ def minimum_acceleration_spline_so3(
     -------
     OptimalChain
         A `Chain` of `Optimum` legs with the least `acceleration_cost` that Newton's method finds
-        from `quaternion_spline_so3`. For a ball, w' is continuous, and 0 at natural ends. For a
-        body, this holds for the torque.
+        from `quaternion_spline_so3`. w' (for a body, the torque) is continuous, and 0 at natural
+        ends.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def minimum_acceleration_spline_so3(
     Notes
     -----
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
-    periodic ends, it may not exist. For example, the result through rotations by 0, 1 and 0.3 rad
-    about one axis at the times 0, 1 and 1 + √2 costs 5.6, but curves with more full turns on the
-    legs have costs as small as you like. The result is proven to be a local minimum if it is
-    `certified`; for bodies, a leg can be a saddle. A leg that is much shorter than its neighbours
-    may spin; to prevent this, insert poses. Singular set: neighbouring
-    rotations a half-turn apart raise ValueError.
+    periodic ends, it may not exist. For example, take rotations by 0, 1 and 0.3 rad about one axis,
+    at the times 0, 1 and 1 + √2. The result costs 5.6, but more full turns on the legs make the
+    cost as small as you like. If the result is `certified`, it is proven to be a local minimum; for
+    bodies, a leg can be a saddle. A leg that is much shorter than its neighbours may spin; to
+    prevent this, insert poses. Singular set: neighbouring rotations a half-turn apart raise
+    ValueError.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def minimum_torque_spline_so3(
     inertia: ArrayLike,
     long: ArrayLike = False,
 ) -> OptimalChain:
-    """Return the curve through many rotations that moves a body with the least squared torque.
+    """Return the curve with the least integral of squared torque through many rotations.
 
     Source: beyond BK 4, beyond BK 12.
 
@@ -158,7 +158,7 @@ def minimum_torque_spline_so3(
 
     Notes
     -----
-    Errors, domain and singular set: as for `minimum_acceleration_spline_so3`.
+    Errors, domain and singular set are those of `minimum_acceleration_spline_so3`.
 
     Examples
     --------
@@ -194,7 +194,7 @@ def minimum_jerk_spline_so3(
 
     Notes
     -----
-    Errors, domain and singular set: as for `minimum_acceleration_spline_so3`.
+    Errors, domain and singular set are those of `minimum_acceleration_spline_so3`.
 
     Examples
     --------
@@ -216,7 +216,7 @@ def minimum_acceleration_spline_se3(
     centre: ArrayLike = (0.0, 0.0, 0.0),
     long: ArrayLike = False,
 ) -> OptimalChain:
-    """Return the motion of least acceleration through many poses, of a ball or of any body.
+    """Return the motion of least acceleration through many poses, for a ball or any body.
 
     Source: BK 6.3; beyond BK 12.
 
@@ -232,12 +232,12 @@ def minimum_acceleration_spline_se3(
     Returns
     -------
     OptimalChain
-        A chain of `RigidMotion` legs. Its rotation is `minimum_acceleration_spline_so3`, and the
-        centre of mass moves on a cubic spline.
+        A chain of `RigidMotion` legs. Its rotation is that of `minimum_acceleration_spline_so3`;
+        its centre of mass moves on a cubic spline.
 
     Notes
     -----
-    Errors, domain and singular set: as for `minimum_acceleration_spline_so3`.
+    Errors, domain and singular set are those of `minimum_acceleration_spline_so3`.
 
     Examples
     --------
@@ -287,8 +287,8 @@ class OptimalChain(Chain):
         The `acceleration_cost`, `torque_cost` or `jerk_cost`.
     definite : bool
         Whether the second derivative of the cost with respect to the values at the poses is
-        positive definite. It is not positive definite if a family of curves has the same cost, for
-        example for a body that is symmetric about the axis of all rotations.
+        positive definite. This is False if a family of curves has the same cost, for example if a
+        body is symmetric about the axis of all rotations.
     certified : bool
         The result of `is_local_minimum` for the chain.
     """
@@ -328,7 +328,7 @@ class OptimalChain(Chain):
         return bool(is_local_minimum(self))
 
     def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration, and the same first time."""
+        """Return the chain with another duration, but the same first time."""
         start, end = self.domain
         share = float(duration) / (end - start)
         power = self.rotation.functional.ends + 1
@@ -348,22 +348,22 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
     Returns
     -------
     ndarray of bool, shape curve.batch_shape
-        Whether all nearby curves with the same ends, and through the same poses, cost more. It is
-        False for a saddle, for a curve that is NaN, and if the proof does not succeed.
+        True if all nearby curves with the same ends and poses are proven to cost more. It is False
+        for a saddle, for a curve that is NaN, and if the proof fails.
 
     Notes
     -----
-    If R p is constant, a curve is stationary, but it may not be a minimum. This function shows that
-    the second variation is positive: it computes this quadratic form on polynomials and bounds the
-    rest (see `rbcourse.optimum.second_variation`). That is a proof up to rounding, quadrature and
-    the error of the computed curve. It does not exclude distant curves that cost less. An
-    eigenvalue below 1e-6, as a share of the leading term, counts as 0. For the acceleration of a
-    ball over the time from 0 to 1, ‖c‖ < 2π³ is a sufficient condition (docs/near_optimal.md).
+    If R p is constant, a curve is stationary, but it may not be a minimum. This function proves
+    that the second variation is positive: it computes this quadratic form on polynomials and bounds
+    the rest (see `rbcourse.optimum.second_variation`). The proof holds up to rounding, quadrature
+    and the error of the computed curve. It does not exclude distant curves that cost less. An
+    eigenvalue below 1e-6 times the leading term counts as 0. For the acceleration of a ball and
+    times from 0 to 1, ‖c‖ < 2π³ is a sufficient condition (docs/near_optimal.md).
 
     Examples
     --------
-    The turn of a book about the axis of its largest moment, from rest to rest, has the least torque
-    up to about 107.9°. Beyond this angle, curves that leave the axis cost less:
+    From rest to rest, a turn of a book about the axis of its largest moment has the least torque if
+    the angle is at most about 107.9°. Beyond this angle, curves that leave the axis cost less:
 
     >>> from rbcourse import exp_so3, minimum_torque_so3
     >>> book, rest = np.diag([1.0, 2.22, 3.18]), [0, 0, 0]
@@ -398,7 +398,7 @@ class _Problem(NamedTuple):
 
     @property
     def weight(self) -> Array:
-        """The factor in the cost of each leg's ∫ ‖u‖² dt for times from 0 to 1."""
+        """The weight of each leg in the cost: the factor of ∫ ‖u‖² dt for times from 0 to 1."""
         weight: Array = self.functional.scale * self.h ** -(self.functional.ends + 1.0)
         return weight
 
@@ -420,17 +420,17 @@ class _Problem(NamedTuple):
         return Stationary(self.functional, *parts)
 
     def on_nodes(self, R: Array, n: int) -> Array:
-        """Return rotations interpolated to n nodes, with the given ones at the ends of the legs."""
+        """Return R interpolated to n nodes, with the given rotations at the ends of the legs."""
         return self.with_ends(along(interpolation(R.shape[1], n), R))
 
     def with_ends(self, R: Array) -> Array:
-        """Return rotations, orthogonal to rounding, with the given ones at the ends of the legs."""
+        """Return R, orthogonal up to rounding, with the given rotations at the ends of the legs."""
         R = orthogonal(R)
         R[:, 0], R[:, -1] = self.R[:-1], self.R[1:]
         return R
 
     def solve(self, system: KnotSystem) -> Array:
-        """Return the changes of the values at the rotations that solve a system.
+        """Solve a system for the changes of the values at the rotations.
 
         If the matrix is not positive definite, a diagonal matrix is added until it is.
         """
@@ -461,7 +461,7 @@ class _Curve(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """The result of Newton's method: solutions of the legs, and the least eigenvalue's sign."""
+    """The result of Newton's method; `sign` is the sign of the least eigenvalue."""
 
     curve: _Curve
     legs: list[Solution]
@@ -516,10 +516,10 @@ def _quaternion_spline(problem: _Problem, long: NDArray[np.bool_]) -> _Curve:
 
 
 def _found(problem: _Problem, start: _Curve) -> _Found | Failure:
-    """Return a minimum by Newton's method, and if this fails from starts of lower cost.
+    """Return a minimum that Newton's method finds.
 
     If a curve turns about one axis only, no step leaves this axis. For a body, curves that leave
-    the axis can cost less, so another search starts from a curve off the axis.
+    the axis can cost less, so a second search starts from a curve off the axis.
     """
     found = _searched(problem, start, lower=False)
     if isinstance(problem.functional, Effort) and (
@@ -543,7 +543,7 @@ def _is_about_one_axis(R: Array) -> bool:
 
 
 def _searched(problem: _Problem, start: _Curve, *, lower: bool) -> _Found | Failure:
-    """Return a minimum by Newton's method from a curve, or from curves of lower cost.
+    """Return a minimum that Newton's method finds from a curve or from cheaper curves.
 
     The minimum must not cost more than its start. This is not required for the jerk, since its
     start does not have all given end values.
@@ -611,13 +611,13 @@ def _iterated(problem: _Problem, start: _Curve, n: int) -> _Found | Failure:
 
 
 def _momenta(problem: _Problem, legs: Equations, unknowns: Arrays) -> tuple[Array, list[Array]]:
-    """Return the momenta at both ends of the legs, for times from 0 to 1, and derivatives."""
+    """Return the momenta at both ends of the legs, and their derivatives, for times from 0 to 1."""
     rates = rates_at_nodes(legs.ends, legs.bend(unknowns))[: problem.functional.ends]
     return problem.functional.momenta(*(x[:, [0, -1]] for x in rates))
 
 
 def _balanced(problem: _Problem, legs: Equations, unknowns: Arrays) -> bool:
-    """Tell whether the momenta are equal on both sides of each pose without given values."""
+    """Tell whether the momenta agree on both sides of all poses at which no values are given."""
     weight = problem.weight[:, None] * problem.scale
     found = weight[:, None] * _momenta(problem, legs, unknowns)[0]
     jump = np.zeros_like(problem.given)
@@ -658,12 +658,12 @@ def _linearised(
 
 
 def _lowered(problem: _Problem, start: _Curve, worthwhile: float) -> tuple[_Curve, float]:
-    """Return a curve after Gauss–Newton steps that never raise the cost, and the cost.
+    """Lower the cost of a curve by Gauss–Newton steps; return the curve and its cost.
 
     For R exp(η̂) with η = 0 at the poses, u changes to first order by D₀ η + D₁ η' + D₂ η'' (see
     `guesses.lowered`). A step uses the η that minimises the integral of the squared new u. On each
     leg, η is a cubic with any η' at the poses, plus a sum of `BUMPS` polynomials t² (1 − t)² p(t).
-    The coefficients of the latter are eliminated leg by leg.
+    The coefficients of this sum are eliminated leg by leg.
     """
     functional, h, R = problem.functional, problem.h[:, None], start.R
     cost, count, n = problem.cost(R), len(h), R.shape[1]
@@ -701,7 +701,7 @@ def _lowered(problem: _Problem, start: _Curve, worthwhile: float) -> tuple[_Curv
 
 @lru_cache
 def _shapes(n: int) -> list[Array]:
-    """Return cubics with η' = 1 at one end, and bumps, at the nodes, and two derivatives."""
+    """Return the cubics and the polynomials of `_lowered`, and two derivatives, at the nodes."""
     nodes = grid(n)
     t = nodes.t[:, None]
     cubics = t * (1 - t) ** 2, -(t**2) * (1 - t)
