@@ -1,9 +1,9 @@
-"""Derive every number of near_optimal.md exactly, and write the table of the package.
+"""Derive the numbers in near_optimal.md exactly, and write rbcourse/leading_excess.csv.
 
-Three vectors describe a problem: sigma is the rotation vector from R0 to R1; d = u1 - u0 is the
-difference of the parallel end velocities u0 and u1, and e is their mean minus sigma. A term of
-third order is a linear combination of sigma, e and d. Its three coefficients are polynomials in t
-and in the inner products of sigma, e and d, and the code stores them as a list.
+Three vectors describe a problem. The rotation vector from R0 to R1 is sigma. The difference of the
+parallel end velocities is d = u1 - u0, and their mean is sigma + e. A term of third order is a
+linear combination of sigma, e and d. The code stores its three coefficients in a list. They are
+polynomials in t and in the inner products of sigma, e and d.
 """
 
 import csv
@@ -21,17 +21,17 @@ TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
 u0, u1 = [one, one, -one / 2], [one, one, one / 2]
-# Hermite's cubics: of their values and rates at 0 and 1, one is 1 and the others are 0
+# Hermite's cubics: one of the values and rates at 0 and 1 is 1, the other three are 0
 TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
 
 
 def add(*vectors):
-    """Return the sum of vectors."""
+    """Return the sum of the vectors."""
     return [sum(parts, 0 * one) for parts in zip(*vectors, strict=True)]
 
 
 def times(share, vector):
-    """Return a polynomial times a vector."""
+    """Return a vector multiplied by a polynomial."""
     return [share * part for part in vector]
 
 
@@ -46,14 +46,14 @@ def triple(a, b, c):
 
 
 def rate(x, order=1):
-    """Return a derivative with respect to t."""
+    """Return the derivative of this order with respect to t."""
     for _ in range(order):
         x = [part.diff(t) for part in x]
     return x
 
 
 def integral(p):
-    """Return the polynomial with this derivative, 0 at t = 0."""
+    """Return the integral of p from 0 to t."""
     return RING.from_dict({(k[0] + 1, *k[1:]): c / (k[0] + 1) for k, c in p.terms()})
 
 
@@ -69,7 +69,7 @@ def energy(x):
 
 
 def clamped(load, end_rate):
-    """Return the y with y'''' = load, y = y' = 0 at t = 0, and y = 0 and y' = end_rate at t = 1."""
+    """Solve y'''' = load with y = y' = 0 at t = 0, and y = 0, y' = end_rate at t = 1."""
     parts = []
     for p, last in zip(load, end_rate, strict=True):
         for _ in range(4):
@@ -85,7 +85,7 @@ END_RATE = times(QQ(-1, 24), triple(sigma, sigma, u1))
 
 
 def optimum():
-    """Return the third-order term of the optimum: w''' + w x w'' = 0 for R = R0 exp(y)."""
+    """Return the third-order term of the optimum R = R0 exp(y), where w''' + w x w'' = 0."""
     x, v, a, j = (rate(CUBIC, k) for k in range(4))
     load = add(
         times(QQ(-1, 2), triple(a, x, a)),
@@ -96,14 +96,14 @@ def optimum():
 
 
 def exponential():
-    """Return the third-order term of the exponential cubic, which has the same end rate."""
+    """Return the third-order term of the exponential cubic."""
     return times(LAST_RATE, END_RATE)
 
 
 def geodesic(a, b, share):
-    """Return the point of the geodesic from exp(a) to exp(b) after a share of its length.
+    """Return the point of the geodesic from exp(a) to exp(b) at a fraction of its length.
 
-    Each point is a pair: its terms of first and of third order.
+    A point is stored as a pair: its first-order term and its third-order term.
     """
     (a1, a3), (b1, b3) = a, b
     way = add(b1, times(-1, a1))
@@ -115,7 +115,7 @@ def geodesic(a, b, share):
 
 def bezier():
     """Return the third-order term of Bézier's curve, by de Casteljau's construction."""
-    last = times(QQ(-1, 3), u1)  # from R1 back to the third point
+    last = times(QQ(-1, 3), u1)  # from R1 to the third control point
     back = add(
         times(QQ(-1, 24), triple(sigma, sigma, last)), times(QQ(-1, 12), triple(last, sigma, last))
     )
@@ -129,7 +129,8 @@ def bezier():
 def quaternion():
     """Return the third-order term of the quaternion cubic.
 
-    It is the direction of a cubic from (1, 0) to (cos, sin); its rates are half the velocities.
+    The curve normalises a cubic from (1, 0) to (cos, sin). The rates of this cubic at its ends are
+    half the velocities.
     """
     real = -TO_GOAL * ss / 8 - LAST_RATE * dot(sigma, u1) / 4
     imaginary = add(
@@ -143,7 +144,7 @@ def quaternion():
 def cayley():
     """Return the third-order term of Cayley's curve.
 
-    It is a cubic in the coordinates g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...).
+    The curve is a cubic in the coordinates g = tan(a/2) n = y/2 (1 + |y|^2/12 + ...).
     """
     goal = times(ss / 24, sigma)
     end = add(END_RATE, times(ss / 12, u1), times(dot(sigma, u1) / 6, sigma))
@@ -155,7 +156,7 @@ def cayley():
 def projection():
     """Return the third-order term of the nearest rotation to a cubic of matrices.
 
-    The cubic is I + skew + symmetric + skew; these parts are of first, second and third order.
+    The cubic is I + skew + symmetric + skew, with parts of first, second and third order.
     """
     skew = add(
         times(-TO_GOAL * ss / 6, sigma),
@@ -176,7 +177,7 @@ def projection():
 
 def cumulative_energy():
     """Return the energy of the second-order deviation of the cumulative curve."""
-    # the deviation y from the optimum, in the basis sigma x e, sigma x d, e x d
+    # y, the deviation from the optimum, is in the basis sigma x e, sigma x d, e x d
     first, last = times(QQ(1, 3), u0), times(QQ(1, 3), u1)
     middle = add(sigma, times(-1, first), times(-1, last))
     shares = 1 - (1 - t) ** 3, TO_GOAL, t**3
@@ -234,9 +235,9 @@ def of_splines():
 
     The splines pass through the angles 0, θ and 0 about one axis at equally spaced times, with
     natural ends. They are the projected matrix spline, the projected spline and the quaternion
-    spline. On a leg σ = θ p + θ³ r, where p is the cubic spline, and the result is the integral of
-    r''² divided by the integral of p''². The tangent of σ is y/x. In the first spline x and y are
-    splines themselves; in the second they are cubics on each leg.
+    spline. On a leg σ = θ p + θ³ r, where p is the cubic spline. The result is the integral of r''²
+    divided by the integral of p''². The tangent of σ is y/x. In the first spline, x and y are
+    splines. In the second spline, x and y are cubics on each leg.
     """
     p = (3 * t - t**3) / 2
     matrix = -p / 6 + p * p / 2 - p**3 / 3
@@ -247,7 +248,7 @@ def of_splines():
 
 
 def write(table=TABLE):
-    """Write the table: powers of the inner products, and integers over a common denominator."""
+    """Write the powers of the inner products, and coefficients over a common denominator."""
     found = forms()
     over = {way: lcm(*(int(c.denominator) for c in form.coeffs())) for way, form in found.items()}
     powers = sorted({term for form in found.values() for term in form.monoms()}, reverse=True)

@@ -1,14 +1,14 @@
-"""Prove Proposition 7 of near_optimal.md, an order of closed forms, in rational arithmetic.
+"""Prove Proposition 7 of near_optimal.md in rational arithmetic.
 
 The leading excess E of a closed form is a polynomial in the inner products of sigma, e and d; see
 near_optimal.py. For each pair of a worse and a better closed form, ordering.csv has a number c with
 
     E_worse - c E_better = sum_kl M_kl V_k . V_l + share volume^2,
 
-where volume is sigma . (e x d), share >= 0 and M is positive definite. Each V_k is the product of
-an inner product and one of sigma, e and d, except ss sigma. So the difference is positive unless e
-and d are 0. Each product V_k . V_l is a monomial. If several pairs (k, l) have the same monomial,
-all of their entries of M except one are free. ordering.csv contains the free entries.
+where volume is sigma . (e x d), share >= 0 and M is positive definite. Each inner product times
+sigma, e or d is one of the V_k, except for ss sigma. So the left side is positive unless e = d = 0.
+Each product V_k . V_l is a monomial. Of the entries M_kl with the same monomial, all except one are
+free. ordering.csv contains the free entries.
 """
 
 import csv
@@ -33,7 +33,7 @@ near = _load()
 VOLUME = ss * ee * dd + 2 * se * sd * ed - ss * ed**2 - ee * sd**2 - dd * se**2
 
 
-# the names of the V: "se d" is se times d; names with an even number of letters d come first
+# "se d" names the vector se times d; names with an even number of letters d come first
 VECTORS = [f"{inner} {vector}" for inner in near.NAMES for vector in "sed"]
 VECTORS = sorted((name for name in VECTORS if name != "ss s"), key=lambda x: x.count("d") % 2)
 
@@ -55,7 +55,7 @@ def entries():
 
 
 def matrix(form, free):
-    """Return the M of a form. The free entries determine the first entry of each monomial."""
+    """Return M for a polynomial. The free entries determine the first entry of each monomial."""
     upper = {}
     for monomial, pairs in entries().items():
         rest = form.coeff(monomial)
@@ -83,7 +83,7 @@ def is_positive(upper):
 
 
 def read(table=TABLE):
-    """Return c, the share and the free entries of M for each pair of closed forms."""
+    """Return (c, share, free entries of M) for each pair of closed forms."""
     with open(table, newline="", encoding="utf-8") as file:
         (_, *worse), (_, *better), (_, *ratio), (_, *share), *rows = csv.reader(file)
     free = [{} for _ in worse]
@@ -95,7 +95,7 @@ def read(table=TABLE):
 
 
 def verify(table=TABLE):
-    """Return the c of each pair with E_worse >= c E_better, or raise a ValueError."""
+    """Check that E_worse >= c E_better for each pair, and return the numbers c."""
     form, proven = near.forms(), {}
     for (worse, better), (ratio, share, free) in read(table).items():
         left = form[worse] - near.QQ(ratio) * form[better]

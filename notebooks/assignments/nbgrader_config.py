@@ -1,6 +1,6 @@
-"""Settings of nbgrader for the problem sets, also for its own commands, typed in this folder.
+"""Settings for nbgrader; nbgrader's own commands read them in this folder.
 
-They do not ask for a private set: that is ``--CourseDirectory.source_directory=private``.
+For a private set, add ``--CourseDirectory.source_directory=private`` to these commands.
 """
 
 from rbclassroom.assignments.autograding import configure
