@@ -50,6 +50,9 @@ def mark_lesson(notebook: NotebookNode, name: str) -> None:
 
 def mark_problems(notebook: NotebookNode) -> None:
     """Mark the answers and the tests of a problem set."""
+    text = "\n".join(cell.source for cell in notebook.cells)
+    if missing := [jupyter for jupyter in _IN_PAGES if not re.search(jupyter, text)]:
+        raise ValueError(f"problem set: the sentence {missing[0]!r} is missing")
     for at, cell in enumerate(notebook.cells):
         name = grade_id(cell)
         if is_test(cell):
