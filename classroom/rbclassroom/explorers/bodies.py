@@ -28,7 +28,7 @@ def body_explorer() -> Explorer:
     """Return an explorer of a book of 1 kg that is turned from rest to rest in 1 s.
 
     It shows three motions: the optimum for a ball, the motion of least acceleration, and the motion
-    of least torque. Its controls are the axis of the displacement, ``about``, the ``turn`` in
+    of least torque. The controls are ``about`` (the axis of the displacement), the ``turn`` in
     degrees, the ``thickness`` of the book in cm, and the time ``t``, which the play button moves
     (beyond BK 3, beyond BK 4).
     """
@@ -66,7 +66,6 @@ def body_explorer() -> Explorer:
 
 @lru_cache(maxsize=64)
 def _solved(about: str, turn: float, thickness: float) -> Any:
-    """Return the three motions, the norms of their torques, and their costs by name."""
     G, rest = rb.metrics.box_inertia([_LENGTH, _WIDTH, thickness / 100]), np.zeros(3)
     ends = np.eye(3), rb.exp_so3(np.radians(turn) * _AXES[about]), rest, rest
     curves: list[rb.Curve] = [

@@ -24,7 +24,7 @@ _SEEN_FIRST = np.array([0.8, 0.8, 1])  # at the start the ends with a number are
 
 
 def theta_explorer() -> Explorer:
-    """Return an explorer of the straight line between two rotations and its projection, θ(t).
+    """Return an explorer of the line between two rotations, and of its projection θ(t).
 
     The left picture shows the circle of the rotations between the two ends, with the chord; the
     right picture shows θ against time. The controls are the ``angle`` a in degrees, and the time

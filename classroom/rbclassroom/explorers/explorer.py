@@ -1,4 +1,4 @@
-"""The base of all explorers: a picture that the reader changes by sliders."""
+"""The base class of explorers: pictures that readers change with sliders."""
 
 import base64
 import html
@@ -49,7 +49,7 @@ class State:
 
     shown: list[Any]
     drawn: NDArray[np.int16]
-    texts: list[Any]  # (name, value) pairs, a notice, and one line with all of these
+    texts: list[Any]  # (name, value) pairs, a notice, and all of these in one line
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
@@ -62,14 +62,15 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     Parameters
     ----------
     name, fig
-        The title of the explorer, and its figure with all artists; the axes must not change.
+        The title of the explorer, and the figure with all artists. The axes must not change.
     artists, controls : mapping of str
         The artists that move, in the order in which they are drawn, and the sliders and choices.
     show : callable
         ``show(**values)`` moves the artists to the values of the controls, and returns the
         displayed texts, by name. It may raise a ValueError or a RuntimeError, or warn.
     plays, seconds
-        The control that the play button moves, made by `widgets.stepped`, and its playing time.
+        The name of the control that the play button moves, and its playing time in seconds.
+        `widgets.stepped` must have made this control.
     point : callable, optional
         ``point(x, y)`` gets the position of a click in the pixels of Matplotlib, and returns the
         new values of controls, as a dict; it may raise a ValueError.
@@ -190,7 +191,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     def _push(self, first: int, states: Sequence[State], notice: str = "") -> None:
         self.picture.run = {
             "version": self._version,
-            "number": self.picture.run.get("number", 0) + 1,  # since equal runs are not sent
+            "number": self.picture.run.get("number", 0) + 1,  # because equal runs are not sent
             "index": first,
             "states": joined([state.drawn for state in states]),
             "texts": [state.texts for state in states],
@@ -238,7 +239,7 @@ def new_line(ax: Any, **style: Any) -> Any:
 
 
 def apart(R: Any, S: Any) -> str:
-    """Return the largest angle between two rotations or two stacks, as text in degrees."""
+    """Return the largest angle between the rotations R and S, as text in degrees."""
     return f"{numbers(np.degrees(angle_between(R, S)).max(), 1)}°"
 
 

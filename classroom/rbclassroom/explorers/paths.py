@@ -1,4 +1,4 @@
-"""Explorers of motions through many poses: on the sphere of directions, and of a box in space."""
+"""Explorers of motions through many rotations or poses."""
 
 from typing import Any
 

@@ -116,7 +116,7 @@ def projection_explorer() -> Explorer:
 
 
 def _gram_schmidt(M: rb.Array) -> tuple[rb.Array, str]:
-    """Return the Gram–Schmidt result for M, and the reason why it is not a rotation, or ""."""
+    """Return the Gram–Schmidt result for M and, if it is not a rotation, the reason."""
     try:
         G = rb.orthonormalize_gram_schmidt(M)
     except ValueError:
@@ -175,7 +175,6 @@ def _sample(sampler: str, seed: int) -> rb.Array:
 
 
 def _axes_of(ax: Any, name: str, colour: str | None = None, **style: Any) -> dict[str, Any]:
-    """Draw three axes, which `_move_axes` moves; coloured axes with full lines have letters."""
     artists: dict[str, Any] = {}
     for axis in "xyz":
         artists[f"{name} {axis}"] = new_line(ax, color=colour or COLOURS[axis], **style)

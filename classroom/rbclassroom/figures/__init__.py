@@ -11,7 +11,7 @@ from rbcourse.draw.save import Table
 def columns(form: str, vectors: Mapping[str, Array], letters: str = "xyz") -> dict[str, Array]:
     """Return the components of vectors, shape (n, 2) or (n, 3), as columns of a table.
 
-    `form` combines the names of a vector and a component to the name of a column.
+    `form` makes the name of a column from the names of a vector and of a component.
     """
     return {
         form.format(name, letter): column

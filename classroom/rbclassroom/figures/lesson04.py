@@ -1,8 +1,8 @@
 """Lesson 4: the drift of matrices that should be rotations, and their repair.
 
-A 2 × 2 matrix is a multiple of a turn plus a multiple of a mirror. As a map of complex numbers it
-takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends only on z. The `shadows` are
-these z, and the rotations are the unit circle.
+A 2 × 2 matrix is a multiple of a turn plus a multiple of a reflection. As a map of complex
+numbers it takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends only on z. The
+`shadows` are these z, and the rotations are the unit circle.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,9 +27,9 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
     """Multiply a matrix repeatedly in single precision, and return its distance from SO(3).
 
     For each name, `ways` has the factor, shape (3, 3), and a function or None. The function repairs
-    the matrix after every 100 products. The table has the defect ‖RᵀR − I‖ of each name before the
-    repair. The rows are for up to 60 numbers of products, equally spaced on a logarithmic scale;
-    numbers above 100 are multiples of 100 (RR 1.4).
+    the matrix after every 100 products. For each name, the table has the defect ‖RᵀR − I‖ before
+    the repair. The rows are for up to 60 numbers of products, equally spaced on a logarithmic
+    scale; numbers above 100 are multiples of 100 (RR 1.4).
     """
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))

@@ -126,7 +126,7 @@ def describe_accelerations(data: Table, knots: ArrayLike) -> str:
 
 
 def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
-    """Return a table of natural cubic splines through three angles plus whole turns.
+    """Return a table of natural cubic splines through three angles, with whole turns added.
 
     The "bend" of a spline is its difference from the straight line between its ends.
     """
@@ -140,7 +140,7 @@ def turns_table(turns: Mapping[str, tuple[int, int]]) -> Table:
 
 
 def draw_turns(axes: Sequence[Axes], data: Table) -> None:
-    """Draw a `turns_table`; dots mark all angles of the three rotations, with whole turns."""
+    """Draw a `turns_table`, with dots at all angles that represent the three rotations."""
     t, *columns = (np.asarray(x) for x in data.values())
     low, high = np.min(columns) - 8, np.max(columns) + 8
     for clock, angle in zip(_CLOCK, _ANGLES, strict=True):

@@ -1,4 +1,4 @@
-"""Lesson 15: the phase plane of a path, two passes by hand, and the used fractions of limits."""
+"""Lesson 15: the phase plane of a path, the two passes, and the use of each limit."""
 
 from itertools import combinations
 from typing import Any
@@ -53,7 +53,7 @@ def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, 
 
 
 def _least(a: list[Array], b: list[Array]) -> Array:
-    """Return, for each s, the least value over r of the largest ‖a r + b‖² of all limits."""
+    """Return, for each s, the minimum over r of the maximum over all limits of ‖a r + b‖²."""
     if not a:
         return np.zeros(1)
     A, B = np.array(a), np.array(b)
@@ -71,9 +71,10 @@ def _least(a: list[Array], b: list[Array]) -> Array:
 
 
 def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
-    """Return a table of rates: the limit curves, the rate for `even` seconds, and the fastest rate.
+    """Return a table of rates: the limit curves, a constant rate, and the fastest rate.
 
-    Rates above twice the largest rate of the fastest timing are replaced by NaN.
+    With the constant rate, the motion takes `even` seconds. Rates above twice the largest rate of
+    the fastest timing are replaced by NaN.
     """
     s = np.linspace(*timed.curve.domain, 601)
     rates = highest_rates(timed.curve, s, limits)
@@ -145,10 +146,10 @@ def describe_shares(data: Table) -> str:
 
 
 def two_passes(highest: ArrayLike, step: float) -> tuple[Array, Array]:
-    """Return the largest x at the nodes after the pass from the end, and after both passes.
+    """Return the largest allowed x at the nodes, after the pass from the end and after both passes.
 
-    Each x is at most `highest`, and exceeds the x of a neighbour by at most `step`. At both ends x
-    = 0.
+    Each x is at most `highest`, and exceeds the x of a neighbour by at most `step`. At both ends, x
+    is 0.
     """
     back = np.array(highest, float)
     back[[0, -1]] = 0

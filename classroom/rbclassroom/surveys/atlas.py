@@ -40,9 +40,10 @@ WAYS: dict[str, Maker] = {**FORMS, "projection": projection}
 
 
 def closed_forms(inertia: ArrayLike | None = None) -> dict[str, Maker]:
-    """Return the closed forms that are compared for a body: `WAYS`, and two that use the inertia.
+    """Return the closed forms that are compared for a body.
 
-    These two are "weighted", `weighted_cubic_so3`, and "normal", `normal_cubic_so3`.
+    If an inertia is given, "weighted" (`weighted_cubic_so3`) and "normal" (`normal_cubic_so3`) are
+    added to `WAYS`.
     """
     if inertia is None:
         return WAYS
@@ -122,9 +123,9 @@ def _as_count(name: str, value: int) -> int:
 def starts() -> dict[str, Maker]:
     """Return initial guesses of Newton's method, to see how the result depends on the guess.
 
-    They are the exponential cubic the long way round, and all closed forms except two. If the
-    Cayley cubic is far from the optimum, the method seldom converges from this guess. The corrected
-    Bézier curve leads to the same result as the Bézier curve.
+    The guesses are all closed forms except two, and the exponential cubic that turns the long way
+    round. If the Cayley cubic is far from the optimum, the method seldom converges from this guess.
+    The corrected Bézier curve leads to the same result as the Bézier curve.
     """
     return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
         "long way round": rb.exponential_cubic_long_so3
@@ -134,10 +135,10 @@ def starts() -> dict[str, Maker]:
 def defects(make: Maker, ends: Ends, *, rng: Rng = None) -> dict[str, float]:
     """Return how far curves are from being invariant when their ends are moved or exchanged.
 
-    The values are the largest angles in rad over all problems and 33 times, for random rotations L
-    and Q (BK Prop. 3). "left" compares L R(t) with the curve of the ends moved by L, "right"
-    compares R(t) Q with the curve of the ends moved by Q, and "reversed" compares R(1 − t) with the
-    curve of the exchanged ends.
+    The values are the largest angles in rad over all problems at 33 values of t, for random
+    rotations L and Q (BK Prop. 3). "left" compares L R(t) with the curve of the ends moved by L,
+    "right" compares R(t) Q with the curve of the ends moved by Q, and "reversed" compares R(1 − t)
+    with the curve of the exchanged ends.
     """
     R0, R1, w0, w1 = ends
     L, Q = sample_rotation(2, rng=rng)
@@ -195,7 +196,7 @@ def cell_table(
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
-    """Return the least x such that at least `share` of the entries of the last axis are at most x.
+    """Return the least x that a fraction `share` of the entries on the last axis does not exceed.
 
     NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 

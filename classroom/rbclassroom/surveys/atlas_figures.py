@@ -1,4 +1,4 @@
-"""Figures of the atlas: heat maps, and excess against excursion and against margin."""
+"""Figures of the atlas: heat maps, and the excess against the excursion or the margin."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

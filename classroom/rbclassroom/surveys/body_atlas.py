@@ -109,11 +109,11 @@ def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
     tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. If several
     curves are equally cheap, the first counts as the cheapest. For curves that are not closed
     forms, this share is NaN. For each value there are the ends of the interval, "low" and "high".
-    For quantiles, the binomial distribution selects these ends from the sample; they are NaN if the
-    sample is too small. Intervals of shares are those of Clopper and Pearson. Both kinds hold for
-    independent problems; for a sample with the same number of problems in each cell, the intervals
-    are too long rather than too short. All values are rounded to four digits. Problems with a NaN
-    do not count.
+    For quantiles, these ends are values of the sample, with ranks from the binomial distribution.
+    They are NaN if the sample is too small. Intervals of shares are those of Clopper and Pearson.
+    Both kinds hold for independent problems; for a sample with the same number of problems in each
+    cell, the intervals are too long rather than too short. All values are rounded to four digits.
+    Problems with a NaN do not count.
     """
     cheapest = np.argmin([excess[curve] for curve in CLOSED_FORMS], axis=0)
     known = ~np.isnan([excess[curve] for curve in CURVES]).any(axis=0)

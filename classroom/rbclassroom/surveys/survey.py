@@ -212,7 +212,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _end_with_parent() -> None:
-    """Ignore Ctrl-C, and end when the parent is killed, which the queue does not report."""
+    """Ignore Ctrl-C, and end when the parent is killed, because the queue does not report this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None
