@@ -27,7 +27,7 @@ Update = Callable[[int], Sequence[Any]]
 
 @dataclass(frozen=True, repr=False)
 class Animation(Player):
-    """A player of a moving figure, which also has the frames as pictures.
+    """A player of a moving figure; it also stores the frames as pictures.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Animation(Player):
     seconds: float = 4.0
 
     def save(self, path: str | Path) -> None:
-        """Write the animation to a file, as a GIF that repeats without end."""
+        """Write the animation to a file as a GIF that repeats forever."""
         if not self.pictures:
             raise ValueError("RBCOURSE_FIGURES is empty: the frames for a file were not drawn")
         Path(path).write_bytes(gif(self.pictures, self.seconds))
@@ -62,7 +62,7 @@ def animate(
     if not 0 < frames <= 50 * seconds:
         raise ValueError(f"frames: 1 to 50 per second are wanted, got {frames} in {seconds} s")
     files = os.environ.get("RBCOURSE_FIGURES") != ""  # see `save_figure`
-    rendered = render(fig, update, frames if files else 0)  # this also lays out the figure
+    rendered = render(fig, update, frames if files else 0)  # `render` also lays out the figure
     pictures = tuple(indexed(rendered)) if rendered else ()
     fig.set_layout_engine("none")  # keeps all artists in place
     display = Display(fig)
@@ -147,7 +147,7 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
 
 
 def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return pictures as a GIF without end; the durations of frames are multiples of 10 ms."""
+    """Return pictures as a GIF that repeats forever; frames last multiples of 10 ms."""
     content = io.BytesIO()
     ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)
     durations = [int(10 * step) for step in np.diff(ends)]

@@ -20,7 +20,7 @@ _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], 
 
 
 def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
-    """Return a table of a path: joint angles, then ends of links; the last end is the tip."""
+    """Return a path as a table of joint angles and ends of links; the last end is the tip."""
     path = np.asarray(path)
     table = {f"theta{i} [rad]": angle for i, angle in enumerate(path.T)}
     for i, end in enumerate(np.moveaxis(_joints(path, lengths)[:, 1:], 1, 0), start=1):
@@ -70,7 +70,7 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
 def moving_arm(
     ax: Axes, path: Array, shown: Iterable[int], lengths: ArrayLike = LINKS
 ) -> Callable[[int], list[Any]]:
-    """Draw some states of an arm in a pale colour; return a function that moves the arm.
+    """Draw an arm at some states in a pale colour; return a function that moves the arm.
 
     The axes show all points that the arm can reach. ``update(i)`` moves the arm to state i, draws
     the path of the tip up to this state, and returns the moving artists (RR 4.3, RR Fig. 8, RR Fig.
@@ -92,7 +92,7 @@ def moving_arm(
 
 
 def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LINKS) -> list[Any]:
-    """Draw up to three paths of an arm's tip, and, in a pale colour, the arm on the last path.
+    """Draw up to three paths of an arm's tip, and the arm at states of the last path.
 
     Return the lines of the paths (RR 4.3).
     """
@@ -122,7 +122,7 @@ def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
 
 
 def show_reach(ax: Axes, lengths: ArrayLike = LINKS) -> None:
-    """Make axes show all points that an arm can reach, with dotted circles as bounds."""
+    """Make axes show all points that an arm can reach; dotted circles bound them."""
     total, longest = np.sum(lengths), np.max(lengths)
     for radius in (total, max(0.0, 2 * longest - total)):
         ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))
@@ -189,7 +189,7 @@ def _joints(q: ArrayLike, lengths: ArrayLike) -> Array:
 
 
 def _columns(joints: Array) -> Array:
-    """Return the columns of the Jacobian: vectors from joints to tip, turned left by 90°."""
+    """Return the columns of the Jacobian: vectors from joints to the tip, turned left by 90°."""
     x, y = (joints[-1] - joints[:-1]).T
     return np.array([-y, x])
 

@@ -16,7 +16,7 @@ from rbcourse.draw.space import Faces
 
 
 def pose_table(first: Table, poses: Array) -> Table:
-    """Return a table of poses: given columns, such as times, then positions and rotations.
+    """Return poses as a table: the given columns (such as times), positions and rotations.
 
     Examples
     --------
@@ -57,8 +57,8 @@ def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Tabl
 def draw_box(ax: Any, pose: Array, edges: float | Array) -> Faces:
     """Draw a box, centred at the origin of its frame, with a rectangle on its +z face.
 
-    `edges` are the lengths of its three edges, or the edge of a cube, in m. `move_box` moves the
-    box (BK Fig. 5).
+    `edges` gives the lengths of its three edges in m, or one length for a cube. `move_box` moves
+    the box (BK Fig. 5).
     """
     box: Faces = ax.add_artist(Faces(_box_faces(pose, edges), [*["0.98"] * 6, COLOURS["x"]]))
     return box
@@ -72,11 +72,10 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
 def draw_cube_motion(
     ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
 ) -> list[Any]:
-    """Draw a cube at each pose, and stars at the centres of the cubes, in front of them.
+    """Draw a cube at each pose; stars at the centres of the cubes are in front.
 
-    The edges of the cubes have the length `side` in m. Further cubes, at the poses `compared`, are
-    drawn behind these as blue outlines. Return the artists of the cubes, and then the stars (BK
-    Fig. 5).
+    The edges of the cubes have the length `side` in m. Behind these cubes, blue outlines show cubes
+    at the poses `compared`. Return the artists of the cubes, and then the stars (BK Fig. 5).
     """
     for pose in compared:
         draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["z"], zorder=-1)
@@ -106,7 +105,7 @@ def set_space(
 
 
 def set_turning(ax: Any, reach: float) -> None:
-    """Fit the axes to a body that turns about the origin; no point is farther than `reach` in m.
+    """Fit the axes to a turning body whose points are within `reach` (in m) of the origin.
 
     Draw the axes of the fixed frame, with their names, in a pale colour.
     """
@@ -118,7 +117,7 @@ def set_turning(ax: Any, reach: float) -> None:
 
 
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor between two corners, with lines at the numbers that `draw_room` writes."""
+    """Draw a floor between two corners; its lines are at the numbers that `draw_room` writes."""
     pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
     for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
         ax.plot([x, x], [low[1], high[1]], low[2], **pale)
@@ -133,7 +132,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
     """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
-    # the start of each axis, and the offset of its numbers (for x and y, also downwards)
+    # the start of each axis, and the offset of its numbers (lower for x and y)
     azimuth = np.radians(ax.azim)
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
@@ -149,7 +148,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # the name is beyond the numbers, in the last of the largest gaps
+        else:  # the name is beyond the numbers, beside the last of the largest gaps
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
@@ -173,7 +172,7 @@ def describe_cube_motion(poses: Array) -> str:
 
 
 def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
-    """Draw the paths of a frame's origin in up to three motions, and the frame at their ends.
+    """Draw up to three motions of a frame: the paths of its origin, and the frame at the ends.
 
     The motions begin at the same pose, where letters mark the axes of the frame. Return a line for
     each motion (BK 2.6).
@@ -219,8 +218,8 @@ def moving_boxes(
 ) -> Callable[[int], list[Any]]:
     """Draw a box for each motion, on separate axes; return a function that moves all boxes.
 
-    The motions have the same number of poses. `edges` are the lengths of the edges of a box, or the
-    edge of a cube, in m. Boxes that stay at the origin are drawn larger; they have the axes of the
+    The motions have the same number of poses. `edges` gives the lengths of a box's edges in m, or
+    one length for cubes. Boxes that stay at the origin are drawn larger; they have the axes of the
     fixed frame instead of a floor. Return ``update(i)``, which moves all boxes to pose i of their
     motions and returns their artists.
     """
@@ -243,7 +242,7 @@ def moving_boxes(
 
 
 def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
-    """Return a description of the picture of `moving_boxes`; the poses are those at the times t."""
+    """Return a description of the picture of `moving_boxes`; t are the times of the poses."""
     (first, poses), *others = motions.items()
     said = f"Motions of a box: {', '.join(motions)}. A rectangle marks one of its faces."
     for name, other in others:

@@ -80,11 +80,11 @@ class Display(RendererBase):
         """Return the drawing of these artists.
 
         The result is a sequence of polygons. Each polygon has a style, a number of points, and
-        their positions. Positions are in parts of a pixel from the upper left, and are stored as
-        differences from the previous position. A negative number of points means that the polygon
-        is filled together with the previous one, for example as a hole. If the style has a marker,
-        the marker is drawn at the points. All visible artists in a `Space` are recorded, too, with
-        their positions in space.
+        their positions. Positions are in fractions of a pixel from the upper left, and are stored
+        as differences from the previous position. A negative number of points means that the
+        polygon is filled together with the previous one, for example as a hole. If the style has a
+        marker, the marker is drawn at the points. All visible artists in a `Space` are recorded,
+        too, with their positions in space.
         """
         self._drawn = [np.zeros(0, np.int16)]
         for room, scene in enumerate(scenes(self._fig)):
@@ -161,7 +161,7 @@ class Display(RendererBase):
 
 
 def _within(piece: Piece, reach: float) -> list[Piece]:
-    """Return the parts of a piece inside a cube that extends by `reach` to each side."""
+    """Return the parts of a piece that are in a cube; `reach` is half the cube's edge."""
     parts = [piece]
     for side in [*np.eye(3), *-np.eye(3)] if np.abs(piece.places[:, :3]).max() > reach else []:
         cut = (part.cut(reach - part.places[:, :3] @ side) for part in parts)

@@ -101,7 +101,7 @@ class Picture:
 
 
 def caption(alt: str, files: str = "") -> str:
-    """Return the caption of a picture: the first sentence of its description, and its files.
+    """Return the caption of a picture: the first sentence of the description, and the file names.
 
     Examples
     --------

@@ -64,8 +64,8 @@ class Piece:
     def cut(self, height: Array, overlap: float = 0.0) -> "list[tuple[int, Piece]]":
         """Return the parts above a plane (1), in the plane (0), and below the plane (-1).
 
-        `height` has the heights of the positions over the plane, shape (n,). Pieces above the plane
-        are extended below it by `overlap` pixels, except for transparent or dashed ones.
+        `height` contains the heights of the positions above the plane, shape (n,). Pieces above the
+        plane are extended below it by `overlap` pixels, except for transparent or dashed ones.
         """
         side = np.where(np.abs(height) < NEAR, 0, np.sign(height)).astype(int)
         if self.marker:
@@ -117,11 +117,11 @@ def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
     The plane of a face has the eye on one of its sides. Pieces on the other side are drawn first,
     then pieces in the plane in the order of zorder, and then pieces on the side of the eye. The
     pieces on each side are ordered in the same way by their next face. A piece in the plane that
-    covers the faces there, such as an edge, is drawn with the pieces on the side of the eye, so
-    that the next faces do not cover half of it. The first face is the one whose plane cuts the
-    fewest faces and lines. Pieces that no face separates are drawn in the order of zorder, then of
-    their mean depth in `whole_pixels`, and then in the given order. `eye` is the direction to the
-    eye, shape (3,).
+    covers faces, such as an edge, is drawn with the pieces on the side of the eye. Otherwise the
+    next faces could cover half of it. The first face is the one whose plane cuts the fewest faces
+    and lines. Pieces that no face separates are drawn in the order of zorder, then of their mean
+    depth in `whole_pixels`, and then in the given order. `eye` is the direction to the eye, shape
+    (3,).
     """
     drawn: list[Piece] = []
     todo = [(False, pieces)]  # (whether the pieces are in order, pieces); the last pair is next
@@ -165,7 +165,7 @@ def _wall(group: list[Piece], eye: Array) -> Piece | None:
 
 
 def whole_pixels(depth: Any) -> Any:
-    """Return depths as whole numbers, so that rounding errors do not determine their order.
+    """Return depths as whole numbers, so that their order does not depend on rounding errors.
 
     Fractions of 0.7 and more are rounded up, since depths in symmetric scenes rarely have a
     fraction of 0.7.

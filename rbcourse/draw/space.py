@@ -1,4 +1,4 @@
-"""Axes for drawings in space; their lines, letters, marks and faces of bodies form one scene.
+"""Axes for drawings in space; lines, letters, marks and faces form one scene.
 
 Matplotlib draws one artist in space after the other, so a line is entirely in front of a body or
 behind it. In this module, all artists become pieces of a scene, which are cut where they pass
@@ -41,7 +41,7 @@ LIGHT = np.array([0.48, -0.36, 0.8])
 
 
 class Faces(Artist):
-    """The faces of a convex body, which are lighter if they are turned to the light.
+    """The faces of a convex body; faces that are turned to the light are lighter.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Scene(Artist):
     def __init__(self) -> None:
         super().__init__()
         self.set_in_layout(False)
-        # the pieces of lines and letters, kept until these change
+        # the pieces of lines and letters, kept until an artist changes
         self._known: WeakKeyDictionary[Artist, tuple[Any, list[Piece]]] = WeakKeyDictionary()
 
     @property
@@ -189,7 +189,7 @@ class Scene(Artist):
 class Looks(RendererBase):
     """A renderer that records the look of an artist: context, filling, and outlines in pixels.
 
-    The outlines are those of letters or, for a line, those of its marker.
+    The outlines belong to letters or to the marker of a line.
     """
 
     def __init__(self, renderer: Any, letters: bool) -> None:
@@ -260,7 +260,7 @@ class Sight:
         return np.concatenate([[self.scale], *parts]).tobytes()
 
     def flat(self, places: Array) -> Array:
-        """Return the images, shape (n, 2), of positions relative to the middle, in pixels."""
+        """Project positions relative to the middle to image points in pixels, shape (n, 2)."""
         return self.origin + places @ np.stack([self.right, self.up], axis=-1)
 
 
@@ -312,7 +312,7 @@ class Space(Axes3D):  # type: ignore[misc]
         return Sight(scale, middle, seen[0], right, up, np.cross(right, up))
 
     def draw(self, renderer: Any) -> None:
-        """Draw the artists that are not in space, such as titles, and the scene over them."""
+        """Draw the artists that are not in space, such as titles, and then the scene."""
         if not self.get_visible():
             return
         inside = [artist for artist in self.scene.artists if artist.get_visible()]

@@ -24,7 +24,7 @@ EYE = np.array(
 
 
 def draw_sphere(ax: Any) -> None:
-    """Draw the unit sphere with meridians and parallels; artists on its far side become pale."""
+    """Draw the unit sphere with meridians and parallels; artists on the far side look pale."""
     turn = np.linspace(0, 2 * np.pi, 49)
     thin: Any = {"color": "0.8", "lw": 0.5, "zorder": 0}
     ax.add_artist(Ball())

@@ -81,8 +81,8 @@ def minimum_acceleration_so3(
     sufficient one, and has several solutions. Costs with a relative difference below 1e-9 count as
     equal, so that rounding does not decide which curve is returned.
 
-    The starting curves turn the short way and the long way, with additional full turns if
-    ‖w0‖ + ‖w1‖ > 6π. For a body, the search also starts from the optimum of the ball and from
+    The starting curves turn the short way or the long way. If ‖w0‖ + ‖w1‖ > 6π, some make
+    additional full turns. For a body, the search also starts from the optimum of the ball and from
     curves that lead from one free motion to another. Gauss–Newton steps lower the costs of all
     these curves. Then Newton's method solves R p = c, starting from the cheapest curves. The result
     is stationary, and `is_local_minimum` tells whether it is proven to be a local minimum. It is
@@ -138,9 +138,9 @@ def minimum_torque_so3(
     -----
     The method, errors, warnings and singular set are those of `minimum_acceleration_so3`. For thin
     rods, the method often does not converge. A turn about a principal axis is a stationary curve. A
-    turn about the axis of the largest moment may be a saddle; a curve that leaves the axis then
-    costs less. The search also tries such curves. With J = R G Rᵀ and H = R G w, the equation is
-    J H'' + H' × H = c; see `rbcourse.textbook.minimum_torque_so3`.
+    turn about the axis of the largest moment of inertia may be a saddle. Then a curve that leaves
+    the axis costs less; the search also tries such curves. With J = R G Rᵀ and H = R G w, the
+    equation is J H'' + H' × H = c; see `rbcourse.textbook.minimum_torque_so3`.
 
     Examples
     --------
@@ -267,14 +267,14 @@ class Optimum(Curve):
     functional : Functional
         The functional that defines the cost and p.
     converged : bool, or ndarray of bool, shape (...)
-        True if a solution was found and every curve that was tried costs at least as much. If no
-        solution was found, the curve, `c` and the cost are NaN.
+        True if a solution was found and no curve that was tried costs less. If no solution was
+        found, the curve, `c` and the cost are NaN.
     c : ndarray, shape (..., 3)
         The constant R p in the fixed frame. Without an inertia, p is w''; with the inertia
         2 I, p is 2 w''.
     cost, residual : float or ndarray, shape (...)
         The `acceleration_cost`, `torque_cost` or `jerk_cost`. The residual is the largest error of
-        R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for times from 0 to 1.
+        the equations R0 + ∫ R ŵ dt = R(t) and R p = c at the nodes, for times from 0 to 1.
     iterations, nodes : int or ndarray of int, shape (...)
         The number of steps of the solver, and the number of nodes that represent the curve.
     """
@@ -296,7 +296,7 @@ class Optimum(Curve):
 
     @property
     def converged(self) -> Any:
-        """True if a solution was found and every curve that was tried costs at least as much."""
+        """True if a solution was found and no curve that was tried costs less."""
         return self._told(self.found["converged"])
 
     @property
@@ -318,7 +318,7 @@ class Optimum(Curve):
         return values if self.batch_shape else values.item()
 
     def take(self, index: Any) -> Self:
-        """Return the stack of the curves that have these indices in the flattened stack."""
+        """Return the curves that have these indices in the flattened stack."""
         functional = self.functional.take(np.reshape(index, -1))
         return replace(super().take(index), functional=functional)
 
@@ -367,7 +367,7 @@ def optimum_of(
     solutions: Sequence[Solution | Failure],
     duration: Array,
 ) -> Optimum:
-    """Return the solutions as a stack of curves, with the batch shape of the durations."""
+    """Return the solutions as a stack of curves; its batch shape is the shape of the durations."""
     batch = duration.shape
     found, c = np.zeros(len(solutions), _FOUND), np.full((len(solutions), 3), np.nan)
     for i, one in enumerate(solutions):

@@ -50,7 +50,7 @@ def chebyshev(t: Array, count: int) -> Array:
 
 @lru_cache
 def grid(n: int) -> Grid:
-    """Return the grid of n nodes, bitwise the same for any number of BLAS threads."""
+    """Return the grid of n nodes; its bits do not depend on the number of BLAS threads."""
     from numpy.polynomial.chebyshev import chebder, chebint
 
     k = np.arange(n)
@@ -64,7 +64,7 @@ def grid(n: int) -> Grid:
 
 
 def _product(A: Array, B: Array) -> Array:
-    """Return A B without BLAS, since the rounding of BLAS depends on its number of threads."""
+    """Return A B without BLAS, whose rounding depends on the number of threads."""
     return np.einsum("ij,jk->ik", A, B)
 
 
@@ -108,7 +108,7 @@ def interpolation(few: int, many: int) -> Array:
 
 
 def along(matrix: Array, values: Array) -> Array:
-    """Return the matrix times values at the nodes, shape (N, n, ...)."""
+    """Multiply values at the nodes, shape (N, n, ...), by the matrix."""
     count, n, *core = values.shape
     columns = values.reshape(count, n, math.prod(core))
     return (matrix @ columns).reshape(count, len(matrix), *core)

@@ -1,4 +1,4 @@
-"""Newton's method for R p = c, with the values at all Chebyshev nodes of a curve as unknowns.
+"""Newton's method for R p = c; the unknowns are the values of a curve at Chebyshev nodes.
 
 `Stationary` is the equation for any functional. `BallStationary` is the equation R w'' = c for a
 ball; it has fewer unknowns and faster steps.
@@ -19,7 +19,7 @@ from rbcourse.so3 import hat, vee
 
 STEPS = 25
 EXACT = 3e-12  # bound on the residual and on the last Chebyshev coefficients of R
-SHARE = 0.03  # times EXACT: bound on the relative residual of p and on the last coefficients of k
+SHARE = 0.03  # SHARE * EXACT bounds the relative residual of p and the last coefficients of k
 LONGEST_STEP = 0.5  # rad: no step turns a node by more than this
 ROUGH = 1e-2  # rad: after a step shorter than this, the method continues on more nodes
 FAILED, FINER, SOLVED = range(3)
@@ -29,8 +29,8 @@ Arrays: TypeAlias = tuple[Array, ...]
 class Solution(NamedTuple):
     """A solution of R p = c, with R and the highest derivative k of w at the nodes.
 
-    The cost is ∫ ‖u‖² dt. `beaten` is True if a curve costs less, but Newton's method found no
-    solution from this curve.
+    The cost is ∫ ‖u‖² dt. `beaten` is True if Newton's method fails from a known curve that costs
+    less.
     """
 
     R: Array
@@ -98,7 +98,7 @@ class Equations(Protocol):
 
 
 def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
-    """Solve a stack of problems by Newton's method, starting from R at nodes, (N, n, 3, 3).
+    """Solve problems by Newton's method, starting from rotations at nodes, (N, n, 3, 3).
 
     The method works on these nodes until the steps are short, and then on more nodes until the last
     Chebyshev coefficients have decayed. A problem that is singular or overflows gives a `Failure`.
@@ -108,7 +108,7 @@ def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
 
 
 def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
-    """Solve problems of balls as `relax` does, with linear systems on the nodes of the given R."""
+    """Solve problems of balls like `relax`; the linear systems use the nodes of the given R."""
     parts = equations.R0, equations.R1, equations.ends
     return relax(BallStationary(*parts, R.shape[1]), R)
 
@@ -252,7 +252,7 @@ def mending_turns(R: Array, E: Array, W: Array) -> Array:
 
 
 def costs(functional: Functional, ends: Array, k: Array) -> Array:
-    """Return ∫ ‖u‖² dt, integrated on twice as many nodes as k has."""
+    """Return ∫ ‖u‖² dt, computed with twice as many nodes as k has."""
     fine = grid(2 * k.shape[1] - 1)
     up = interpolation(k.shape[1], len(fine.t))
     rates = rates_at_nodes(ends, up @ k)
@@ -279,9 +279,9 @@ class Stationary:
         return type(self)(self.functional.take(index), *parts)
 
     def first(self, R: Array) -> tuple[Array, Array]:
-        """Return k and c = 0; k fits w with half as many polynomials as there are nodes.
+        """Return k, fitted to w by n/2 polynomials, and c = 0.
 
-        The mean of R p is a worse initial value of c than 0.
+        The mean of R p would be a worse initial value of c.
         """
         nodes, by = grid(R.shape[1]), primitives(R.shape[1], self.ends.shape[1])
         w = vee(R.mT @ along(nodes.derivative, R))
@@ -294,7 +294,8 @@ class Stationary:
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest error of each problem, and the data for a step.
 
-        The errors are those of R = R0 + ∫ R ŵ dt, and of p = Rᵀc relative to the size of k and p.
+        The equations are R = R0 + ∫ R ŵ dt and p = Rᵀc. The error of the second equation is
+        relative to the size of k and p.
         """
         R, k, c = unknowns
         rates = rates_at_nodes(self.ends, k)
@@ -353,7 +354,7 @@ class Stationary:
         return responses[1]
 
     def tails(self, unknowns: Arrays) -> Array:
-        """Return the last coefficients of R, or the relative ones of k if these are larger."""
+        """Return the last coefficients of R or, if larger, the last relative coefficients of k."""
         R, k, _ = unknowns
         return np.maximum(tails(R), tails(k) / (SHARE * (1 + np.abs(k).max(axis=(1, 2)))))
 
@@ -364,7 +365,7 @@ class Stationary:
 
 
 def _by_ends(from_ends: Array, matrices: Array) -> Array:
-    """Return the matrices times the rate that each unit end value causes, (N, n, 3, 3 m)."""
+    """Multiply the matrices by the rates for unit end values; the shape is (N, n, 3, 3 m)."""
     products = matrices[..., None, :] * from_ends[:, None, :, None]
     return products.reshape(*products.shape[:3], -1)
 
@@ -409,7 +410,7 @@ class BallStationary:
         return (np.linalg.solve(effect.mT @ effect, effect.mT @ lacking)[..., 0],)
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n, and the numbers of nodes for 2, 4, 8, 16 times the intervals, up to 257."""
+        """Return n, and the numbers of nodes for 2, 4, 8 and 16 times as many intervals (≤ 257)."""
         return tuple((n - 1) * times + 1 for times in (1, 2, 4, 8, 16) if (n - 1) * times <= 256)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
@@ -423,14 +424,14 @@ class BallStationary:
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
         """Return the turns ε of the nodes, and the change of c.
 
-        The unknowns are R and c, with w'' = Rᵀc and so w = (1 − t) w0 + t w1 + K Rᵀc. If ε turns R,
-        then Rᵀc changes by Rᵀ(ĉ ε + δc). To first order,
+        The unknowns are R and c. Since w'' = Rᵀc, we have w = (1 − t) w0 + t w1 + K Rᵀc. If ε turns
+        R, then Rᵀc changes by Rᵀ(ĉ ε + δc). To first order,
 
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
-        The equation is solved for ĉ ε on the `coarse` nodes. The integrals smooth the error so much
-        that the right side, evaluated on all nodes, is as accurate as a solution on all nodes. A
-        change of the end values adds a term to d.
+        The equation is solved for ĉ ε on the `coarse` nodes. Then the right side gives ε on all
+        nodes. The integrals smooth the error, so this ε is as accurate as a solution on all nodes.
+        A change of the end values adds a term to d.
         """
         R, c = unknowns
         stride = (R.shape[1] - 1) // (self.coarse - 1)
@@ -469,7 +470,7 @@ class BallStationary:
 
 
 def _coarse_causes(R: Array, c: Array, known: Array) -> Array:
-    """Return ĉ ε at the nodes for each column of d, and for a unit of each component of δc.
+    """Return ĉ ε at the nodes for each column of d, and for unit vectors δc.
 
     Only the two components of ε perpendicular to c matter. For each problem, they are the solution
     of one linear system.
@@ -492,7 +493,7 @@ def _across(c: Array) -> tuple[Array, Array]:
 
     The rows, shape (N, 2, 3), belong to the Householder reflection that maps c to the third axis.
     """
-    v = scaled(c, axis=-1)  # so that squares of small numbers do not underflow
+    v = scaled(c, axis=-1)  # otherwise squares of small numbers could underflow
     v[:, 2] += np.copysign(np.sqrt(np.sum(v * v, axis=-1)), v[:, 2])
     square = np.sum(v * v, axis=-1)
     twice = v * (2 / np.where(square == 0, 1, square))[:, None]
@@ -502,5 +503,5 @@ def _across(c: Array) -> tuple[Array, Array]:
 
 @lru_cache
 def _for_each_entry(n: int) -> Array:
-    """Return the Kronecker product of the twofold integral and a 2 × 2 matrix of ones."""
+    """Return the matrix of the twofold integral; each entry is repeated in a 2 × 2 block."""
     return np.kron(primitives(n, 2).from_k[0], np.ones((2, 2)))

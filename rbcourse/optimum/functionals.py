@@ -28,7 +28,7 @@ from rbcourse.so3 import hat
 
 
 class Functional(Protocol):
-    """A number times ∫ ‖u‖² dt, for a stack of problems, with the derivatives of u and p.
+    """A number times ∫ ‖u‖² dt for a stack of problems; it also gives the derivatives of u and p.
 
     The rates w, w', … have the shape (N, n, 3), for N problems and n times. Derivatives with
     respect to the rates are lists of 3 × 3 matrices, shape (N, n, 3, 3); the first one is the
@@ -39,8 +39,8 @@ class Functional(Protocol):
     name : str
         The name of the optimum.
     ends : int
-        The number of end values of the optimum: w, or w and w', at 0 and at 1. It is also the order
-        of the highest derivative of w in p.
+        The number of end values of an optimum: 2 (w at 0 and 1) or 4 (also w'). It is also the
+        order of the highest derivative of w in p.
     needs : tuple of int
         The orders of the derivatives ``c(t, order)`` on which the deviation u depends.
     scale, unit : float or ndarray, shape (N,)
@@ -82,7 +82,7 @@ class Functional(Protocol):
 
 
 class BallAcceleration:
-    """The functional 2 ∫ ‖w'‖² dt of the squared covariant acceleration of a ball, G = 2 I.
+    """The functional 2 ∫ ‖w'‖² dt: the squared covariant acceleration of a ball (G = 2 I).
 
     Here u = w' and p = w''. The optimum has R w'' = c.
 
@@ -119,12 +119,11 @@ class BallAcceleration:
 
 
 class Effort:
-    """The functional ∫ τᵀ M τ dt of a body with the inertia G and the torque τ = G w' + w × G w.
+    """The functional ∫ τᵀ M τ dt, where τ = G w' + w × G w is the torque on a body of inertia G.
 
-    If M = G⁻¹, M τ = w' + G⁻¹ (w × G w) is the covariant acceleration ∇_V V in the metric G of the
-    kinetic energy, and τᵀ M τ is its square. If M = I, τᵀ M τ is the square of the torque.
-
-    With v = M τ and h = G w,
+    If M = G⁻¹, the product M τ = w' + G⁻¹ (w × G w) is the covariant acceleration ∇_V V in the
+    metric G of the kinetic energy, and τᵀ M τ is its squared norm. If M = I, τᵀ M τ is the squared
+    norm of the torque. With v = M τ and h = G w,
 
         p = G (v' + w × v) − h × v.
 
@@ -200,7 +199,7 @@ class Effort:
 
 
 class Jerk:
-    """The functional 2 ∫ ‖j‖² dt of the squared covariant jerk of a ball, j = w'' + ½ w × w'.
+    """The functional 2 ∫ ‖j‖² dt, where j = w'' + ½ w × w' is the covariant jerk of a ball.
 
     In the metric G = 2 I, p = j'' + ½ w × j' + w' × j. Among all j = w'' + κ w × w', only this one
     assigns the same cost to a motion R(t) and to its inverse Rᵀ(t).

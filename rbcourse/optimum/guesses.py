@@ -14,7 +14,7 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-LONGEST = 100.0  # rad: longer curves do not get more full turns
+LONGEST = 100.0  # rad: a larger length does not add more full turns
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 _TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
@@ -25,7 +25,7 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
 
     Let v be the rotation vector from the Bézier control point C₁ = R0 exp(ŵ0/3) to the control
     point R1 exp(−ŵ1/3), for the short way or the long way. If ‖w0‖/3 + ‖w1‖/3 + `bend` is at least
-    2k − 1 full turns, both v are also used with k additional full turns. Accelerations at the ends
+    2k − 1 full turns, both vectors v are also used with k additional full turns. End accelerations
     cause the `bend`. With β = 3t² − 2t³, the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
@@ -41,7 +41,7 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
     # rounding must not choose between two turns by π
     other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
     v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
-    along_v = v + 1e-9 * (first + last)  # this has a direction even if v is 0
+    along_v = v + 1e-9 * (first + last)  # `along_v` has a direction even if v is 0
     full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
     length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
     problem, turns = [], []
@@ -64,16 +64,16 @@ def leading_sign(v: Array) -> Array:
 
 
 def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp], Array]:
-    """Return two curves for each problem, from one free motion to another, at n nodes.
+    """Return two curves at n nodes for each problem; they lead from one free motion to another.
 
-    Let F be the free motion of a body of inertia G that starts at R0 with w0, and B the free motion
-    that arrives at R1 with w1. With β = 3t² − 2t³ and a logarithm v of FᵀB that is continuous in
-    time, the curve
+    For a body of inertia G, let F be the free motion that starts at R0 with w0, and let B be the
+    free motion that arrives at R1 with w1. With β = 3t² − 2t³ and a logarithm v of FᵀB that is
+    continuous in time, the curve
 
         R = F exp(β v̂)
 
     has the given ends. At t = ½, one v is the shortest logarithm, and the other v turns the other
-    way round. A problem index for each curve is returned before the curves.
+    way round. The first result is the problem index of each curve.
     """
     fine, t = grid(2 * n - 1).t, grid(n).t
     R0, w0 = np.stack([ends.R0, ends.R1]), _bounded(np.stack([ends.w0, -ends.w1]))
@@ -124,8 +124,8 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
 def _continuous_log(R: Array) -> Array:
     """Return two logarithms of R that are continuous along the first axis.
 
-    The length of this axis is odd. In its middle, one logarithm is the shortest, and the other
-    turns the other way round.
+    The length of this axis is odd. At the middle of the axis, one logarithm is the shortest, and
+    the other turns the other way round.
     """
     shortest = log_so3(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
@@ -159,7 +159,7 @@ def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
 
 
 def with_ends(R: Array, ends: Array) -> Array:
-    """Return the curves R times factors exp(η̂) that correct w0, w1 and, if given, a0, a1.
+    """Multiply the curves R by factors exp(η̂) that correct w0, w1 and, if given, a0, a1.
 
     On too few nodes, the polynomials through R have other end velocities than w0 and w1; Δw₀ and
     Δw₁ are the differences. The factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁. For
@@ -181,9 +181,9 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
     For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation u
     changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
     the integral of the squared new deviation. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the ends, and
-    p has half as many coefficients as there are nodes. A quarter of η, or three times η, is used if
-    it costs less. The steps end when one of them lowers the cost by less than the fraction
-    `worthwhile`.
+    p has half as many coefficients as there are nodes. A quarter of η or three times η is used if
+    that makes the curve cheaper. The steps end when one of them lowers the cost by less than the
+    fraction `worthwhile`.
     """
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
@@ -198,7 +198,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Return the cheapest curve, R or R after one of `SHARES` of the step, and its cost."""
+    """Return the cheapest of R and the curves after `SHARES` of the step, and its cost."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))

@@ -1,4 +1,4 @@
-"""The search for the cheapest curve, by Newton's method from many starts (starting curves)."""
+"""The search for the cheapest curve: Newton's method from many starting curves (starts)."""
 
 from __future__ import annotations
 
@@ -54,27 +54,27 @@ class Limits:
     """
 
     nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_turns: int = 25  # for bodies, if full turns are added
-    nodes_for_jerk: int = 29  # the jerk has higher derivatives
-    nodes_for_all_starts: int = 33  # if a start costs less than all solutions
+    nodes_for_turns: int = 25  # nodes for bodies if full turns are added
+    nodes_for_jerk: int = 29  # the jerk needs more, since it has higher derivatives
+    nodes_for_all_starts: int = 33  # nodes if a start costs less than all solutions
     nodes_for_very_fast: int = 65
-    followed: float = 1.1  # Newton's method starts from curves that cost up to this ratio
+    followed: float = 1.1  # Newton's method starts from curves up to this cost ratio
     same_entries: float = 0.1  # starts count as equal if all entries of R differ by less than this
     fast: float = 24.0  # if ‖w0‖ + ‖w1‖ is larger, all starts are tried
     very_fast: float = 80.0  # if ‖w0‖ + ‖w1‖ is larger, `nodes_for_very_fast` is used
     known_cost: float = 1.01  # largest accepted ratio of a solution's cost to a start's cost
     one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
-    flat: float = 0.1  # curves are bent if w deviates from one axis by a smaller fraction
-    bend: float = 0.5  # rad: the size of this bend
-    turned: float = 3.0  # full turns are added to curves that cost up to this ratio
-    turned_again: float = 1.2  # second full turns are added to curves that cost up to this ratio
-    worth_a_turn: float = 0.3  # no turn is added to costs below this fraction of a turn's cost
+    flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
+    bend: float = 0.5  # rad: size of the bend
+    turned: float = 3.0  # full turns are added to curves up to this cost ratio
+    turned_again: float = 1.2  # second full turns are added to curves up to this cost ratio
+    worth_a_turn: float = 0.3  # no turn is added if the cost is below this share of a turn's cost
     promising_turn: float = 1.5  # curves that cost more after `new_turns` are dropped
     starts: tuple[int, float] = (40, 5e-4)
     new_turns: tuple[int, float] = (3, 5e-4)
     on_more_nodes: tuple[int, float] = (40, 1e-4)
-    bent: tuple[int, float] = (40, 1e-6)  # for bent curves, which may be near a saddle
-    last: tuple[int, float] = (200, 0.0)  # if the other pairs do not suffice
+    bent: tuple[int, float] = (40, 1e-6)  # steps for bent curves, which may be near a saddle
+    last: tuple[int, float] = (200, 0.0)  # used if the other pairs do not suffice
 
 
 LIMITS = Limits()
@@ -84,13 +84,13 @@ class Task(NamedTuple):
     """A stack of problems with one batch axis, and the functions that solve them.
 
     If the functional is an `Effort`, the search also adds full turns to the starts, and bends
-    solutions that turn about one axis, because these may be saddles.
+    solutions that turn about one axis, because such solutions may be saddles.
     """
 
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
-    # from problem indices and n, makes the starts and, before them, a problem index for each
+    # maps problem indices and n to the problem index of each start, and the starts at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = LIMITS.nodes  # of starting curves
@@ -112,13 +112,13 @@ def ball(given: Ends) -> Task:
 
 
 def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Solve the problems with small σ, w0 and w1 from one start each; return solutions by index.
+    """Solve problems with small σ, w0 and w1 from one start; return solutions by problem index.
 
     If the entries of σ, w0 and w1 are below ½, their norms are below 1. With e = σ − (w0 + w1)/2
     and d = w1 − w0, the optimum then costs about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve that turns
     the long way between such ends has a length of at least 2π − 1 and costs at least
-    12 (2π − 2)² > 200. It is not proven that only one curve that turns the short way is stationary,
-    but no second one was found.
+    12 (2π − 2)² > 200. No second stationary curve that turns the short way was found, but a proof
+    is missing.
     """
     largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
     slow = np.flatnonzero(largest < LIMITS.one_start)
@@ -191,8 +191,8 @@ def cheapest(task: Task) -> list[Solution | Failure]:
     """Return the cheapest solution that is found for each problem.
 
     Gauss–Newton steps lower the costs of the starts, and Newton's method continues from the
-    cheapest ones. All starts are tried if no solution is found, or if a start costs less than the
-    solution, before or after the steps. If even this does not suffice, more steps are made.
+    cheapest ones. All starts are tried if no solution is found, or if a start, before or after
+    these steps, costs less than the solution. If this fails, more steps are made.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _searched(task)
@@ -271,10 +271,10 @@ def _with_more_turns(
 def _leave_the_axis(
     task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
 ) -> None:
-    """Bend solutions that turn about almost one axis; solve from bent curves that cost less.
+    """Bend solutions whose axis is almost constant; solve from bent curves that cost less.
 
-    Such a solution may be a saddle: if all starts turn about the axis, no step leaves it, even if a
-    curve that leaves the axis costs less.
+    Such a solution may be a saddle. If all starts turn about one axis, no step leaves the axis,
+    even if a curve that leaves it costs less.
     """
     order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
     problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
@@ -315,7 +315,7 @@ def _follow_on(
     n: int,
     found: list[Solution | Failure],
 ) -> None:
-    """Solve some problems from more starts, on n nodes, for more accurate costs."""
+    """Solve some problems from more starts; n nodes make their costs more accurate."""
     mine = np.isin(problem, index)
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, index, n)
@@ -361,7 +361,7 @@ def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Solve the problems from these curves; solutions of lower cost replace those in `found`.
+    """Solve the problems from these curves; cheaper solutions replace those in `found`.
 
     If two solutions have the same cost, the first one is kept, so that rounding does not decide.
     """

@@ -36,7 +36,7 @@ from rbcourse.optimum import Optimum
 from rbcourse.optimum.chebyshev import Grid, grid
 from rbcourse.so3 import hat
 
-_PENALTY = 1e4  # it is multiplied by (‖c‖ + 1) ‖M‖
+_PENALTY = 1e4  # the penalty is this number times (‖c‖ + 1) ‖M‖
 _CLEAR = 1e-6  # a smaller eigenvalue may differ from 0 only by rounding
 _DEGREES = 24, 48, 96
 
@@ -128,7 +128,7 @@ def _largest(matrices: Array) -> float:
 
 
 def on_each_axis(values: Array, root: Array) -> Array:
-    """Return the products of m functions, (n, m), and columns of a matrix, shape (n, 3, 3 m)."""
+    """Multiply m functions, shape (n, m), by the columns of a matrix: shape (n, 3, 3 m)."""
     return np.einsum("tj,ab->tajb", values, root).reshape(len(values), 3, -1)
 
 

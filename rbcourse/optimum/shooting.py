@@ -70,7 +70,7 @@ def shoot(equations: BallStationary, R: Array) -> list[Solution | Failure]:
 
 
 def _shoot(equations: BallStationary, start: Array) -> Solution | Failure:
-    """Improve the aim, the pair (w'(0), b), by Newton steps that move the end by at most 0.5."""
+    """Improve the aim (w'(0), b) by Newton steps that move the end by at most 0.5."""
     try:
         aim = _first_aim(equations, start)
         for iteration in range(STEPS):

@@ -7,11 +7,10 @@ a ball, it is 4 w' · δw. So at an optimum the momenta are the same on both sid
 and 0 at natural ends.
 
 In a Newton step, each leg is linearised, and its responses to unit changes of its end values are
-computed (`collocation`). The changes of the momenta of a leg form a symmetric element of the linear
-system for the values at the poses, a `rbcourse.velocities.KnotSystem`. The matrix of this system is
-the second derivative of the cost.
-
-If that matrix is positive definite, and each leg is a strict local minimum among the curves with
+computed (`collocation`). The changes of the momenta give a symmetric matrix for each leg. Together
+these matrices form the linear system for the values at the poses
+(`rbcourse.velocities.KnotSystem`). The matrix of this system is the second derivative of the cost.
+If this matrix is positive definite, and each leg is a strict local minimum among the curves with
 its ends (`second_variation`), the whole spline is a strict local minimum.
 """
 
@@ -70,7 +69,7 @@ DESCENTS = 1e-2, 1e-4, 1e-6
 """Shares of the cost. If Newton's method finds no minimum, Gauss–Newton steps lower the cost of its
 start until a step lowers it by less than the first share. Newton's method is then tried again. If
 it fails again, the next share is used."""
-FLAT = 1e-9  # as a share of the diagonal: smaller eigenvalues may be 0
+FLAT = 1e-9  # eigenvalues below this share of the diagonal may be 0
 ASIDE = np.array([0.4, 0.6, 0.8])  # rad: displacement from the axis in the middle of a leg
 
 
@@ -100,9 +99,9 @@ def minimum_acceleration_spline_so3(
     Returns
     -------
     OptimalChain
-        A `Chain` of `Optimum` legs with the least `acceleration_cost` that Newton's method finds
-        from `quaternion_spline_so3`. w' (for a body, the torque) is continuous, and 0 at natural
-        ends.
+        A `Chain` of `Optimum` legs with the least `acceleration_cost` that Newton's method finds,
+        starting from `quaternion_spline_so3`. w' (for a body, the torque) is continuous, and 0 at
+        natural ends.
 
     Raises
     ------
@@ -112,12 +111,12 @@ def minimum_acceleration_spline_so3(
     Notes
     -----
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
-    periodic ends, it may not exist. For example, take rotations by 0, 1 and 0.3 rad about one axis,
-    at the times 0, 1 and 1 + √2. The result costs 5.6, but more full turns on the legs make the
-    cost as small as you like. If the result is `certified`, it is proven to be a local minimum; for
-    bodies, a leg can be a saddle. A leg that is much shorter than its neighbours may spin; to
-    prevent this, insert poses. Singular set: neighbouring rotations a half-turn apart raise
-    ValueError.
+    periodic ends, such a curve may not exist. For example, take rotations by 0, 1 and 0.3 rad about
+    one axis, at the times 0, 1 and 1 + √2. The result costs 5.6, but with more full turns on the
+    legs, the cost can be as small as you like. If the result is `certified`, it is proven to be a
+    local minimum; for bodies, a leg can be a saddle. A leg that is much shorter than its neighbours
+    may spin; to prevent this, insert poses. Singular set: neighbouring rotations a half-turn apart
+    raise ValueError.
 
     Examples
     --------
@@ -232,8 +231,8 @@ def minimum_acceleration_spline_se3(
     Returns
     -------
     OptimalChain
-        A chain of `RigidMotion` legs. Its rotation is that of `minimum_acceleration_spline_so3`;
-        its centre of mass moves on a cubic spline.
+        A chain of `RigidMotion` legs. The rotation is the result of
+        `minimum_acceleration_spline_so3`; the centre of mass moves on a cubic spline.
 
     Notes
     -----
@@ -328,7 +327,7 @@ class OptimalChain(Chain):
         return bool(is_local_minimum(self))
 
     def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration, but the same first time."""
+        """Return the chain with another duration and the same start time."""
         start, end = self.domain
         share = float(duration) / (end - start)
         power = self.rotation.functional.ends + 1
@@ -381,7 +380,7 @@ def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.
 
 
 class _Problem(NamedTuple):
-    """The data of a spline: rotations, durations scaled to mean 1, given values, and functional."""
+    """The data of a spline: rotations, durations with mean 1, given values, and functional."""
 
     R: Array
     h: Array
@@ -392,7 +391,7 @@ class _Problem(NamedTuple):
 
     @property
     def scale(self) -> Array:
-        """The powers of h that convert values at the rotations to unit time, (N, 3 m/2)."""
+        """The powers of `h` that scale values at the rotations to unit time, (N, 3 m/2)."""
         orders = np.arange(1, 1 + self.functional.ends // 2)
         return np.repeat(self.h[:, None] ** orders, 3, axis=1)
 
@@ -443,7 +442,7 @@ class _Problem(NamedTuple):
         raise np.linalg.LinAlgError("the system of a step is singular")
 
     def least_sign(self, system: KnotSystem) -> int:
-        """Return the sign of the least eigenvalue of a system, or 0 if it may be 0."""
+        """Return the sign of the least eigenvalue of a system, or 0 if this eigenvalue may be 0."""
         sizes = np.diag(np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0))
         for sign, shift in (1, -FLAT), (0, FLAT):
             moved = system._replace(A=system.A + shift * sizes, D=system.D + shift * sizes)
@@ -617,7 +616,7 @@ def _momenta(problem: _Problem, legs: Equations, unknowns: Arrays) -> tuple[Arra
 
 
 def _balanced(problem: _Problem, legs: Equations, unknowns: Arrays) -> bool:
-    """Tell whether the momenta agree on both sides of all poses at which no values are given."""
+    """Tell whether the momenta agree on both sides of each pose without given values."""
     weight = problem.weight[:, None] * problem.scale
     found = weight[:, None] * _momenta(problem, legs, unknowns)[0]
     jump = np.zeros_like(problem.given)
@@ -647,7 +646,7 @@ def _linearised(
         rate = along(K[[0, -1]], bends)
         rate[..., 1:] += np.kron(E[[0, -1]][:, None], np.eye(3)).reshape(2, 3, 3 * m)
         change += D @ rate
-    # with respect to values at both rotations: (leg, end, momentum, rotation, value)
+    # the axes are: leg, end, momentum, rotation, value
     by_knots = change[..., 1:].reshape(count, 2, -1, m // 2, 2, 3).swapaxes(3, 4)
     by_knots = by_knots.reshape(count, 2, -1, 2, 3 * (m // 2)) * problem.scale[:, None, None, None]
     weight = (problem.weight[:, None] * problem.scale)[:, None]
