@@ -35,7 +35,7 @@ LISTS = {  # lists of exact versions; an environment needs its own list and all 
 }
 PYTEST = "pytest -n auto --dist loadfile --no-loadscope-reorder"
 BROWSER = "pytest -n auto --dist worksteal classroom/tests/browser"
-TASKS = {  # environment, commands, help; further arguments go to the last command
+TASKS = {  # the environment, commands and help of each task; the last command gets arguments
     "lab": ("lessons", ["rbclassroom.course.lab"], "open the lessons in JupyterLab"),
     "check": ("lessons", ["rbclassroom.assignments.check"], "check a problem set: check FILE"),
     "book": ("book", ["rbclassroom.book.build"], "write the course as web pages, in book/"),
@@ -81,14 +81,14 @@ def main():
     set_up(environment)
     if "pytest" in commands[-1]:  # each worker uses one processor, so one thread is enough
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        # otherwise each process compiles all modules again
+        # with this variable, each process would compile all modules again
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for command in commands:
         run(*command.split(), *(words if command is commands[-1] else []))
 
 
 def run(*words):
-    """Run a module in .venv, in the folder of the course; exit if it fails.
+    """Run a module with the Python of .venv, in the course's folder; exit if the module fails.
 
     Ctrl-C also reaches the module, and this function waits until the module ends.
     """
@@ -116,7 +116,7 @@ def set_up(environment):
         print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
         install(*[word for name in missing for word in ("-r", LISTS[name])])
         if "lessons" in missing:
-            # the first import searches for fonts
+            # the first import of Matplotlib searches for fonts
             patiently(python(), "-c", "import matplotlib.pyplot")
         write_stamp(dict(found, **{name: wanted[name] for name in missing}))
         print(" done.", flush=True)
@@ -141,7 +141,7 @@ def create(found):
     except OSError as error:
         sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
-    # if this run is interrupted, the next one finds this stamp
+    # if this run is interrupted, the next run finds this stamp
     write_stamp({"unfinished": True})
     print("Making .venv", end=" ", flush=True)
     if UV:
@@ -153,7 +153,7 @@ def create(found):
 
 
 def install(*words):
-    """Install into .venv with uv, or with pip if uv fails; pip fetches uv if it is missing."""
+    """Install distributions into .venv with uv, or with pip if uv fails."""
     pip = python(), "-m", "pip"
     uv, settings = UV, {}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -177,7 +177,7 @@ def settings_of_pip(*pip):
         "cert": "SSL_CERT_FILE",
     }
     listed = subprocess.run(pip + ("config", "list"), stdout=subprocess.PIPE, text=True).stdout
-    # all indexes have the same rank, as for pip
+    # uv then treats all indexes alike, as pip does
     settings = {"UV_INDEX_STRATEGY": "unsafe-best-match"}
     for key, _, value in (line.partition("=") for line in listed.splitlines()):
         name = names.get(key.rpartition(".")[2])

@@ -51,10 +51,10 @@ def configure(config: Config) -> None:
     config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
     run = [BoxedExecute, nbgrader.IgnorePattern, nbgrader.SaveAutoGrades]
     config.Autograde.autograde_preprocessors = [*run, nbgrader.AssignLatePenalties, end]
-    # by default nbgrader gives no points if a cell writes to stderr, even a warning
+    # by default nbgrader gives no points for a cell that writes to stderr, even for a warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."
-    # the feedback shows a run without hidden tests, and the scores from the gradebook
+    # the feedback shows scores from the gradebook, and a run without hidden tests
     clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
     shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
     config.GenerateFeedback.preprocessors = shown
@@ -82,7 +82,7 @@ def inert_html(content: object) -> str:
 
 
 class _Renderer(IPythonRenderer):
-    """Render Markdown, with the addresses of links and of missing pictures as text."""
+    """Render Markdown; links and missing pictures become text with their addresses."""
 
     def link(self, text: str, url: str, title: str | None = None) -> str:
         return f"{text} ({html.escape(url)})"
@@ -112,7 +112,7 @@ class RestoreCells(nbgrader.OverwriteCells):  # the base class adds the hidden t
         remarks = locked_cells.restore(nb, original)
         if len(remarks) > 2:
             remarks[1:] = [f"and {len(remarks) - 1} more changes"]
-        for cell in nb.cells:  # nbgrader stops at text that looks like the mark of a region
+        for cell in nb.cells:  # nbgrader fails at text that looks like the mark of a region
             if locked_cells.is_answer(cell) or not marks_of(cell):
                 regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
                 cell.source = re.sub(regions, r"\1-\2", cell.source)

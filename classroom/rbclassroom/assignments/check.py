@@ -65,7 +65,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
 
 
 def _find_original(path: Path) -> tuple[str, bytes]:
-    """Return the name and the content of a set's original, which is generated in the course."""
+    """Return the name and the content of the original notebook of a set."""
     folder, course = path.parent / "original", Path("notebooks", "assignments")
     if course.is_dir() and not folder.exists():
         from rbclassroom.assignments.handout import release  # this needs nbgrader
@@ -81,8 +81,6 @@ def _find_original(path: Path) -> tuple[str, bytes]:
 
 
 class _Client(BoundedClient):
-    """Print the number of the running cell, and record the time that each cell takes."""
-
     at, began, took = 0, 0.0, dict[int, float]()
 
     def on_cell_start(self, cell: NotebookNode, cell_index: int) -> None:
@@ -125,12 +123,11 @@ def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
 
 
 def _error(cell: NotebookNode) -> str:
-    """Return the last line of the last error of a cell, or an empty string."""
     errors = [o for o in cell.get("outputs", []) if o.output_type == "error"]
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
-    hint = lines[-1] and errors[-1].ename == "NotYet"  # a hint is complete without the name NotYet
+    hint = lines[-1] and errors[-1].ename == "NotYet"  # show a hint without the name of its error
     return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
 
 

@@ -34,15 +34,15 @@ FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
 BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["not on the roster", "missing"]
-Row = tuple[str, str, str]  # the name of a list, a file or a student, and the reason
+Row = tuple[str, str, str]  # the list, the file or student, and the reason
 
 
 class Upload(NamedTuple):
-    """A notebook that a student handed in; of several, the last one in sorted order is used."""
+    """A notebook that a student handed in; the last of several, in sorted order, is used."""
 
-    number: int  # given by Canvas; later uploads have larger numbers
+    number: int  # Canvas gives larger numbers to later uploads
     date: str
-    prepared: bool  # the student's check wrote it
+    prepared: bool  # the student's check wrote the file
     file: str
     about: dict[str, str]
     content: bytes
@@ -110,7 +110,7 @@ def _find(folder: Path) -> Iterator[Upload | Row]:
 def _look(label: str, name: str, stream: IO[bytes], date: datetime) -> Iterator[Upload | Row]:
     """Yield the notebooks in a file, or the reason why it is not used.
 
-    `name` is the path of the file, including the zips that contain it; it identifies the student.
+    `name` is the path of the file through all zips, and identifies the student.
     """
     suffix, owner = Path(name).suffix.lower(), _owner(name)
     try:
@@ -145,7 +145,7 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
             if wanted and entry.file_size > FILE_BYTES:
                 raise ValueError("it is too large")
             content = zipped.read(entry) if wanted else b""
-            # dates in a student's own zip are not used
+            # dates in a zip of a student are not used
             when = date if upload else datetime(*entry.date_time)
         except BROKEN as error:
             yield "refused", f"{label}: {inner}", str(error)
@@ -184,7 +184,6 @@ def _read_sets(assignments: Path) -> dict[str, set[str]]:
 
 
 def _read_roster(path: Path) -> list[dict[str, str]]:
-    """Return the rows of the roster, or no rows if it does not exist."""
     if not path.exists():
         return []
     try:
@@ -224,19 +223,19 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
     """Return a student's id in the roster, or an id made from the name."""
     canvas, plain, number = "number" in about, _plain(about["name"]), _plain(about["id"])
     found = [r["id"] for r in roster if canvas and r.get("lms_user_id") == about["id"]]
-    key: Any = "".join if canvas else sorted  # Canvas joins last name and first name without spaces
+    key: Any = "".join if canvas else sorted  # Canvas writes names without spaces, last name first
     for row in roster if plain and not found else ():
         words = _plain(f"{row.get('last_name', '')} {row.get('first_name', '')}")
         found += [row["id"]] * (key(words.split("_")) == key(plain.split("_")))
     if len(found) == 1:
         return found[0]
-    # unknown students of Canvas, anonymous students and reserved names need a number
+    # add a number to unknown Canvas students, and to anonymous or reserved names
     alone = plain not in ("", "participant", "aux", "con", "nul", "prn") and not canvas
     return plain if alone else f"{plain}_{number}".strip("_") or "student"
 
 
 def _take(best: Upload, place: Path) -> Row:
-    """Write an upload to its folder, unless a newer one is there; return a row for it."""
+    """Write an upload to its folder, unless a newer file is there; return a row for the report."""
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
     text = decode(best.content).encode()
     note = "; it is now stored in UTF-8" * (text != best.content)

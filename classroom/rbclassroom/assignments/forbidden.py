@@ -17,7 +17,7 @@ from rbclassroom.assignments.locked_cells import grade_id, is_answer
 
 # these names give access to objects that the code does not mention
 NAMES = {"exec", "eval", "compile", "globals", "locals", "vars", "setattr", "delattr"}
-NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # In and _ih show the tests
+NAMES |= {"get_ipython", "__import__", "__builtins__", "In", "_ih"}  # In and _ih contain the tests
 ATTRIBUTES = {"modules", "get_ipython", "displayhook", "settrace", "setprofile", "ast_transformers"}
 ATTRIBUTES |= {"input_transformers_post", "input_transformers_cleanup", "_getframe", "tb_frame"}
 ATTRIBUTES |= {"f_back", "f_globals", "f_locals", "f_builtins", "gi_frame", "__dict__", "__code__"}
@@ -44,7 +44,7 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
     names = {_defines(node) for node in given} - {""}
     attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
-    modules = set[str]()  # imported names, and names of parts of modules
+    modules = set[str]()  # imported names, and names for parts of modules
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))
@@ -55,7 +55,6 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
 
 
 def _parsed(source: str) -> ast.Module:
-    """Return the syntax tree of the code, or an empty tree if the code is not valid Python."""
     for text in (HARMLESS.sub("pass", TIMED.sub("", source)), source):
         try:
             tree = ast.parse(TransformerManager().transform_cell(text))
@@ -82,7 +81,7 @@ def _root(node: ast.AST) -> str:
 
 
 def _rebound(node: ast.AST, local: bool) -> list[str]:
-    """Return the global names that a node binds, except for the usual ones, such as np."""
+    """Return the global names that a node binds, except usual abbreviations such as np."""
     match node:
         case ast.Global(names=names):
             return names
@@ -93,7 +92,7 @@ def _rebound(node: ast.AST, local: bool) -> list[str]:
         case ast.alias(name=name, asname=short) if not local:
             usual = CUSTOMARY.get(short or "", short)
             return [short] if short and usual != name.rpartition(".")[2] else []
-    return [] if local else [getattr(node, "name", "")]  # definitions, and patterns of `match`
+    return [] if local else [getattr(node, "name", "")]  # a definition or a pattern of `match`
 
 
 def _overrides(
@@ -112,7 +111,7 @@ def _overrides(
             case ast.Attribute(attr=name, ctx=ast.Load()) if name in ATTRIBUTES:
                 yield node.lineno, f"uses {name}"
             case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
-                root = _root(node)  # `self` belongs to a class of the student
+                root = _root(node)  # attributes of `self` are the student's own
                 if root in modules or (name in attributes and root != "self"):
                     yield node.lineno, f"replaces {ast.unparse(node)}"
             case ast.Call(func=ast.Name(id="getattr"), args=args):

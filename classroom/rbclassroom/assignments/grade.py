@@ -33,10 +33,10 @@ from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.tables import update
 
-WORKERS = 2  # students graded at the same time
+WORKERS = 2  # number of students graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
-Job = tuple[str, str]  # the names of a set and of a student
+Job = tuple[str, str]  # the name of a set, and the name of a student
 Row = dict[str, Any]
 
 
@@ -131,7 +131,6 @@ def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[J
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
-    """Yield unused files that may belong to this set, and students without files, with reasons."""
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
     for row in _report(assignments):
         what, student = row["what"], row["what"].removesuffix(f", {name}")
@@ -144,13 +143,11 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
 
 
 def _perhaps_late(assignments: Path) -> set[str]:
-    """Return the names ``STUDENT, SET`` of submissions that `collect` listed as perhaps late."""
     rows = (row for row in _report(assignments) if row["list"] == "late")
     return {row["what"] for row in rows if row["why"].startswith("perhaps")}
 
 
 def _report(assignments: Path) -> list[dict[str, str]]:
-    """Return the rows that `collect` reported."""
     report = assignments / "submitted" / "report.csv"
     text = report.read_text("utf-8-sig") if report.exists() else ""
     return list(csv.DictReader(io.StringIO(text, newline="")))
@@ -186,7 +183,6 @@ def last_line(done: dict[str, str]) -> str:
 
 
 def _points(gradebook: Any) -> set[tuple[str, str, float]]:
-    """Return the points of each student in each set."""
     submissions = (each for student in gradebook.students for each in student.submissions)
     return {(each.student_id, each.assignment.name, each.score) for each in submissions}
 
@@ -209,12 +205,12 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     if boxed and sandbox.missing():
         raise Refused(f"the sandbox does not work any more: {sandbox.missing()}")
     config = course_config(name, folder)
-    if hasattr(signal, "alarm"):  # a time limit for both runs together
+    if hasattr(signal, "alarm"):  # a time limit for grading and feedback together
         signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
     graded = folder / "autograded" / student / name / f"{name}.ipynb"
     before = _words(graded)
-    if glob.escape(student) != student:  # nbgrader would read the name as a pattern
+    if glob.escape(student) != student:  # nbgrader reads this name as a pattern
         raise Refused("the name of the folder contains [, * or ?; rename the folder")
     given = {path.name for path in find_set(name, folder).iterdir()}
     check_submission(folder / "submitted" / student / name, name, given)
@@ -257,12 +253,11 @@ def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
 
 
 def _to_do(grades: Iterable[Any]) -> list[str]:
-    """Return the names of the answers that are still to be graded by hand."""
     return [g.name for g in grades if g.auto_score is None and g.manual_score is None]
 
 
 def _words(path: Path) -> dict[str, str]:
-    """Return the answers that a person grades, from an autograded notebook."""
+    """Return those answers in an autograded notebook that are graded by hand."""
     cells = nbformat.read(path, as_version=4).cells if path.exists() else []
     words = (cell for cell in cells if is_answer(cell) and locked_cells.marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}
@@ -287,7 +282,6 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
 
 
 def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[str]]) -> Row:
-    """Return the row of a student in the table."""
     if error := work.exception():  # the other submissions are still graded
         _withdraw(gradebook, root, name, student)
         why = str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
@@ -313,7 +307,7 @@ def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[
 
 
 def _tidy(words: str) -> str:
-    """Return a remark as a short printable line; it may quote a student."""
+    """Return a remark, which may quote a student, as a short printable line."""
     words = "".join(letter if letter.isprintable() else "?" for letter in words)
     return words if len(words) <= 300 else f"{words[:300]}…"
 

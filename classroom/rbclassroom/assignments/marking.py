@@ -33,11 +33,11 @@ class Problem:
     """A problem whose answer is a function that returns numbers.
 
     The `inputs` distinguish every mistake from the answer and from the other mistakes. A result may
-    differ from the answer by `accuracy` times the largest entry of the answer, or times 1 if this
-    is larger. Entries with the indices `angles` are compared up to full turns.
+    differ from the answer by `accuracy` times the largest entry of the answer, or by `accuracy` if
+    this entry is below 1. Entries with the indices `angles` are compared up to full turns.
     """
 
-    names: Sequence[str]  # of the arguments
+    names: Sequence[str]  # the names of the arguments
     inputs: Sequence[Sequence[Any]]  # the arguments of each trial
     answers: Sequence[Any]  # the right result of each trial
     mistakes: Sequence[Mistake] = ()
@@ -76,7 +76,7 @@ class Problem:
             raise NotYet(hint)
         numbers = [(value, as_numbers(value)) for value in given]
         meant = [value if number is None else np.radians(number) for value, number in numbers]
-        if hint := self._hint(meant):  # the results are in degrees
+        if hint := self._hint(meant):  # the student's results are in degrees
             raise NotYet(f"{IN_RADIANS} There is a second mistake: {hint}")
         first = right.index(False)
         arguments = zip(self.names, self.inputs[first], strict=False)
@@ -85,7 +85,8 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            trials = zip(given, *mistake.results, strict=True)  # any of the functions may match
+            # in each trial, any function of the mistake may match
+            trials = zip(given, *mistake.results, strict=True)
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""
@@ -116,11 +117,11 @@ class Problem:
 
 @dataclass(frozen=True)
 class Drawing(Problem):
-    """A problem whose answer is a function that draws; the data of its artists are compared.
+    """A problem whose answer is a function that draws on axes; the drawn data are compared.
 
-    The student's function gets axes before the arguments of `inputs`. A result is a list of
-    curves, each an array of points, shape (n, 2); the function may draw further curves. The bars of
-    a histogram give a curve through the midpoints of their upper edges. Both axes need a label.
+    The student's function gets axes before the arguments of `inputs`. A result is a list of curves,
+    which are arrays of points of shape (n, 2). The function may draw further curves. The curve of a
+    histogram goes through the midpoints of the upper edges of its bars. Both axes need a label.
     """
 
     accuracy: float = 1e-6
@@ -184,7 +185,7 @@ def curves_of(axes: Any) -> list[Array]:
         if (style := line.get_drawstyle()) != "default":
             outlines.append(np.column_stack(STEP_LOOKUP_MAP[style](*line.get_xydata().T)))
     for a, b in ((np.array(outline[:-1]), np.array(outline[1:])) for outline in outlines):
-        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # the top of a step runs to the right
+        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # top edges of steps run rightwards
         found.append((a + b)[treads] / 2)
     for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
         found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))

@@ -11,7 +11,7 @@ from rbclassroom.assignments.student_code import NotYet, call_student
 from rbcourse import Array, exp_so3, matrix_from_quaternion
 from rbcourse.sampling import Rng, angle_law
 
-DELTA = 1e-6  # upper bound of the probability that a correct sampler is rejected
+DELTA = 1e-6  # the probability of rejecting a correct sampler is below this value
 Rows = dict[str, Array]
 
 
@@ -19,24 +19,25 @@ Rows = dict[str, Array]
 class Sampler:
     """A problem whose answer is a sampler: the student's ``function(rng)`` returns one draw.
 
-    A correct sampler is rejected with a probability below `DELTA`, whatever generator it uses. This
-    follows from the inequality of Dvoretzky, Kiefer and Wolfowitz, with Massart's constant: the
-    observed distribution of n independent numbers is off by more than e with a probability of at
-    most 2 exp(−2 n e²), for every n.
+    A correct sampler is rejected with a probability below `DELTA`, for every generator. This
+    follows from the inequality of Dvoretzky, Kiefer and Wolfowitz, with Massart's constant. For
+    every n, the observed distribution of n independent numbers is off by more than e with a
+    probability of at most 2 exp(−2 n e²).
 
-    The rows of `uniforms` are independent numbers, uniform on [0, 1], if the sampler is correct.
-    The results of `mistakes` are quantiles of the distributions of these numbers.
+    If the sampler is correct, each row of `uniforms` has independent numbers that are uniform on
+    [0, 1]. If the sampler makes a known mistake, these numbers have other distributions, and
+    `mistakes` has the quantiles of these distributions.
     """
 
     shape: tuple[int, ...]  # of one draw
-    fault: Callable[[Array], str]  # a hint if one of the stacked draws is invalid, or ""
-    uniforms: Callable[[Array], Rows]  # named rows of numbers from stacked draws
+    fault: Callable[[Array], str]  # returns a hint if a stacked draw is invalid, else ""
+    uniforms: Callable[[Array], Rows]  # returns named rows of numbers from stacked draws
     mistakes: Sequence[Mistake]
     allowed: Sequence[str] = ()  # as in `Problem`
     draws: int = 20_000
 
     def accepts(self, function: Callable[..., Any], rng: Rng = None) -> bool:
-        """Call a function for many draws, and compare their distributions with the right ones."""
+        """Call a sampler many times, and compare its distributions with the right ones."""
         rng = np.random.default_rng(rng)
         drawn = self._as_draws(call_student(function, (rng,), self.allowed, self.draws))
         if (drawn[:10] == drawn[0]).all():
@@ -60,7 +61,7 @@ class Sampler:
 
     def _hint(self, rows: Rows) -> str:
         """Return the hint of the mistake with the nearest distributions, or "" if none is near."""
-        near, hint = 2.0, ""  # twice the bound; two samples of one distribution are nearer
+        near, hint = 2.0, ""  # two samples of one distribution differ by less than 2 bounds
         for mistake in self.mistakes:
             for result in mistake.results:
                 pairs = zip(rows.items(), result, strict=True)

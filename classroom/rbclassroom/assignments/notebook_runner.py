@@ -11,8 +11,8 @@ from traitlets import Integer
 
 from rbclassroom.course.notebooks import kernel_address
 
-CELL_SECONDS = 30  # limit for a cell, in the check and in grading
-ROOM = {"stream": 100_000, "data": 2_000_000}  # characters of a cell's outputs, by kind
+CELL_SECONDS = 30  # the time limit for a cell, in the check and in grading
+ROOM = {"stream": 100_000, "data": 2_000_000}  # limits for a cell's outputs, in characters
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
 CUT = "the output is too large, and the rest is left out"
@@ -20,7 +20,7 @@ WIDGET = "application/vnd.jupyter.widget-view+json"
 
 
 class BoundedClient(NotebookClient):
-    """A client for a notebook whose cells may loop, print without end, or end their kernel.
+    """A client for a notebook whose cells may loop or print without end, or end their kernel.
 
     The kernel keeps its files in `folder`, which has to be set before the start. `slow` has the
     indices of the cells that took too long. `cut` has the indices of the cells whose output is
@@ -65,7 +65,7 @@ class BoundedClient(NotebookClient):
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
-            if kind != "stream":  # widgets are dropped because they need their kernel
+            if kind != "stream":  # drop widgets, because they do not work without a kernel
                 data, kind = content["data"].items(), "data"
                 content["data"] = {k: v for k, v in data if isinstance(v, str) and k != WIDGET}
             size = len(content["text"] if kind == "stream" else json.dumps(content["data"]))

@@ -24,8 +24,8 @@ import rbcourse
 
 PROCESSES = 128  # the largest number of processes and threads
 FILE_BYTES = 100_000_000
-NOBODY = 2**30  # if root grades, kernels get unused user ids from this one on
-# each command begins its own Linux session, because keys of a session outlive its processes
+NOBODY = 2**30  # if root grades, each kernel gets an unused user id above this number
+# keys of a Linux session outlive its processes, so each command begins a new session
 KEYCTL = {"x86_64": 250, "aarch64": 219}.get(platform.machine(), -1)
 ALONE = f"import ctypes, os, sys; ctypes.CDLL(None).syscall({KEYCTL}, 1, None); "
 ALONE += "os.execvp(sys.argv[1], sys.argv[1:])"
@@ -55,7 +55,7 @@ def prepare(folder: Path) -> None:
     """Make the folders in which the kernel works and keeps its files."""
     for name in ("work", "tmp", "matplotlib"):
         (folder / name).mkdir(exist_ok=True)
-    # the copied list saves Matplotlib a search for fonts, which takes seconds
+    # without this list, Matplotlib needs seconds to search for fonts
     for fonts in Path(matplotlib.get_cachedir()).glob("fontlist-*.json"):
         shutil.copy(fonts, folder / "matplotlib")
 
@@ -88,8 +88,9 @@ def box(folder: Path, seconds: int) -> list[str]:
     python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
-    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root  # dropped when the user changes
-    # the command ends with this process, or after some seconds
+    # these powers are lost when the user changes
+    powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root
+    # the command ends when this process ends, or after `seconds`
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]
     words += [sys.executable, "-ISc", ALONE, "bwrap", "--die-with-parent", "--new-session"]
     words += [*(f"--unshare-{kind}" for kind in kinds), "--cap-drop", "ALL"]
@@ -98,9 +99,9 @@ def box(folder: Path, seconds: int) -> list[str]:
     for path in SYSTEM:
         link = os.path.islink(path)
         words += ["--symlink", os.readlink(path), path] if link else ["--ro-bind-try", path, path]
-    for path in ("/tmp", "/dev/shm"):  # by default they are in memory, without a limit
+    for path in ("/tmp", "/dev/shm"):  # by default these folders are in memory, without a limit
         words += ["--bind", str(folder / "tmp"), path]
-    for parent in sorted(seen)[1:]:  # otherwise they keep the permissions of the real folders
+    for parent in sorted(seen)[1:]:  # without this, parent folders keep their real permissions
         words += ["--dir", parent]
     for path in python:
         words += ["--ro-bind", path, path]
@@ -121,4 +122,4 @@ def put_in_box(manager: Any, folder: Path, seconds: int) -> None:
     manager.connection_file = str(folder / "connection.json")
     manager.write_connection_file()
     spec.argv = [*box(folder, seconds), sys.executable, *spec.argv[1:]]
-    spec.interrupt_mode = "message"  # a signal would end the sandbox
+    spec.interrupt_mode = "message"  # an interrupt by a signal would end the sandbox

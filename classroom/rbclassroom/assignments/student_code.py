@@ -1,4 +1,4 @@
-"""Call a student's function; report errors with their line, and functions that are not allowed.
+"""Call a student's function, and report errors and functions that are not allowed.
 
 Only the names in a function are examined. This helps honest students; it is not protection.
 """
@@ -62,7 +62,7 @@ def _foreign_names(function: Any, allowed: Sequence[str]) -> Iterator[str]:
             # names that the function itself imports are not globals
             found = [value.__globals__.get(name, sys.modules.get(name)) for name in names]
         elif isinstance(value, ModuleType) and name.partition(".")[0] in LIBRARIES:
-            # an attribute may belong to any module, so each module is searched
+            # an attribute may belong to any module, so search all modules
             found = [getattr(value, inner) for inner in names if hasattr(value, inner)]
         elif (own := module.partition(".")[0]) in LIBRARIES and (own, name) not in permitted:
             yield f"{own}.{name}"

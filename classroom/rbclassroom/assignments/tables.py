@@ -3,7 +3,7 @@
 The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder. Students do not get the
 table. It has a section ``SLUG`` for the problem with the cells ``SLUG-answer`` and ``SLUG-test``. A
 section has the inputs and common mistakes. Each mistake has a hint, and the bodies of functions
-that make the mistake. The right answers are those of the notebook.
+that make the mistake. The right answers come from the notebook.
 """
 
 import copy

@@ -57,10 +57,10 @@ MADE = "made-by-course.txt"
 
 @dataclass
 class Sources:
-    """The sources of the book in `folder`, and the files in `extra`, which are copied to the book.
+    """The sources of the book in `folder`, and files in `extra` that are copied to the book.
 
-    `repository` is the GitHub repository ``owner/name`` from which Binder takes the lessons, or is
-    empty. `live` tells whether Python runs in the pages. `shown` is the data of the templates in
+    Binder takes the lessons from the GitHub repository ``owner/name`` in `repository`, if it is not
+    empty. `live` tells whether Python runs in the pages. `shown` has data for the templates in
     ``pages/``.
     """
 
@@ -73,7 +73,7 @@ class Sources:
 
     @cached_property
     def works(self) -> dict[str, str]:
-        """A dict from the keys of the cited works to their names."""
+        """A dict that maps the keys of the cited works to their names."""
         return names(self.read("notebooks/REFERENCES.bib"))
 
     def read(self, path: str) -> str:
@@ -207,7 +207,7 @@ class Sources:
                 self.shown["run"] = relinked(
                     text[text.index("| to learn |") : text.index("<!--")], path, page
                 )
-                continue  # this page has a template
+                continue  # the template of this page uses the text
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
@@ -255,7 +255,7 @@ def _write(path: Path, text: str) -> None:
 def write_sources(
     root: Path, folder: Path, extra: Path, repository: str = "", pyodide: Path | None = None
 ) -> None:
-    """Write all sources of the book to the folders `folder` and `extra`, see `Sources`.
+    """Write all sources of the book to `folder` and `extra`, see `Sources`.
 
     `pyodide` is a folder with the files of Pyodide; if it is given, Python runs in the pages.
     """

@@ -11,7 +11,7 @@ _WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
 
 
 def names(bibliography: str) -> dict[str, str]:
-    r"""Return a dict from the keys of works in a BibTeX file to the names that texts cite.
+    r"""Return a dict that maps the keys of works in a BibTeX file to names for citations.
 
     Examples
     --------

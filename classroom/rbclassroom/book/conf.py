@@ -23,7 +23,7 @@ nb_code_prompt_show, nb_code_prompt_hide = "Show the code", "Hide the code"
 myst_enable_extensions = ["amsmath", "dollarmath"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
-toc_object_entries = False  # otherwise each page lists all objects in its navigation
+toc_object_entries = False  # if true, the navigation of each page lists all objects
 
 html_theme = "furo"
 html_static_path = ["static"]
@@ -46,14 +46,14 @@ def name_sections(_app: Any, doctree: Any) -> None:
 
 
 def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
-    """Omit members of other packages, and the constant ENGINE, a page of JavaScript."""
+    """Omit members of other packages, and the constant ENGINE, which is JavaScript."""
     module = getattr(obj, "__module__", None) or "rbcourse"
     own = module.startswith(("rbcourse", "rbclassroom"))
     return True if name == "ENGINE" or not own else None
 
 
 def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:
-    """Link the keys in a docstring to the ledger, and list the tests of a function below it."""
+    """Link the keys in a docstring to the ledger, and add the tests of a function."""
     for i, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
             lines[i] = KEY.sub(lambda key: f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__", line)
@@ -86,7 +86,7 @@ def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
 
 
 def write_texts(app: Any, failed: Exception | None) -> None:
-    """Write the words of all pages to a file, from which search results show excerpts."""
+    """Write the words of all pages to a file; search results show excerpts from this file."""
     if failed:
         return
     texts = {}

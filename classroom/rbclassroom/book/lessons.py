@@ -87,7 +87,7 @@ def without_outputs(notebook: NotebookNode) -> NotebookNode:
 
 
 def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
-    """Return cells in which each answer, up to the next heading, is folded."""
+    """Return cells in which each answer is folded; an answer ends at the next heading."""
     result, inside = [], False
     for cell in cells:
         heading = cell.cell_type == "markdown" and re.match(r"#+ ([^\n]*)\n?", cell.source)
@@ -107,7 +107,7 @@ def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
 def with_picture_files(
     shown: str, known: dict[bytes, str], folder: Path, loading: str = "lazy"
 ) -> str:
-    """Return HTML whose pictures are files; by default, they are loaded when they become visible.
+    """Return HTML with pictures in separate files, which by default are loaded when visible.
 
     `known` maps the contents of pictures to their addresses. Other pictures are written to the
     folder ``pictures`` inside `folder`. The attribute ``data-cuts`` of a wide picture lists the
@@ -131,7 +131,7 @@ def with_picture_files(
 
 
 def cuts_of(still: Image.Image) -> list[float]:
-    """Return the places at which a wide still can be cut between panels, as shares of its width.
+    """Return the places at which a wide still can be cut between panels, as fractions of its width.
 
     Each cut is in the middle of blank columns, near a boundary between equal parts of the still.
     The width of these parts is at most 1.5 times their height.
@@ -157,7 +157,6 @@ def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
     """
 
     def kept(data: str) -> tuple[str, str]:
-        """Write data to a file; return the data's name, and the tag that loads the file."""
         name = hashlib.sha256(data.encode()).hexdigest()[:16]
         text = f'(window.rbcourseStates ??= {{}})["{name}"] = {data};\n'
         _put(folder / "pictures" / f"{name}.js", text)
@@ -240,7 +239,7 @@ def prepared(
 ) -> str:
     """Prepare the notebook of a lesson for the book, and return its run sheet.
 
-    Its pictures become files, see `with_picture_files`; `lead` is the picture at its beginning.
+    The pictures become files, see `with_picture_files`. `lead` is the picture at the beginning.
     """
     path, page, sheet_page = f"notebooks/{name}", f"lessons/{name}", f"teach/{Path(name).stem}.md"
     lessons = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
@@ -276,7 +275,7 @@ def prepared(
 
 
 def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:
-    """Put the number of a lesson before its title, and buttons for its uses below the title."""
+    """Put the number of a lesson before its title, and buttons below the title."""
     title, _, rest = notebook.cells[0].source.partition("\n")
     slides = f"../slides/{Path(name).stem}.html"
     ways = [

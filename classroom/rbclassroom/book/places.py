@@ -30,13 +30,13 @@ def source_of(path: str) -> str | None:
 
 
 def full_name(module: str) -> str:
-    """Return the full dotted name of a module or function, from its name within its package."""
+    """Return the full dotted name of a module or function, given its name within its package."""
     package = "rbclassroom" if module.split(".")[0] in CLASSROOM else "rbcourse"
     return f"{package}.{module}"
 
 
 def file_of(module: str) -> str:
-    """Return the file of a module, from its name within its package.
+    """Return the file of a module, given its name within its package.
 
     Examples
     --------
@@ -48,12 +48,12 @@ def file_of(module: str) -> str:
 
 
 def has_page(module: str) -> bool:
-    """Tell whether a module has its own page; modules for maintainers and private ones do not."""
+    """Tell whether a module has a page; private modules and modules for maintainers have none."""
     return not re.search(r"\b_|^(?:figures|course|lecture|assignments|book)\b", module)
 
 
 def anchor(key: str) -> str:
-    """Return the anchor of a row in the page of the ledger, from the key of the row.
+    """Return the anchor of the row with this key in the page of the ledger.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def anchor(key: str) -> str:
 
 
 def fragment(heading: str) -> str:
-    """Return the anchor of a section in the page of a lesson, from its heading or its number.
+    """Return the anchor of a section in a lesson's page, given the section's heading or number.
 
     Examples
     --------
@@ -84,14 +84,14 @@ def link(to: str, page: str, text: str) -> str:
 
 
 def to_test(test: str, page: str = "ledger.md") -> str:
-    """Return a link to a test, from its name in the ledger."""
+    """Return a link to a test, given its name in the ledger."""
     path, name = test.split(".py::")
     home = "classroom/tests" if path.split("/")[0] in CLASSROOM else "tests"
     return link(f"code/{home}/{path}.html#{name}", page, name.replace("_", "_<wbr>"))
 
 
 def to_tests(tests: list[str], page: str = "ledger.md") -> str:
-    """Return links to tests; several links are folded."""
+    """Return links to tests; two or more links are folded."""
     links = "<br>".join(to_test(test, page) for test in tests)
     more = f"<details><summary>{len(tests)} tests</summary>{links}</details>"
     return more if len(tests) > 1 else links
@@ -108,14 +108,14 @@ def to_function(name: str, page: str = "ledger.md") -> str:
 
 
 def to_section(place: str, page: str = "ledger.md") -> str:
-    """Return a link to a section of a lesson, from its name in the ledger."""
+    """Return a link to a section of a lesson, given its name in the ledger."""
     file, section = place.split(".ipynb, ", 1)
     text = f"{file[:2]} {'§ ' * section.isdigit()}{section}"
     return link(f"lessons/{lesson_of(place)}", page, text)
 
 
 def lesson_of(place: str) -> str:
-    """Return the address of a section within the folder ``lessons``, from its name in the ledger.
+    """Return the address of a section in the folder ``lessons``, given its name in the ledger.
 
     Examples
     --------

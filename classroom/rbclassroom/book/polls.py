@@ -10,7 +10,7 @@ _IDEA = re.compile(r"(?:(?<=[.?!)] )|^)(?=\*\*[A-Z]\*\*)", re.MULTILINE)
 
 
 def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
-    r"""Return the right letter of a poll, and the explanation of each letter, from its answer.
+    r"""Find the right letter, and the explanation of each letter, in the answer to a poll.
 
     The answer is given as the texts of its cells. A paragraph with the right letter in bold
     explains this letter; the items of a list explain the other letters.

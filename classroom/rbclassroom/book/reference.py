@@ -19,7 +19,7 @@ from rbclassroom.course.ledger import Entry
 
 
 def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return a dict from headings to lists of the modules that have a page; see `module`."""
+    """Return the modules that have a page, as a dict with headings as keys; see `module`."""
     groups = {title: names.split() for title, names in CONTENTS["modules"].items()}
     for room, title in CONTENTS["rooms"].items():
         folder = root / file_of(room).removesuffix(".py")
@@ -48,7 +48,6 @@ def module(name: str, root: Path) -> dict[str, Any]:
 
 
 def _documented(tree: ast.Module) -> list[str]:
-    """Return the documented public constants of a module."""
     found = []
     for node, after in pairwise(tree.body):
         match node, after:
@@ -61,7 +60,7 @@ def _documented(tree: ast.Module) -> list[str]:
 
 
 def shown_code(root: Path) -> list[str]:
-    """Return the files whose code has a page; tests that contain answers do not have one."""
+    """Return the files whose code has a page; tests that contain answers have no page."""
     packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
     paths = [path for package in packages for path in (root / package).rglob("*.py")]
     paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
@@ -91,7 +90,7 @@ def coloured(source: str) -> str:
 
 
 def naming(root: Path) -> dict[str, list[str]]:
-    """Return a dict from the names of functions to the tests that use them.
+    """Return a dict that maps the names of functions to the tests that use them.
 
     Functions have names such as ``so3.exp_so3``. Tests are named as in the ledger:
     ``test_so3.py::test_exp``.
@@ -117,7 +116,6 @@ def naming(root: Path) -> dict[str, list[str]]:
 
 
 def _imported(tree: ast.Module) -> dict[str, str]:
-    """Return a dict from the imported names in a file to their full names."""
     known = {}
     for node in tree.body:
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -128,7 +126,7 @@ def _imported(tree: ast.Module) -> dict[str, str]:
 
 
 def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return the tests of a function in the test file of its module, or else all its tests."""
+    """Return the tests of a function in its module's test file, or else its tests elsewhere."""
     *room, module, _ = name.split(".")
     own = "/".join([*room, f"test_{module}"])
     found = named.get(name, [])

@@ -46,7 +46,7 @@ def _checksum(picture: re.Match[str]) -> str:
 
 
 def reconciled_notebook(stored: str, again: str) -> str:
-    """Return the notebook of a new run, with stored pictures in place of new ones that agree."""
+    """Return the new notebook; stored pictures replace new pictures that agree with them."""
     if stored == again:
         return again
     notebook = nbformat.reads(again, as_version=4)
@@ -63,7 +63,7 @@ def reconciled_notebook(stored: str, again: str) -> str:
 
 
 def reconciled(stored: str, again: str) -> str:
-    """Return a new page, with stored pictures in place of new ones that agree."""
+    """Return a new page; stored pictures replace new pictures that agree with them."""
     kept = [match[0] for match in PICTURE.finditer(stored)]
     if len(kept) != len(PICTURE.findall(again)):
         return again
@@ -172,7 +172,8 @@ def look_the_same(one: bytes, other: bytes) -> bool:
 
     A pixel differs visibly if a colour differs by more than 16 of 255 levels. At most 1 pixel in
     10,000 may differ visibly, and at most 12 in a square of 16 × 16; a different letter changes
-    about thirty. The mean difference has to be below 0.05 levels. Frames have the same durations.
+    about thirty pixels. The mean difference has to be below 0.05 levels. Frames have the same
+    durations.
     """
     if one == other:
         return True
@@ -181,7 +182,6 @@ def look_the_same(one: bytes, other: bytes) -> bool:
 
 
 def _frames(content: bytes) -> Iterator[tuple[Any, NDArray[np.uint8]]]:
-    """Yield the duration in milliseconds and the pixels of each frame of a picture."""
     with Image.open(io.BytesIO(content)) as picture:
         mode = "RGB" if picture.format == "GIF" else "RGBA"
         for frame in ImageSequence.Iterator(picture):
@@ -213,7 +213,7 @@ def _same_columns(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
         return False
     try:
         ours, theirs = (np.array(column[1:], dtype=float) for column in (one, other))
-    except ValueError:  # two columns of words that differ
+    except ValueError:  # the columns are words, and they differ
         return False
     largest = np.abs(theirs).max(initial=0, where=np.isfinite(theirs))
     allowed = np.maximum(2e-11 * np.abs(theirs), max(1e-12 * largest, 1e-13))

@@ -28,8 +28,9 @@ get_config().ContentsManager.pre_save_hook = before_saving
 def configure() -> Path:
     """Write the configuration of JupyterLab into the environment; return its folder.
 
-    It switches off news and the extensions for lecturers, shows full names, and encrypts the
-    messages of kernels. It inverts pictures in a dark theme, and saves explorers as stills.
+    The configuration switches off news and the extensions for lecturers, shows full names, and
+    encrypts the messages of kernels. It inverts pictures in a dark theme, and saves explorers as
+    stills.
     """
     shared = Path(sys.prefix, "share")
     _write(shared / "jupyter" / "lab" / "settings" / "overrides.json", OVERRIDES)
@@ -40,7 +41,7 @@ def configure() -> Path:
     server = {
         "jpserver_extensions": extensions,
         "tornado_settings": {"static_custom_path": [str(folder / "custom")]},
-        "answer_yes": True,  # Ctrl-C ends the server at once
+        "answer_yes": True,  # Ctrl-C ends the server without a question
     }
     settings = {
         "ServerApp": server,
@@ -78,7 +79,7 @@ def main() -> None:
     paths = [str(configure()), os.environ.get("JUPYTER_CONFIG_PATH")]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
     print("JupyterLab opens in the browser. To stop it, press Ctrl-C here.", flush=True)
-    # JupyterLab itself causes these warnings; it reads its configuration twice
+    # JupyterLab causes these warnings, because it reads its configuration twice
     warnings.filterwarnings("ignore", category=DeprecationWarning)
     warnings.filterwarnings("ignore", "Overriding existing pre_save_hook")
     from jupyterlab.labapp import LabApp

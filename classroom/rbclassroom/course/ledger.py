@@ -65,8 +65,8 @@ def collect(root: Path) -> dict[str, Entry]:
     """Return the places of each entry and each misprint.
 
     The keys of a function are in the paragraph "Source: …" of its docstring, and the keys of a
-    constant are in the text below it. Tests have keys in the mark ``source``. Sections of lessons
-    have keys in small type below their headings.
+    constant are in the text below the constant. Tests have keys in the mark ``source``. Sections of
+    lessons have keys in small type below their headings.
     """
     found = {key: Entry() for key in [*WHAT, *MISPRINTS]}
     finders = {"functions": _functions, "tests": _tests, "lessons": _headings}
@@ -140,7 +140,7 @@ def render(found: dict[str, Entry]) -> str:
 
 
 def _place(function: str) -> str:
-    """Return the module of a function, or only its folder in `draw` and the classroom."""
+    """Return the module of a function; for `draw` and the classroom, return only the folder."""
     module = function.rsplit(".", 1)[0]
     return module if module.startswith("optimum") else module.split(".")[0]
 

@@ -18,7 +18,7 @@ HEAD = "# Exact versions, for every system and Python; written by 'course.py loc
 
 
 def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
-    """Return lines with the required distributions, in the preferred versions if possible."""
+    """Return a line for each required distribution, with the preferred version if possible."""
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder, "output.txt")
         output.write_text(preferred, "utf-8")

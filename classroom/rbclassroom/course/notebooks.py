@@ -95,7 +95,7 @@ def kernel_address(folder: str) -> dict[str, str]:
 
 
 def normalised(notebook: NotebookNode) -> str:
-    """Return the text of a notebook without differences between runs or between machines.
+    """Return the text of a notebook in a form that is the same for all runs and machines.
 
     Only the names of kernel and language are stored. In the outputs, memory addresses become 0x0,
     and random ids of 32 hexadecimal digits are numbered in the order of appearance.
@@ -115,7 +115,7 @@ def normalised(notebook: NotebookNode) -> str:
 
 
 def keep_stills(notebook: Any) -> None:
-    """Remove widgets that have a still, because a widget needs its kernel."""
+    """If an output has a still, remove its widget, which does not work without a kernel."""
     for cell in notebook["cells"]:
         for output in cell.get("outputs", []):
             if "text/html" in (data := output.get("data", {})):
@@ -126,8 +126,8 @@ def before_saving(model: Any, path: str, contents_manager: Any, **_: Any) -> Non
     """Save stills in place of widgets, and do not change the stored lessons.
 
     Without ``course.py lab --edit``, the stored lesson is protected if it has a copy in ``work/``.
-    It keeps its outputs if it was only opened or run. A changed lesson is not saved, and the error
-    message gives the path of the copy.
+    The stored lesson keeps its outputs if it was only opened or run. A changed lesson is not saved,
+    and the error message gives the path of the copy.
     """
     if model["type"] != "notebook" or not model.get("content"):
         return
@@ -168,7 +168,7 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
     """Execute lessons, then rewrite the stored outputs and figures that have changed.
 
     By default all lessons run; `names` limits the run to lessons whose names begin with one of
-    these words. Results that agree up to the rounding of processors are not rewritten. If a lesson
+    these words. Results that agree up to rounding are not rewritten. If a lesson
     fails, no file is rewritten. If all lessons run, figures that none of them draws are removed.
     """
     every = lesson_paths(lessons)

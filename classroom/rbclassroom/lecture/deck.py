@@ -19,7 +19,8 @@ WIDE = 1.9
 """A picture whose ratio of width to height exceeds this value is shown below its text."""
 IDEA = 26
 """The largest number of words in an idea behind an option, unless its first sentence has more."""
-_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")  # keys of works, which only the book shows
+# keys of cited works; only the book shows them
+_KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")
 _LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to files of the course
 _TOGETHER = {  # patterns of text that must stay on one line
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
@@ -96,7 +97,7 @@ def section(slide: Slide) -> str:
     elif slide.picture:
         narrow = " narrow" * (slide.words < 18)
         layout = "wide" if slide.picture.aspect > WIDE else f"split{narrow}"
-    elif "<h3>" not in words:  # a recap, or a slide after the end
+    elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
     layout += " tabled" * ("<table" in words)
     shown = f"<figure>{slide.picture.html}</figure>" if slide.picture else ""
@@ -110,7 +111,7 @@ def section(slide: Slide) -> str:
 
 
 def deck_page(deck: Deck) -> str:
-    """Return the page of a deck; its last column has the last slide, exercises and references."""
+    """Return the page of a deck; the last column has the last slide, exercises and references."""
     *parts, end = deck.sections
     stacks = [part for part in parts if part] + [[*end, *deck.behind]]
     joined = ("".join(map(section, part)) for part in stacks)

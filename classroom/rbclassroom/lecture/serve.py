@@ -115,7 +115,7 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
         if phones:
             print(f"Phones vote at {phones.url}", flush=True)
         print("Press Ctrl-C to stop.", flush=True)
-        if browser:  # some browsers return only when they are closed
+        if browser:  # with some browsers, this call returns only when they are closed
             threading.Thread(target=webbrowser.open, args=[shown], daemon=True).start()
         await asyncio.Event().wait()
 
@@ -191,7 +191,8 @@ def main() -> None:
     votes = "let phones vote, at this machine's ADDRESS in their network"
     parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help=votes)
     words = parser.parse_args()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # even if a script ignores Ctrl-C
+    # Ctrl-C ends the lecture even if the calling script ignores Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         path = find_lesson(words.lesson, Path("notebooks"))
         phones = None if words.votes is None or words.pdf else open_votes(words.votes)

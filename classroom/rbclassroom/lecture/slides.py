@@ -39,9 +39,9 @@ class Picture:
 class Slide:
     """The content of a slide, and the notes for the lecturer.
 
-    The `parts` are Markdown texts; each part after the first one appears at a key press. A row of
-    the run sheet names the slide by one of its `keys`. The slide of a poll has `options`. The slide
-    of its verdict also has the `ideas` behind the options, and the `right` letter.
+    The `parts` are Markdown texts; each part after the first one appears at a key press. In the run
+    sheet, one of the `keys` names the slide. The slide of a poll has `options`. The slide of the
+    verdict also has the `ideas` behind the options, and the `right` letter.
     """
 
     title: str
@@ -87,14 +87,12 @@ class Deck:
 
 
 class _Reader:
-    """A reader of the cells of a lesson, in their order."""
-
     def __init__(self, root: Path) -> None:
         self.root = root
         self.sections: list[list[Slide]] = [[]]
         self.behind: list[Slide] = []
         self.section = self.title = ""
-        self.keys: set[str] = set()  # keys of the next slide
+        self.keys: set[str] = set()  # the keys of the next slide
         self.ahead: list[str] = []  # notes for the next slide
         self.poll: Slide | None = None  # the poll whose verdict comes next
         self.answer = ""
@@ -111,7 +109,7 @@ class _Reader:
         (self.behind if self.after else self.sections[-1]).append(slide)
 
     def put_text(self, wish: str, own: Picture | None = None) -> None:
-        """Add the slides of a text; the last one shows `own`, the picture of the cell."""
+        """Add the slides of a text; the last slide shows `own`, the picture of the cell."""
         texts = [text.strip() for text in re.split(r"^---$", wish, flags=re.M)]
         for text in texts:
             borrowed = [self.borrowed(name) for name in _PICTURE.findall(text)]
@@ -135,7 +133,7 @@ class _Reader:
         return found[0]
 
     def note(self, text: str, ahead: bool = False) -> None:
-        """Add a note for the lecturer to the last slide, or with `ahead` to the next one."""
+        """Add a note for the lecturer to the last slide, or to the next one if `ahead` is true."""
         slides = self.sections[-1]
         if text.strip() and not self.after and (ahead or slides):
             (self.ahead if ahead else slides[-1].notes).append(text.strip())
@@ -236,7 +234,7 @@ class _Reader:
         self.put(self.poll)
 
     def put_answer(self, poll: Slide, text: str, wish: str) -> None:
-        """Read a cell of an answer; a cell with the list of ideas also makes the verdict."""
+        """Read a cell of an answer; the list of ideas becomes the slide of the verdict."""
         listed = [*_ITEM.finditer(text)]
         outside = re.search(r"(?:^|[^-] )\*\*([A-Z])\*\*(.*(?:\n.+)*)", _ITEM.sub("", text), re.M)
         if outside and not poll.right:
@@ -277,7 +275,7 @@ class _Reader:
             self.put_exercise(before)
 
     def put_exercise(self, text: str) -> None:
-        """Add an exercise; it shares a slide with the exercise before it if both are short."""
+        """Add an exercise; short exercises share a slide."""
         if self.title != self.section:
             text = f"**{self.title}.** {text}"
         last = self.behind[-1] if self.behind else None
@@ -301,7 +299,7 @@ def printed(cell: NotebookNode) -> str:
 
 
 def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
-    """Return the picture of a code cell without its caption, interactive if possible."""
+    """Return the picture of a code cell without the caption; if possible, it is interactive."""
     explorer = re.search(r"explorers\.(\w+)_explorer\(\)", cell.source)
     page = "".join(o.data["text/html"] for o in cell.outputs if "text/html" in o.get("data", {}))
     if explorer and (root / "figures" / "explorers" / f"{explorer[1]}.html").exists():
@@ -324,7 +322,7 @@ def picture_of(cell: NotebookNode, root: Path) -> Picture | None:
 
 
 def margins(still: Image.Image) -> tuple[float, ...]:
-    """Return the white margins of a still, left, top, right, bottom, as shares of its size."""
+    """Return the white margins (left, top, right, bottom) of a still as fractions of its size."""
     grey = still.convert("L")
     box = grey.point([255 * (x < 245) for x in range(256)]).getbbox() or (0, 0, *still.size)
     sides = box[0], box[1], still.width - box[2], still.height - box[3]
@@ -362,8 +360,8 @@ def named_in(slides: list[Slide], part: str) -> list[int]:
 def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> list[int]:
     """Return the slide at which each row of a run sheet begins: the first slide that it names.
 
-    Homework belongs to the last slide. In a lesson of two lectures, it also belongs to the last
-    slide of the first lecture.
+    Homework belongs to the last slide. In a lesson of two lectures, homework also belongs to
+    the last slide of the first lecture.
     """
     starts: list[int] = []
     later = [i for i, row in enumerate(rows[1:], 1) if row[0] < rows[i - 1][0]]
@@ -383,8 +381,8 @@ def starts_of(slides: list[Slide], rows: list[tuple[int, str, str, str]]) -> lis
 def plan(slides: list[Slide], sheet: str) -> None:
     """Give each slide its row of the run sheet and its share of the time.
 
-    The question of a row is asked at the last slide that the row names, but never before its vote
-    has ended.
+    The question of a row is asked at the last slide that the row names, but never before the
+    vote on this slide has ended.
     """
     rows = rows_of(sheet)
     starts = starts_of(slides, rows)

@@ -20,8 +20,8 @@ MOST = 500
 class Ballot:
     """The current vote on a poll, which is opened, closed and then counted.
 
-    `key`, `poll` and `options` belong to the vote that was opened last: a random name, the name of
-    its poll, and the text of each letter as HTML. Phones can vote while `open` is true. After the
+    For the vote that was opened last, `key` is a random name, `poll` is the name of the poll, and
+    `options` has the text of each letter as HTML. Phones can vote while `open` is true. After the
     vote, `counts` has the number of votes for each letter.
     """
 
@@ -33,7 +33,7 @@ class Ballot:
         self.counts: Counter[str] = Counter()
 
     def begin(self, poll: str, options: list[str]) -> None:
-        """Open a vote on a poll; its counts will replace the earlier ones."""
+        """Open a vote on a poll; the new counts will replace the earlier counts."""
         if self.open:
             raise ValueError(f"The vote on {self.poll} is open; close it first.")
         if not 2 <= len(options) <= 26:
@@ -56,7 +56,7 @@ class Ballot:
         return phone in self._votes
 
     def vote(self, phone: str, letter: str) -> None:
-        """Record the vote of an admitted phone; it replaces an earlier vote of the phone."""
+        """Record the vote of an admitted phone, in place of an earlier vote."""
         if letter not in self.options:
             raise ValueError(f"The options are {', '.join(self.options)}.")
         if not self.knows(phone):
@@ -68,14 +68,14 @@ class Ballot:
         return self._votes.get(phone, "")
 
     def close(self) -> None:
-        """If the vote is open, close it, count it, and delete the votes of the single phones."""
+        """Close and count the vote if it is open, and delete the votes of individual phones."""
         if self.open:
             self.counts = Counter(filter(None, self._votes.values()))
             self._votes.clear()
             self.open = False
 
     def state(self) -> dict[str, Any]:
-        """Return the poll, whether it is open, the number of votes, and if closed the counts."""
+        """Return the poll, whether its vote is open, the number of votes, and the final counts."""
         counts = [] if self.open else [self.counts[letter] for letter in self.options]
         voters = sum(map(bool, self._votes.values())) if self.open else sum(counts)
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
@@ -109,7 +109,7 @@ class Phone(WithBallot):
         return self.get_cookie(f"vote-{self.ballot.key}", "") or ""
 
     def get(self) -> None:
-        """Show the options of an open vote, the last result, or that no vote is open."""
+        """Show the options of an open vote; if no vote is open, show the last result, if any."""
         ballot = self.ballot
         if ballot.open and not ballot.knows(self.phone):
             try:
@@ -138,8 +138,6 @@ class State(WithBallot):
 
 
 class _Server(HTTPServer):
-    """A server that refuses further connections when it has `MOST` of them."""
-
     def handle_stream(self, stream: Any, address: Any) -> None:
         if len(self._connections) < MOST:
             super().handle_stream(stream, address)

@@ -1,4 +1,4 @@
-"""Run a cell of a page with the statements above it that it needs, in the browser's Python.
+"""Run a cell in the browser's Python, after the statements above it that it needs.
 
 Each run begins without variables of earlier runs. Therefore the same code gives the same outputs,
 no matter how often and in which order the cells of a page are run.
@@ -26,7 +26,8 @@ The kinds are "text", "html", "hint" and "error".
 CUT = 100_000
 """The largest number of characters that a run may print."""
 
-logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)  # no message about its cache
+# hide messages about the cache of fonts
+logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
 
 
 def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> list[list[ast.stmt]]:
@@ -55,7 +56,7 @@ def needed(above: Sequence[Sequence[ast.stmt]], cell: Sequence[ast.stmt]) -> lis
                 names = names - _replaced(statement) | _read(statement)
                 kept.append(statement)
         functions = (each for each in kept if isinstance(each, ast.FunctionDef | ast.ClassDef))
-        late = wanted.union(*map(_read, functions))  # read when a function is called
+        late = wanted.union(*map(_read, functions))  # names that are read when a function is called
         if late == wanted:
             return [[each for each in some if each in kept] for some in above]
         wanted = late
@@ -108,7 +109,7 @@ def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> 
 
 
 class _Written(io.TextIOBase):
-    """A stream that shows up to `CUT` characters of printed text, or nothing without `show`."""
+    """A stream that shows up to `CUT` characters of printed text, or nothing if `show` is None."""
 
     def __init__(self, show: Show | None) -> None:
         self._show, self._room = show, CUT
@@ -223,7 +224,7 @@ def _changed(statement: ast.stmt, modules: set[str]) -> set[str]:
 
 
 def _root(node: ast.AST) -> set[str]:
-    """Return the first name of an expression such as ``name.part[0].method``, if it has one."""
+    """Return a set with the first name, as in ``name.part[0].method``, or an empty set."""
     while isinstance(node, ast.Attribute | ast.Subscript | ast.Starred):
         node = node.value
     return {node.id} if isinstance(node, ast.Name) else set()

@@ -42,7 +42,7 @@ STATIC = Path(__file__).with_name("static")
 
 
 class EngineError(Exception):
-    """The error that a file of Pyodide could not be downloaded, or is not the official file."""
+    """A file of Pyodide could not be downloaded, or is not the official file."""
 
 
 @cache
@@ -111,7 +111,7 @@ def _is_good(path: Path) -> bool:
 
 
 def write(root: Path, folder: Path, source: Path) -> None:
-    """Write all files that pages need to run Python to a folder of the site.
+    """Fill a folder of the site with the files that its pages need to run Python.
 
     `source` is the folder with the files of Pyodide, and `root` is the folder of the course.
     """
@@ -142,7 +142,6 @@ def _own(root: Path) -> dict[str, bytes]:
 
 
 def _facts(folder: Path) -> dict[str, Any]:
-    """Return data for the pages: versions, megabytes of the first load, and files for drawing."""
     start = "*.packed", "pyodide.js", "*.json", "python_stdlib.zip", "rbcourse.zip", "numpy-*.whl"
     size = sum(path.stat().st_size for form in start for path in folder.glob(form))
     packages = lock()["packages"]
@@ -157,7 +156,6 @@ def _facts(folder: Path) -> dict[str, Any]:
 
 
 def _with_needs(names: Iterable[str], packages: dict[str, Any] | None = None) -> set[str]:
-    """Return packages with all packages that they need."""
     packages, found = packages or lock()["packages"], list(names)
     for name in found:
         found += {*packages[name]["depends"]} - {*found} - APART

@@ -26,7 +26,7 @@ def left_out() -> dict[str, dict[str, str]]:
 
 
 def cells_of(notebook: NotebookNode) -> list[dict[str, str]]:
-    """Return the code of a lesson in its order, without the explorers, which need Jupyter.
+    """Return the code cells of a lesson in order, without explorers, which need Jupyter.
 
     Code without output is joined with the code that follows it, as in the pages.
     """

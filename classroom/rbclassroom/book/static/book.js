@@ -38,7 +38,7 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Shrink formulas that are too wide, at most to 80 %. Formulas that are still too wide scroll, also with keys.
+  // Shrink formulas that are too wide, at most to 80 %. Formulas that are still too wide can be scrolled, also with keys.
   const fit = () => {
     for (const formula of all('mjx-container[display="true"]')) {
       formula.style.fontSize = "";
@@ -61,7 +61,7 @@ addEventListener("DOMContentLoaded", () => {
   const current = all(".sidebar-tree .current-page").at(-1), list = document.querySelector(".sidebar-scroll");
   if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
 
-  // Put the panels of a wide still into a column, at one scale; CSS shows the column on phones.
+  // Arrange the panels of a wide still in a column, at the same scale. CSS shows the column on phones.
   for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
     const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
     const shares = ends.slice(1).map((end, k) => end - ends[k]), [wide, high] = still.style.aspectRatio.split("/").map(Number);
@@ -79,8 +79,8 @@ addEventListener("DOMContentLoaded", () => {
   // The hint "drag to turn" disappears when the reader touches the picture.
   addEventListener("pointerdown", ({ target }) => target.closest("figure")?.classList.add("touched"));
 
-  // The picture of the start page plays once when it becomes visible. Its controls, except the slider, are
-  // folded under "More".
+  // The picture of the start page plays once when it becomes visible. All controls except
+  // the slider are folded under "More".
   const hero = document.querySelector("figure.hero");
   const ready = new MutationObserver(() => {
     const canvas = hero.querySelector("canvas"), slider = all("input", hero).at(-1);

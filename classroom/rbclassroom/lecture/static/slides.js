@@ -5,7 +5,7 @@ const printing = /[?&](print-pdf|view=print)/.test(location.search);
 const voting = /[?&]token=/.test(location.search) && window === window.top;
 const sections = all(".slides section section");
 
-// A picture with its controls is as large as its place allows; white margins are cut off.
+// Enlarge a picture with its controls as far as its place allows, and cut off white margins.
 const fit = (figure) => {
   const seen = figure.querySelector(":scope > :is(canvas, img)"), panel = figure.querySelector(":scope > div");
   if (!seen || !figure.clientWidth) return;

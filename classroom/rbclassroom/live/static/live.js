@@ -14,7 +14,7 @@ addEventListener("DOMContentLoaded", () => {
   const page = () => (data ??= fetch(`${engine.folder}pages/${name}.json`).then((answer) => answer.json())
     .catch((error) => { data = null; throw error; }));
 
-  // Make a text area, which becomes a CodeMirror editor if it has code to run; edit(text) replaces its text.
+  // Make a text area; for code, it becomes a CodeMirror editor. The function edit replaces the text.
   function editor(text, label, changed, go) {
     const area = make("textarea", { value: text, ariaLabel: label, spellcheck: !go });
     const part = make("div", { className: "editor" }, area);
@@ -88,8 +88,8 @@ addEventListener("DOMContentLoaded", () => {
     return part;
   }
 
-  // Run a cell and show its outputs below its editor. The buttons show its state and can stop it. Return
-  // whether it ran without an error.
+  // Run a cell and show its outputs below its editor. The buttons show the state of the run and can stop it.
+  // Return whether the cell ran without an error.
   async function perform(read, bar, shown, show) {
     const wrong = engine.missing(), [go, halt] = all("button", bar);
     show("clear");
@@ -107,7 +107,7 @@ addEventListener("DOMContentLoaded", () => {
     };
     try {
       if ((await engine.run(await read(), first)) === "stopped") first("error", "Stopped.");
-      document.body.classList.add("python-is-there"); // the buttons no longer show a size
+      document.body.classList.add("python-is-there"); // from now on the buttons show no size
     } catch (error) {
       first("error", `Python has ended: ${error.message}. Run the cell again to restart Python.`);
     }

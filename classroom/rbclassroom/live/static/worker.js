@@ -51,7 +51,7 @@ async function load(python, name) {
   }
 }
 
-// The memory of Python just after its start is stored for the next visit, which then needs half the time.
+// Store the memory of Python just after its start, so that the next visit needs half the time.
 const memory = (mode, act) => new Promise((resolve) => {
   const ask = indexedDB.open("rbcourse engine", 1);
   ask.onupgradeneeded = () => ask.result.createObjectStore("memory");
@@ -80,7 +80,7 @@ async function start() {
 }
 const ready = start();
 ready.then(() => tell("ready"), async (error) => {
-  await memory("readwrite", (store) => store.clear()); // otherwise a damaged memory would stay
+  await memory("readwrite", (store) => store.clear()); // a damaged memory must not stay in the store
   tell("failed", String(error.message ?? error));
 });
 
