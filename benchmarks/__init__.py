@@ -1,1 +1,1 @@
-"""Compare the speed of rbcourse with other packages on the same tasks."""
+"""Compare the times that rbcourse and other packages need for the same tasks."""

@@ -1,4 +1,4 @@
-"""The contests: a table of the tasks, and the methods that are timed on each of them."""
+"""Define the contests, in which several methods for the same task are timed."""
 
 import sys
 import tempfile
@@ -51,10 +51,10 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])  # the inertia of a book of 1 kg
 
 
 class Method(NamedTuple):
-    """A timed method: `does` names its functions, and `call` runs it on prepared input.
+    """A timed method: `does` names its functions, and `call()` runs the method on prepared input.
 
-    `value` converts the result, so that its error can be computed; it is None if results are not
-    comparable. The time is divided by `items`, the number of problems that a call solves.
+    `value` converts the result so that its error can be computed. If results are not comparable,
+    `value` is None. The time is divided by `items`, the number of problems that a call solves.
     """
 
     does: str
@@ -136,7 +136,7 @@ def projected_cubic(n, rng, orders):
 
 
 def closed_forms(n, rng, orders):
-    """Compare closed-form curves between the same ends, and their derivatives, at n times."""
+    """Compare evaluations of closed-form curves and their derivatives at n times."""
     t, methods = rng.random(n), {}
     for form, make in FORMS.items():
         curve, name = make(*ENDS["5"]), OURS if form == "projection" else f"rbcourse, {form}"
@@ -190,7 +190,7 @@ def chain_of_poses(n, rng, legs, poses=1000):
 
 
 def splines(n, rng):
-    """Compare the construction of splines with n legs of 30°; `does` states the excess cost."""
+    """Compare methods that make splines of n legs of 30°; `does` states the excess cost."""
     axes, t = rng.normal(size=(n, 3)), np.cumsum(rng.uniform(0.5, 1.5, n + 1))
     turns = rb.exp_so3(np.pi / 6 * axes / np.linalg.norm(axes, axis=1)[:, None])
     R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
@@ -232,7 +232,7 @@ def one_optimum(n, rng, case):
 
 
 def one_body(n, rng, case):
-    """Compare the times to find optimal motions of a book, such as the least torque."""
+    """Compare methods that find optimal motions of a book, for instance of least torque."""
     bvp, does = textbook.minimum_torque_so3, "minimum_acceleration_so3, of the book"
     rest = np.zeros(3)
     least = _ours(case, rb.minimum_acceleration_so3, BOOK)
@@ -246,7 +246,7 @@ def one_body(n, rng, case):
 
 
 def stacked_optima(n, rng, least, bvps=20):
-    """Compare our solver, on n random problems together, with SciPy's `solve_bvp`.
+    """Compare SciPy's `solve_bvp` with our solver, which solves n random problems together.
 
     `solve_bvp` solves the first `bvps` problems one by one. The times are per solved problem.
     `solve_bvp` may find another optimum.
@@ -305,20 +305,20 @@ def _ours(case, make, *further):
 
 
 def _distance(truth):
-    """Return a function that computes the largest distance between the first values and `truth`."""
+    """Return a function that compares values with `truth` and gives the largest distance."""
     n, truth = len(truth), np.asarray(truth)
     return lambda value: np.linalg.norm((value[:n] - truth).reshape(n, -1), axis=1).max()
 
 
 def _true_optimum(ends, G, near=None):
-    """Return 101 rotations of the least torque, by `solve_bvp` from the guess `near`."""
+    """Return 101 rotations of the curve of least torque that `solve_bvp` finds from `near`."""
     near = near or rb.minimum_torque_so3(*ends, G)
     found, _ = oracles.stationary(("effort", G, np.eye(3)), tuple(ends), near)
     return oracles.rotation_of_quaternions(found.sol(MOMENTS)[:4])
 
 
 def timing_of_poses(n, rng):
-    """Compare fastest timings of a leg, with two kinds of limits, and of a chain of n poses."""
+    """Compare methods that find the fastest timing of a leg or of a chain of n poses."""
     steps = rb.exp_se3(rng.uniform(-0.7, 0.7, (n - 1, 6)))
     poses = np.array(list(accumulate(steps, np.matmul, initial=np.eye(4))))
     path, leg, does = rb.chain(np.arange(n), poses), rb.geodesic_se3(*poses[:2]), "fastest, norms"
@@ -356,10 +356,11 @@ def _by_toppra(curve, cells):
 
 
 class Contest(NamedTuple):
-    """A contest of methods for a task and a case, named as in the CSV, at some sizes N.
+    """A contest, which times methods for the same task at some sizes N.
 
-    `make` takes N, a generator and the options. It returns the methods, with ours first, and a
-    function for the error of a value, or None. `bound` is the largest error that is allowed.
+    `make` takes N, a generator and the options. It returns a dict of the methods, which begins with
+    ours. The second result is a function that computes the error of a value; it may be None.
+    `bound` is the largest error that is allowed.
     """
 
     task: str

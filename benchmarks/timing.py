@@ -44,8 +44,8 @@ def compete(contest, n, rng, machine, **timing):
 def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter):
     """Return the seconds per call, shape (rounds, calls); each round runs every call.
 
-    A short call is repeated until about `loop` seconds have passed. The number of rounds, from
-    `fewest` to `most`, is such that they take about `total` seconds.
+    A short call is repeated until about `loop` seconds have passed. There are between `fewest` and
+    `most` rounds, which take about `total` seconds.
     """
 
     def seconds(call, times):

@@ -1,4 +1,4 @@
-"""Random problems for the optima, and the functionals."""
+"""Define random problems and functionals for the tests of optima."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -80,7 +80,7 @@ def log_so3(R):
 
 
 def nearest_rotation(M):
-    """Return the rotation nearest to M: U diag(1, …, 1, ±1) Vᵀ, by mpmath's singular values."""
+    """Return the rotation U diag(1, …, 1, ±1) Vᵀ nearest to M, by mpmath's singular values."""
     with mp.workdps(DIGITS):
         U, _, Vt = mp.svd_r(mp.matrix(np.asarray(M, dtype=float).tolist()))
         if mp.det(U * Vt) < 0:
@@ -97,7 +97,7 @@ def right_jacobian_so3(w):
 
 
 def theta(t, angle, order=0):
-    """Return BK (16) for f(t) = t, or its derivative by differences."""
+    """Return θ of BK (16) for f(t) = t, or its derivative by differences."""
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
         return float(
@@ -110,7 +110,7 @@ def theta(t, angle, order=0):
 
 
 def f(t, angle, order=0):
-    """Return BK Corollary 2, or its derivative by differences."""
+    """Return f of BK Corollary 2, or its derivative by differences."""
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
         return float(
@@ -263,7 +263,7 @@ def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
 
 
 def free_body(moments, a, c, t):
-    """Return the velocity of Euler's free body by Jacobi's functions: (a cn, b sn, c dn)(λ t).
+    """Return the velocity (a cn, b sn, c dn)(λ t) of Euler's free body, by Jacobi's functions.
 
     It is (a, 0, c) at t = 0. The principal moments are J1 < J2 < J3, and a, c > 0 with a²J1 (J2 −
     J1) < c²J3 (J3 − J2).
@@ -387,7 +387,7 @@ def least_directly(deviation, ends, curve, terms=16, nodes=80):
         return base, [sum(comb(k, i) * B[i] * T[k - i] for i in range(k + 1)) for k in order]
 
     def rates(x, table):
-        """Return w and its rates, by n w = 2 im(q̄ q') with n = ‖q‖², and by its derivatives."""
+        """Return w and its rates, from derivatives of n w = 2 im(q̄ q') with n = ‖q‖²."""
         base, shapes = table
         Q = [b + s @ x.reshape(*x.shape[:-1], terms, 4) for b, s in zip(base, shapes, strict=True)]
 

@@ -1,10 +1,9 @@
 """Compare the numbers that the artists of a figure hold with the CSV of the figure.
 
 A kernel that runs `record` (see conftest.py) writes all numbers that the artists of each saved
-figure hold. For an animation, it writes the numbers of all frames. It stops with an error at a
-figure that is clipped or has no labels. `not_shown` looks for the columns of the CSV among these
-numbers. If a title or a label names a column, it looks only among the numbers of the artists with
-this title or label.
+figure hold. For an animation, it writes the numbers of all frames. The kernel stops with an error
+if a figure is clipped or has no labels. `not_shown` looks for the columns of the CSV among these
+numbers. If a title or a label names a column, only the artists with this title or label count.
 """
 
 import csv
@@ -23,16 +22,16 @@ __import__("shown").record({folder!r})
 # CSV columns of which not every value must appear as a number in the picture. Each entry maps a
 # pattern for "figure, column" to the share of the values that must still appear.
 SHARES = {
-    # these columns accompany the drawn data
+    # these extra columns need not be drawn
     r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,
     # the picture shows these columns by the order of points, or by colours
     r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,
     r".*, (.* )?theta\d? \[rad\]": 0,  # the positions of links and corners show this column
     r"paper_fig[23][ab], .*": 0.3,  # the picture has six curves, and a surface with fewer points
-    r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow, which is drawn three times
+    r"lesson02_two_spaces, .* [xy]1 \[m\]": 0,  # the elbow is drawn three times
     # the picture shows the path of the corner, and not the path of the centre
     r"lesson01_straight, .* by the corner .*": 0,
-    r"lesson08_half, turn \[rad\]": 0,  # the angle of the body
+    r"lesson08_half, turn \[rad\]": 0,  # the body is turned by this angle
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # only the frames at the ends are drawn
     # the place of the cell in the map shows both values
     r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,
@@ -80,7 +79,7 @@ def record(folder):
 
 
 def pooled(pairs):
-    """Return the distinct numbers under each name."""
+    """Return a dict of the sorted numbers for each name."""
     pools = defaultdict(list)
     for key, values in pairs:
         pools[key].append(values)
@@ -88,7 +87,7 @@ def pooled(pairs):
 
 
 def by_names(artists):
-    """Yield each array of numbers that artists hold, once for each name: "", title or label."""
+    """Yield each array of numbers that artists hold, together with each of its names."""
     for artist in artists:
         title = title_of(getattr(artist, "axes", None))
         label = str(artist.get_label()).removeprefix("about ").translate(LETTERS)
@@ -153,7 +152,7 @@ def check_looks(fig):
 
 
 def not_shown(figures, shown):
-    """Yield the CSV columns whose numbers the artists of the figure do not hold."""
+    """Yield the CSV columns that are not shown by the artists of their figure."""
     for file in sorted(figures.glob("*.csv")):
         if not file.with_suffix(".png").exists():
             continue  # a table without a picture
@@ -188,7 +187,7 @@ def name_for(column, pools):
 
 
 def held(pool, value):
-    """Return whether the sorted pool has this number, to the twelve digits of the CSV."""
+    """Return whether the sorted pool contains a number, up to twelve digits as in the CSV."""
     near = pool[np.clip(np.searchsorted(pool, value) + np.array([-1, 0]), 0, len(pool) - 1)]
     return bool((np.abs(near - value) <= 1e-11 * max(1, abs(value))).any())
 

@@ -125,7 +125,7 @@ def as_so3(x):
 
 
 def excess(R, n):
-    """Return the excess over the lowest cost that descent finds, and this cost."""
+    """Find the lowest cost by descent; return the excess of R over this cost, and this cost."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))
@@ -139,7 +139,7 @@ def excess(R, n):
         slope = np.einsum("t,ta,jta->j", weights, a, by)
         step = np.linalg.solve(np.einsum("t,ita,jta->ij", weights, by, by), -slope)
         x, x_rate, x_bend = (np.tensordot(step, z, axes=1) for z in (eta, rate, bend))
-        # w of R exp(x) minus w of R, as a series of Lie brackets, and its derivative
+        # dw is the change of w from R to R exp(x), as a series of brackets; da is its derivative
         dw, da, term, its_rate, k = x_rate.copy(), x_bend.copy(), x_rate, x_bend, 1
         other, other_rate = w, a
         while np.abs(term).max() + np.abs(other).max() > 1e-20 and k < 12:

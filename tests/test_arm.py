@@ -20,8 +20,8 @@ def tips(q, *lengths):
 @pytest.mark.source("RR 4")
 @pytest.mark.parametrize("lengths", [(), LENGTHS[:1], LENGTHS[:3], LENGTHS])
 def test_arms_with_any_number_of_links_agree_with_complex_numbers(lengths):
-    """Without given lengths, the links have 2 and 1.5 m, as in the report. The Jacobian is compared
-    with differences."""
+    """The default lengths of the links are 2 m and 1.5 m, as in the report. The Jacobian is
+    compared with differences."""
     n = len(lengths) or 2
     q, given = RNG.uniform(-7, 7, (5, 6, n)), [lengths] * bool(lengths)
     joints, frames = arm.arm_forward_kinematics(q, *given)
@@ -44,10 +44,10 @@ def test_arms_with_any_number_of_links_agree_with_complex_numbers(lengths):
     assert np.abs(by_each_angle - J.mT).max() < 1e-9
 
 
-def test_the_jacobian_of_two_links_is_singular_if_they_are_in_line():
+def test_the_jacobian_is_singular_if_both_links_are_in_line():
     q = RNG.uniform(-7, 7, (100, 2))
     assert np.abs(np.linalg.det(arm.arm_tip_jacobian(q)) - 3 * np.sin(q[:, 1])).max() < 32 * EPS
-    # the lever arm of joint 0; the lever arm of joint 1 is always 1.5
+    # joint 0 has this lever arm; the lever arm of joint 1 is always 1.5
     for bent, reach in ((0, 3.5), (np.pi, 0.5)):
         singular = np.linalg.svd(arm.arm_tip_jacobian([0.4, bent]), compute_uv=False)
         assert singular == pytest.approx([np.hypot(reach, 1.5), 0], abs=8 * EPS)
@@ -56,8 +56,9 @@ def test_the_jacobian_of_two_links_is_singular_if_they_are_in_line():
 @pytest.mark.source("RR (20)", "RR (21)", "RR 4.1", "errata 19")
 @pytest.mark.parametrize("steps", [1, 10, 37])
 def test_each_joint_goes_from_its_own_start_to_its_own_goal(steps):
-    """The printed formula would blend the starts of links 1 and 2. Its first index counts the
-    links. In the sentence below the formula, the first index distinguishes start and goal."""
+    """The printed formula would blend the starts of links 1 and 2. In this formula, the first index
+    counts the links. In the sentence below the formula, the first index distinguishes start and
+    goal."""
     theta = np.array([[0.1, 0.2], [1.0, 2.0]])
     path, t = arm.interpolate_joints(*theta, steps), np.linspace(0, 1, steps + 1)[:, None]
     assert np.array_equal(path[[0, -1]], theta)
@@ -98,7 +99,7 @@ def test_a_configuration_of_the_arm_is_not_a_planar_pose():
 )
 def test_both_inverse_solutions_reach_the_tip(lengths):
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, size=(4, 250, 2))
-    q[0, :3, 1] = [0, np.pi, -np.pi]  # stretched and folded arms, whose tips are rounded
+    q[0, :3, 1] = [0, np.pi, -np.pi]  # arms that are stretched or folded
     tip = tips(q, lengths)
     found = arm.arm_inverse_kinematics(tip, lengths)
     assert np.abs(tips(found, lengths) - tip[..., None, :]).max() < 16 * EPS * sum(lengths)

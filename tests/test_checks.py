@@ -20,7 +20,7 @@ def test_error_messages_describe_the_wrong_argument():
     assert checks.as_finite("x", [True, False], 2).dtype == np.float64
 
 
-def test_matrices_symmetric_to_rounding_are_made_symmetric():
+def test_nearly_symmetric_matrices_are_made_symmetric():
     given = np.array([[1, 2 + 1e-15], [2, 3]])
     assert np.array_equal(checks.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
     nearly = checks.as_symmetric("G", [[1, 1], [1 + 5e-13, 1]], 2)

@@ -1,4 +1,4 @@
-"""Compare the closed forms of BK 1, and those for bodies, with their definitions in 60 digits."""
+"""Compare all closed forms with their definitions, evaluated in 60 digits."""
 
 from itertools import pairwise
 
@@ -240,9 +240,9 @@ def test_the_long_way_round_completes_a_full_turn(make):
     assert np.all(make(I3, I3, REST, REST)(t) == I3)
 
 
-def test_ends_outside_the_domain_are_refused_by_name():
-    """Three inputs raise errors: speeds of 3π or more for Bézier's curves, half-turns for Cayley's
-    cubic, and inertias of impossible bodies."""
+def test_errors_name_the_ends_that_are_outside_the_domain():
+    """Errors are raised for speeds of 3π or more (Bézier), half-turns (Cayley) and inertias of
+    impossible bodies."""
     w, half = np.zeros((2, 3, 3)), np.diag([-1.0, 1, -1])
     w[1, 2] = 3 * np.pi * np.array([2, 1, 2]) / 3
     for name, given in (("w0", (w, REST)), ("w1", (REST, w))):
@@ -264,7 +264,7 @@ def test_ends_outside_the_domain_are_refused_by_name():
 
 
 @every_curve
-def test_three_closed_forms_follow_the_geodesic_if_the_velocities_do(name):
+def test_three_closed_forms_give_the_geodesic_for_velocities_along_it(name):
     """The expected curve is R0 exp(σ p(t)), where p is the cubic with the same end conditions."""
     R0, R1, _, _ = ends(40)
     turn = Rotation.from_matrix(R0.mT @ R1).as_rotvec()
@@ -337,7 +337,7 @@ def test_the_margin_is_the_least_norm_of_the_cubic():
 def in_a_plane(margin):
     """Return a turn by 2 rad about an axis, and both velocities along this axis.
 
-    Relative to the half-way rotation, Q is a complex number. Its least norm, at t = 1/2, is
+    Relative to the half-way rotation, Q is a complex number. The least norm of Q, at t = 1/2, is
     cos(1/2) + k/8 sin(1/2).
     """
     [n] = directions(1, np.random.default_rng(13))
@@ -346,7 +346,7 @@ def in_a_plane(margin):
 
 
 @pytest.mark.parametrize("margin", [0.3, 1e-2, 1e-4, 1e-6])
-def test_errors_grow_with_powers_of_the_inverse_norm_of_the_cubic(margin):
+def test_errors_grow_with_the_inverse_norm_of_the_cubic(margin):
     turn, w0, w1 = in_a_plane(margin)
     given = I3, oracles.exp_so3(turn), w0, w1
     curve, t = rb.quaternion_cubic_so3(*given), 0.5 + np.array([-0.25, -margin / 8, 0, margin / 32])
@@ -363,7 +363,7 @@ def test_a_zero_of_the_quaternion_cubic_is_refused():
     stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
-    t = np.linspace(0, 0.4, 3000)  # these times fill more than one block, for two curves
+    t = np.linspace(0, 0.4, 3000)  # for two curves, these times fill more than one block
     for order in (0, 1, 2):
         assert np.isfinite(stack([0, 0.25, 0.75, 1], order)).all()
         for k in (0, 2999):
@@ -382,7 +382,7 @@ TIMES = np.linspace(0, 1, 51)
 
 
 @pytest.mark.source("beyond BK 6")
-def test_the_weighted_cubic_is_the_nearest_rotation_in_the_metric():
+def test_the_weighted_cubic_gives_the_nearest_rotation_in_its_metric():
     curves = rb.weighted_cubic_so3(R0, R1, W0, W1, BOOK)
     M = hermite([R0, R1, R0 @ rb.hat_so3(W0), R1 @ rb.hat_so3(W1)], TIMES[:, None, None, None])
     nearest = rb.project_so_weighted(M, rb.metrics.weight_from_inertia(BOOK))

@@ -12,7 +12,7 @@ from rbcourse.optimum.functionals import Effort
 @pytest.mark.parametrize("of_torque", [False, True])
 @pytest.mark.parametrize("start", [np.nan, 1.0])  # the second start makes the matrix singular
 @pytest.mark.parametrize("broken", range(4))
-def test_relax_solves_the_other_problems_of_a_stack_if_one_is_singular(of_torque, start, broken):
+def test_one_singular_problem_does_not_affect_the_rest_of_a_stack(of_torque, start, broken):
     rng = np.random.default_rng(47)
     R0, R1 = rb.sample_rotation((2, 4), rng=rng)
     rates = rng.normal(size=(4, 2, 3))

@@ -81,7 +81,7 @@ def test_the_connection_of_a_bi_invariant_metric_is_half_the_commutator():
 
 @pytest.mark.source("BK (9)", "BK (14)", "BK 2.4")
 @pytest.mark.parametrize(("G", "exp"), [(rb.METRIC_SO3, rb.exp_so3), (rb.METRIC_SE3, rb.exp_se3)])
-def test_the_acceleration_is_the_tangential_part_of_the_ambient_one(G, exp):
+def test_the_acceleration_is_the_tangential_part_of_the_second_derivative(G, exp):
     """The metrics (12) and (14) are induced by a flat metric. A'' is computed by differences, not
     from Γ."""
     start, v, a = np.random.default_rng(2).normal(size=(3, len(G)))
@@ -94,8 +94,8 @@ def test_the_acceleration_is_the_tangential_part_of_the_ambient_one(G, exp):
 
 @pytest.mark.source("BK 2.4", "errata 22")
 def test_the_covariant_derivative_is_along_the_velocity():
-    """The point A is not a tangent vector at A. A has no rotational components, so no vector would
-    turn along A."""
+    """The point A is not a tangent vector at A. The components of A have no rotational part, so no
+    vector would turn along A."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
     gamma = christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
@@ -137,14 +137,14 @@ def test_a_free_body_follows_eulers_solution(a, c):
 
 @pytest.mark.source("BK (8)", "errata 13")
 def test_the_printed_geodesic_equation_is_wrong_for_the_free_body():
-    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines the symbols Γ of the frame with
-    ä of coordinates, where ẇ is needed."""
+    """The printed equation has Γ^i_ik for Γ^i_jk. This equation also combines the symbols Γ of the
+    frame with ä of coordinates, where ẇ is needed."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)
     euler = np.linalg.solve(inertia, np.cross(inertia @ w, w))
     assert np.abs(-np.einsum("ijk,j,k->i", gamma, w, w) - euler).max() < 40 * EPS
-    # two readings: j is summed over, or j stands for i
+    # the printed j is a summation index, or stands for i
     for reading in ("iik,j,k->i", "iik,i,k->i"):
         printed = -np.einsum(reading, gamma, w, w)
         assert np.abs(printed).max() > 0.1
@@ -232,7 +232,7 @@ def test_a_start_near_the_group_is_projected_onto_the_group():
     R, _ = rb.geodesic_flow(INERTIA, start, [0.3, 2, -1], TIMES)
     assert np.abs(R[0] - rb.project_so(start)).max() < 4 * EPS
     assert np.abs(R.mT @ R - ONE).max() < 10 * EPS
-    pose = np.diag([2, 2, 2, 1])  # the projected pose does not move at twice the speed
+    pose = np.diag([2, 2, 2, 1])  # without the projection, the speed would be doubled
     A, _ = rb.geodesic_flow(np.eye(6), pose, [0, 0, 0, 1, 0, 0], 3)
     assert np.abs(A[:3, 3] - [3, 0, 0]).max() < 1e-12
 
@@ -276,6 +276,6 @@ NEARLY_SO3 = [L1 + 1e-7 * ONE, L2, L3 + 1e-10]
         ("geodesic_flow", (ONE, ONE, [1, 2, 3], [0, np.nan]), "t[1] is nan"),
     ],
 )
-def test_bases_without_a_lie_algebra_are_refused(function, arguments, message):
+def test_bases_that_span_no_lie_algebra_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         getattr(rb.connection, function)(*arguments)

@@ -61,7 +61,7 @@ MAKERS = {
     "projected_line_so3 with f": of(timed),
     "retime of a projection": of(lambda R0, R1, w0, w1: rb.retime(cubic(R0, R1, w0, w1), 0.5)),
 }
-CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # for each order of the derivative
+CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # each order has its core shape
 RATES = {"w0": 1, "w1": 1, "d0_dot": 1, "d1_dot": 1, "a0": 2, "a1": 2}
 
 
@@ -173,7 +173,7 @@ def has_values_at_times_of_any_shape(make):
             t = times(curve, *shape)
             assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
     curve = made(make, 2)
-    t = times(curve, 2600)  # these times fill more than one block, for two curves
+    t = times(curve, 2600)  # for two curves, these times fill more than one block
     values = jet(curve, t)
     for part in (slice(1), slice(1, 40), slice(2500, 2600)):
         assert off(jet(curve, t[part]), values[part]) < 1e-12
@@ -288,8 +288,8 @@ def moves_with_its_ends(make):
 
 
 def lasts_as_long_as_it_is_told(make):
-    """Check that a curve of duration T equals the curve on [0, 1], made with rates times T and
-    retimed."""
+    """Multiply the rates by T, make the curve on [0, 1], and retime it. The result must equal the
+    curve of duration T."""
     if "duration" not in inspect.signature(make.function).parameters:
         return  # a curve without the parameter `duration` keeps its own duration
     ends, T = sample(3), np.array([0.5, 1, 1.5])
@@ -327,7 +327,7 @@ def scaled(order, by):
     return altered("__call__", lambda call, c, t, k=0: call(c, t, k) * (by if k == order else 1))
 
 
-CONTRACT = {  # the clauses, and for each clause some makers with a fault that it must detect
+CONTRACT = {  # for each clause, makers with faults that this clause must detect
     meets_its_ends: {
         "end": lambda R0, R1, w0, w1: bezier(R0, R1 @ rb.exp_so3([0, 0, 1e-9]), w0, w1),
         "end velocity": lambda R0, R1, w0, w1: bezier(R0, R1, w0, 1.0000001 * w1),

@@ -84,9 +84,9 @@ def test_zyx_angles_agree_with_the_printed_product_and_scipy():
     for back in (rb.zyx_from_matrix(R), zyx_from_quaternion(q), zyx_from_quaternion(-q)):
         assert np.all(np.abs(back[:, 1]) <= np.pi / 2 * (1 + EPS))
         assert np.all((back[:, ::2] > -np.pi) & (back[:, ::2] <= np.pi))
-        # twice the error of the quaternion
+        # a matrix has twice the error of a quaternion
         assert np.abs(rb.matrix_from_zyx(back) - R).max() < 40 * EPS
-        plain = back[:200]  # the others are near gimbal lock
+        plain = back[:200]  # the other angles are near gimbal lock
         off = np.abs(plain - want[:200].as_euler("ZYX")).max(axis=1)
         assert np.all(off < 20 * EPS / np.cos(plain[:, 1]))
 

@@ -79,7 +79,7 @@ def test_geodesics_cost_nothing():
 
 @pytest.mark.parametrize("margin", [2e-3, 1e-3, 1e-4, 1e-5, 3e-6])
 def test_the_cost_of_sharp_turns_is_integrated(margin):
-    """Nearly all of the cost arises in a small part of the time: half the margin.
+    """Nearly all of the cost arises within a time of half the margin.
 
     The line is tested alone and as a leg of a chain. The breakpoints are close together where the
     cost arises.
@@ -93,7 +93,8 @@ def test_the_cost_of_sharp_turns_is_integrated(margin):
         assert rb.acceleration_cost(line) == pytest.approx(4 * np.pi * k**3 / 27, rel=1e-9)
         least = np.abs(np.setdiff1d(line.breakpoints, 0.5) - 0.5).min()
         assert margin / 20 < least < margin / 4
-    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)  # the cubic turns 3/2 times as fast there
+    # at half time, the cubic turns 3/2 times as fast
+    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)
     assert rb.acceleration_cost(cubic) == pytest.approx(27 / 8 * 4 * np.pi * k**3, rel=20 * margin)
 
 
@@ -156,8 +157,8 @@ def test_the_cost_of_a_sudden_turn_is_integrated(make, given):
 
 
 @pytest.mark.parametrize("speed", [1e3, 1e12, 1e26])
-def test_the_cost_of_fast_motion_in_the_first_instant_is_integrated(speed):
-    """M(t) = I + t M'(0) + … turns immediately, so the cost is of the order of the speed cubed."""
+def test_the_cost_of_a_very_fast_start_is_integrated(speed):
+    """M(t) = I + t M'(0) + … turns immediately, so the cost grows as the cube of the speed."""
     cubic = rb.projected_cubic_so3(I3, I3, [speed] * 3, REST)
     a = np.sqrt(3) * speed  # along one axis, θ = atan(a t)
     want = 2 * a**3 * quad(lambda u: (2 * u / (1 + u * u) ** 2) ** 2, 0, np.inf)[0]

@@ -112,7 +112,7 @@ def test_the_geodesic_over_a_half_turn_follows_rodrigues_formula():
         assert np.abs(curves(t) - want).max() < 20 * EPS
 
 
-def test_the_middle_of_a_line_over_a_half_turn_is_refused():
+def test_a_projected_line_over_a_half_turn_is_undefined_halfway():
     for R0, R1, _ in zip(*half_turns(), strict=True):
         with pytest.warns(RuntimeWarning, match="^margin < 1e-6: .* jumps there"):
             curve = rb.projected_line_so3(R0, R1)
@@ -148,14 +148,14 @@ def test_a_curve_near_the_singular_set_is_accurate_or_gives_a_warning(make, wher
 
 @pytest.mark.parametrize("make", [rb.projected_line_so3, at_rest, quintic_at_rest])
 def test_a_jump_gives_a_warning(make):
-    """From rest to rest over a half-turn, the matrix passes through rank 1."""
+    """If a half-turn goes from rest to rest, its matrix M(t) has rank 1 at half time."""
     half = np.diag([1.0, -1, -1])
     with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6 of curve \[0, 1\]: .* t = 0\.5; .* j"):
         stack = make(I3, np.array([[I3, half], [half, I3], [I3, I3]]))
     assert np.abs(stack.margin - [[2, 0], [0, 2], [2, 2]]).max() < 8 * EPS
     one = stack[0, 1]
     assert np.abs(one([0, 0.25, 0.75, 1]) - [I3, I3, half, half]).max() < 80 * EPS
-    t = np.linspace(0, 0.4, 1000)  # these times fill more than one block, for six curves
+    t = np.linspace(0, 0.4, 1000)  # for six curves, these times fill more than one block
     own = np.full((1000, 3, 2), [[0.5, 0.25], [0.25, 0.5], [0.5, 0.5]])
     for order in (0, 1, 2):
         assert np.isfinite(stack(t, order)).all()
@@ -172,7 +172,7 @@ def test_a_jump_gives_a_warning(make):
                     call(given, order)
 
 
-def test_f_may_miss_the_end_by_rounding():
+def test_f_may_miss_its_end_value_by_a_rounding_error():
     def in_place(t, order):
         t *= t
         return (t * (1 + 1e-14), 2 * np.sqrt(t), 2)[order]

@@ -40,7 +40,8 @@ CURVES = rb.CLOSED_FORMS | {f"bent by {x}": partial(bent, bend=x) for x in (0.3,
 
 @cache
 def problems(count, size, seed, scale=1.0):
-    """Return random problems, with σ, w0 and w1 times a scale, and twice their optimal costs."""
+    """Multiply σ, w0 and w1 of random problems by `scale`; return the problems and twice their
+    least costs."""
     R0, R1, w0, w1 = random_problems(count, size, rng=seed)
     turn = scale * rb.log_so3(R0.mT @ R1)
     ends = Ends(R0, R0 @ rb.exp_so3(turn), scale * w0, scale * w1)
@@ -60,15 +61,14 @@ def solved(name, *given):
     return curves, cost(curves) / best - 1
 
 
-def test_the_stored_table_is_the_derived_one(tmp_path):
+def test_the_stored_table_equals_the_derived_table(tmp_path):
     exact.write(tmp_path / "table.csv")
     stored = ROOT / "rbcourse/leading_excess.csv"
     assert (tmp_path / "table.csv").read_bytes() == stored.read_bytes()
 
 
 def test_the_constants_of_the_excess_near_a_geodesic_are_right():
-    """The compared terms are of second order in e and d; for the cumulative form, of first
-    order."""
+    """The compared terms are quadratic in e and d, or linear for the cumulative form."""
     ss, ee, dd, se, sd = exact.ss, exact.ee, exact.dd, exact.se, exact.sd
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |σ × e|², |σ × d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
@@ -87,7 +87,7 @@ def test_the_constants_of_the_excess_near_a_geodesic_are_right():
         assert exact.RING.from_dict(few) == form, name
 
 
-def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
+def test_only_projection_and_quaternions_have_an_excess_from_rest_to_rest():
     """The excess is 6401/180180 a⁴ for the projection, and a sixteenth of this for quaternions."""
     ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
@@ -99,12 +99,12 @@ def test_from_rest_to_rest_only_projection_and_quaternions_have_an_excess():
 
 
 @pytest.mark.source("beyond BK 14")
-def test_the_constants_of_splines_that_turn_there_and_back_are_right():
+def test_the_constants_of_splines_that_turn_back_are_right():
     found = Q(309247, 1441440), Q(20711, 180180), Q(20711, 16 * 180180)
     assert tuple(exact.of_splines()) == found
 
 
-def test_the_order_of_four_closed_forms_is_proven():
+def test_the_ordering_of_four_closed_forms_is_proven():
     """The proven ratios are nearly sharp: for these inner products they could not be 2 % larger."""
     projection, quaternion, cayley, bezier = (
         f"{x}_so3" for x in ("projected_cubic", "quaternion_cubic", "cayley_cubic", "bezier")
@@ -124,7 +124,7 @@ def test_the_order_of_four_closed_forms_is_proven():
         assert ratio < found < ratio * Q(51, 50)
 
 
-def test_no_other_pair_of_closed_forms_has_an_order():
+def test_no_other_pair_of_closed_forms_is_ordered():
     """For some σ, e and d, the first form has the smaller E; for others, the second form."""
     smaller_and_larger = {
         ("exponential", "bezier"): (((3, 0), (0, 0), (0, 1)), ((1, 0), (1, 0), (2, 1))),
@@ -144,7 +144,7 @@ def test_no_other_pair_of_closed_forms_has_an_order():
         assert signs == [True, False], (first, second)
 
 
-def test_a_false_order_is_not_proven(tmp_path):
+def test_a_false_ordering_is_not_proven(tmp_path):
     """The first false table has a larger ratio, and the second one has a changed entry."""
     rows = (ROOT / "docs/ordering.csv").read_text().splitlines()
     for k, old, new in ((2, "13.1", "13.2"), (4, "-0.017", "-19")):
@@ -157,7 +157,7 @@ def test_a_false_order_is_not_proven(tmp_path):
 
 
 @pytest.mark.source("beyond BK 10")
-def test_the_deviation_in_the_package_is_the_derived_one():
+def test_the_deviation_in_the_package_equals_the_derived_deviation():
     """The two polynomials in t agree exactly, in fractions."""
     numbers = np.random.default_rng(5).integers(-9, 9, (3, 3))
     vectors = np.array([[Q(int(n), 3) for n in row] for row in numbers])
@@ -192,7 +192,7 @@ OVER = {"projected_cubic_so3": 6300, "quaternion_cubic_so3": 256 * 6300, "cayley
 
 @pytest.mark.parametrize(("name", "over"), OVER.items())
 def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
-    """With e = d = 0 the curves deviate at fifth order: ∫ ‖w'‖² = ‖σ‖¹⁰/`over`, to leading
+    """With e = d = 0 the curves deviate at fifth order, so ∫ ‖w'‖² is ‖σ‖¹⁰/`over` to leading
     order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
@@ -203,8 +203,8 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
 
 
 def test_the_excess_of_the_corrected_curve_grows_as_the_eighth_power():
-    """With the solver, only the median shows the power. The estimate resolves smaller values, and
-    shows the power for each problem."""
+    """Excesses from the solver show the power only in the median. The estimate is accurate for
+    smaller values, and shows the power for each problem."""
     (large, _), (middle, middle_one), (_, small_one) = (
         (excess, rb.excess_estimate(curves))
         for curves, excess in (
@@ -230,7 +230,7 @@ def test_the_estimate_is_nan_or_right_within_5_percent(name):
         assert np.all(np.abs(estimate - true)[holds] < 0.05 * true[holds] + 1e-11)
 
 
-def test_the_correction_turns_in_the_direction_of_bezier():
+def test_the_correction_turns_in_the_direction_of_beziers_curve():
     """The velocities require the long way round. A correction by the short way would cost far
     more."""
     rng = np.random.default_rng(2)

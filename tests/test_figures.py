@@ -18,7 +18,7 @@ TABLES = "paper_fig5_costs", "lesson13_atlas_intervals"  # tables without pictur
 
 
 def columns(data, form, keys="xyz"):
-    """Return the columns whose names contain these keys, side by side."""
+    """Return an array of the columns whose names contain these keys."""
     return np.stack([data[form.format(key)] for key in keys], axis=-1)
 
 
@@ -221,7 +221,7 @@ def test_the_numbers_of_paper_fig5_are_right():
         for values, order in (("v", 1), ("a", 2)):
             body = (np.swapaxes(drawn, 1, 2) @ p(t, order)[..., None])[..., 0]
             assert np.abs(columns(data, values + "{} [m]", "123") - body).max() < 1e-8
-        # The velocity of R and its derivative come from splines through the numbers of the file.
+        # Splines through the numbers of the file give the angular velocity and acceleration of R.
         entries = make_interp_spline(t, drawn.reshape(-1, 9), 7)
         rate = np.swapaxes(drawn, 1, 2) @ entries(t, 1).reshape(-1, 3, 3)
         assert np.abs(rb.vee_so3(rate) - w)[5:-5].max() < 1e-4
@@ -344,7 +344,7 @@ def test_the_intervals_cover_all_problems_of_three_seeds():
 
 @pytest.mark.source("beyond BK 1", "beyond BK 3", "beyond BK 4")
 def test_the_torques_of_lesson_13_turn_its_book_to_the_goal():
-    """Euler's equation with the stored torques leads from rest at the start to rest at the goal."""
+    """By Euler's equation, the stored torques take the book from rest to rest at the goal."""
     torques, poses = numbers("lesson13_torques"), numbers("lesson13_book")
     G, t = rb.metrics.box_inertia([0.3, 0.2, 0.03]), torques["t [s]"]
     diagonal = rb.exp_so3(np.radians(150) * np.ones(3) / np.sqrt(3))

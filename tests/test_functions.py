@@ -107,7 +107,7 @@ def test_arguments_are_neither_changed_nor_returned(function):
 
 
 @every_function
-def test_bad_arguments_are_refused_by_name(function):
+def test_errors_name_the_bad_argument(function):
     for name, core in arrays_of(function).items():
         given = sample(function, 2)
         shapes = [()] * len(core[:1]) + [(2, 5, 7)] * len(core[1:])

@@ -109,7 +109,7 @@ def test_the_weighted_trace_induces_the_inertia_of_a_body():
     assert_close(metrics.weight_from_inertia(G), W, 1000)
     by_points = sum(p @ p * np.eye(3) - np.outer(p, p) for p in P[0].T)
     assert_close(G[0], by_points, 1000)
-    # the points of Gauss's rule, two for each axis, are exact for the squares in a box's inertia
+    # Gauss's rule with two points for each axis integrates the inertia of a box exactly
     sides = np.array([[0.3, 0.2, 0.03], [1.0, 2, 3], [2.0, 0, 0]])
     p = sides[:, None] * (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / np.sqrt(3)
     exact, box = metrics.inertia_from_weight(5 / 8 * p.mT @ p), metrics.box_inertia(sides, 5)

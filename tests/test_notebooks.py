@@ -80,7 +80,7 @@ def test_every_lesson_is_listed_with_its_minutes(path):
 
 
 @every_lesson
-def test_the_figures_in_a_lesson_are_the_stored_ones(path):
+def test_the_figures_in_a_lesson_equal_the_stored_figures(path):
     """The test compares all figures whose captions name files. Pictures in exercises need not have
     stored files."""
     text = path.read_text("utf-8")

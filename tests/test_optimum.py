@@ -105,7 +105,7 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
 
 @of_forces
 @pytest.mark.parametrize("size", [2.0, 0.3, 1e-6, 1e9])
-def test_the_optimum_of_a_round_body_is_that_of_a_ball(what, size):
+def test_a_round_body_has_the_optimum_of_a_ball(what, size):
     """The optimum of an almost round body is near the optimum of a ball."""
     ends, power = random_problems(6, 32)[:4], 2 if what == "torque" else 1
     curves, of_balls = OPTIMA[what](*ends, size * I3), rb.minimum_acceleration_so3(*ends)
@@ -276,7 +276,7 @@ def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
 
 
 @pytest.mark.parametrize("what", ["ball", "shooting"])
-def test_ends_with_eight_digits_are_replaced_by_the_nearest_rotations(what):
+def test_ends_rounded_to_eight_digits_are_replaced_by_rotations(what):
     _, R1, *rates = of_paper("4b")[:4]
     rounded, exact = (SOLVERS[what](I3, R, *rates) for R in (R1.round(8), R1))
     assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
@@ -284,8 +284,7 @@ def test_ends_with_eight_digits_are_replaced_by_the_nearest_rotations(what):
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():
-    """The matrices are computed with one thread count and used with all others, so they agree bit
-    by bit."""
+    """The matrices are computed with one thread and with two threads, and must agree bit by bit."""
     found = []
     for threads in (1, 2):
         for kept in (grid, interpolation):

@@ -129,7 +129,7 @@ def cost_about_an_axis(angle, k0, k1):
 
 @pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
 def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
-    """A cubic p(t) may end at σ plus any number of full turns; the optimum costs no more."""
+    """A cubic p(t) may end at σ plus any number of full turns; no such cubic may cost less."""
     rng, count = np.random.default_rng(speed), 30 if speed < 30 else 8
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
@@ -165,8 +165,8 @@ def test_the_solver_converges_near_half_turns(short_of):
 
 @pytest.mark.parametrize("seed", [None, 1])
 def test_the_cost_is_continuous_along_a_path_of_goals(seed):
-    """The cost has a kink where two families cross. No step may be much larger than its
-    neighbours."""
+    """The cost has a kink where two families cross. No step of the cost may be much larger than the
+    neighbouring steps."""
     ends = random_ends(np.random.default_rng(seed), np.pi, 12, 1)[:, 0]
     axis, w0, w1 = ends if seed else vectors(ASTRAY)
     turns = np.linspace(0, 2 * np.pi, 500)[:, None] * axis / np.linalg.norm(axis)
@@ -275,7 +275,7 @@ def test_turns_about_the_largest_moment_may_leave_the_axis(moments):
 
 
 def is_the_same_however_rounded(make, R1, rng, count):
-    """Check that curves to ends near R1 have the same velocities; return these."""
+    """Check that curves to goals near R1 have the same velocities; return these velocities."""
     t = np.linspace(0, 1, 5)
     first, *others = (
         make(R1 @ rb.exp_so3(nudge))(t, 1)

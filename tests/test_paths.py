@@ -136,7 +136,7 @@ def test_a_chain_without_velocities_rests_at_its_ends(poses):
 
 
 def test_user_defined_functions_make_legs():
-    """A leg's function may be a partial one, or combine one rotation with many paths.
+    """The function of a leg may be a `partial`, or combine a single rotation with many paths.
 
     A function that takes an acceleration gets a quintic for the origin; other functions get a
     cubic.
@@ -269,7 +269,7 @@ def test_errors_name_the_leg():
 
 
 @pytest.mark.parametrize("duration", [1e-9, 0.25, 3, 1e12])
-def test_retimed_chains_have_uniformly_scaled_times(duration):
+def test_retiming_a_chain_scales_its_times_uniformly(duration):
     c = rb.chain(TIMES, POSES)
     again, (first, last) = rb.retime(c, duration), c.domain
     start, end = again.domain
@@ -303,9 +303,8 @@ def test_the_cost_of_a_chain_whose_velocity_jumps_raises_an_error():
     assert 0 < rb.acceleration_cost(stops) < np.inf
 
 
-def test_a_chain_far_from_the_origin_is_the_same_motion():
-    """A slow motion in eastings and northings, sampled at 1 kHz, has no rests and no jumps, and has
-    a cost."""
+def test_moving_a_chain_far_from_the_origin_keeps_the_motion():
+    """A slow motion, sampled at 1 kHz and 5300 km from the origin, has no rests and no jumps."""
     t = np.arange(60) / 1000
     here = rb.pose_from_coordinates(t[:, None] * [0, 0, 4e-3, 4e-3, 0, 0])
     far = here.copy()
@@ -321,8 +320,8 @@ def test_a_chain_far_from_the_origin_is_the_same_motion():
     assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
 
 
-def test_equal_poses_are_a_rest_in_every_frame():
-    """Equal poses may differ by rounding errors of products, also at the origin of the frame."""
+def test_a_chain_rests_between_equal_poses_in_every_frame():
+    """Poses that differ only by rounding errors count as equal, also at the origin of the frame."""
     stay = POSES[[0, 1, 1, 2]]
     for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
         seen = frame @ stay
@@ -335,10 +334,9 @@ def test_equal_poses_are_a_rest_in_every_frame():
     assert np.abs(rb.log_so3(rb.chain([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
 
 
-def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
-    """For rotations, R_i exp(x(t)) passes through the neighbours, where x(t) is a parabola; for d,
-    a parabola passes through the positions. If the poses are moved, the velocities move with
-    them."""
+def test_a_parabola_through_three_poses_has_bessels_velocities():
+    """The curve R_i exp(x(t)), with a parabola x(t), passes through the neighbours of R_i. Another
+    parabola passes through the positions. If the poses are moved, the velocities move with them."""
     chosen = rb.bessel_velocities(TIMES, POSES)
     for i in range(N):
         m = min(max(i, 1), N - 2)
@@ -351,5 +349,5 @@ def test_bessels_velocities_are_those_of_the_parabola_through_three_poses():
         assert np.abs(chosen[i, 3:] - ROTATIONS[i].T @ slope[3:]).max() < 200 * EPS
     A = rb.pose_from_coordinates([0.4, -1, 2, 3, 1, 5])
     assert np.abs(rb.bessel_velocities(TIMES, A @ POSES) - chosen).max() < 200 * EPS
-    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # for two poses, the constant velocity
+    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # two poses have a constant velocity
     assert np.abs(w - oracles.log_so3(ROTATIONS[0].T @ ROTATIONS[1]) / 2).max() < 10 * EPS

@@ -133,7 +133,7 @@ def test_a_command_in_the_body_frame_is_a_constant_twist():
 
 @pytest.mark.source("RR 3.2")
 @both_frames
-def test_a_reversed_plan_leads_back(frame):
+def test_a_reversed_plan_leads_back_to_the_start(frame):
     plan = [(np.array(v, float), d) for v, d in PLAN]
     there = planar.propagate_planar(POSES.reshape(4, 50, 3), plan, frame=frame)
     one = planar.propagate_planar(POSES[57], PLAN, frame=frame)

@@ -50,8 +50,8 @@ def test_the_cubic_is_projected_to_the_nearest_rotation():
 
 
 @pytest.mark.source("BK 6.2", "errata 11")
-def test_the_end_conditions_hold_to_rounding():
-    """The printed second derivative at the end is not the prescribed one, and R0 ŵ0 is singular."""
+def test_the_end_conditions_hold_up_to_rounding():
+    """The printed second derivative at the end is wrong, and R0 ŵ0 is singular."""
     for curve in (CUBICS, QUINTICS):
         scale = np.linalg.norm(curve.ends, axis=(-2, -1)).sum(axis=-1)[:, None]
         for t, R, w, a in ((0, R0, W0, B0), (1, R1, W1, B1)):
@@ -63,7 +63,7 @@ def test_the_end_conditions_hold_to_rounding():
     assert np.abs(np.linalg.det(V0)).max() < 1e-13 * 64
 
 
-def test_the_quintic_does_not_have_least_jerk():
+def test_the_quintic_does_not_have_the_least_jerk():
     """About one axis, a quintic in the angle has the least jerk; from rest to rest it costs 720
     angle²."""
     t = np.linspace(0, 1, 4001)
@@ -87,8 +87,8 @@ def test_the_cubic_with_the_ends_of_the_projected_line_equals_this_line():
 
 @pytest.mark.source("BK Prop. 3", "BK Prop. 5")
 def test_moved_ends_give_the_moved_curve():
-    """The ends are multiplied by rotations from both sides. The bound is the documented one, 1e-12
-    over the margin."""
+    """The ends are multiplied by rotations from both sides. The documented bound is 1e-12 divided
+    by the margin."""
     L, Q = Rotation.random(2, rng=5).as_matrix()
     ends, rates = (L @ R0 @ Q, L @ R1 @ Q), np.array([W0, W1, B0, B1]) @ Q
     for moved, curve, want in (
@@ -126,7 +126,7 @@ def test_a_jump_between_the_sampled_times_is_found(k, k1):
 
 @pytest.mark.source("BK 6.2")
 @pytest.mark.parametrize("count", [2, 4, 6])
-def test_the_polynomial_has_least_degree_and_exact_ends(count):
+def test_the_polynomial_of_least_degree_has_exact_ends(count):
     """The ends may have very different sizes, and small changes are computed without
     cancellation."""
     given, t = RNG.normal(size=(6, 5))[:count], np.linspace(0, 1, 21)
@@ -152,8 +152,7 @@ def test_the_polynomial_has_least_degree_and_exact_ends(count):
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.source("BK 6")
 def test_the_polynomial_minimises_its_cost(count):
-    """The derivative in the cost is orthogonal to the same derivative of any change that keeps the
-    ends."""
+    """If a change keeps the ends, its derivative is orthogonal to the derivative in the cost."""
     ends, order = RNG.normal(size=count), count // 2
     t = (1 + np.cos(np.pi * np.arange(9) / 8)) / 2
     best = Polynomial.fit(t, hermite(ends, t), count - 1).convert().deriv(order)

@@ -18,7 +18,7 @@ def test_theta_and_f_agree_with_the_corrected_formulas(name, order):
     want = np.vectorize(getattr(oracles, name))(*grid, order)
     off = np.abs(getattr(line, name)(*grid, order) - want)
     scale = np.abs(want)
-    if (name, order) == ("theta", 3):  # this is a difference; its error is relative to its terms
+    if (name, order) == ("theta", 3):  # the error of this difference is relative to its terms
         scale += 4 * line.theta(*grid, 2) ** 2 / line.theta(*grid, 1)
     assert np.all(off <= (2 * EPS if (name, order) == ("theta", 0) else 8 * EPS * scale + 1e-60))
 
@@ -85,7 +85,8 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
         assert np.abs(printed - projected).max() > 0.1
     pairs = [(w, printed_eigenvectors(w))]
     along_y, turn = np.array([0, 1.2, 0]), oracles.exp_so3([0, 0.7, 0])
-    with np.errstate(invalid="ignore"):  # along y they are undefined, and any pair is valid
+    # about y the printed vectors are undefined, and any pair is valid
+    with np.errstate(invalid="ignore"):
         assert np.isnan(printed_eigenvectors(along_y)).any(axis=1).all()
     pairs += [(along_y, I3[[0, 2]]), (along_y, I3[[0, 2]] @ turn.T)]
     for w, across in pairs:
@@ -95,7 +96,7 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
 
 
 @pytest.mark.source("BK Prop. 6", "errata 7")
-def test_theta_is_accurate_far_from_the_line():
+def test_theta_is_accurate_outside_the_unit_interval():
     outside = [(-0.5, 1.0), (1.5, 1.0), (1e6, 9.99e-10), (1e10, 9.99e-10), (-1e3, 1e-6), (1e12, 3)]
     want = np.array([oracles.theta(*one) for one in outside])
     off = np.abs(line.theta(*np.transpose(outside)) - want)
@@ -121,7 +122,7 @@ def test_theta_and_f_have_their_limits_at_angle_0():
         assert function(0.25, np.nextafter(np.pi, 4)) == function(0.25, np.pi)
 
 
-def test_bad_angles_orders_and_times_are_refused():
+def test_bad_angles_and_times_are_refused():
     for one in (line.theta, line.f):
         with pytest.raises(ValueError, match=r"^angle is 3\.2, an angle in"):
             one(0.5, 3.2)

@@ -29,8 +29,8 @@ def assert_members(R):
 
 
 def assert_nearest(R, M, W=None):
-    """Check that R is nearest: RᵀM, or RᵀMW, is symmetric, and its two smallest eigenvalues sum to
-    0 or more."""
+    """Check that R is the nearest rotation: RᵀM, or RᵀMW, is symmetric, and its two smallest
+    eigenvalues sum to 0 or more."""
     S, n = R.mT @ M, M.shape[-1]
     bound = 8 * n * EPS * np.linalg.norm(M, axis=(-2, -1))
     if W is not None:
@@ -98,7 +98,7 @@ def test_projections_are_invariant():
 
 @pytest.mark.parametrize("n", [2, 3, 4])
 @pytest.mark.source("BK 4")
-def test_the_weighted_projection_is_the_nearest_in_its_metric(n):
+def test_the_weighted_projection_is_the_nearest_rotation_in_its_metric(n):
     """Condition numbers are up to 1e6, and ranks include 1 (a rod) and n − 1 (a flat body).
 
     The moved points of a flat body determine the rotation.
@@ -167,7 +167,7 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
 
 @pytest.mark.source("BK 5", "BK Prop. 4", "BK Prop. 5", "RR 1.6", "errata 16")
 @pytest.mark.parametrize("n", [2, 3, 4])
-def test_the_projected_pose_is_the_nearest_one(n):
+def test_the_projected_pose_is_the_nearest_pose(n):
     """The projection is invariant under poses on the left, but only under rotations on the right.
 
     tr(AᵀA) is n + 1 + dᵀd. The paper prints 4 + dᵀd.
@@ -195,7 +195,7 @@ def test_the_projected_pose_is_the_nearest_one(n):
 
 
 @pytest.mark.source("RR 1.1", "RR (1)", "RR (2)", "RR 1.2", "RR (3)", "RR 1.3", "BK 2.1")
-def test_membership_allows_defects_up_to_1e_9_or_atol():
+def test_membership_tests_allow_defects_up_to_atol():
     is_so, is_se, is_unit = rb.is_so, rb.is_se, rb.is_unit_quaternion
     assert is_so(members(3, np.random.default_rng(0)), 1e-14).all()
     drifted, A = np.eye(3) + 1e-3, rb.pose_from_components(np.eye(3), [1e6, -2, 3])
@@ -305,9 +305,8 @@ def test_foam_projects_every_matrix_of_a_stack():
 
 
 @pytest.mark.source("BK Prop. 2")
-def test_matrices_in_a_stack_are_projected_as_they_are_alone():
-    """Some matrices are near the singular set; some have neighbours that are extreme or of rank 1
-    or 0."""
+def test_stacking_matrices_does_not_change_their_projections():
+    """Some matrices are near the singular set. Some are extreme, or have rank 1 or 0."""
     rng = np.random.default_rng(10)
     kinds = [*KINDS.values(), np.ones((1, 3, 3)), 1e200 * np.ones((1, 3, 3))]
     kinds += [factor * KINDS["noisy"] for factor in (-1, 2.0**900, 2.0**-900, 1e150, 1e-150)]

@@ -39,7 +39,7 @@ def figures_are_closed():
     plt.close("all")
 
 
-def test_names_and_signatures_are_those_of_the_report():
+def test_names_and_signatures_agree_with_the_report():
     """Parameters that are not in the report are keyword-only and optional."""
     wanted = {name: words.split(", ") for words, names in SIGNATURES.items() for name in names}
     assert set(rr.__all__) == set(wanted)
@@ -123,7 +123,7 @@ def strokes_of(figure):
 
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR Fig. 4", "RR Fig. 5")
 @pytest.mark.parametrize("quaternion", [True, False])
-def test_random_rotations_equal_those_of_the_samplers(quaternion):
+def test_random_rotations_agree_with_the_samplers(quaternion):
     one = rr.random_quaternion if quaternion else rr.random_rotation_matrix
     for choice, steps in (({}, 5 if quaternion else 100), ({"naive": True}, 3)):
         naive = bool(choice)

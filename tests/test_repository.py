@@ -36,7 +36,7 @@ PINS = {
     name: [Requirement(line.partition("#")[0]) for line in lines if line[0] not in "#-"]
     for name, lines in LISTS.items()
 }
-EXTRAS = {  # extras of rbcourse and of rbcourse-classroom, by the list that contains them
+EXTRAS = {  # each list has these extras of rbcourse and rbcourse-classroom
     "environment.txt": (["draw"], ["lessons"]),
     "classroom/environment-teach.txt": ([], ["grading"]),
     "classroom/environment-book.txt": ([], ["book"]),
@@ -170,7 +170,7 @@ def course_module():
 
 @pytest.fixture
 def setting_up(tmp_path, monkeypatch):
-    """Return course.py with a folder of its own, in which set-up only records its commands."""
+    """Return course.py in a new folder; its set-up records commands instead of running them."""
     module, done = course_module(), []
 
     def pretend(*command, **_):
@@ -339,7 +339,7 @@ def test_lab_opens_the_first_lesson_without_the_extensions_for_teachers(
     monkeypatch.setattr(lab, "copy_lessons", lambda *paths: copied.append(paths))
     monkeypatch.setattr("jupyterlab.labapp.LabApp.launch_instance", opened.extend)
     monkeypatch.setenv("JUPYTER_CONFIG_PATH", "")
-    monkeypatch.setenv("RBCOURSE_EDIT", "")  # registered here, so that it is removed again
+    monkeypatch.setenv("RBCOURSE_EDIT", "")  # pytest will restore this variable after the test
     with warnings.catch_warnings():
         lab.main()
     assert bool(copied) is not edit
@@ -380,7 +380,7 @@ def test_every_task_is_listed_in_the_readme_or_in_contributing():
     assert len(read("README.md").splitlines()) <= 130
 
 
-def test_the_tests_that_contributing_names_exist():
+def test_the_tests_listed_in_contributing_exist():
     """Each row of the table of promises names a test, or a check by hand."""
     named = re.findall(r"`([\w/]+\.py)::(\w+)`", read("CONTRIBUTING.md"))
     assert len(named) > 25
@@ -422,7 +422,7 @@ NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "
 NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
-IMPORTED = {  # installed requirements, and modules that need further ones
+IMPORTED = {  # each case lists the installed requirements, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
     "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),

@@ -1,4 +1,4 @@
-"""Test imports: no cycles, only exported names, and no library except NumPy at first."""
+"""Test imports: their order, their names, and the libraries that they load."""
 
 import ast
 import importlib
@@ -20,7 +20,7 @@ PACKAGES = {
     name: Path(package.__file__).parent
     for name, package in {"rbcourse": rbcourse, "rbclassroom": rbclassroom}.items()
 }
-MAY_IMPORT = {  # for each part of the packages, the other parts that it may import
+MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbcourse": set(),
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},

@@ -23,7 +23,7 @@ CORNERS = np.array(np.meshgrid(*3 * [SHARES])).reshape(3, -1).T
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.source("RR 2.1", "RR 2.2", "RR (7)", "RR (8)", "RR (9)", "RR (13)")
-def test_draws_are_rotations_in_any_shape(sampler):
+def test_draws_of_any_shape_are_rotations(sampler):
     before, core = np.random.get_state(), sampler(rng=3).shape  # noqa: NPY002
     draws = sampler(20_000, rng=1)
     defect = draws.mT @ draws - np.eye(3) if core == (3, 3) else np.linalg.norm(draws, axis=-1) - 1
@@ -43,7 +43,7 @@ def test_draws_are_rotations_in_any_shape(sampler):
 
 @pytest.mark.source("RR 2.1", "RR (9)", "RR (10)", "RR (11)", "RR 2.2", "RR (13)")
 @pytest.mark.parametrize("name", ["sample_rotation", "sample_quaternion"])
-def test_the_fast_draws_equal_those_of_the_textbook(name):
+def test_fast_draws_equal_the_draws_of_the_textbook(name):
     """The draws fill one block or several. The generator ends in the same state as the
     textbook's."""
 
@@ -88,7 +88,7 @@ def test_quaternions_agree_with_the_report():
     assert oracles.between_rotations(q, printed).max() < 4 * EPS
     assert oracles.between_rotations(rb.quaternion_from_matrix(R), printed).min() > 1e-3
     turns = 2 * np.pi * np.stack([s, x1, x2])[:, :, None] * np.eye(3)[::-1, None]
-    first, second, third = rb.exp_so3(turns)  # about z, y and x
+    first, second, third = rb.exp_so3(turns)  # these turns are about z, y and x
     assert np.abs(R - first @ second @ third).max() < 4 * EPS
 
 
@@ -108,7 +108,7 @@ def test_bad_arguments_are_refused():
             function(**arguments)
 
 
-def test_other_processors_draw_the_same_to_rounding():
+def test_other_processors_give_the_same_samples_up_to_rounding():
     """In this test, NumPy does not use the instructions that make its tangent fast."""
     code = "import rbcourse as rb; print(*map(float, rb.sample_rotation(300, rng=8).ravel()))"
     slow = os.environ | {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
@@ -165,8 +165,8 @@ def test_deliberate_errors_are_detected():
 
 
 def test_the_angle_is_distributed_as_the_area_of_spherical_caps():
-    """The distribution function is (a − sin a)/π. Its relative error is a few eps/a², or the error
-    of the approximation a³/(6π)."""
+    """The distribution function is (a − sin a)/π. The relative error of this formula is a few
+    eps/a², or the error of the approximation a³/(6π)."""
     for a in (0.1, 1.0, 2.5, np.pi):
         cap, _ = quad(lambda u: np.sin(u) ** 2, 0, a / 2)
         assert angle_law(a) == pytest.approx(cap / (np.pi / 4), rel=1e-12)

@@ -79,8 +79,8 @@ def test_the_second_differences_are_right_for_a_curve_at_rest():
 
 
 def test_the_constants_of_the_lemma_are_right():
-    """The constants bound η, clamped at both ends, by ∫ ‖η''‖². They are computed as Rayleigh
-    quotients of polynomials."""
+    """If η is clamped at both ends, the constants bound it by ∫ ‖η''‖². The constants are computed
+    as Rayleigh quotients of polynomials."""
     nodes = grid(129)
     weights = nodes.integral[-1]
     eta, rate = polynomials(40, 2, 129)[:2]
@@ -139,8 +139,8 @@ MINIMA = [
 
 @pytest.mark.parametrize(("what", "degrees"), SADDLES)
 def test_a_saddle_is_not_a_local_minimum(what, degrees):
-    """These turns about an axis from rest to rest are saddles: some turns of the nodes reduce the
-    cost."""
+    """These turns about a fixed axis are saddles, because small rotations of the nodes can reduce
+    the cost."""
     curve = upright(what, np.radians(degrees))
     assert curve.converged.all()
     assert hessian(curve[0])[0] < -1e-5
@@ -155,8 +155,8 @@ def test_turns_that_are_minima_are_recognised(what, degrees):
 
 
 def test_saddles_are_recognised_among_many_stationary_curves():
-    """The curves are turns by more than 360° with slow ends. Second differences of the cost show
-    which ones are saddles."""
+    """The curves turn by more than 360° and are slow at both ends. Second differences of the cost
+    show which curves are saddles."""
     rng, told, least = np.random.default_rng(7), [], []
     t = grid(LIMITS.nodes).t[:, None]
     for _ in range(16):
@@ -187,8 +187,8 @@ def test_missing_curves_are_not_minima():
 
 
 def test_stationary_curves_with_short_costates_are_minima():
-    """Stationary curves with ‖c‖ < 2π³ are minima by the isoperimetric inequality, see
-    docs/near_optimal.md."""
+    """If ‖c‖ < 2π³, a stationary curve is a minimum by the isoperimetric inequality
+    (docs/near_optimal.md)."""
     curves = rb.stationary_so3(rb.exponential_cubic_long_so3(*random_problems(200, 1.5, rng=8)))
     short = np.linalg.norm(curves.c, axis=-1) < 2 * np.pi**3
     assert short.sum() > 20

@@ -121,11 +121,13 @@ def test_a_moved_path_has_the_moved_spline(name):
 
 @pytest.mark.source("beyond BK 14")
 @pytest.mark.parametrize("name", ["projected", "quaternion"])
-def test_the_excess_of_a_spline_there_and_back_has_the_exact_constant(name):
-    """The angle about one axis is (0, θ, 0) at 0, 1, 2. Let σ = θ p + θ³ r + … on a leg, where p is
-    the spline and r the leading error of the projected cubic. The excess is θ⁴ ∫ r''² / ∫ p''²."""
+def test_the_excess_of_a_spline_that_turns_back_has_the_exact_constant(name):
+    """The angle about one axis is 0, θ, 0 at the times 0, 1, 2. Let σ = θ p + θ³ r + … on a leg,
+    where p is the spline and r the leading error of the projected cubic. The excess is θ⁴ ∫ r''² /
+    ∫ p''²."""
     p, H = Polynomial([0, 1.5, 0, -0.5]), Polynomial([0, 0, 3, -2])
-    r = -p / 6 + p * H / 2 - p**3 / 3  # from tan σ = y/x, with the cubics y for sin and x for cos
+    # this follows from tan σ = y/x, where the cubics y and x replace sin and cos
+    r = -p / 6 + p * H / 2 - p**3 / 3
     parts = [(x.deriv(2) ** 2).integ()(1) for x in (r, p)]
     constant = Fraction(20711, 180180) / (16 if name == "quaternion" else 1)
     if name == "projected":
@@ -157,7 +159,7 @@ def test_the_optimum_about_one_axis_is_the_cubic_spline_of_the_angle(ends, size)
     assert c.certified
 
 
-def test_the_optimal_spline_through_samples_of_an_optimum_is_that_optimum():
+def test_the_optimal_spline_through_samples_of_an_optimum_equals_this_optimum():
     """Passing through the inner samples does not change the optimum."""
     _, (R0, R1) = path(2, 100, 6)
     w0, w1 = 2 * np.random.default_rng(7).normal(size=(2, 3))
@@ -274,7 +276,7 @@ def test_splines_of_large_turns_at_uneven_times_are_found(ends, seed):
         assert off(rate(c, s) - before, before) < 1e-9
 
 
-def test_the_long_way_is_kept():
+def test_optimal_splines_keep_the_chosen_long_way_round():
     t, R = path(5, 70, 11)
     way = [False, True, False, False]
     c = rb.minimum_acceleration_spline_so3(t, R, long=way)
@@ -342,7 +344,7 @@ def test_a_body_leaves_the_axis_of_its_poses_if_this_costs_less(name, power, deg
     assert c.cost < 0.9999 * 2 * 12 * angle**2 * BOOK[2, 2] ** power
 
 
-def test_a_family_of_curves_of_equal_cost_is_not_reported_as_definite():
+def test_a_family_of_equally_cheap_curves_is_not_definite():
     """For a plate, each curve that leaves its axis can be turned about this axis at the same
     cost."""
     rest, plate = np.zeros(3), np.diag([1, 1, 1.9])
@@ -382,7 +384,7 @@ def test_bad_choices_of_the_long_way_are_refused(long):
 
 
 def test_very_uneven_times_give_a_minimum_or_an_error():
-    """The short legs last a thousandth of the time of the others, but turn by the same angle."""
+    """The short legs last a thousandth as long as the other legs, but turn by the same angle."""
     t = np.array([0, 1, 1.001, 2, 2.001, 3])
     _, R = path(6, 150, 17)
     try:

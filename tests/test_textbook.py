@@ -26,7 +26,7 @@ def test_the_geodesic_agrees_with_the_textbook():
 
 @pytest.mark.source("BK 6.2")
 def test_the_projected_cubic_agrees_with_the_textbook():
-    """The bound is eps divided by the least gap; for derivatives, by its square and its cube."""
+    """The error of derivative k is of order eps/gap^(k + 1), where gap is the least gap."""
     rng = np.random.default_rng(62)
     for _ in range(15):
         ends = *Rotation.random(2, rng=rng).as_matrix(), *3 * rng.normal(size=(2, 3))

@@ -47,7 +47,7 @@ def trapezoid(length, v, a):
 
 
 def on_circle(angle, r, a):
-    """Return the time from rest to rest on a circle: v² = r a sin(2s/r), until v² = r a."""
+    """Return the least time from rest to rest on a circle; v² = r a sin(2s/r), until v² = r a."""
     if angle > np.pi / 2:
         return LEMNISCATE * np.sqrt(r / a) + (angle - np.pi / 2) * np.sqrt(r / a)
     half = np.sqrt(r * angle / 2)
@@ -209,7 +209,7 @@ def test_used_shares_agree_with_the_torque_and_the_force():
 @pytest.mark.parametrize("name", SETS)
 def test_the_least_time_has_the_symmetries_of_the_problem(name):
     """The path is moved or reversed, or its times or its unit of length are changed. Finally all
-    limits are scaled to a faster motion."""
+    limits are scaled so that the motion is k times as fast."""
     c, limits = random_chain(7), SETS[name]
     t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
     turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # this pose turns about the vertical
@@ -261,7 +261,7 @@ def test_a_timed_curve_has_exact_derivatives(size):
         rb.acceleration_cost(timed)
 
 
-def test_a_constant_share_is_returned_with_its_first_time():
+def test_limits_used_returns_the_first_time_of_a_constant_share():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 
@@ -277,7 +277,7 @@ def test_no_uniform_timing_within_the_limits_is_faster(name):
 
 
 def test_limits_hold_in_the_cells_next_to_a_rest():
-    """Speeds and accelerations in the cells next to a rest vary as polynomials."""
+    """In the cells next to a rest, speeds and accelerations are polynomials."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
     slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
     still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)

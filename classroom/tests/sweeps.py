@@ -11,14 +11,15 @@ from rbclassroom import explorers
 
 @cache
 def made(name):
-    """Return an explorer; each is made once."""
+    """Return an explorer; each explorer is made only once."""
     return getattr(explorers, f"{name}_explorer")()
 
 
 def sweep(name, **base):
-    """Apply each setting over the start values and `base`; yield the values and the texts.
+    """Apply each setting to an explorer with the start values and `base`; yield values and texts.
 
-    Check that each setting shows values, or the reason for having none, and no "nan" or "-0".
+    Check that each setting shows values or states why there are none. No text may contain "nan" or
+    "-0".
     """
     explorer = made(name)
     explorer.restart()
@@ -34,7 +35,7 @@ def sweep(name, **base):
 
 def settings(explorer):
     """Yield settings. First, each control alone takes five values in its range. Then all controls
-    take extreme values, so that each pair takes all combinations."""
+    take extreme values, in all combinations for each pair of controls."""
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)
@@ -63,7 +64,7 @@ def read_off(explorer):
 
 
 def reads(text, wanted):
-    """Return whether the numbers in a text equal these, up to half a unit of the last digit."""
+    """Return whether the numbers in a text equal `wanted`, up to half a unit of the last digit."""
     found = re.findall(r"-?\d+(?:\.\d+)?", text)
     digits = np.array([len(each.partition(".")[2]) for each in found])
     return np.all(np.abs(np.array(found, float) - np.ravel(wanted)) <= 0.51 * 10.0**-digits)

@@ -41,7 +41,7 @@ def test_the_path_table_has_joint_angles_and_link_ends():
 
 @pytest.mark.source("RR 4")
 @pytest.mark.parametrize("q", [[0.5, 0.8], [-0.5, -2], [2, -1]])
-def test_a_drawn_arm_has_its_links_frames_and_angles(axes, q):
+def test_a_drawn_arm_shows_its_links_and_angles(axes, q):
     links, *arrows = arm.draw_posture(axes[0], np.array(q))
     joints, headings = ends(q), np.cumsum(q)
     assert off(links, joints) < 1e-14

@@ -105,7 +105,7 @@ def test_letters_of_a_frame_are_beyond_the_tips_of_its_arrows(axes):
 
 
 def test_descriptions_state_the_drawn_numbers():
-    # the maximum is at 1/3, but at the six given times the largest value is at 0.4
+    # the maximum is at 1/3, but the largest of the six given values is at 0.4
     bump = 4 * TIMES * (1 - TIMES) ** 2
     turns = rb.exp_so3(np.radians(50) * np.outer(bump, [0, 0.6, 0.8]))
     tilted = rb.pose_from_components(turns, [0, 0, 0])

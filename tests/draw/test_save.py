@@ -20,7 +20,7 @@ def saved(folder, monkeypatch, alt="a line"):
     return save.save_figure(fig, "line", TABLE, alt)
 
 
-def test_the_png_pdf_and_csv_have_the_same_bytes_each_time(tmp_path, monkeypatch):
+def test_saved_files_have_the_same_bytes_each_time(tmp_path, monkeypatch):
     picture, _ = (saved(tmp_path / folder, monkeypatch) for folder in "ab")
     files, again = ({f.name: f.read_bytes() for f in (tmp_path / x).iterdir()} for x in "ab")
     assert set(files) == {"line.png", "line.pdf", "line.csv"}

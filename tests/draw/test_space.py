@@ -103,7 +103,7 @@ def sampled(part):
 
 
 def covers(face, places, sight):
-    """Return a mask of the places that, in the view, lie on a face or on the disc of a ball."""
+    """Return a mask of the places that appear on a face or on the disc of a ball."""
     corners = sight.flat(face.places)
     (x, y), to = (np.roll(corners, -1, axis=0) - corners).T, sight.flat(places)[:, None] - corners
     if face.kind == "ball":
@@ -145,7 +145,7 @@ def test_a_line_that_is_cut_keeps_its_length_and_its_dashes(ax):
     assert max(places[-1, 3] for places in line) == pytest.approx(steps.sum())
 
 
-def test_a_line_that_crosses_a_plane_twice_is_cut_in_three(ax):
+def test_a_line_that_crosses_a_plane_twice_is_cut_into_three_pieces(ax):
     corners = np.array([[0, 0, 5], [1, 0, 0], [2, 0, -5], [3, 0, 0], [4, 0, 5.0]])
     ax.plot(*corners.T, lw=3)
     pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
@@ -155,7 +155,7 @@ def test_a_line_that_crosses_a_plane_twice_is_cut_in_three(ax):
     assert [len(part.places) for _, part in parts] == [3, 2, 2]
 
 
-def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
+def test_opaque_pieces_overlap_where_they_are_cut(ax):
     square = np.array([[[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]]])
     ax.add_artist(space.Faces(square, ["red"]))
     for alpha, overlap in ((1, 2), (0.5, 0)):
@@ -168,7 +168,7 @@ def test_parts_of_an_opaque_piece_overlap_where_it_is_cut(ax):
         line.remove()
 
 
-def test_bodies_that_pass_through_each_other_have_an_outline_where_they_meet(ax):
+def test_intersecting_bodies_have_an_outline_where_they_meet(ax):
     """A corner of one cube is inside the other cube, so six lines meet at their ends."""
     corners, apart = bodies.draw_box(ax, np.eye(4), 1.0).corners[:6], np.array([0.4, 0.3, 0.2])
     ax.artists[0].remove()
@@ -231,7 +231,7 @@ def test_a_line_is_not_drawn_in_its_gaps(ax):
         drawn(ax)
 
 
-def test_only_changed_pieces_are_made_again(ax):
+def test_only_changed_pieces_are_computed_again(ax):
     (line,), text = ax.plot([0, 1], [0, 0], [0, 0]), ax.text(0, 0, 0, "a")
     first, _ = drawn(ax)
     assert drawn(ax)[0] == first  # the same objects

@@ -93,7 +93,7 @@ def test_check_writes_the_file_to_submit_without_nbgrader(hand_in):
     assert names == ["points.csv", "ps0.ipynb", "ps0.ipynb", "ps0.ipynb"]
 
 
-def test_faults_are_reported_and_the_file_is_still_written(hand_in, capsys, monkeypatch):
+def test_the_file_is_written_even_if_answers_have_faults(hand_in, capsys, monkeypatch):
     def change(notebook):
         cell(notebook, "half-test").source = "assert True"
         notebook.cells.append(new_code_cell("open('made_by_a_run', 'w').close(); nowhere"))
@@ -115,7 +115,7 @@ def test_faults_are_reported_and_the_file_is_still_written(hand_in, capsys, monk
         assert words in said
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
     slow = "took more than half of the 30 s that grading allows"
-    assert said.count(slow) == 6  # the test's clock jumps, so every cell with code is reported
+    assert said.count(slow) == 6  # in this test, every code cell seems to be slow
     assert BoxedExecute().timeout == signature(check.check).parameters["seconds"].default == 30
     assert not (path.parent / "made_by_a_run").exists()
 
@@ -124,7 +124,7 @@ def test_faults_are_reported_and_the_file_is_still_written(hand_in, capsys, monk
 def endless(monkeypatch, tmp_path):
     """Return a function that gives a time limit to a single cell: ``endless(name, patience)``.
 
-    The cell runs the returned code just before its endless loop; then the limit begins.
+    The function returns code that the cell runs before its endless loop. Then the limit begins.
     """
 
     def begin(name, patience):

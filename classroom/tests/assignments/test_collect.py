@@ -76,7 +76,7 @@ def of(kind, rows):
 
 
 def files(course):
-    """Return a dict from the folders of collected notebooks to their texts."""
+    """Return a dict with the text of each collected notebook; the keys are the folders."""
     paths = (course / "submitted").glob("*/*/*.ipynb")
     notebooks = {path: nbformat.read(path, as_version=4) for path in paths}
     return {
@@ -106,7 +106,7 @@ def files(course):
     ],
 )
 @pytest.mark.parametrize("packing", ["zip", "loose"])
-def test_the_file_names_of_moodle_and_canvas_give_the_student(entry, student, packing, course):
+def test_file_names_from_moodle_and_canvas_identify_the_student(entry, student, packing, course):
     content = answered(course)
     given = {"ROB_2026_01_all.zip": packed({entry: content})} if packing == "zip" else {}
     rows = collected(course, given or {entry: content})
@@ -164,7 +164,7 @@ def test_each_notebook_is_assigned_to_its_problem_set(course):
     assert files(course).keys() == wanted
 
 
-def test_different_encodings_of_a_name_give_one_student(course):
+def test_different_encodings_of_a_name_identify_one_student(course):
     content, plain = answered(course), moodle("Jörg Müller_1")
     undeclared = bytearray(packed({plain: content}))
     for mark, at in ((b"PK\x03\x04", 7), (b"PK\x01\x02", 9)):
@@ -238,7 +238,7 @@ def test_the_file_to_submit_is_found_in_a_zip(course):
 @pytest.mark.parametrize(
     "inner", [moodle("Bob Bee_2"), "ps1_2026_11_final.ipynb", "img/plot_2026_11_20"]
 )
-def test_all_files_in_the_zip_of_a_student_get_the_same_student(course, inner):
+def test_all_files_in_a_zip_are_assigned_to_the_same_student(course, inner):
     upload = packed({"ps1.ipynb": answered(course), inner: answered(course)}, NEWEST)
     theirs = {moodle("Ann Ay_1", "ps1.zip"): upload}
     for given in ({"all.zip": packed(theirs)}, theirs):
@@ -272,7 +272,7 @@ def test_only_unsafe_files_are_refused(course):
     }
     zips = [packed(entries), bytes(encrypted), bytes(broken), bomb, b"PK", b""]
     rows = collected(course, {f"{k}.zip": content for k, content in enumerate(zips)})
-    # this file name points outside the folder; only the student is read from it
+    # the path in this file name is ignored; only the student's name is used
     assert files(course).keys() == {f"{who}/ps1" for who in ("a", "b", "d", "good_one")}
     why = [reason for _, reason in of("refused", rows)]
     assert len(why) == 9

@@ -101,7 +101,7 @@ def test_remarks_state_the_number_of_the_line_in_the_cell():
     assert found("%%time\nx = 1\nnp.allclose = print") == [(3, "replaces np.allclose")]
 
 
-def test_students_may_import_the_same_module_in_another_way():
+def test_another_way_to_import_the_same_module_is_accepted():
     locked = ["import matplotlib.pyplot as plt\nimport math\nmath.tau = 6"]
     assert found("from matplotlib import pyplot as plt", locked) == []
     assert found("from json import tool as plt", locked)

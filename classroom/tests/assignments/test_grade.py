@@ -55,7 +55,7 @@ def square(x):
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """
 # This answer exceeds the limit on output before its time limit begins, and then prints slowly.
-# Without the pause, only fast machines would fill the memory within the limit.
+# Without the pause, fast machines would fill the memory before the time limit.
 LOUD = f"""
 import sys, time
 from IPython.display import HTML, display
@@ -128,7 +128,9 @@ def rows(course):
     [(student, *wanted) for student, _, _, *wanted in CLASS]
     + [(student, " ", [why]) for student, _, _, why in FILES],
 )
-def test_each_submission_has_its_points_and_remarks(course, rows, student, points, remarks):
+def test_each_submission_gets_the_expected_points_and_remarks(
+    course, rows, student, points, remarks
+):
     row = rows[student]
     assert f"{row['square-test']} {row['half-test']}" == points, row
     assert all(remark in row["remarks"] for remark in remarks), row
@@ -176,7 +178,7 @@ def test_feedback_shows_no_hidden_tests(course):
 
 
 class Killed(ProcessPoolExecutor):
-    """A pool of workers that kills one student's worker at its start."""
+    """A pool of workers in which one student's worker is killed when it starts."""
 
     def submit(self, work, name, student, *further):
         if student == "half right":

@@ -51,7 +51,7 @@ def test_the_handout_has_all_files_that_a_student_needs(course, unpacked):
     assert lines[-2:] == [f"./{name}" for name in wheels]
     assert all(f"\n{line} " in environment for line in lines[:-2])
     assert len(lines) == environment.count("==") - environment.count("== ") + 2
-    readme = (unpacked / "README.txt").read_bytes()  # readable as plain text on every system
+    readme = (unpacked / "README.txt").read_bytes()  # this text must be readable on every system
     assert readme.count(b"\r\n") == readme.count(b"\n") > 20
     assert readme.decode("ascii").startswith("Problem set ps0")
 

@@ -63,7 +63,7 @@ def test_wrong_answers_get_a_hint_or_a_description_of_the_error(body, said):
     assert all(map(np.array_equal, before, [x for x, _ in DOUBLE.inputs]))
 
 
-def test_the_error_for_a_wrong_number_of_arguments_is_reported():
+def test_a_wrong_number_of_arguments_is_reported():
     assert "takes 1 positional argument but 2 were given" in told(DOUBLE, "def answer(x): return x")
 
 

@@ -21,7 +21,7 @@ COIN = Sampler(
 
 
 def draws(law, n, rng):
-    """Return draws from the right distribution, made with SciPy."""
+    """Return SciPy's draws from the right distribution."""
     if law == "direction":
         points = rng.normal(size=(n, 3))
         return points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -31,9 +31,9 @@ def draws(law, n, rng):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
-    """For any number of draws, Massart's bounds on the probability of refusal add up to 1e-6.
+    """By Massart's inequality, the probability of a refusal is at most 1e-6.
 
-    With 20 times as many draws, the test would detect a row that is not uniform.
+    This test uses 20 times as many draws, so that it would detect a row that is not uniform.
     """
     problem = Sampler(**LAWS[law], mistakes=())
     drawn = draws(law, 20 * problem.draws, np.random.default_rng(17))

@@ -54,7 +54,7 @@ def namespace(name, *further):
 
 
 def head(name, slug):
-    """Return an answer's code above the solution, and the name of its function."""
+    """Return the code that precedes the solution of an answer, and the function's name."""
     text = re.split(r" *### BEGIN SOLUTION", cells(name)[f"{slug}-answer"].source)[0]
     return text, re.search(r"def (\w+)\(", text)[1]
 
@@ -71,8 +71,8 @@ def no_figure_stays():
 
 
 @problems
-def test_the_reference_answer_passes_even_as_lists(name, slug):
-    """If lists pass the visible tests, they must pass the hidden tests."""
+def test_reference_answers_pass_even_if_they_return_lists(name, slug):
+    """If an answer that returns lists passes the visible tests, it must pass the hidden tests."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
     with pytest.raises(NotYet, match="Nothing is written here yet"):
@@ -86,7 +86,7 @@ def test_the_reference_answer_passes_even_as_lists(name, slug):
 
 @problems
 def test_wrong_answers_get_their_hints(name, slug):
-    """The first wrong sampler makes as many draws as a student's, which takes a second.
+    """To save time, only the first wrong sampler makes as many draws as a student's sampler.
 
     The others make fewer draws, so their errors are harder to detect and to distinguish.
     """

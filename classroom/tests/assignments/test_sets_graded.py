@@ -24,7 +24,7 @@ UNSEEN = "HIDDEN TESTS|MARK SCHEME"
 
 
 def regions(name, kinds):
-    """Return the lines that students must not see, except short ones and those shown elsewhere."""
+    """Return the hidden lines of a set, except short lines and lines that are also visible."""
     text = "\n".join(cell.source for cell in SETS[name].cells)
     inside = re.findall(rf"BEGIN (?:{kinds})(.*?)END (?:{kinds})", text, re.DOTALL)
     outside = re.sub(r"(?s)BEGIN [A-Z]+.*?END [A-Z]+", "", text)
@@ -55,7 +55,7 @@ def wrong(grade_id, source):
 def course(tmp_path_factory):
     """Return a course with two graded sets; the first also has wrong and empty submissions.
 
-    A different student solves each set, so that all can be graded in one run.
+    A different student solves each set, so that all sets can be graded in one run.
     """
     folder = tmp_path_factory.mktemp("course")
     shutil.copytree(SOURCE, folder / "source")

@@ -1,4 +1,4 @@
-"""Test the call of a student's function; errors and forbidden library functions are reported."""
+"""A call of a student's function reports errors and forbidden library functions."""
 
 from textwrap import dedent
 

@@ -99,7 +99,7 @@ def test_stray_files_are_not_included(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["https://github.com/us/course", "us", "us/a b"])
-def test_a_repository_is_given_as_owner_and_name(name, monkeypatch, capsys):
+def test_a_repository_name_without_its_owner_is_refused(name, monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["build", "--repository", name])
     with pytest.raises(SystemExit):
         build.main()

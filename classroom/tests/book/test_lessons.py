@@ -113,7 +113,7 @@ def test_a_lesson_page_offers_a_download(repository):
     assert lessons.without_outputs(notebook).cells[1].outputs == []
 
 
-def test_wide_stills_are_cut_only_between_their_panels():
+def test_wide_pictures_are_split_only_between_their_panels():
     def still(*panels, size=(900, 400)):
         shown = Image.new("RGB", size, "white")
         for left, right in panels:

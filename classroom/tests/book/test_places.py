@@ -36,7 +36,7 @@ def test_links_between_files_become_links_between_pages():
         assert relinked(text, *place) == wanted
 
 
-def test_each_module_finds_the_source_of_its_page():
+def test_each_module_is_mapped_to_its_page():
     for module in ("draw.save", "surveys.atlas", "optimum"):
         assert source_of(file_of(module)) == f"package/{module}.rst"
     assert full_name("draw.save") == "rbcourse.draw.save"

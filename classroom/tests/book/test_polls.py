@@ -43,7 +43,7 @@ def test_each_poll_option_has_its_own_explanation(
             assert not any(f"**{other}**" in line for other in others), line
 
 
-def test_an_answer_that_omits_a_poll_option_is_an_error():
+def test_an_answer_that_omits_a_poll_option_raises_an_error():
     question = "### Poll 2\n\nWhich?\n\n- **A** · one\n- **B** · two"
     for answer, match in (
         ("It is **A**.", "Poll 2: the answer does not explain B"),

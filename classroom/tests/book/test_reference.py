@@ -1,4 +1,4 @@
-"""Test which modules, code and tests the pages about the package show."""
+"""Test the pages about the package: their modules, code and tests."""
 
 import ast
 import html
@@ -16,7 +16,7 @@ def test_only_modules_for_maintainers_have_no_page():
     names = {".".join(path.with_suffix("").parts) for path in paths if path.stem[0] != "_"}
     listed = [module["name"] for some in reference.modules(ROOT).values() for module in some]
     assert len(listed) == len(set(listed))
-    names.add("optimum")  # a package with public functions of its own
+    names.add("optimum")  # this package has public functions of its own
     apart = "assignments.", "book.", "course.", "figures.", "lecture.", "live."
     hidden = {name for name in names if name.startswith(apart)}
     assert set(listed) == names - hidden

@@ -1,4 +1,4 @@
-"""Fixtures: a headless Chromium for each worker, and a JupyterLab where a test needs it."""
+"""Define fixtures: a headless Chromium, and a JupyterLab for tests that need one."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
-PATIENCE = 600_000  # in milliseconds, enough for a slow machine
+PATIENCE = 600_000  # this many milliseconds suffice on a slow machine
 QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
 
@@ -32,7 +32,7 @@ def pytest_sessionstart(session):
 
 @pytest.fixture(scope="session")
 def context():
-    """Return the browser context that all pages of a worker share, to use its cache."""
+    """Return the browser context of a worker; all its pages share one cache."""
     expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         path = os.environ["CHROMIUM"]
@@ -45,8 +45,8 @@ def context():
 
 @pytest.fixture(scope="session")
 def home(tmp_path_factory):
-    """Return the course folder, in a new home directory with copies of the lessons, and the
-    environment variables."""
+    """Make a home directory with a course folder, and copy the lessons. Return the course folder
+    and the environment variables."""
     home = tmp_path_factory.mktemp("home")
     kept = ("PATH", "SYSTEMROOT", "LANG")
     env = {name: os.environ[name] for name in kept if name in os.environ}

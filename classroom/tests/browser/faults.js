@@ -1,4 +1,4 @@
-// Return the faults of all slides (cut parts, small text), and the numbers of slides with little text.
+// Return two lists: faults such as cut parts or small text, and the page numbers of slides with little text.
 async () => {
   const faults = [], thin = [], sections = [...document.querySelectorAll(".slides section section")];
   const frame = () => new Promise(requestAnimationFrame);

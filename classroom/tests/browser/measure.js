@@ -21,7 +21,7 @@
     else if (element.tabIndex < 0) faults.push(`scrolls by mouse only: ${name(element)}`);
   }
 
-  // Texts: places, contrast, letters in a line.
+  // Check that texts do not overlap, have enough contrast, and have lines of moderate length.
   const walker = document.createTreeWalker(content, NodeFilter.SHOW_TEXT), boxes = [];
   for (let node; (node = walker.nextNode()); ) {
     const element = node.parentElement;

@@ -78,9 +78,10 @@ def centre(explorer):
 
 
 def move_every_control(explorer):
-    """Move each slider and choose each option by keys and by mouse; move the time first.
+    """Move each slider and choose each option, with keys and with the mouse.
 
-    The numbers must change immediately; the picture and the text may follow later.
+    The time is moved first. The numbers must change immediately; the picture and the text may
+    follow later.
     """
     table, sliders = explorer.locator("table"), explorer.locator(".widget-slider").all()
     said, picture = table.inner_text(), shown(explorer.locator("canvas"))

@@ -18,9 +18,9 @@ def shown(canvas):
 
 
 def check_alike(drawn, want, background):
-    """Check that few pixels differ by over 64: under 1 % of all, at most half of the moving ones.
+    """Check that under 1 % of all pixels, and at most half of the moving ones, differ by over 64.
 
-    Because thin lines cover little, an empty canvas would pass the first condition.
+    Thin lines cover so few pixels that an empty canvas would pass the first condition.
     """
     drawn, want, background = map(pixels, (drawn, want, background))
     assert drawn.shape == want.shape == background.shape

@@ -1,4 +1,4 @@
-"""Programs that run during a test."""
+"""Start and end programs that run during a test."""
 
 import re
 import subprocess

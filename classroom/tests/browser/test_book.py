@@ -209,7 +209,7 @@ def test_the_picture_on_the_start_page_plays_once(motion, page):
     if motion == "no-preference":
         expect(play).to_have_text("❚❚")
         middle = str(int(time.get_attribute("max")) // 2)
-        # the player passes this value, and stops there at the end
+        # the player passes this value once, and finally stops there
         expect(time).to_have_value(middle)
     expect(play).to_have_text("▶")
     if motion == "no-preference":
@@ -251,7 +251,7 @@ def test_keys_move_interactive_pictures(name, page):
             assert shown(canvas) != turned
 
 
-def test_the_search_finds_lessons_keys_and_functions(page):
+def test_the_search_finds_lessons_and_functions(page):
     for words, wanted in {
         "geodesic": "lessons/06_geodesics.html",
         "Slerp": "lessons/06_geodesics.html",

@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 from rbclassroom import explorers
 from rbclassroom.course.notebooks import KERNEL
 
-# One explorer of each kind: in the plane, with a menu, with buttons, and in space. Each is given
-# with the place and the name of the slider that the test moves. The last explorer solves a problem
+# One explorer of each kind: in the plane, with a menu, with buttons, and in space. Each entry also
+# has the place and the name of the slider that the test moves. The last explorer solves a problem
 # for each picture.
 KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
 
@@ -60,7 +60,7 @@ def test_explorer_pictures_follow_the_keys(home, lab, page, record_property):
             waits.append(pictures[0] - keys[0])
         keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
         after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
-        # at most three more: one in transit, one being drawn, and one for the last position
+        # at most three pictures arrive late: one in transit, one being drawn, and the last one
         assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
         rate = 1000 * len(pictures) / (max(*pictures, keys[-1]) - keys[0])
         kind = "3-D" if explorer.display.rooms else "2-D"

@@ -1,4 +1,4 @@
-"""Test a lesson in JupyterLab: as stored, run by a user, as an original, and without Python."""
+"""Test lessons in JupyterLab: stored copies, running explorers, and originals."""
 
 import html
 import re
@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 
 PANEL = "jupyterapp.shell.currentWidget"
 DIRTY = f"{PANEL}.context.model.dirty"
-# A function that tests whether exactly the pictures with these descriptions are shown, with states.
+# A function that tests whether all pictures with the given descriptions are shown, and no others.
 WHOLE = """(wanted) => {
   const pictures = [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")];
   const found = pictures.filter((picture) => picture.complete ?? true)
@@ -123,7 +123,7 @@ def settled(page, text):
     return now
 
 
-def test_keys_play_pause_and_reset_an_explorer(opened, page):
+def test_keys_start_and_reset_an_explorer(opened, page):
     explorer = run_explorer(page, opened("02_two_link_arm", "play"))
     assert page.evaluate(SEEN) == []
     time, play = explorer.locator(".widget-readout").last, explorer.locator("button").first
@@ -154,7 +154,7 @@ def test_keys_play_pause_and_reset_an_explorer(opened, page):
     canvas.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
     refused = explorer.get_by_role("alert").get_by_text("from the base wanted")
     refused.wait_for()
-    assert "wanted" in settled(page, refused)  # after the player has been prepared
+    assert "wanted" in settled(page, refused)  # the player has been prepared by now
     assert page.evaluate(SEEN) == []
 
 

@@ -133,7 +133,7 @@ def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
             for body in mistake["code"]:
                 wrong = start + indent(body.strip(), "    ")
                 found = run([*setup, *code], f"{wrong}\n\n{visible}", name)
-                # the first sampler makes as many draws as a student's
+                # only the first sampler makes as many draws as a student's sampler
                 if "law" in TABLES[name][slug]:
                     visible = "\n".join([visible.split("assert")[0], *fewer])
                 if ["hint", mistake["hint"]] not in found:
@@ -169,7 +169,7 @@ def test_nothing_is_loaded_before_the_reader_acts(page, address):
     expect(page.locator(".differences")).to_contain_text("32 bits")
 
 
-def test_a_cell_can_be_changed_stopped_and_reset(page, address):
+def test_a_changed_cell_can_be_stopped_and_reset(page, address):
     opened(page, address, "lessons/10_rigid_body_motion.html")
     page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
     part = page.locator(".tag_try-cell-16")
@@ -287,7 +287,7 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     submitted = check(tmp_path / "ps1.ipynb")
     assert "7 of 7 visible tests passed" in capsys.readouterr().out
     uploaded = tmp_path / "downloads" / "Ada Lovelace_123_assignsubmission_file" / "ps1.ipynb"
-    # first the file without a check, then the checked file
+    # submit the file without a check, and then the checked file
     for file in (tmp_path / "ps1.ipynb", submitted):
         uploaded.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(file, uploaded)

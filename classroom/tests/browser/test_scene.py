@@ -55,7 +55,7 @@ def crossing(ax):
 
 
 def turn_to(page, canvas, now, side):
-    """Drag from one view to another, by half a degree per pixel, in steps within the canvas."""
+    """Drag from one view to another, in steps within the canvas; a pixel is half a degree."""
     box, (up, across) = canvas.bounding_box(), np.subtract(side, now)
     steps = int(max(abs(up), abs(across)) // 60 + 1)
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

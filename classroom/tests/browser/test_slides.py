@@ -47,7 +47,7 @@ def test_every_slide_fits_and_is_legible_from_the_last_row(context, path):
             assert faults == []
             assert len(thin) <= 3, thin
     cells = nbformat.read(path, as_version=4).cells
-    small = {  # numbers have 13.5 points at 100 pixels per inch; letters have 14.5 points at 80
+    small = {  # 13.5 points suffice at 100 pixels per inch, and 14.5 points at 80
         output.data["text/plain"].partition(": ")[2]
         for cell in cells
         for output in cell.get("outputs", [])
@@ -234,7 +234,7 @@ def test_the_key_t_in_the_speaker_view_opens_the_vote(context, home):
         page.goto("about:blank")  # leave the page before the server ends
 
 
-def test_in_print_each_title_is_above_its_text(page):
+def test_each_printed_title_is_above_its_text(page):
     opened(page, of(LESSONS[6]) + "?print-pdf")
     page.locator(".pdf-page section h2").last.wait_for(state="attached")
     pairs = page.evaluate(
@@ -245,7 +245,7 @@ def test_in_print_each_title_is_above_its_text(page):
     assert all(body["top"] >= title["bottom"] for title, body in pairs)
 
 
-def test_the_pdf_has_a_page_for_each_slide_and_contains_its_fonts(home):
+def test_the_pdf_has_a_page_for_each_slide(home):
     course, env = home
     words = [sys.executable, "-m", "rbclassroom.lecture.serve", "06", "--pdf"]
     done = subprocess.run(words, cwd=course, env=env, capture_output=True, text=True)

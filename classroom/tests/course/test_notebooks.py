@@ -200,7 +200,7 @@ def test_a_copy_that_cannot_be_signed_is_still_made(folders, monkeypatch, capsys
     assert "not marked as trusted: read-only home" in capsys.readouterr().out
 
 
-def test_only_the_stills_of_widgets_are_saved():
+def test_widgets_are_saved_only_as_still_pictures():
     widget = {"application/vnd.jupyter.widget-view+json": {"model_id": "1"}}
     still, alone = {"text/html": "<img>", **widget}, {"text/plain": "IntSlider()", **widget}
     outputs = [{"data": still}, {"name": "stdout", "text": "1"}, {"data": alone}]

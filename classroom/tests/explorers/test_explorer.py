@@ -45,7 +45,7 @@ def explorer():
 
     def point(x, y):
         if x < 100:
-            raise ValueError(f"click more to the right than {x:g}, {y:g}")
+            raise ValueError(f"click to the right of {x:g}, {y:g}")
         return {"x": 4.0, "kind": "high"}
 
     return Explorer("A dot", fig, {"dot": line}, controls, show, plays="x", point=point)
@@ -72,7 +72,7 @@ def test_the_picture_follows_the_controls(explorer):
     runs = []
     explorer.picture.observe(lambda change: runs.append(change.new), "run")
     explorer.controls["x"].value = 5.0
-    assert runs == []  # the control that plays requests its states itself
+    assert runs == []  # the player of this control requests the states
     explorer.controls["kind"].value = "high"
     assert sent(explorer) == ([[at(5, 1)]], [[[("place", "5.0\nhigh")], "", repr(explorer)]])
     explorer.put(x=7.0, kind="low")
@@ -130,7 +130,7 @@ def test_a_refused_click_states_the_reason(explorer):
         version = explorer.picture.run["version"]
         tell(explorer, place=[0.125, 0.1])
         assert explorer.picture.run["version"] > version
-        assert notice(explorer) == "click more to the right than 70, 342"  # pixels of the figure
+        assert notice(explorer) == "click to the right of 70, 342"  # pixels of the figure
         assert explorer.values == {"x": 4.0, "kind": "high"}
         explorer.put()
         assert notice(explorer) == ""
@@ -153,7 +153,7 @@ def test_the_zoom_does_not_change_a_drawing(explorer):
     assert mpl.rcParams["xtick.labelsize"] == "medium"  # the style is not changed
 
 
-def test_the_output_has_a_still_for_readers_without_a_kernel(explorer):
+def test_readers_without_a_kernel_see_a_still_picture(explorer):
     bundle = explorer._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in bundle
     assert 'alt="A dot. place: 2.0 low"' in bundle["text/html"]
@@ -162,7 +162,7 @@ def test_the_output_has_a_still_for_readers_without_a_kernel(explorer):
     for widget in (explorer, explorer.picture, *explorer.controls.values(), explorer.play):
         state, _, parts = _remove_buffers(widget.get_state())
         json.dumps(state)
-        # one part for the background, and one for the states
+        # the background and the states are separate parts
         assert len(parts) == (2 if widget is explorer.picture else 0)
     assert explorer.picture.made["background"].startswith(b"\x89PNG")
 

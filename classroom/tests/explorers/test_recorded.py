@@ -30,7 +30,7 @@ def test_every_explorer_is_recorded():
 
 
 @pytest.mark.parametrize("name", sorted(recorded.MOVED))
-def test_recorded_states_equal_those_of_the_explorer(name):
+def test_recorded_states_equal_the_states_of_the_explorer(name):
     """Compare states at random settings."""
     explorer, (moved, stride) = made(name), recorded.MOVED[name]
     explorer.restart()

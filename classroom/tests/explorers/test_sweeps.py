@@ -52,15 +52,16 @@ def assert_seen(ax, places, *limits):
         ("cube", {}, "their ratio", "1.773"),
         ("minimum_acceleration", {"k": 5.0}, "their ratio", "1.174"),  # case (c)
         ("minimum_acceleration", {"k": 0.0}, "cost, projection", "0.222 rad²"),  # case (a)
-        # For turns at constant ω the optimum is the geodesic. The projection costs 3e-11 and 3e-14
-        # rad².
+        # For turns at constant ω the optimum is the geodesic. The projection costs only 3e-11 and
+        # 3e-14 rad².
         ("minimum_acceleration", {"k": 0, "size": 0.1}, "their ratio", COSTS_NOTHING),
         ("minimum_acceleration", {"k": 0, "size": 0.05}, "their ratio", "none: both cost nothing"),
         ("flip", {"axis": "axis 1", "t": 8.0}, "turned over", "0 times"),
         ("flip", {"axis": "axis 2", "t": 8.0}, "turned over", "2 times"),
         ("flip", {"axis": "axis 2", "t": 3.0}, "turned over", "once"),
         ("flip", {"axis": "axis 3", "t": 8.0}, "turned over", "0 times"),
-        # The axis is √(1 + cot²(angle/2)) m away: 3.07 m, then 2.996 m. The picture ends at 3 m.
+        # The axis is √(1 + cot²(angle/2)) m away: 3.07 m for 38°, and 2.996 m for 39°. The picture
+        # ends at 3 m.
         ("screw", {"angle": 38.0, "z": 0.0}, "its axis through", "(1.0, 2.9, 0.0) m, not in sight"),
         ("screw", {"angle": 39.0, "z": 0.0}, "its axis through", "(1.0, 2.8, 0.0) m"),
         ("screw", {"angle": 0.0}, "its axis through", "none"),
@@ -103,7 +104,7 @@ PANELS = {"as if a ball": (-15, 202), "least acceleration": (172, 389), "least t
 
 @cache
 def turned_books(about, turn, thickness):
-    """Return three curves, the inertia, and the ratio of each cost to the least one."""
+    """Return three curves, the inertia, and each cost divided by the least cost."""
     (axis,) = (np.array(x, float) for name, x in AXES.items() if about.startswith(name))
     G = rb.metrics.box_inertia([0.3, 0.2, thickness / 100])
     goal = rb.exp_so3(np.radians(turn) * axis / np.linalg.norm(axis))
@@ -190,7 +191,7 @@ def test_the_screw_and_the_geodesic_agree_with_the_package():
 
 @cache
 def spun(axis, tilt):
-    """Return the motion of the book, integrated independently; its momentum is vertical."""
+    """Integrate the motion of a book with vertical momentum, without rbcourse."""
     w0 = np.full(3, 4 * np.sin(np.radians(tilt)) / np.sqrt(2))
     w0[int(axis[-1]) - 1] = 4 * np.cos(np.radians(tilt))
     momentum = MOMENTS * w0 / np.linalg.norm(MOMENTS * w0)
@@ -247,8 +248,7 @@ KNOWN = {}
 
 
 def solved(optimum, rival, ends):
-    """Return both curves for these ends and the costs of their rotations; keep them for later
-    calls."""
+    """Return both curves for these ends, and the costs of their rotations; results are kept."""
     key = rival.__name__, str(ends)
     if key not in KNOWN:
         curves = optimum(*ends), rival(*ends)
@@ -422,7 +422,7 @@ def test_the_timing_stays_below_the_limits_of_its_path():
 
 
 def planned(v, t, frame):
-    """Return the pose at time t of a plan of two commands."""
+    """Return the pose that a plan of two commands reaches at time t."""
     first, second = ([v[f"vx{i}"], v[f"vy{i}"], np.radians(v[f"omega{i}"])] for i in (1, 2))
     commands = [(first, min(t, 2.0)), (second, max(t - 2.0, 0.0))]
     return rb.planar.propagate_planar([0, 0, 0], commands, frame=frame)[-1]
@@ -537,7 +537,7 @@ def test_matrices_and_their_projections_agree_with_the_package():
         drawn, R, G = (tips("projection", name) for name in ("M", "nearest", "Gram–Schmidt"))
         S, det = R.T @ M, np.linalg.det(M)
         assert off(drawn, M) < 1e-15
-        assert off(S, S.T) < 1e-14  # the definition of the nearest rotation
+        assert off(S, S.T) < 1e-14  # this defines the nearest rotation
         assert np.linalg.eigvalsh(S)[:2].sum() > -1e-14
         assert np.linalg.det(R) > 0
         assert off(letter.get_position_3d(), 1.2 * R[:, 0]) < 1e-14

@@ -1,4 +1,4 @@
-"""Test the descriptions of the lessons' figures, and the parts that are not in a CSV.
+"""Test the descriptions of the lessons' figures, and drawn parts that no CSV contains.
 
 When a lesson draws a figure, the figure is compared with the stored one. tests/shown.py checks that
 the artists hold the numbers of the CSV, are labelled, and are not clipped.
@@ -46,7 +46,7 @@ def axes():
 
 
 def check_held(axes, held):
-    """Check that artists hold the given numbers, listed by the titles of axes and by labels."""
+    """Check that artists with the given title and label hold the given numbers."""
     for (title, label), columns in held.items():
         artists = [x for ax in axes if ax.get_title() == title for x in ax.get_children()]
         found = list(numbers_of([x for x in artists if str(x.get_label()).startswith(label)]))
@@ -127,7 +127,7 @@ def test_the_six_curves_of_a_family_have_the_colours_of_its_surface(axes):
         chosen = faces[..., 1].min(axis=1) == angle[row, 0]
         colours = space.collections[0]._facecolor3d[chosen]
         assert np.array_equal(colours, np.tile(line.get_color(), (4, 1)))
-    for line in ax.lines:  # the WCAG contrast with white
+    for line in ax.lines:  # this is the WCAG contrast with white
         rgb = np.array(line.get_color()[:3])
         linear = np.where(rgb > 0.04045, ((rgb + 0.055) / 1.055) ** 2.4, rgb / 12.92)
         assert 1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05) > 3
@@ -184,7 +184,7 @@ def test_descriptions_of_curves_state_their_numbers():
     largest = np.linalg.norm(vectors("{} {} [N m]", torques)["least torque"], axis=-1).max()
     words = f"least torque: {largest:.2g} N m"
     check_said(lesson13.describe_torques(torques), words)
-    # The speed is 2.67 rad times 30 t² (1 − t)², which is 1.875 at half time.
+    # The speed is 2.67 rad times 30 t² (1 − t)²; at half time this factor is 1.875.
     check_said(lesson13.describe_speeds(numbers("lesson13_jerk")), "least jerk at most 5.0")
 
 
@@ -343,7 +343,7 @@ def test_limit_curves_are_the_largest_admissible_rates():
 
 
 def test_two_passes_give_the_largest_squared_rates_below_all_limits():
-    """The squared rate x_i is the minimum of highest_j + step |i − j|; it is 0 at both ends."""
+    """The squared rate x_i is the minimum of highest_j + step |i − j| over all j."""
     highest = np.random.default_rng(3).uniform(0.5, 6, 12)
     highest[[0, -1]] = 0
     apart = np.abs(np.subtract.outer(np.arange(12), np.arange(12)))
@@ -353,7 +353,7 @@ def test_two_passes_give_the_largest_squared_rates_below_all_limits():
     assert back == pytest.approx(later.min(axis=1))
 
 
-def test_used_shares_are_norms_divided_by_limits(axes):
+def test_a_used_share_is_a_norm_divided_by_its_limit(axes):
     path = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
     data = lesson15.share_table(path, {"angular_speed": 4.0, "speed": 5.0})
     assert data["angular speed [1]"] == pytest.approx(0.5)

@@ -264,7 +264,7 @@ def state(folder):
 
 
 @pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
-def test_each_submission_has_its_points_and_a_clear_remark(course, rows, student, wanted, remark):
+def test_each_submission_gets_the_expected_points_and_remark(course, rows, student, wanted, remark):
     """Large outputs cost no points. If a row gives None as the remark, any text is accepted."""
     row = rows["'" * student.startswith("=") + student]
     assert f"{row['square-test']} {row['half-test']}" == wanted, row
@@ -341,7 +341,7 @@ def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, m
     ],
 )
 def test_points_written_by_a_submission_are_detected(tmp_path, template, who, said, monkeypatch):
-    """A submission gives itself points above the maximum, or changes those of another student."""
+    """A submission gives itself points above the maximum, or changes another student's points."""
     course = Class(tmp_path, template)
     course.submit("ann")
     grade(["ps0"], course.folder)
@@ -360,5 +360,5 @@ def test_points_written_by_a_submission_are_detected(tmp_path, template, who, sa
     monkeypatch.setattr(grading, "wait", harmed)
     with pytest.raises(ValueError, match=said):
         grade(["ps0"], course.folder)
-    assert "bob" not in course.rows()  # in the table of the first grading
+    assert "bob" not in course.rows()  # this is the table of the first grading
     assert (course.folder / "gradebook.before-ps0.db").exists()

@@ -1,4 +1,4 @@
-"""Test a real JupyterHub on this machine: two users open lesson 00 and run lesson 06 by its API."""
+"""Run a JupyterHub: two users open lesson 00, and run lesson 06 by the hub's API."""
 
 import asyncio
 import json

@@ -29,8 +29,7 @@ def text(source, slide=None, **more):
 
 
 def picture(name, slide=None, size=(400, 300), **more):
-    """Return a code cell with a black picture; the white margin is a tenth of its size on each
-    side."""
+    """Return a code cell with a black picture; each white margin takes a tenth of the size."""
     still = Image.new("L", size, 255)
     still.paste(0, (size[0] // 10, size[1] // 10, size[0] * 9 // 10, size[1] * 9 // 10))
     file = io.BytesIO()
@@ -153,7 +152,7 @@ def test_the_verdict_of_a_poll_comes_after_the_evidence(tmp_path):
     page = pages.section(verdict)
     assert page.count('class="option wrong"') == 3
     assert page.count('class="option right"') == 1
-    assert page.count("fragment") == 3  # each wrong idea appears separately
+    assert page.count("fragment") == 3  # each wrong option has its own step
     seen = pages.section(asked).partition("<aside")[0]
     assert seen.count('class="option"') == 4
     assert "even" not in seen
@@ -223,7 +222,7 @@ def test_a_question_of_the_run_sheet_is_asked_after_the_vote(tmp_path):
     assert asked == {"title": [], "poll": [], "plain": [], "verdict": ["**Ask:** Why B?"]}
     assert "**Ask:** And so?" in deck.shown[4].notes
     cells = poll()
-    cells[3].id = "proof"  # the row of this cell begins before the verdict, and after the vote
+    cells[3].id = "proof"  # the row of this cell begins after the vote and before the verdict
     deck = tiny(tmp_path, *cells, sheet="| 0 | poll 1 | Why B? | |\n| 5 | proof | | |\n")
     assert "**Ask:** Why B?" in deck.shown[2].notes
 
@@ -273,7 +272,7 @@ def plain(tex):
 
 
 def pieces(formula):
-    """Split a formula at signs "=", gaps and line breaks."""
+    """Split a formula at equals signs, gaps and line breaks."""
     return [part for part in re.split(r"\\q?quad|=|\\\\", formula) if part.strip()]
 
 

@@ -85,7 +85,7 @@ def test_the_class_votes_by_hand_without_a_network(monkeypatch, capsys):
     assert "show of hands" in capsys.readouterr().out
 
 
-def test_the_address_found_belongs_to_this_machine():
+def test_the_detected_address_belongs_to_this_machine():
     try:
         address = find_address()
     except OSError:

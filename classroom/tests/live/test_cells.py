@@ -59,7 +59,7 @@ def test_only_statements_that_a_cell_needs_are_kept():
         ),
     ],
 )
-def test_a_cell_prints_the_same_as_after_all_cells_above(above, source, wanted, capsys):
+def test_skipping_unneeded_statements_does_not_change_the_output(above, source, wanted, capsys):
     space = {}
     for text in [*above, source]:
         exec(text, space)
@@ -96,7 +96,7 @@ def test_errors_state_their_place():
     assert run([], hint)[2] == [("hint", str(NotYet("Turn it round.")))]
 
 
-def test_a_missing_package_is_named_if_it_can_be_loaded():
+def test_missing_packages_that_can_be_loaded_are_named():
     assert run([], "import not_there.part", ["not_there"])[0] == "not_there"
     missing, _, found = run([], "import not_there")
     assert missing == ""

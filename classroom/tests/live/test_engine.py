@@ -30,7 +30,7 @@ def made_up(monkeypatch, tmp_path):
     return asked, lambda answers: monkeypatch.setattr(engine, "_official", source(answers))
 
 
-def test_each_file_is_fetched_once_from_the_first_place_that_has_it(made_up, tmp_path):
+def test_each_file_is_fetched_once_from_the_first_possible_source(made_up, tmp_path):
     asked, _ = made_up
     for _ in "ab":
         assert engine.fetch(tmp_path / "cache") == tmp_path / "cache"
@@ -48,7 +48,7 @@ def test_a_file_that_is_not_official_is_refused(made_up, tmp_path):
     assert list((tmp_path / "cache").iterdir()) == []
 
 
-def test_the_lock_has_the_files_that_the_pages_load():
+def test_the_lock_file_lists_all_files_that_the_pages_load():
     lock = engine.lock()
     assert lock["info"]["version"] == engine.VERSION
     assert set(lock["core"]) == set(engine.CORE)

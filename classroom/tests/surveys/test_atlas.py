@@ -36,7 +36,7 @@ def test_each_cell_has_problems_of_its_family():
 def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
-        share = (norms(x) / radius) ** 3  # this share of the ball's volume is uniform
+        share = (norms(x) / radius) ** 3  # this share of the ball is nearer to its centre
         assert share.max() < 1 + 1e-9
         assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
@@ -69,7 +69,7 @@ def about_the_identity(R0, R1, w0, w1):
 
 
 @pytest.mark.source("BK Prop. 3")
-def test_all_closed_forms_move_with_their_ends():
+def test_moving_the_ends_moves_every_closed_form():
     reversible = "projection", "Bézier", "corrected", "quaternion", "about the identity"
     for way, make in {**atlas.WAYS, "about the identity": about_the_identity}.items():
         off = atlas.defects(make, SOME, rng=1)

@@ -1,5 +1,5 @@
-"""Heat maps of the atlas show the cells of their tables. Its other figures are tested in
-test_drawn.py."""
+"""Heat maps of the atlas show the cells of their tables. The other figures of the atlas are tested
+in test_drawn.py."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -44,7 +44,7 @@ def test_each_cell_has_its_colour(fig, family):
 
 
 def test_the_contour_is_at_an_excess_of_10_percent(fig):
-    # exponents of ten, increasing with the displacement
+    # the exponents of ten increase with the displacement
     slope = np.repeat(np.linspace(-3, 1, 10), 10)
     table = CELLS | {f"{way} excess [1]": np.tile(10.0**slope, 2) for way in atlas.WAYS}
     atlas_figures.draw_atlas(fig, table, "along", "median")
@@ -63,7 +63,7 @@ def test_the_description_states_the_shares_of_cells():
     assert "across the axis" in said
 
 
-def test_each_body_has_a_row_of_maps_and_each_curve_a_column(fig):
+def test_rows_of_maps_are_bodies_and_columns_are_curves(fig):
     names = {"one": "curve\none", "two": "another"}
     data = {"body": np.repeat(["ball", "book"], 100)}
     data |= {f"{name} median [1]": 10.0 ** RNG.uniform(-5, 3, 200) for name in names}

@@ -1,4 +1,4 @@
-"""Test surveys: the costs of curves on any executor, and the tables of the atlas."""
+"""Test the tables of the atlas, and surveys of costs on any executor."""
 
 import subprocess
 import sys
@@ -25,7 +25,7 @@ BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
 def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(inertia):
     assert rb.projected_cubic_so3(*SHARP).margin < 0.004
     found = survey.survey(FEW, inertia=inertia)
-    # this call uses several threads; a survey uses one
+    # this call uses several threads; a survey uses one thread
     best = rb.minimum_acceleration_so3(*FEW, inertia)
     assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
     makers = dict(atlas.FORMS)
@@ -45,7 +45,7 @@ def test_a_survey_of_no_problems_is_empty():
         assert {cost.shape for cost in found.values()} == {(0,)}
 
 
-def test_an_optimum_that_is_not_found_is_nan_without_a_warning():
+def test_the_cost_of_an_unsolved_problem_is_nan_without_a_warning():
     w0, w1 = SOME.w0[:3].copy(), SOME.w1[:3].copy()
     w0[1], w1[1] = [1e3, 0, 0], [0, 1e3, 0]
     ends = atlas.Ends(SOME.R0[:3], SOME.R1[:3], w0, w1)
@@ -55,7 +55,7 @@ def test_an_optimum_that_is_not_found_is_nan_without_a_warning():
 
 
 @pytest.mark.source("BK (19)")
-def test_the_optimum_costs_no_more_than_those_from_several_starts():
+def test_solving_from_several_starts_finds_no_cheaper_curve():
     """A solver that starts from the projected cubic turns the wrong way in many of these
     problems."""
     used, found = rb.minimum_acceleration_so3(*SOME).cost, several_starts(SOME)
@@ -176,7 +176,7 @@ def test_processes_end_when_their_parent_is_killed(tmp_path):
         assert job.communicate(timeout=600)[0] == ""
 
 
-def test_only_the_first_seed_is_used_for_the_maps(tmp_path, monkeypatch):
+def test_the_maps_use_only_the_first_seed(tmp_path, monkeypatch):
     surveyed = []
 
     def made_up(problems, executor, *, inertia, ways, report):
