@@ -110,6 +110,7 @@ def test_the_book_is_small():
     assert live < 45e6
 
 
+@pytest.mark.slow
 def test_the_book_has_the_same_bytes_each_time(tmp_path):
     again = tmp_path / "book"
     code = f"from rbclassroom.book.build import *; build(Path(), Path({str(again)!r}))"

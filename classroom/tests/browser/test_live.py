@@ -90,7 +90,14 @@ def told(outputs):
     return shown(texts), pictures
 
 
-@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=[] if path.stem[:2] == "06" else pytest.mark.slow)
+        for path in LESSONS
+    ],
+    ids=lambda path: path.stem[:2],
+)
 def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
     """Cells on the list of exceptions must really give another text. Slow cells are not run."""
     notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
