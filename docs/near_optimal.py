@@ -21,7 +21,7 @@ TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
 u0, u1 = [one, one, -one / 2], [one, one, one / 2]
-# Hermite's cubics: one of the values and rates at 0 and 1 is 1, the other three are 0
+# Hermite's cubics: among the values and rates at 0 and 1, one is 1 and three are 0
 TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
 
 
@@ -46,7 +46,7 @@ def triple(a, b, c):
 
 
 def rate(x, order=1):
-    """Return the derivative of this order with respect to t."""
+    """Return the derivative of x with respect to t, of the given order."""
     for _ in range(order):
         x = [part.diff(t) for part in x]
     return x
@@ -129,8 +129,8 @@ def bezier():
 def quaternion():
     """Return the third-order term of the quaternion cubic.
 
-    The curve normalises a cubic from (1, 0) to (cos, sin). The rates of this cubic at its ends are
-    half the velocities.
+    The curve is a normalised cubic from (1, 0) to (cos, sin). The end rates of this cubic are half
+    the velocities.
     """
     real = -TO_GOAL * ss / 8 - LAST_RATE * dot(sigma, u1) / 4
     imaginary = add(
@@ -177,7 +177,7 @@ def projection():
 
 def cumulative_energy():
     """Return the energy of the second-order deviation of the cumulative curve."""
-    # y, the deviation from the optimum, is in the basis sigma x e, sigma x d, e x d
+    # y has the components of the deviation in the basis sigma x e, sigma x d, e x d
     first, last = times(QQ(1, 3), u0), times(QQ(1, 3), u1)
     middle = add(sigma, times(-1, first), times(-1, last))
     shares = 1 - (1 - t) ** 3, TO_GOAL, t**3
@@ -235,8 +235,8 @@ def of_splines():
 
     The splines pass through the angles 0, θ and 0 about one axis at equally spaced times, with
     natural ends. They are the projected matrix spline, the projected spline and the quaternion
-    spline. On a leg σ = θ p + θ³ r, where p is the cubic spline. The result is the integral of r''²
-    divided by the integral of p''². The tangent of σ is y/x. In the first spline, x and y are
+    spline. On each leg σ = θ p + θ³ r, where p is the cubic spline. The result is the integral of
+    r''² divided by the integral of p''². The tangent of σ is y/x. In the first spline, x and y are
     splines. In the second spline, x and y are cubics on each leg.
     """
     p = (3 * t - t**3) / 2
@@ -248,7 +248,7 @@ def of_splines():
 
 
 def write(table=TABLE):
-    """Write the powers of the inner products, and coefficients over a common denominator."""
+    """Write the polynomials to a table of powers, with coefficients over a common denominator."""
     found = forms()
     over = {way: lcm(*(int(c.denominator) for c in form.coeffs())) for way, form in found.items()}
     powers = sorted({term for form in found.values() for term in form.monoms()}, reverse=True)
