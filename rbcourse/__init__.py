@@ -3,25 +3,25 @@
 The package exports the names for everyday use. Other names are only in its modules: inner products
 in `rbcourse.metrics`, the connection in `rbcourse.connection`, planar motions and arms in
 `rbcourse.planar` and `rbcourse.arm`, naive samplers and tests of uniformity in `rbcourse.sampling`,
-and the timings θ and f in `rbcourse.projected_line`. The module `rbcourse.textbook` has the main
-algorithms, written as on the board.
+and the timings θ and f in `rbcourse.projected_line`. The module `rbcourse.textbook` has short
+versions of the main algorithms.
 
-In a docstring, the line "Source" cites the equation. BK is Belta and Kumar (2002), and RR is the
-report by Samayamantula and Zou. Entries of docs/ledger.md, such as "beyond BK 12", are in neither
-text.
+The line "Source" of a docstring cites the equations that the function implements. BK is Belta and
+Kumar (2002), and RR is the report by Samayamantula and Zou. Sources such as "beyond BK 12" are
+entries of docs/ledger.md, which are in neither text.
 
 `BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), are the standard bases of the Lie
 algebras. `METRIC_SO3` and `METRIC_SE3` are the matrices of the metrics that the trace induces (BK
-(12), (14)). The dict `CLOSED_FORMS` contains the functions that approximate the optimum in closed
-form, by name.
+(12), (14)). The dict `CLOSED_FORMS` maps names to the functions that approximate the optimum in
+closed form.
 
-Every function raises ValueError, and names the argument, if an argument is not finite, has the
-wrong shape, is outside the stated range, or is not symmetric or positive definite where that is
-stated. Batch shapes that do not broadcast also raise ValueError. The docstrings name the other
+An argument that is not finite, has the wrong shape or is outside the stated range raises a
+ValueError that names it. So does a matrix that is not symmetric or positive definite where this is
+required. Batch shapes that do not broadcast also raise ValueError. The docstrings name the other
 errors.
 
 Unless a docstring says so, functions do not check that rotation matrices and poses are valid;
-`project_so` and `project_se` return the nearest valid ones. The last row of a pose is not read.
+`project_so` and `project_se` return the nearest valid ones. The last row of a pose is ignored.
 Angles are in rad, and lengths in m. Angular velocities and twists (ω, v) are in the body frame, per
 unit of time.
 """
@@ -148,7 +148,7 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "angle_between",
     "right_jacobian_so3",
     "right_jacobian_inverse_so3",
-    # rotations by other numbers
+    # other representations of rotations
     "quaternion_multiply",
     "rotate_by_quaternion",
     "slerp",
@@ -202,7 +202,7 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "projected_cubic_se3",
     "projected_quintic_so3",
     "ProjectedPolynomial",
-    # the optimum, and what curves cost
+    # the optimum, and costs of curves
     "minimum_acceleration_so3",
     "minimum_acceleration_se3",
     "minimum_torque_so3",
@@ -252,7 +252,7 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "write_path",
     # for annotations
     "Array",
-    # modules with more
+    # modules with further names
     "arm",
     "connection",
     "files",

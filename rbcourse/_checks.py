@@ -1,4 +1,4 @@
-"""Checks of arguments: each raises a ValueError that names the argument and its first bad entry."""
+"""Checks of arguments: a failed check raises a ValueError that names the first bad entry."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array
 
-Rng: TypeAlias = "np.random.Generator | int | None"  # a string avoids importing numpy.random
+Rng: TypeAlias = "np.random.Generator | int | None"  # a string needs no import of numpy.random
 
 
 def as_array(
     name: str, value: ArrayLike, *core: int | str, stacked: bool = True, copy: bool = True
 ) -> Array:
-    """Return `value` as floats whose last axes have the sizes `core`; NaN and infinity are allowed.
+    """Return `value` as an array of floats; its last axes must have the sizes `core`.
 
     A letter in `core` matches any size ≥ 1, repeated letters match the same size, and "n+1" matches
     any size ≥ 2. For example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All
-    other axes are batch axes; with ``stacked=False``, no batch axis is allowed. With
-    ``copy=False``, the result may be the input.
+    other axes are batch axes; with ``stacked=False``, no batch axis is allowed. Entries may be NaN
+    or infinite. With ``copy=False``, the result may be the input.
 
     Raises
     ------
     ValueError
-        If `value` is ragged, masked, not made of real numbers, or of another shape. The message
-        names the argument, the expected shape or type, and the given one.
+        If `value` is ragged, is masked, has another shape, or has entries that are not real
+        numbers. The message names the argument, and the expected and the given shape or type.
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]
@@ -54,30 +54,30 @@ def as_array(
 
 
 def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
-    """Return `as_array` of the arguments; no entry may be NaN or infinite."""
+    """Return `value` as `as_array` does, but refuse NaN and infinity."""
     array = as_array(name, value, *core, stacked=stacked)
     _check_all(np.isfinite(array), name, array, "a finite number")
     return array
 
 
 def as_single(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of one array of the shape `core`; a stack is not allowed."""
+    """Return `value` as `as_finite` does, but refuse a stack of arrays."""
     return as_finite(name, value, *core, stacked=False)
 
 
 def as_unit(name: str, value: ArrayLike, size: int) -> Array:
-    """Return `as_finite` of vectors, each divided by its norm."""
+    """Return vectors, divided by their norms."""
     array = as_finite(name, value, size)
     largest = np.abs(array).max(axis=-1, keepdims=True)
     if not largest.all():
         entry = first_index(name, largest[..., 0] == 0)
         raise ValueError(f"{entry} is zero: it has no direction")
-    scaled = array / largest  # so that no square overflows
+    scaled = array / largest  # avoids overflow of the squares
     return scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
 
 
 def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
-    """Return `as_finite` of square matrices that are symmetric, to 1e-12 of the largest entry."""
+    """Return square matrices; they must be symmetric up to 1e-12 times the largest entry."""
     half = as_finite(name, value, size, size) / 2  # so that nothing overflows
     mirrored = np.swapaxes(half, -1, -2)
     skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (half - mirrored, half))
@@ -88,14 +88,13 @@ def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
 
 
 def as_inertia(name: str, value: ArrayLike) -> Array:
-    """Return `as_symmetric` of 3 × 3 matrices that are positive definite.
+    """Return 3 × 3 matrices; they must be symmetric and positive definite.
 
     Raises
     ------
     ValueError
-        As for `as_symmetric`; also if a matrix is not positive definite, or if the squares of its
-        eigenvalues overflow or underflow. The message names the first such
-        matrix.
+        If a matrix is not symmetric or not positive definite, or if the squares of its eigenvalues
+        overflow or underflow. The message names the first such matrix.
     """
     G = as_symmetric(name, value, 3)
     moments = np.linalg.eigvalsh(G)
@@ -117,7 +116,7 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
 
 
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
-    """Return `as_finite` of the arguments; all entries must lie in [0, 1]."""
+    """Return `value` as `as_finite` does; all entries must lie in [0, 1]."""
     array = as_finite(name, value, *core)
     _check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
     return array
@@ -126,7 +125,7 @@ def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
 def as_time(
     t: ArrayLike, batch_ndim: int, domain: tuple[float, float | Array] = (0.0, 1.0)
 ) -> Array:
-    """Return the times `t`, all in the domain, with `batch_ndim` axes of length 1 appended.
+    """Append `batch_ndim` axes of length 1 to the times `t`, which must lie in the domain.
 
     A time that is outside the domain by at most 8 eps of the larger end is replaced by the nearer
     end. The end of the domain is a number, or an array that broadcasts with the times.
@@ -159,7 +158,7 @@ def as_angle(angle: ArrayLike) -> Array:
 
 
 def as_tolerance(name: str, value: float) -> float:
-    """Return a tolerance; raise ValueError if it is not a number of at least 0."""
+    """Return a tolerance: a number of at least 0."""
     tolerance = as_array(name, value)
     if tolerance.ndim or not tolerance >= 0:
         raise ValueError(f"{name}: a number from 0 up is wanted, got {value!r}")
@@ -167,7 +166,7 @@ def as_tolerance(name: str, value: float) -> float:
 
 
 def as_positive(name: str, value: float) -> float:
-    """Return a number above 0; raise ValueError for any other value."""
+    """Return a number above 0."""
     if isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} is {value}, a number above 0 is wanted")
     number = float(as_single(name, value))
@@ -177,7 +176,7 @@ def as_positive(name: str, value: float) -> float:
 
 
 def as_count(name: str, value: int) -> int:
-    """Return a count; raise ValueError if it is not an integer of at least 1."""
+    """Return a count: an integer of at least 1."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{name}: an integer from 1 up is wanted, got {value!r}")
     return int(value)
@@ -199,7 +198,7 @@ def as_size(size: int | Sequence[int] | None) -> tuple[int, ...]:
 
 
 def as_generator(rng: Rng) -> np.random.Generator:
-    """Return a generator of random numbers; raise ValueError if `rng` is invalid."""
+    """Return a generator of random numbers."""
     try:
         return np.random.default_rng(rng)
     except (TypeError, ValueError) as error:
@@ -232,7 +231,7 @@ def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
 
 
 def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
-    """Name the first chosen entry, such as ``R[0, 2]``, or ``R`` for a single value."""
+    """Return the name of the first chosen entry: ``R[0, 2]``, or ``R`` for a single value."""
     first = ", ".join(str(i) for i in np.argwhere(chosen)[0])
     return f"{name}[{first}]" if first else name
 

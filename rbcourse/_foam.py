@@ -1,6 +1,6 @@
 """The nearest rotations to 3 × 3 matrices, by Markley's FOAM (fast optimal attitude matrix).
 
-Let R be the nearest rotation to M, so that S = RᵀM is symmetric, with eigenvalues s₁ ≥ s₂ ≥ |s₃|.
+Let R be the nearest rotation to M. Then S = RᵀM is symmetric and has eigenvalues s₁ ≥ s₂ ≥ |s₃|.
 The cofactor matrix of R f(S) is R cof f(S) for every function f. So three matrices are products of
 R and a symmetric matrix:
 
@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
-LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; smaller ζ are rare and lose digits
-_BLOCK = 5128  # number of matrices that fit into the cache; rows of 4096 bytes would collide there
+LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; for smaller ζ, the result loses digits
+_BLOCK = 5128  # matrices that fit into the cache; multiples of 512 cause cache conflicts
 
 
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
-    """Write the nearest rotations to M, shape (3, 3, N), into R; return a mask of the valid ones.
+    """Write the nearest rotations to M into R, and return a mask of the valid rotations.
 
     A rotation is not valid if ζ is less than `LEAST_ZETA` s₁ ‖M‖², which means that M is near the
     singular set of `project_so`. It is also not valid if an entry of M is not finite or ‖M‖ is
@@ -49,9 +49,9 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
 
 
 def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
-    """Do the work of `nearest_rotations` for one block; write into C, and overwrite M and X."""
+    """Write the nearest rotations to one block M into C; M and X are overwritten."""
     norm2 = _dots(M, M)
-    if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # so that its sixth power does not overflow
+    if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # avoids overflow of norm2**6
         M[...] = scaled(M, axis=(0, 1))
         norm2 = _dots(M, M)
     _write_cofactors(M, C)
@@ -78,7 +78,7 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
 
 
 def _write_cofactors(M: Array, C: Array) -> None:
-    """Write the cofactors of M into C: each row is the cross product of the two other rows of M."""
+    """Write the cofactors of M into C."""
     for i in range(3):
         (a, b, c), (d, e, f), (x, y, z) = M[i - 2], M[i - 1], C[i]
         np.subtract(b * f, c * e, x)

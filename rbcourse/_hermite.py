@@ -1,4 +1,4 @@
-"""Polynomials of degree one, three and five with given ends: Hermite interpolation."""
+"""Hermite interpolation by polynomials of degree one, three and five."""
 
 import math
 from collections.abc import Sequence
@@ -11,11 +11,12 @@ from rbcourse._numerics import Array
 
 
 def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
-    """Evaluate the polynomial of least degree with these ends, or a derivative, at the times t.
+    """Evaluate a Hermite polynomial, or its derivative of the given order, at the times t.
 
-    The ends at t = 0 and 1 are x0, x1. For a cubic, they include v0, v1, and for a quintic, also
-    a0, a1. The times broadcast with the ends. The polynomial meets both ends exactly. The line
-    minimizes ∫ ‖x'‖² dt, the cubic ∫ ‖x''‖² dt, and the quintic ∫ ‖x'''‖² dt.
+    The ends of a line are its values x0, x1 at t = 0 and 1. For a cubic, the derivatives v0, v1
+    follow, and for a quintic, also the second derivatives a0, a1. The times broadcast with the
+    ends. The polynomial meets all boundary conditions exactly. The line minimizes ∫ ‖x'‖² dt, the
+    cubic ∫ ‖x''‖² dt, and the quintic ∫ ‖x'''‖² dt.
     Source: BK 6, BK 6.2.
     """
     return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
@@ -24,9 +25,9 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
 def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
     """Evaluate `hermite` for a stack of ends, given the result of `stack_terms`.
 
-    The components are on the first axes. The terms have the shape (n + 1, ..., count). If t has the
-    shape (T, count) or (T, 1), the result has the shape (..., T, count). If `by_curve`, t has the
-    shape (count, T) or (1, T), and the result has the shape (..., count, T).
+    The terms have the shape (n + 1, ..., count). If t has the shape (T, count) or (T, 1), the
+    result has the shape (..., T, count). If `by_curve`, t has the shape (count, T) or (1, T), and
+    the result has the shape (..., count, T).
     """
     weights = _weights(len(terms) - 1, t, order)
     if not by_curve:
@@ -39,7 +40,6 @@ def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False)
 
 
 def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
-    """Return the weighted sum of the terms; surplus terms at the front are not used."""
     first, *others = (w * x for w, x in zip(weights, terms[-len(weights) :], strict=True))
     return sum(others, first)
 
@@ -56,7 +56,7 @@ def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
 
 
 def _weights(count: int, t: Array, order: int) -> list[Array]:
-    """Return the weights of the terms; for derivatives, x0 and x1 themselves have no weight."""
+    """Return the weights of the terms; derivatives depend on x0 and x1 only through x1 − x0."""
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
     weights = [weight for pair in rates for weight in pair]

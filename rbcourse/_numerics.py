@@ -18,7 +18,7 @@ def sinc(x: Array) -> Array:
 
 def sine_gap_ratio(x: Array) -> Array:
     """Return (x − sin x)/x³, and 1/6 at x = 0, with an absolute error of eps/x²."""
-    tiny = np.abs(x) < 1e-4  # the caller multiplies by x³, so the limit suffices
+    tiny = np.abs(x) < 1e-4  # accurate enough, since the caller multiplies by x³
     return np.where(tiny, 1 / 6, (1 - sinc(x)) / np.where(tiny, 1.0, x) ** 2)
 
 
@@ -48,7 +48,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 def at_cache_line(*shape: int) -> Array:
-    """Return an uninitialised array, aligned to a cache line because this makes NumPy faster."""
+    """Return an uninitialised array that is aligned to a cache line."""
     raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
     start = -raw.ctypes.data % 64
     return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)

@@ -1,7 +1,7 @@
 """Quaternions (w, x, y, z) as functions of time: products, exp and slerp with their derivatives.
 
-A jet lists the values of a function of time and its derivatives: [x, x', x'', x'''] or fewer.
-Components are on the first axis: a quaternion has the shape (4, ...), a vector (3, ...).
+A jet lists the values of a function of time and its derivatives: [x, x', x'', x'''] or fewer. The
+first axis indexes the components: a quaternion has the shape (4, ...), a vector (3, ...).
 """
 
 import math
@@ -28,7 +28,7 @@ def product(p: Jet, q: Jet) -> Jet:
 
 
 def multiply(p: Array, q: Array) -> Array:
-    """Return Hamilton's product of two quaternions, with components on the first axis."""
+    """Return Hamilton's product of two quaternions, shape (4, ...)."""
     (a, b, c, d), (w, x, y, z) = p, q
     return np.stack(
         [
@@ -68,7 +68,7 @@ def slerp(a: Jet, b: Jet, share: Jet) -> Jet:
 
 
 def times(share: Jet, x: Jet) -> Jet:
-    """Return the jet of a number, `share`, times a number or vector x."""
+    """Return the jet of `share` times x, for a scalar `share` and a scalar or vector x."""
     return _leibniz(np.multiply, share, x)
 
 
@@ -146,7 +146,7 @@ def _leibniz(op: Callable[[Array, Array], Array], x: Jet, y: Jet) -> Jet:
 
 
 def _chain(f: list[Array], x: Jet) -> Jet:
-    """Return the jet of f(x), from f and its derivatives at x."""
+    """Return the jet of f(x); `f` lists the value of f and its derivatives at x."""
     jet = f[:1]
     if len(f) > 1:
         jet.append(f[1] * x[1])

@@ -31,7 +31,8 @@ class Posture(NamedTuple):
     Parameters
     ----------
     joints : ndarray, shape (..., n + 1, 2)
-        The positions of the joints in order (the first is at the origin), and then of the tip.
+        The positions of the joints in order, then the position of the tip. The first joint is at
+        the origin.
     frames : ndarray, shape (..., n, 3)
         The poses (x, y, theta) of the frames of the links: each frame is at the centre of its link,
         with its x axis along the link.
@@ -120,8 +121,8 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     Returns
     -------
     ndarray, shape (..., 2, 2)
-        Angles in [−π, π], one row for each solution. The first has an elbow angle in [0, π], and
-        the second is its mirror image.
+        Angles in [−π, π], one row for each solution. The first solution has an elbow angle in [0,
+        π], and the second is its mirror image.
 
     Examples
     --------
@@ -148,7 +149,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
 
 
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
-    """Return joint angles interpolated linearly in equal steps; full turns are kept.
+    """Interpolate joint angles linearly in equal steps, without removing full turns.
 
     Source: RR 4.1, RR (20), RR (21), with errata 19.
 
@@ -161,7 +162,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     Returns
     -------
     ndarray, shape (steps + 1, ..., n)
-        The ends are exact.
+        The first and the last row are exact.
 
     Examples
     --------
@@ -175,7 +176,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
 
 
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
-    """Return the joint angles at the start and after each command of a plan; full turns are kept.
+    """Return the joint angles, with full turns, at the start and after each command of a plan.
 
     Source: RR 4.2, RR (22), RR (23), with errata 20.
 

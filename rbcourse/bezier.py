@@ -51,7 +51,8 @@ def bezier_so3(
     -----
     Singular set: the two inner control points are a half-turn apart. `log_so3` then chooses the
     geodesic between them. By the triangle inequality, no other leg can become a half-turn. The
-    curve does not depend on the choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
+    curve does not depend on the choice of frames, and the ends R1, R0, −w1, −w0 give the reversed
+    curve.
 
     Examples
     --------
@@ -68,9 +69,9 @@ def bezier_long_so3(
 ) -> Bezier:
     """Return the Bézier curve with these ends whose middle leg turns the other way round.
 
-    If the end velocities are large, it may cost less than `bezier_so3`. The singular set and the
-    symmetries are as for `bezier_so3`. Ends with equal inner control points are also singular; they
-    give the same curve as `bezier_so3`.
+    If the end velocities are large, this curve may cost less than `bezier_so3`. The singular set
+    and the symmetries are as for `bezier_so3`. Equal inner control points are also singular; both
+    functions then return the same curve.
     Source: beyond BK 10.
 
     Parameters
@@ -153,14 +154,14 @@ def corrected_bezier_so3(
 
     Notes
     -----
-    R_m = R0 exp(σ̂/2) is the half-way rotation. Among all logarithms of R0ᵀ R1, including long
-    ones, σ is the nearest to the sum of the three legs of the Bézier curve.
+    R_m = R0 exp(σ̂/2) is the half-way rotation. The vector σ is the logarithm of R0ᵀ R1, of any
+    length, that is nearest to the sum of the three legs of the Bézier curve.
     The curve is near-optimal for small excursions: if the excursion is multiplied by s, the
     relative excess over the optimum is multiplied by about s⁸ (s⁴ or s² for the other closed
-    forms). δ is of third order in the excursion. Large end velocities make δ large, and the curve
-    may then cost more than the Bézier curve (see docs/near_optimal.md). The singular set and the
-    symmetries are as for `bezier_so3`. Ends for which two logarithms are equally near are also
-    singular.
+    forms). The deviation δ is of third order in the excursion. Large end velocities make δ large,
+    and the curve may then cost more than the Bézier curve (see docs/near_optimal.md). The singular
+    set and the symmetries are as for `bezier_so3`. Ends are also singular if two logarithms are
+    equally near.
 
     Examples
     --------
@@ -192,7 +193,7 @@ def bezier_legs(ends: Ends) -> Legs:
 def _slow_ends(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
 ) -> tuple[Ends, Array, Legs]:
-    """Check ‖w0‖ and ‖w1‖; return the ends rescaled to unit time, the duration and the legs."""
+    """Return the ends rescaled to unit time, the duration, and the legs of the Bézier curve."""
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     for name, w in (("w0", ends.w0), ("w1", ends.w1)):
         angle = np.linalg.norm(w, axis=-1)
@@ -205,7 +206,7 @@ def _slow_ends(
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
-    """Return e = (u0 + u1)/2 − σ and d = u1 − u0, from σ = log(R0ᵀ R1) and end velocities.
+    """Return e = (u0 + u1)/2 − σ and d = u1 − u0, where σ = log(R0ᵀ R1).
 
     The vectors u0 and u1 are w0 and w1, parallel transported to the half-way rotation R0 exp(σ̂/2)
     in a bi-invariant metric. On each half, the body axes turn by σ/2, and parallel vectors by σ/4.
@@ -220,8 +221,7 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
     """Return the coefficients c₀, …, c₄ of the Bézier curve's deviation from the optimum.
 
     To third order, the deviation is the rotation vector δ(t) = t² (1 − t)² (c₀ + c₁ u + … + c₄ u⁴),
-    with u = 2t − 1; e and d are those of `seen_from_the_middle`. In the code, ``sed`` is
-    σ × (e × d).
+    where u = 2t − 1. `seen_from_the_middle` defines e and d. In the code, ``sed`` is σ × (e × d).
     Source: beyond BK 10.
     """
     first = np.stack([sigma, sigma, sigma, e, e, e, d, d])
@@ -238,7 +238,7 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
 
 
 def nearest_turn(turn: Array, way: Array) -> Array:
-    """Return `turn` plus the full turns that bring it nearest to `way`."""
+    """Return `turn` plus full turns, as near as possible to `way`."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     axis = turn / np.where(angle == 0, 1, angle)
     more = (np.sum(way * axis, axis=-1, keepdims=True) - angle) / (2 * np.pi)
@@ -293,7 +293,7 @@ class CorrectedBezier(Bezier):
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return exp(−δ/4) Q exp(−δ/4), from four points and the coefficients of δ."""
+        """Return exp(−δ/4) Q exp(−δ/4)."""
         points, deviation = controls[:4], controls[4:, 1:]
         moved = exp([x / -4 for x in _clamped(deviation, t, order)])
         return product(product(moved, super().quaternion(points, t, order)), moved)

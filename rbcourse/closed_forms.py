@@ -1,8 +1,8 @@
-"""Other closed forms, with the same boundary conditions as the projected cubic (BK section 1).
+"""Closed forms with the same boundary conditions as the projected cubic (BK section 1).
 
-Each curve is a fixed rotation times the rotation of a quaternion Q(t) of any norm. `CLOSED_FORMS`
-lists the closed forms that the course compares; each takes two rotations and two angular
-velocities. Add new closed forms to this list.
+Each curve is a fixed rotation times the rotation of a quaternion Q(t), whose norm need not be 1.
+`CLOSED_FORMS` lists the closed forms that the course compares; each takes two rotations and two
+angular velocities. Add new closed forms to this list.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ def exponential_cubic_so3(
     Notes
     -----
     Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ(1). The curve itself is
-    smooth everywhere. If both velocities are along the geodesic, it is the optimum among all curves
-    that turn by σ(1). The curve does not depend on the choice of frames, but the reversed ends do
-    not give the reversed curve.
+    smooth everywhere. If both velocities are along the geodesic, the curve is the optimum among all
+    curves that turn by σ(1). The curve does not depend on the choice of frames, but the reversed
+    ends do not give the reversed curve.
 
     Examples
     --------
@@ -81,8 +81,8 @@ def exponential_cubic_long_so3(
 ) -> ExponentialCubic:
     """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
 
-    Singular set: as for `exponential_cubic_so3`; also R0 = R1, where both functions give the same
-    curve.
+    Singular set: as for `exponential_cubic_so3`; also R0 = R1, where the short and the long curve
+    are the same.
     Source: beyond BK 10.
 
     Parameters
@@ -123,7 +123,7 @@ def quaternion_cubic_so3(
     Returns
     -------
     QuaternionCubic
-        A `Curve`, with ``margin``, that meets all four boundary conditions. The cubic has
+        A `Curve` that has a ``margin`` and meets all four boundary conditions. The cubic has
         q' = q (0, w)/2 at its ends. It ends at q1 or −q1, whichever is nearer to q0.
 
     Notes
@@ -133,7 +133,7 @@ def quaternion_cubic_so3(
     raises ValueError. If ``margin`` is small, the body turns by up to a full turn in a short time.
     The error of the curve is then about eps divided by ``margin``. For its first and second
     derivatives, eps is divided by the square and by the cube of ``margin``. The curve does not
-    depend on the choice of frames, and R1, R0, −w1, −w0 give the reversed curve.
+    depend on the choice of frames, and the ends R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def quaternion_cubic_so3(
 def quaternion_cubic(
     ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
 ) -> QuaternionCubic:
-    """Return the quaternion cubic of checked ends; if `long`, it turns the long way round."""
+    """Return the quaternion cubic for checked ends; if `long`, it turns the long way round."""
     turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
     turn = np.where(np.expand_dims(long, -1), -turn, turn)
     return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
@@ -169,16 +169,16 @@ def cayley_cubic_so3(
     Returns
     -------
     CayleyCubic
-        A curve whose quaternion is (1, g) over its norm. The Cayley parameters of a turn by the
-        angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w + (g·w)
-        g.
+        A curve whose quaternion is (1, g), divided by its norm. The Cayley parameters of a turn by
+        the angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w +
+        (g·w) g.
 
     Notes
     -----
-    Singular set: half-turns, which have no Cayley parameters. No such curve contains a half-turn
-    from R0. As R1 approaches a half-turn, the curve therefore becomes long, and its cost grows
-    without bound. The curve does not depend on the choice of frames, but the reversed ends do not
-    give the reversed curve.
+    Singular set: half-turns, which have no Cayley parameters. No Cayley cubic passes through a
+    half-turn from R0. As R1 approaches a half-turn, the curve therefore becomes long, and its cost
+    grows without bound. The curve does not depend on the choice of frames, but the reversed ends do
+    not give the reversed curve.
 
     Examples
     --------
@@ -224,19 +224,19 @@ def normal_cubic_so3(
 
     Notes
     -----
-    To second order, x is the Riemannian normal coordinate of R0 exp(ŷ), which is the initial
-    velocity of the geodesic from R0 to R0 exp(ŷ). Zimmermann interpolates in normal coordinates; we
-    know no source of the second-order map. The curve is not the optimum, which is a Riemannian
-    cubic. It is near-optimal for small excursions: if the excursion is multiplied by s, the
-    relative excess over the optimum is multiplied by about s⁴. If G is a multiple of I, the curve
-    is `exponential_cubic_so3`.
+    To second order, x is the Riemannian normal coordinate of R0 exp(ŷ): the initial velocity of the
+    geodesic from R0 to R0 exp(ŷ). Zimmermann interpolates in normal coordinates; we know of no
+    source for the second-order map. The curve is not the optimum, which is a Riemannian cubic. It
+    is near-optimal for small excursions: if the excursion is multiplied by s, the relative excess
+    over the optimum is multiplied by about s⁴. If G is a multiple of I, the curve is
+    `exponential_cubic_so3`.
 
     Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses y(1). Ends are also
-    singular if the map x ↦ y is singular at x(1). They raise ValueError, as do ends for which no
-    x(1) is found. With the moments of inertia 1, 2, 2.9, the map is never singular for ‖y(1)‖ up to
-    π. For thin bodies with three different moments, it is singular at some turns of more than about
-    2 rad about the middle axis. Near such ends, the curve is long. The curve does not depend on the
-    choice of frames, but the reversed ends do not give the reversed curve.
+    singular if the map x ↦ y is singular at x(1). Such ends raise ValueError, as do ends for which
+    no x(1) is found. With the moments of inertia 1, 2, 2.9, the map is never singular for ‖y(1)‖ up
+    to π. For thin bodies with three different moments, it is singular at some turns of more than
+    about 2 rad about the middle axis. Near such ends, the curve is long. The curve does not depend
+    on the choice of frames, but the reversed ends do not give the reversed curve.
 
     Examples
     --------
@@ -270,7 +270,7 @@ def exponential_quintic_so3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ExponentialQuintic:
-    """Return R0 exp(σ̂(t)) with these ends and a quintic σ(t), near-optimal for minimum jerk.
+    """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic.
 
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
 
@@ -287,9 +287,9 @@ def exponential_quintic_so3(
 
     Notes
     -----
-    The curve is near-optimal for small excursions (see docs/near_optimal.md). From rest to rest, it
-    is the optimum (`minimum_jerk_so3`). The singular set is that of `exponential_cubic_so3`, and
-    the curve does not depend on the choice of frames.
+    For small excursions, the curve is near-optimal for minimum jerk (see docs/near_optimal.md).
+    From rest to rest, it is the optimum (`minimum_jerk_so3`). The singular set is that of
+    `exponential_cubic_so3`, and the curve does not depend on the choice of frames.
 
     Examples
     --------
@@ -325,7 +325,7 @@ CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
 
 
 class ExponentialCubic(QuaternionCurve):
-    """The `Curve` R0 exp(σ̂(t)) with a cubic σ; σ(1) is any logarithm of the turn."""
+    """The `Curve` R0 exp(σ̂(t)) with a cubic σ(t)."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return exp(σ/2)."""
@@ -333,7 +333,7 @@ class ExponentialCubic(QuaternionCurve):
 
 
 class ExponentialQuintic(ExponentialCubic):
-    """The `Curve` R0 exp(σ̂(t)) with a quintic σ."""
+    """The `Curve` R0 exp(σ̂(t)) with a quintic σ(t)."""
 
 
 def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
@@ -343,10 +343,10 @@ def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
 
 
 class NormalCubic(QuaternionCurve):
-    """The `Curve` R0 exp(ŷ), y = x − ½ G⁻¹(x × G x), with a cubic x."""
+    """The `Curve` R0 exp(ŷ), where y = x − ½ G⁻¹(x × G x) and x is a cubic."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return exp(y/2); `controls` contains the ends of x, G and G⁻¹."""
+        """Return exp(y/2); `controls` contains the ends of x, then the matrices G and G⁻¹."""
         x, G, inverse = polynomial_jet(controls[:4], t, order), controls[4:7], controls[7:]
         bent = cross(x, [np.einsum("ij...,j...->i...", G, each) for each in x])
         return exp(
@@ -358,7 +358,7 @@ class NormalCubic(QuaternionCurve):
 
 
 def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Array]:
-    """Solve x − ½ G⁻¹(x × G x) = y by Newton's method, in four steps of y; return x and ∂y/∂x."""
+    """Solve x − ½ G⁻¹(x × G x) = y for x by Newton's method; return x and ∂y/∂x."""
     x = np.zeros_like(y)
     for share in (0.25, 0.5, 0.75, 1):
         goal = share * y
@@ -383,9 +383,9 @@ def _check_normal(lost: Array, why: str) -> None:
 
 
 class NormalizedCubic(QuaternionCurve):
-    """The `Curve` of a cubic of quaternions with norm 1 at its start and any norm at its end.
+    """The `Curve` of a cubic of quaternions, whose norm at the end need not be 1.
 
-    Quaternions are relative to the goal, so that Q(1) is real and w1 is not lost to rounding.
+    Quaternions are relative to the goal, so that Q(1) is real and w1 is not lost in rounding.
     """
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
@@ -396,7 +396,7 @@ class NormalizedCubic(QuaternionCurve):
 def _cubic_from_the_goal(
     ends: Ends, T: Array, turn: Array, norm: Array, growth: Array
 ) -> dict[str, Array]:
-    """Return the arrays of a `NormalizedCubic`; `growth` is the rate of the norm at the goal."""
+    """Return the arrays of a `NormalizedCubic`; `growth` is the rate of log ‖Q‖ at the end."""
     start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
     end_rate = growth[..., None] * one + _rate(one, ends.w1)
     cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate

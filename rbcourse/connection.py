@@ -1,4 +1,4 @@
-"""The connection of a left-invariant metric, in components, and its geodesics (BK section 2).
+"""The connection and the geodesics of a left-invariant metric, in components (BK section 2).
 
 Components are those of angular velocities or twists, as in `rbcourse.metrics`.
 """
@@ -29,8 +29,8 @@ def structure_constants(basis: ArrayLike) -> Array:
     ----------
     basis : array_like, shape (m, n, n)
         The basis L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``. The matrices must be linearly
-        independent, to one part in a million. Their commutators must be combinations of the basis,
-        to rounding.
+        independent; the tolerance is one part in a million. Up to rounding, their commutators must
+        be combinations of the basis matrices.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     products = N[:, None] @ N
     brackets = (products - products.swapaxes(0, 1)).reshape(m * m, -1).T
     C = np.zeros((m, m * m))
-    for _ in range(3):  # normal equations (exact for the standard bases), then refinement
+    for _ in range(3):  # normal equations, refined twice
         C += np.linalg.solve(columns.T @ columns, columns.T @ (brackets - columns @ C))
     if np.abs(columns @ C - brackets).max() > 1e-14 * condition:
         raise ValueError("basis: a commutator of two of the matrices is not a combination of them")
@@ -66,18 +66,18 @@ def structure_constants(basis: ArrayLike) -> Array:
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
-    At all points ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. Two identities hold to a few eps
-    times the condition number of G: the torsion vanishes, Γ[i, j, k] − Γ[i, k, j] = C[i, j, k], and
-    Γ with its first index lowered by G is antisymmetric in i and k. But Γ is *not* symmetric in j
-    and k. Γ follows from Koszul's formula,
+    At all points ∇_{L_j} L_k = Γ[i, j, k] L_i, summed over i. Two identities hold up to a few eps
+    times the condition number of G. The torsion vanishes: Γ[i, j, k] − Γ[i, k, j] = C[i, j, k]. If
+    G lowers the first index, Γ is antisymmetric in i and k. But Γ is *not* symmetric in j and k. Γ
+    follows from Koszul's formula,
     2 ⟨∇_i L_j, L_k⟩ = ⟨[L_i, L_j], L_k⟩ − ⟨[L_j, L_k], L_i⟩ + ⟨[L_k, L_i], L_j⟩.
     Source: BK 2.4, BK (8).
 
     Parameters
     ----------
     G : array_like, shape (..., m, m)
-        The matrix of the metric in the frame. It is symmetric and not singular to rounding, but
-        need not be definite.
+        The matrix of the metric in the frame. It is symmetric and nonsingular, but need not be
+        definite.
     basis : array_like, shape (m, n, n)
         The frame L_1 … L_m at the identity, as for `structure_constants`.
 
@@ -108,7 +108,7 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
     """Return the covariant derivative x_dot[i] + gamma[i, j, k] v[j] x[k] of a field along a curve.
 
     The sum is over j and k. For x = v, the result is the acceleration BK (9), which vanishes along
-    geodesics (BK (8)). For x_dot = 0, the result is ∇_v x of left-invariant fields.
+    geodesics (BK (8)). For x_dot = 0, the result is ∇_v x for left-invariant fields v and x.
     Source: BK 2.4, BK (8), BK (9).
 
     Parameters
@@ -141,8 +141,8 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
 def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
     """Return A and v at the times t for the geodesics that start at A0 with the velocity v0.
 
-    Source: BK 2.4, BK (8). The second derivatives of coordinates that the paper prints need other
-    Christoffel symbols than those of the left-invariant frame.
+    Source: BK 2.4, BK (8). The paper prints second derivatives of coordinates, which need the
+    Christoffel symbols of the coordinates, not those of the left-invariant frame.
 
     Parameters
     ----------
@@ -167,9 +167,9 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     raised.
     An eighth-order Runge–Kutta method with a relative tolerance of 3e-14 solves A' = A hat(v), v'_i
     = −Γ_ijk v_j v_k. On SO(3), these are Euler's equations. The N members of a batch share the
-    tolerance, so the error of a single member may be up to √N times larger. `screw_se3` is a closed
-    form for the metric (10). Between given ends, `geodesic_so3` and `geodesic_se3` are closed forms
-    for (12) and (14).
+    tolerance, so the error of a single member may be up to √N times larger. `screw_se3` gives
+    geodesics of the metric (10) in closed form. `geodesic_so3` and `geodesic_se3` give geodesics of
+    (12) and (14) in closed form.
 
     Examples
     --------
@@ -200,7 +200,6 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
 
 
 def _scales(A0: Array, v0: Array, last: float) -> tuple[Array, Array]:
-    """Return typical sizes of the entries of A and v; ω, v and d have separate sizes."""
     speeds = np.abs(v0).reshape(*v0.shape[:-1], v0.shape[-1] // 3, 3).max(axis=-1)
     speeds = np.where(speeds == 0, speeds.max(axis=-1, keepdims=True), speeds)
     speeds = np.where(speeds < 1e-200, 1.0, speeds)  # at rest
@@ -218,7 +217,6 @@ def _joined(A: Array, v: Array) -> Array:
 def _integrate(
     flow: Callable[[float, Array], Array], start: Array, scales: Array, times: Array
 ) -> Array:
-    """Return the states at the times, one row for each time; the state at t = 0 is `start`."""
     from scipy.integrate import solve_ivp
 
     states = np.broadcast_to(start, (len(times), len(start))).copy()

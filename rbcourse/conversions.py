@@ -19,7 +19,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions; any other norm scales R by its square.
+        Unit quaternions. A quaternion of another norm n gives n² R.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
 def quaternion_from_matrix(R: ArrayLike) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
-    Among the rows of 4 q qᵀ, which is linear in R, the row with the largest diagonal entry is
+    The matrix 4 q qᵀ is linear in R. The row that contains the largest diagonal entry is
     normalised. The result is accurate to a few eps. Singular set: half-turns, where
     `canonical_quaternion` chooses between q and −q.
     Source: BK Remark 7.
@@ -74,7 +74,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 4)
-        The quaternion is (−1, 0, 0, 0) for one full turn, and (1, 0, 0, 0) for two.
+        The quaternion is (−1, 0, 0, 0) for one full turn, and (1, 0, 0, 0) for two full turns.
 
     Examples
     --------
@@ -87,9 +87,9 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
 
 
 def axis_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n, shape (..., 3), and a, shape (..., 1), of w = a n; both are 0 if w is 0.
+    """Return the unit vector n, shape (..., 3), and a ≥ 0, shape (..., 1), with w = a n.
 
-    ValueError is raised if the norm overflows.
+    If w is 0, n and a are 0. If the norm overflows, ValueError is raised.
     """
     with np.errstate(over="ignore"):
         angle = np.linalg.norm(w, axis=-1, keepdims=True)
@@ -103,7 +103,7 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same vector.
 
-    The angle is in [0, π] to rounding, and the result is accurate to a few eps. Singular set:
+    Up to rounding, the angle is in [0, π]. The result is accurate to a few eps. Singular set:
     half-turns, where `canonical_quaternion` chooses the axis.
     Source: BK 2.5, RR 2.2.
 
@@ -204,9 +204,9 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
-    Singular set: gimbal lock, where β is ±π/2 to 16 eps. Then only α − γ (for β = −π/2, only α + γ)
-    is determined, and γ = 0 is returned. Near gimbal lock, α and γ are accurate to eps divided by
-    the distance of β from ±π/2, but α ∓ γ is accurate to eps.
+    Singular set: gimbal lock, where β differs from ±π/2 by less than 16 eps. Then only α − γ (for β
+    = −π/2, only α + γ) is determined, and γ = 0 is returned. Near gimbal lock, α and γ are accurate
+    to eps divided by the distance of β from ±π/2, but α ∓ γ is accurate to eps.
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
 
@@ -236,7 +236,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
 
 
 def _wrapped(angle: Array) -> Array:
-    """Wrap angles in (−2π, 2π) to (−π, π]; an angle that is −π to rounding becomes π."""
+    """Wrap angles in (−2π, 2π) to (−π, π]; an angle that equals −π up to rounding becomes π."""
     angle = np.where(angle > np.pi, angle - 2 * np.pi, angle)
     angle = np.where(angle < -np.pi * (1 - 4 * EPS), angle + 2 * np.pi, angle)
     return np.minimum(angle, np.pi)

@@ -34,7 +34,7 @@ def acceleration_cost(
     """Return L_a, the integral of the squared acceleration in the metric of BK or of a body.
 
     Source: BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for
-    other inertias beyond BK 1.
+    other inertias, beyond BK 1.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def acceleration_cost(
     mass, centre : float above 0; array_like, shape (3,); optional
         The mass of the body, and its centre of mass in the body frame; for SE(3) only.
     rtol : float, optional
-        The relative error, from 1e-12 to 0.1. If it is at least 1e-8, the quadrature starts with
-        two panels instead of 16 or more. The quadrature is then 3 to 40 times as fast, but may miss
-        a peak narrower than a hundredth of the interval.
+        The relative error, from 1e-12 to 0.1. If `rtol` is at least 1e-8, the quadrature starts
+        with two panels instead of 16 or more. The quadrature is then 3 to 40 times as fast, but may
+        miss a peak narrower than a hundredth of the interval.
 
     Returns
     -------
@@ -56,9 +56,9 @@ def acceleration_cost(
         ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w. On SE(3), ∫ m ‖d_c''‖² dt is added, where
         d_c is the position of the centre of mass. By default, the cost is ∫ 2 ‖w'‖² dt, and on
         SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. The relative error is `rtol`. For tiny costs, the absolute
-        error is 1e-20 times a third of the trace of G (1e-20 by default). The errors may be larger
-        if the acceleration has peaks or ripples within a hundredth of the interval, for example
-        with an abrupt ``f`` of a `projected_line_so3`.
+        error is 1e-20 times a third of the trace of G (2e-20 by default). The errors may be larger
+        if the acceleration has peaks or ripples that are narrower than a hundredth of the interval,
+        for example if the ``f`` of a `projected_line_so3` changes abruptly.
 
     Raises
     ------
@@ -68,11 +68,11 @@ def acceleration_cost(
 
     Notes
     -----
-    A curve does not remember the body for which it was made: give the same inertia, mass and centre
-    again. G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ is its square. Free
-    motions have the cost 0. On SE(3), the cost is a sum of two parts (`acceleration_cost_parts`).
-    It depends on the unit of length, and so does any ratio of costs, unless inertia and mass are
-    those of a body.
+    A curve does not store the inertia, mass and centre for which it was made: give them again. The
+    vector G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ is its squared norm.
+    Free motions have the cost 0. On SE(3), the cost is a sum of two parts
+    (`acceleration_cost_parts`). This sum depends on the unit of length. Ratios of such sums also
+    depend on it, unless inertia and mass are those of a body.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def acceleration_cost_parts(
 ) -> tuple[Array, Array]:
     """Return the two parts of `acceleration_cost`: rotation and translation.
 
-    Source: BK (18); for other inertias beyond BK 1.
+    Source: BK (18); for other inertias, beyond BK 1.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Arr
     Parameters
     ----------
     curve, inertia, rtol
-        As for `acceleration_cost`, with the same errors and accuracy, but on SO(3) only.
+        As for `acceleration_cost`, but on SO(3) only. The errors and the accuracy are the same.
 
     Returns
     -------
@@ -172,8 +172,8 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     Parameters
     ----------
     curve, rtol
-        As for `acceleration_cost`, with the same errors and accuracy, but on SO(3) only. An error
-        is also raised if the acceleration of a `chain` jumps.
+        As for `acceleration_cost`, but on SO(3) only. The errors and the accuracy are the same. An
+        error is also raised if the acceleration of a `chain` jumps.
 
     Returns
     -------
@@ -213,7 +213,7 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
 
 
 def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
-    """Scale the legs' costs from unit time to their durations; sum them for a chain."""
+    """Rescale the costs of legs from unit time to their durations; sum the costs of a chain."""
     with np.errstate(over="ignore"):
         costs = costs / legs.flat.duration**power
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
@@ -242,12 +242,12 @@ def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Arr
 
 
 def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
-    """Integrate `density` over unit time for each curve of a stack, by halving panels.
+    """Integrate `density` over unit time for each curve of a stack, by adaptive quadrature.
 
     Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
-    nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
-    integrand at the times t, shape (T, K), for the K curves `some`, which have the indices `index`
-    in the stack. Error messages begin with `name`.
+    nodes differ by more than `rtol` times the integral. For the K curves `some`, whose indices in
+    the stack are `index`, ``density(some, t, index)`` returns the integrand at the times t, shape
+    (T, K). Error messages begin with `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")
@@ -275,7 +275,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
                 error[part] = np.abs(value[part] - rest)
         expected = cost + np.bincount(index, value, curve.count)
         coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN counts as coarse
-        lost = coarse & (width < 256 * EPS * (start + width))  # lost in the rounding of times
+        lost = coarse & (width < 256 * EPS * (start + width))  # too narrow for distinct times
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
         cost += np.bincount(index[~coarse], value[~coarse], curve.count)

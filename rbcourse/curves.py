@@ -40,7 +40,8 @@ class _Ends(NamedTuple):
 class Ends(_Ends):
     """Boundary conditions: rotations and angular velocities at both ends, in a common batch shape.
 
-    Ends are a tuple: a function ``make`` that makes curves is called as ``make(*ends)``.
+    Because `Ends` is a tuple, a function ``make`` that returns a curve is called as
+    ``make(*ends)``.
     Source: BK 6.2.
 
     Parameters
@@ -93,7 +94,7 @@ class Ends(_Ends):
 
 
 def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
-    """Return the boundary conditions and the inertia in a common batch shape."""
+    """Broadcast the boundary conditions and the inertia to a common batch shape."""
     G = as_inertia("inertia", inertia)
     batch = check_broadcast(ends=(ends.R0, 2), inertia=(G, 2))
     return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
@@ -117,8 +118,8 @@ class Curve:
     """A rotation or a pose over time: ``c(t)``, with derivatives ``c(t, 1)`` and ``c(t, 2)``.
 
     On SO(3), ``c(t)`` is the rotation matrix R. Its derivatives are in the body frame: ``c(t, 1)``
-    is the angular velocity w, with R' = R hat_so3(w), ``c(t, 2)`` is the angular acceleration w',
-    and ``c(t, 3)`` is the angular jerk w''.
+    is the angular velocity w (R' = R hat_so3(w)), ``c(t, 2)`` is the angular acceleration w', and
+    ``c(t, 3)`` is the angular jerk w''.
 
     On SE(3), ``c(t)`` is the pose A, and ``c(t, 1)`` is the twist S = (w, v), with A' = A
     hat_se3(S). ``c(t, 2)`` is the covariant acceleration (w', Rᵀ d'') in metric (14). It is *not*
@@ -127,8 +128,8 @@ class Curve:
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of the shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``. On SE(3), the
     shapes are ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed like an
-    array of its shape: ``c[2]`` is its third curve. All array attributes begin with the axes of the
-    stack.
+    array of its shape: ``c[2]`` is its third curve. The first axes of all array attributes are the
+    axes of the stack.
 
     Source: BK (1), BK (9), BK 6.
 
@@ -139,8 +140,8 @@ class Curve:
     batch_shape : tuple of int
         The shape of the stack; ``()`` for a single curve.
     domain : tuple of float
-        The first and the last time. For a stack, they bound the interval that all curves have in
-        common; for an empty stack, they are (0, inf).
+        The first and the last time. For a stack, the domain is the interval that all curves have in
+        common; for an empty stack, it is (0, inf).
     """
 
     duration: Array
@@ -169,9 +170,9 @@ class Curve:
     def breakpoints(self) -> Array:
         """The ends of panels for a quadrature, as fractions of the duration, shape (n,).
 
-        The panels are sixteenths. They are divided further where a curve may turn fast: near an end
-        with a large velocity or acceleration, and near times of small margin. A margin below 1e-6
-        raises RuntimeError.
+        The panels are sixteenths of the duration, divided further where a curve may turn fast: near
+        an end with a large velocity or acceleration, and near times of small margin. A margin below
+        1e-6 raises RuntimeError.
         """
         ends = np.array([[0.0], [1.0]])
         w, a = (np.linalg.norm(self.flat.values(ends, k)[..., :3], axis=-1) for k in (1, 2))
@@ -214,7 +215,7 @@ class Curve:
         return rate
 
     def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
-        """Return each curve of the stack, or a derivative, at its own times within its duration.
+        """Evaluate each curve of the stack, or a derivative, at its own times.
 
         `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or t.shape
         + (3,); on SE(3), t.shape + (4, 4) or t.shape + (6,).
@@ -230,7 +231,7 @@ class Curve:
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
-        """Return one curve or a smaller stack; the index is used as for NumPy arrays."""
+        """Return one curve or a smaller stack, by NumPy's rules of indexing."""
         if not self.batch_shape:
             raise TypeError("a single curve is not a stack and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
@@ -257,11 +258,11 @@ class Curve:
         return type(self)(**parts)
 
     def lasting(self, duration: Array) -> Self:
-        """Return the curves with other durations."""
+        """Return the same curves with other durations."""
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return all curves, or a derivative, at times from 0 to 1; the stack must have one axis.
+        """Return all curves of a flat stack, or a derivative, at times from 0 to 1.
 
         Subclasses implement this method. `t` has the shape (T, count) or (T, 1). The result has the
         shape (T, count, 3, 3) or (T, count, 3); on SE(3), (T, count, 4, 4) or (T, count, 6).
@@ -299,7 +300,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class QuaternionCurve(Curve):
-    """A `Curve` that is a fixed rotation times the rotation of a quaternion Q(t) of any norm.
+    """The `Curve` of a fixed rotation times the rotation of a quaternion Q(t), of any norm.
 
     Source: BK 1.
     """
@@ -308,7 +309,7 @@ class QuaternionCurve(Curve):
     controls: Array  # the data that define Q, shape (..., n, components)
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
-        """Return the jet of Q at the times t, from controls that broadcast with them."""
+        """Return the jet of Q at the times t; the controls broadcast with the times."""
         raise NotImplementedError
 
     def values(self, t: Array, order: int) -> Array:
@@ -324,16 +325,16 @@ class QuaternionCurve(Curve):
         return values.swapaxes(0, 1) if by_curve else values
 
     def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
-        """Raise SingularTime if Q is 0 to rounding at one of the times."""
+        """Raise SingularTime if Q is 0 up to rounding at one of the times."""
 
     @cached_property
     def _first(self) -> Array:
-        """The controls with the axis of the components first."""
+        """The controls, with the axis of the components moved to the front."""
         return np.ascontiguousarray(np.moveaxis(self.controls, (-2, -1), (0, 1)))
 
 
 def other_way(turn: Array) -> Array:
-    """Return the turns to the same rotations the other way round; a zero turn is kept."""
+    """Return the rotation vectors that reach the same rotations the other way round."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     return turn - 2 * np.pi * turn / np.where(angle == 0, 1, angle)
 
@@ -368,7 +369,7 @@ class AlongGeodesic(Curve):
         return identity(t, order)
 
     def values(self, t: Array, order: int) -> Array:
-        """Return R0 exp(σ̂ p), or a derivative of p times σ."""
+        """Return R0 exp(σ̂ p), or σ times a derivative of p."""
         progress, count = self._progress(t, order), self.count
         if order:
             values = np.empty((len(t), count, 3))
@@ -386,7 +387,7 @@ class AlongGeodesic(Curve):
 
 
 def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
-    """Write sin a and 1 − cos a for a = 2 `half` `progress`, by the fastest way: from tan(a/2)."""
+    """Write sin a and 1 − cos a, computed fast from tan(a/2), where a = 2 `half` `progress`."""
     tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
     np.multiply(tangent, tangent, out=sine)
     sine += 1
@@ -396,7 +397,7 @@ def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: 
 
 
 def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
-    """Return the weighted sums of the terms of each curve of a stack.
+    """Return, for each curve of a stack, the weighted sums of its terms.
 
     `weights` has the shape (T, count, n) or (T, 1, n), `terms` has the shape (count, n, m), and the
     result has the shape (T, count) + core.
@@ -421,13 +422,14 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     Returns
     -------
     AlongGeodesic
-        A `Curve`: R0 exp(σ̂ t) with ``rotation_vector`` σ = log_so3(R0ᵀ R1), of length ‖σ‖ ≤ π.
+        The `Curve` R0 exp(σ̂ t), where the ``rotation_vector`` is σ = log_so3(R0ᵀ R1), with ‖σ‖ ≤
+        π.
 
     Notes
     -----
-    Singular set: R0 and R1 are a half-turn apart. Two geodesics are then shortest. The returned
-    geodesic has a ``rotation_vector`` whose component of largest magnitude (the first, if several
-    are equal) is positive.
+    Singular set: R0 and R1 are a half-turn apart. Two geodesics are then shortest. In the
+    ``rotation_vector`` of the returned geodesic, the component of largest magnitude (the first, if
+    several are equal) is positive.
 
     Examples
     --------
@@ -440,7 +442,7 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
 
 
 def geodesic_data(R0: ArrayLike, R1: ArrayLike, duration: ArrayLike) -> dict[str, Array]:
-    """Return the arrays of an `AlongGeodesic`, from the arguments of `geodesic_so3`."""
+    """Return the attributes of the `AlongGeodesic` that `geodesic_so3` returns."""
     R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
     T = as_duration("duration", duration)
     batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), duration=(T, 0))
@@ -461,14 +463,14 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
         A curve or a stack of curves.
     duration : array_like, shape (...)
         The new duration, at least 1e-100: one for all curves, or one for each curve. For a `chain`,
-        it must not vanish by rounding when it is added to the first time.
+        the duration must not be lost in rounding when it is added to the first time.
 
     Returns
     -------
     Curve
         A curve of the same kind. If the duration is multiplied by k, velocities and accelerations
-        are divided by k and k², and `acceleration_cost` by k³. A `chain` that starts at a then
-        passes through its poses at a + k (t − a).
+        are divided by k and k², and `acceleration_cost` by k³. A `chain` that starts at time a then
+        passes the pose of time t at the time a + k (t − a).
 
     Examples
     --------
@@ -493,7 +495,7 @@ def identity(t: Array, order: int) -> Array:
 
 
 def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
-    """Return the name of a curve of a stack for messages; it is empty for a single curve."""
+    """Return words that name a curve of a stack in messages, or "" for a single curve."""
     index = [int(i) for i in np.unravel_index(curve, batch_shape)] if batch_shape else []
     return f" of curve {index}" if index else ""
 
@@ -501,7 +503,7 @@ def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
 def check_defined(
     t: Array, lost: NDArray[np.bool_], reason: str, *, by_curve: bool = False
 ) -> None:
-    """Raise `SingularTime` for the first time that is `lost`.
+    """Raise `SingularTime` for the first time at which `lost` is True, if there is one.
 
     `t` and `lost` have the shape (T, count) or, if `by_curve`, (count, T).
     """
@@ -521,7 +523,7 @@ def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
 
 
 def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Add breakpoints in [0, 1] to `points`, at distances 1/32, 1/64, …, `widths` from `times`."""
+    """Refine `points` in [0, 1] near `times`, by points at distances 1/32, 1/64, …, `widths`."""
     cuts = [points]
     for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
@@ -533,9 +535,10 @@ def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
 def least_over_time(
     value: Callable[[Array], Array], batch_shape: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Return the time of a function's minimum, and the minimum, both of shape batch_shape.
+    """Return the time of a function's minimum, and the minimum.
 
-    The function takes times of the shape (N,) + batch_shape and returns values of this shape.
+    The function takes times of the shape (N,) + batch_shape and returns values of this shape. Both
+    results have the shape batch_shape.
     """
     centre, reach, count = np.full(batch_shape, 0.5), 0.5, 129
     while reach > 1e-15:

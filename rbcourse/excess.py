@@ -1,6 +1,6 @@
 """The excess of a curve's cost over the optimum: the leading term, and an estimate.
 
-Both hold for small excursions; `rbclassroom.surveys.atlas` treats large ones.
+The results hold for small excursions; `rbclassroom.surveys.atlas` treats large excursions.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rbcourse.paths import smooth_parts
 from rbcourse.so3 import hat, log_so3
 
 _NODES, _BUMPS = 33, 12
-_TOGETHER = 64  # number of curves whose systems fit into the cache together
+_TOGETHER = 64  # number of curves whose linear systems fit into the cache
 _SMOOTH = 1e-6  # bound on the last two Chebyshev coefficients of w', divided by √∫ ‖w'‖² dt
 SPEED_LIMIT = 2.5
 """In rad per duration: no estimate is given for a curve that turns at this speed or faster."""
@@ -45,16 +45,16 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     ndarray, shape (...)
         E/(12 ‖e‖² + ‖d‖²), the leading term of the excess for small excursions. Let σ = log_so3(R0ᵀ
         R1), and let both end velocities be parallel transported to the half-way rotation. Then e is
-        their mean minus σ, and d is their difference. E is a polynomial in σ, e and d of degree six
-        (four for "cumulative_bezier_so3"). If e and d are 0, the optimum costs nothing, and the
-        result is NaN.
+        the mean of these velocities minus σ, and d is their difference. E is a polynomial in σ, e
+        and d of degree six (four for "cumulative_bezier_so3"). If e and d are 0, the optimum costs
+        nothing, and the result is NaN.
 
     Notes
     -----
     Domain: small excursions. The relative error is proportional to the square of the excursion (for
     "cumulative_bezier_so3", to the excursion). On random problems with ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ <
-    1, this error was at most 14 % for all other forms. It can be larger if E is much smaller than
-    usual for ends of this size, for example if the velocities are along σ.
+    1, this error was at most 14 % for all other forms. The error can be larger if E is much smaller
+    than usual for ends of this size, for example if the velocities are along σ.
     Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ.
 
     Examples
@@ -75,13 +75,13 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     powers, coefficients = forms[name]
     E = np.prod(inner[..., None, :] ** powers, axis=-1) @ coefficients
     optimum = 12 * inner[..., 1] + inner[..., 2]
-    E = np.maximum(E, 0)  # it is negative only by rounding
+    E = np.maximum(E, 0)  # only rounding makes E negative
     return np.divide(E, optimum, out=np.full_like(E, np.nan), where=optimum > 0)[()]
 
 
 @lru_cache
 def _forms() -> dict[str, tuple[Array, Array]]:
-    """Return the terms of the polynomials E: powers of six inner products, and factors."""
+    """Return the powers of six inner products, and their coefficients, in each polynomial E."""
     path = os.path.join(os.path.dirname(__file__), "leading_excess.csv")
     with open(path, encoding="utf-8") as file:
         head, over, *rows = csv.reader(file)
@@ -109,21 +109,22 @@ def excess_estimate(curve: Curve) -> Array:
     ndarray, shape curve.batch_shape
         An estimate of (cost of the curve)/(cost of the optimum) − 1. A `chain` is compared with the
         optimal legs that have the same velocities at its poses; if its velocity jumps, RuntimeError
-        is raised. The estimate is NaN for a curve that turns at `SPEED_LIMIT` or faster at some
-        time, costs more than about twice the optimum, is not smooth enough for 33 nodes, costs
-        nothing, or is NaN itself. It is also NaN if H (see the notes) is not positive definite.
+        is raised. The estimate is NaN if the curve reaches the `SPEED_LIMIT`, costs more than about
+        twice the optimum, is not smooth enough for 33 nodes, costs nothing, or is NaN itself. It is
+        also NaN if H (see the notes) is not positive definite.
 
     Notes
     -----
     Domain: ‖w‖ times the duration is below 2.5 rad at all times, and the excess is at most 1. On
     random problems with an excess of at least 1e-8, the estimates were within 1.4 % of the excess
     for closed forms, and within 6 % for quintics with random end accelerations. If ‖w‖ < 1 at all
-    times, these figures were 0.03 % and 1.2 %. For a smaller excess, the costs are not known with
-    enough digits. An excess below 1e-22 is lost in rounding. If ‖w‖ reaches 3π/4, the optimum may
-    turn the other way round; the estimate is then the excess over the stationary curve nearby.
+    times, these figures were 0.03 % and 1.2 %. For a smaller excess, the computed costs are not
+    accurate enough for a comparison. An excess below 1e-22 is lost in rounding. If ‖w‖ reaches
+    3π/4, the optimum may turn the other way round; the estimate is then the excess over the nearby
+    stationary curve.
 
-    Let J = ∫ ‖w'‖² dt. For a small η with η = η' = 0 at both ends, J of the curve R exp(η̂) is, to
-    second order, J − 2 g · η + η · H η. With x = η' + w × η,
+    Let J = ∫ ‖w'‖² dt. Let η be small, with η = η' = 0 at both ends. To second order, J of the
+    curve R exp(η̂) is J − 2 g · η + η · H η. With x = η' + w × η,
 
         g · η = −∫ w' · x' dt,    η · H η = ∫ ‖x'‖² − w' · (η × x)' dt.
 

@@ -1,4 +1,4 @@
-"""Reading and writing of paths and plans: CSV with names and units, and TUM trajectories."""
+"""Paths and plans in files: CSV with column names and units, or TUM trajectories."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 def write_path(
     file: File, times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> None:
-    """Write a path of poses or rotations as CSV or as a TUM trajectory, by the file extension.
+    """Write a path of poses or rotations; the file extension selects CSV or TUM.
 
     The first line has the names of the columns. In CSV, the names have units; in TUM, the line is a
     comment. Each further line has a time, position, quaternion, ω and v. Quaternions are (w, x, y,
@@ -117,7 +117,7 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     Returns
     -------
     times : ndarray, shape (N,)
-        In s.
+        Times in s.
     poses : ndarray, shape (N, 4, 4) or (N, 3, 3)
         Poses, or rotation matrices if the file has no positions.
     velocities : ndarray, shape (N, 6) or (N, 3), or None
@@ -126,7 +126,7 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     Raises
     ------
     ValueError
-        If the file has other content or no pose, if times do not increase, or if the norm of a
+        If the file has another format or no pose, if times do not increase, or if the norm of a
         quaternion differs from 1 by more than 1e-3. The message names the line and the reason.
 
     Examples
@@ -171,8 +171,8 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
         A planar velocity has three numbers, and joint velocities have one for each joint. Durations
         are at least 0, in s.
     kind : {"world", "body", "joints"}
-        The kind of velocities: planar in the world or the body frame, or of joints. It determines
-        the names of the columns.
+        The kind of velocities: planar velocities in the world or the body frame, or joint
+        velocities. The kind determines the names of the columns.
 
     Examples
     --------
@@ -191,8 +191,8 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
 def load_plan(file: File, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote.
 
-    A malformed file is rejected as a whole: other content or another kind raises ValueError. The
-    message names the line and the reason.
+    A malformed file, or a plan of another kind, raises ValueError. The message names the line and
+    the reason.
     Source: RR 3.2, RR 4.2.
 
     Parameters
@@ -239,7 +239,7 @@ def _csv_rows(file: File) -> tuple[bool, Rows]:
 
 
 def _tum_rows(file: File) -> tuple[bool, Rows]:
-    """Return True, because a TUM file has positions; also return its rows in the order of CSV."""
+    """Return True (TUM files have positions), and the rows in the order of CSV."""
     lines = ((place, line.split()) for place, line in text_lines(file))
     rows = (
         _row(place, TUM, cells) for place, cells in lines if cells and not cells[0].startswith("#")
@@ -248,7 +248,6 @@ def _tum_rows(file: File) -> tuple[bool, Rows]:
 
 
 def _velocities(kind: str, joints: int) -> list[str]:
-    """Return the names of the velocity columns of a plan; joints are numbered from 0."""
     if kind == "joints":
         return [f"v{i} [rad/s]" for i in range(joints)]
     if kind in list(VELOCITIES):

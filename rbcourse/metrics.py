@@ -40,7 +40,8 @@ METRIC_SO3.flags.writeable = METRIC_SE3.flags.writeable = False
 def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors X, Y of GL(n) at one point.
 
-    It is invariant under rotations and reflections on either side, but not under other matrices.
+    This inner product is invariant under rotations and reflections on either side, but not under
+    other matrices.
     Source: BK 3.1, BK (11), BK Prop. 1.
 
     Parameters
@@ -62,8 +63,8 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) = 2 x · y for tangent vectors X = R hat_so3(x), Y = R hat_so3(y).
 
-    It is invariant under rotations on both sides. For X = Y it is twice the kinetic energy of a
-    ball with moment of inertia 2.
+    This inner product is invariant under rotations on both sides. For X = Y, it is twice the
+    kinetic energy of a ball with moment of inertia 2.
     Source: BK 3.1, BK (12), BK Prop. 1, BK Remark 1, BK Remark 2.
 
     Parameters
@@ -106,9 +107,9 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
 def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) = 2 ω_x · ω_y + v_x · v_y for X = A hat_se3(x), Y = A hat_se3(y).
 
-    It is invariant under poses on the left, but on the right only under rotations. For X = Y it is
-    twice the kinetic energy of a ball around the body's origin, with mass 1 and moment of inertia
-    2.
+    This inner product is invariant under poses on the left, but only under rotations on the right.
+    For X = Y, it is twice the kinetic energy of a ball of mass 1 and moment of inertia 2, whose
+    centre is the body's origin.
     Source: BK 3.2, BK (14), BK Remark 3, BK Remark 4, BK Remark 5.
 
     Parameters
@@ -138,7 +139,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     G : array_like, shape (..., 3, 3) for SO(3), (..., 6, 6) for SE(3)
         The symmetric matrix of the metric at the identity, for angular velocities or twists.
     A, X, Y : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses, and tangent vectors there; x and y are their components.
+        Rotations or poses A, and tangent vectors X and Y at A, with the components x and y.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
 
 
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
-    """Return [[alpha I, beta I], [beta I, 0]], an indefinite metric invariant on both sides.
+    """Return [[alpha I, beta I], [beta I, 0]], an indefinite bi-invariant metric.
 
     Three eigenvalues are positive and three negative, so the "length" of a motion can be 0 or
     imaginary. The geodesics are screw motions.
@@ -169,7 +170,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     ----------
     alpha, beta : float
         Positive numbers. alpha is the weight of rotation, and beta couples rotation to translation.
-        If the result is an energy per mass, their units are m² and m.
+        If the result is an energy per mass, alpha is in m² and beta is in m.
 
     Returns
     -------
@@ -223,7 +224,7 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     Parameters
     ----------
     A, X : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotations or poses, and tangent vectors there.
+        Rotations or poses A, and tangent vectors X at A.
 
     Returns
     -------
@@ -248,14 +249,14 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
     Parameters
     ----------
     sides : array_like, shape (..., 3)
-        The lengths a, b, c along the axes, not negative.
+        The lengths a, b, c along the axes, at least 0.
     mass : float, optional
-        Positive, in kg.
+        The mass in kg, above 0.
 
     Returns
     -------
     ndarray, shape (..., 3, 3)
-        In kg m², in body axes.
+        The inertia in body axes, in kg m².
 
     Examples
     --------
@@ -282,7 +283,8 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     Parameters
     ----------
     W : array_like, shape (..., 3, 3)
-        Symmetric matrices; for a body, ∫ p pᵀ dm over its points p in the body frame, in kg m².
+        Symmetric matrices. The W of a body is ∫ p pᵀ dm over its points p in the body frame, in kg
+        m².
 
     Returns
     -------
@@ -304,15 +306,16 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     """Return the weight W = tr(G)/2 I − G, which satisfies tr(W) I − W = G.
 
     The inertia of every body satisfies the condition on G below. For any other G, W has a negative
-    eigenvalue. The eigenvalues of a body's W are ∫ x² dm along the axes. W has rank 2 for a flat
-    body, whose largest moment is the sum of the other two, and rank 1 for a rod without thickness.
+    eigenvalue. The eigenvalues of a body's W are the integrals ∫ x² dm along its principal axes. W
+    has rank 2 for a flat body, and rank 1 for a rod without thickness. The largest moment of a flat
+    body is the sum of the other two.
     Source: BK 3, for the metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
     G : array_like, shape (..., 3, 3)
-        Symmetric matrices. Each eigenvalue is at most the sum of the other two, to a few eps of the
-        largest.
+        Symmetric matrices. Each eigenvalue is at most the sum of the other two, up to a few eps of
+        the largest.
 
     Returns
     -------
@@ -327,7 +330,7 @@ def weight_from_inertia(G: ArrayLike) -> Array:
 
 
 def weight_of(name: str, G: Array) -> Array:
-    """Return `weight_from_inertia` of symmetric matrices; error messages begin with `name`."""
+    """Compute `weight_from_inertia` for symmetric matrices; error messages begin with `name`."""
     moments = np.linalg.eigvalsh(scaled(G))
     slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
     refused = slack < -16 * EPS * np.abs(moments).max(axis=-1)
@@ -341,7 +344,7 @@ def weight_of(name: str, G: Array) -> Array:
 
 
 def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
-    """Return matrices of SO(3) or SE(3), and the dimension of the group, found from their size."""
+    """Return the matrices, and the dimension of their group, which is SO(3) or SE(3)."""
     A = as_finite(name, value, "n", "n")
     if A.shape[-1] not in (3, 4):
         raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) is wanted, got {A.shape}")

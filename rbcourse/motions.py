@@ -28,7 +28,7 @@ from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RigidMotion(Curve):
-    """The `Curve` on SE(3) of a rotation R(t) and a polynomial path d(t) of a point of the body.
+    """A `Curve` on SE(3): a rotation R(t), and a polynomial path d(t) of one point of the body.
 
     Source: BK 6.3.
 
@@ -36,8 +36,8 @@ class RigidMotion(Curve):
     ----------
     rotation : Curve on SO(3)
     path : ndarray, shape (..., n, 3)
-        d(0) and d(1). A cubic also has d'(0) and d'(1), and a quintic also d''(0) and d''(1). All
-        are in m, in the fixed frame, with time from 0 to 1.
+        d(0) and d(1). A cubic also has d'(0) and d'(1), and a quintic also d''(0) and d''(1). The
+        vectors are in m, in the fixed frame, and time runs from 0 to 1.
     centre : ndarray, shape (..., 3)
         The point of the body that follows the path, in the body frame, in m; 0 is the origin.
     """
@@ -80,7 +80,7 @@ class RigidMotion(Curve):
 
     @property
     def size(self) -> int:
-        """The size of its matrices, 4."""
+        """The size of the matrices, 4."""
         return 4
 
     @property
@@ -89,7 +89,7 @@ class RigidMotion(Curve):
         return self.rotation.breakpoints
 
     def lasting(self, duration: Array) -> Self:
-        """Return the motion and its rotation with another duration."""
+        """Return the same motion with another duration."""
         return replace(self, duration=duration, rotation=self.rotation.lasting(duration))
 
 
@@ -110,7 +110,7 @@ class ProjectedMotion(RigidMotion):
 def rigid_motion(
     kind: type[Motion], rotation: Curve, *path: Array, centre: Array | None = None
 ) -> Motion:
-    """Return the motion with this rotation and path; velocities are per unit of the duration."""
+    """Return the motion with this rotation and path, which use the same unit of time."""
     batch = np.broadcast_shapes(rotation.batch_shape, *(x.shape[:-1] for x in path))
     numbers = np.arange(rotation.count).reshape(rotation.batch_shape)
     turning = rotation.take(np.broadcast_to(numbers, batch))
@@ -165,7 +165,7 @@ def projected_cubic_se3(
     *,
     duration: ArrayLike = 1.0,
 ) -> ProjectedMotion:
-    """Return the near-optimal minimum-acceleration motion: a projected cubic and a cubic in R³.
+    """Return a near-optimal motion: a projected cubic, and a cubic in R³ for the origin.
 
     Source: BK 6.3, BK Prop. 5.
 
@@ -215,7 +215,7 @@ def minimum_acceleration_se3(
 
     If its rotation has the least cost, the motion has the least `acceleration_cost` of all motions
     with these ends, for the same `inertia`, `mass` and `centre`.
-    Source: BK 6.3; for bodies beyond BK 9.
+    Source: BK 6.3; for bodies, beyond BK 9.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def minimum_acceleration_se3(
     Notes
     -----
     Rotation and translation are independent in metric (14). In the metric of the kinetic energy,
-    rotation and the position d + R r of the centre of mass r are independent. So each has its own
+    the rotation and the position d + R r of the centre of mass are independent. So each has its own
     optimum. The end velocities of the centre are d_c' = d' + R (w × r). `projected_cubic_se3` is
     near-optimal and has a closed form.
 
@@ -261,7 +261,7 @@ def minimum_acceleration_se3(
 
 
 def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
-    """Return the screw motion from A0 to A1: a motion about one fixed axis with a constant twist.
+    """Return the screw motion from A0 to A1, which has one fixed axis and a constant twist.
 
     Its covariant acceleration is (0, ω × v). Every point of the body moves on a helix about the
     axis (see `screw_from_pose`). A screw motion is a geodesic of the indefinite metric (10), not of
@@ -310,7 +310,7 @@ class ScrewMotion(Curve):
 
     @property
     def size(self) -> int:
-        """The size of its matrices, 4."""
+        """The size of the matrices, 4."""
         return 4
 
     @property
@@ -336,7 +336,7 @@ def screw_from_pose(A: ArrayLike) -> Screw:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
-        Poses. For the screw from a pose A0 to A1, in the fixed frame, use A1 @ inverse_se3(A0).
+        Poses. For the screw in the fixed frame that takes A0 to A1, use A1 @ inverse_se3(A0).
 
     Returns
     -------
@@ -377,7 +377,7 @@ class Screw(NamedTuple):
         The unit vector along the axis. If there is no turn, it is the direction of the slide; if
         there is no motion, it is 0.
     point : ndarray, shape (..., 3)
-        The point of the axis nearest to the origin, in m; 0 if there is no turn.
+        The point on the axis that is nearest to the origin, in m; 0 if there is no turn.
     angle, slide : ndarray, shape (...)
         The turn, in [0, π] rad, and the displacement along the axis, in m.
     """

@@ -54,8 +54,8 @@ def chain(
     times, poses
         As for `bessel_velocities`.
     velocities : array_like, shape (N, 6) or (N, 3), optional
-        Twists or angular velocities at the poses. By default they are the `spline_velocities`, with
-        velocity 0 at both ends and where two successive poses are equal to rounding.
+        Twists or angular velocities at the poses. The default is the `spline_velocities`, with
+        velocity 0 at both ends, and at successive poses that are equal up to rounding.
     leg : callable, optional
         A function, from this package or your own, that makes the legs. It returns a stack of
         two-point curves, and is called once for all legs. Its arguments are the keyword
@@ -67,24 +67,25 @@ def chain(
     Returns
     -------
     Chain
-        A `Curve` on [times[0], times[-1]] that passes through its poses to a few eps. It has the
+        A `Curve` on [times[0], times[-1]] that passes through its poses up to a few eps. It has the
         attributes ``legs`` and ``velocities`` and the method ``jumps(order)``.
 
     Raises
     ------
     ValueError
-        As for `bessel_velocities`; also if `velocities` are given, but `leg` takes none, or if
-        `leg` needs other arguments, raises ValueError, or misses the next pose by more than 1e-6.
-        The message names the first such place. Warnings and other errors are those of `leg`.
+        As for `bessel_velocities`. Other causes are `velocities` that are given although `leg`
+        takes none, and a `leg` that needs other arguments, raises ValueError, or misses the next
+        pose by more than 1e-6. The message names the first such place. Warnings and other errors
+        are those of `leg`.
 
     Notes
     -----
-    At the joints, a chain is C⁰ (the velocity jumps) with `geodesic_so3`, `geodesic_se3`,
-    `screw_se3` and `projected_line_so3`. With the default legs and velocities, it is C², except at
-    inner poses where it rests. It is also C² with `projected_quintic_so3`,
-    `exponential_quintic_so3` and `minimum_jerk_so3`. All other legs take velocities, and the chain
-    is C¹ (the acceleration jumps). At the joints of projected legs, velocities agree to a few eps
-    of the largest ‖w‖, and accelerations to a few eps of ‖w‖² + ‖w'‖.
+    With `geodesic_so3`, `geodesic_se3`, `screw_se3` and `projected_line_so3`, a chain is C⁰ at the
+    joints (the velocity jumps). With the default legs and velocities, it is C², except at inner
+    poses where it rests. It is also C² with `projected_quintic_so3`, `exponential_quintic_so3` and
+    `minimum_jerk_so3`. All other legs take velocities, and the chain is C¹ (the acceleration
+    jumps). At the joints of projected legs, velocities agree to a few eps of the largest ‖w‖, and
+    accelerations to a few eps of ‖w‖² + ‖w'‖.
     The accelerations a0, a1 are 0 at both ends and where the curve rests. At other poses they are
     those of the default chain, even if velocities are given.
     A chain at rest at both ends costs more than one with natural ends (`projected_spline_se3`).
@@ -140,7 +141,7 @@ def projected_spline_so3(
     ends: PathEnds = "natural",
     inertia: ArrayLike | None = None,
 ) -> Chain:
-    """Return BK's projected cubics through many rotations, with a continuous acceleration.
+    """Return a twice differentiable chain of BK's projected cubics through many rotations.
 
     Source: BK Prop. 3; beyond BK 13, beyond BK 14.
 
@@ -182,7 +183,7 @@ def projected_spline_so3(
 
 
 def projected_spline_se3(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural") -> Chain:
-    """Return BK's projected motions through many poses, with a continuous acceleration.
+    """Return a twice differentiable chain of BK's projected motions through many poses.
 
     Source: BK 6.3; beyond BK 13.
 
@@ -291,7 +292,7 @@ class Chain(Curve):
         return f"Chain of {self.legs.count} legs, {self.legs._what()},"
 
     def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration, and the same first time."""
+        """Return the chain with another duration; the first time is kept."""
         start, end = self.domain
         share = float(duration) / (end - start)
         if start + float(duration) == start:
@@ -309,7 +310,7 @@ class Chain(Curve):
         )
 
     def jumps(self, order: int) -> Array:
-        """Return the jumps of the curve, or of a derivative, at the inner poses, (N − 2, ...).
+        """Return the jumps of the curve, or of a derivative, at the N − 2 inner poses.
 
         A jump is the value after a pose minus the value before it; `order` is from 0 to 3, or from
         0 to 2 on SE(3).
@@ -351,19 +352,19 @@ class Chain(Curve):
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
         for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
-            if k == 2:  # the size includes the velocity over the shortest duration
+            if k == 2:
                 sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
-            for half in (slice(3), slice(3, None)):  # the rotation in rad and the translation in m
+            for half in (slice(3), slice(3, None)):
                 jump = jumps[:, half].max(initial=0)
                 if jump > 1e-9 * sizes[:, half].max(initial=0):
                     raise RuntimeError(f"{name}: {what} jumps at a joint, by {jump:.3g}")
 
 
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Divide successive runs of `counts` rows into parts of equal length.
+    """Divide successive groups of `counts` rows into parts of equal length.
 
-    Return the run of each part, shape (parts,), and its rows, shape (parts, length). Shorter parts
-    are filled up by repeating their last row.
+    Return the group of each part, shape (parts,), and the rows, shape (parts, length). Shorter
+    parts are filled up by repeating their last row.
     """
     mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
     length, ends = max(1, min(int(counts.max()), 2 * mean)), np.cumsum(counts)
@@ -375,7 +376,7 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
 
 
 def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
-    """Return the curve; for a chain, call `Chain.check_smooth` and return its legs."""
+    """Return the curve, or the legs of a chain that passes `Chain.check_smooth`."""
     if isinstance(curve, Chain):
         curve.check_smooth(name, order)
         return curve.legs
@@ -408,7 +409,6 @@ def _arguments(leg: Leg) -> list[str]:
 
 
 def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
-    """Make the stack of legs; warnings are shown for the line that calls `chain`."""
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
             legs = leg(**ends, duration=duration)

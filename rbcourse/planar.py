@@ -1,8 +1,8 @@
 """Rigid bodies in the plane: poses (x, y, theta), the group SE(2), plans and paths.
 
 Poses are in m, m and rad. Unless a docstring says otherwise, they are in the world frame. Angles
-count full turns: theta and theta + 2π are the same orientation, but the latter has one more turn. A
-twist is (vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A
+count full turns: theta and theta + 2π give the same orientation, but the latter has one more turn.
+A twist is (vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A
 path is an array with one row for each state.
 """
 
@@ -67,9 +67,9 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
 def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices, with −π ≤ theta ≤ π.
 
-    The angle is that of the rotation nearest to the upper left block. Singular set: blocks [[a, b],
-    [b, −a]], to which all rotations are equally near; theta is then 0. At θ = ±π, rounding decides
-    the sign.
+    The rotation nearest to the upper left block gives the angle. Singular set: blocks [[a, b], [b,
+    −a]], to which all rotations are equally near; theta is then 0. At θ = ±π, rounding decides the
+    sign.
     Source: RR 3.1.
 
     Parameters
@@ -158,8 +158,8 @@ def exp_planar(S: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (..., 3)
-        Poses (x, y, omega). The point (x, y) is the end of an arc of the angle omega. It is (vx,
-        vy), turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
+        Poses (x, y, omega). The point (x, y) is the end of an arc through the angle omega. The
+        vector (x, y) is (vx, vy), turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
 
     Examples
     --------
@@ -173,7 +173,7 @@ def exp_planar(S: ArrayLike) -> Array:
 
 
 def log_planar(pose: ArrayLike) -> Array:
-    """Return the body twist, −π ≤ omega ≤ π, that leads from (0, 0, 0) to a pose in unit time.
+    """Return the body twist with −π ≤ omega ≤ π that leads from (0, 0, 0) to a pose in unit time.
 
     Singular set: half-turns, to which two twists lead. theta = π gives omega = π, and −π gives −π.
     If full turns are added to these angles, rounding decides the sign.
@@ -207,8 +207,8 @@ def interpolate_planar(
 
     The path depends on which point of the body has the position (x, y).
     Singular set of `shortest`: angles that differ by half a turn. If the given angles differ by π
-    or −π, the turn is this difference. If they also differ by full turns, rounding decides its
-    sign.
+    or −π, the turn is this difference. If the angles also differ by full turns, rounding decides
+    the sign of the turn.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Parameters
@@ -217,13 +217,13 @@ def interpolate_planar(
     steps : int, optional
         The number of equal steps, at least 1.
     shortest : bool, optional
-        Whether to turn by at most π (to rounding). The last theta may then differ from that of
-        `goal` by full turns. By default, theta changes from its given start to its given goal.
+        Whether to turn by at most π (up to rounding). The last theta may then differ by full turns
+        from the theta of `goal`. By default, theta changes from its given start to its given goal.
 
     Returns
     -------
     ndarray, shape (steps + 1, ..., 3)
-        The ends are exact.
+        The first and the last row are exact.
 
     Examples
     --------
@@ -242,7 +242,7 @@ def interpolate_planar(
 
 
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
-    """Return the poses at the start and after each command of a plan; full turns are kept.
+    """Return the poses, with full turns, at the start and after each command of a plan.
 
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
@@ -252,8 +252,9 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     plan : iterable of (velocity, duration)
         Velocities (vx, vy, vtheta) in m/s, m/s and rad/s, and durations of at least 0 in s.
     frame : {"world", "body"}, optional
-        The frame of vx and vy. In "world", a command adds velocity times duration. In "body", a
-        command is a constant twist, which moves the body along an arc or a line (`exp_planar`).
+        The frame of vx and vy. With "world", a command adds its velocity times its duration. With
+        "body", a command is a constant twist, which moves the body along an arc or a line
+        (`exp_planar`).
 
     Returns
     -------
@@ -300,7 +301,7 @@ def as_plan(plan: Plan, size: int | str) -> Commands:
 
 
 def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> tuple[Array, float]:
-    """Return one command as arrays; `name` is its name in messages."""
+    """Return one checked command; error messages call it `name`."""
     try:
         velocity, duration = command
     except (TypeError, ValueError) as error:
@@ -317,7 +318,7 @@ def as_states(path: ArrayLike) -> Array:
 
 
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
-    """Return (1 − t) start + t goal for steps + 1 equally spaced t; keep equal entries exactly."""
+    """Interpolate linearly in equal steps; entries that are equal in start and goal are kept."""
     t = np.linspace(0, 1, as_count("steps", steps) + 1)
     batch = check_broadcast(start=(start, 1), goal=(goal, 1))
     t = t.reshape(-1, *[1] * (len(batch) + 1))

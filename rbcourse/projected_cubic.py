@@ -1,4 +1,4 @@
-"""Projections on SO(3) of the cubic and quintic polynomials with given ends."""
+"""Cubic and quintic polynomials with given ends, projected on SO(3)."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class ProjectedPolynomial(Curve):
         M(0), M(1), M'(0), M'(1), and for a quintic also M''(0), M''(1), with time from 0 to 1. If
         there is a weight W, all matrices are multiplied by it.
     margin, margin_time : ndarray, shape (...)
-        The minimum over t of the sum of the two smallest eigenvalues of RᵀM, where R is the
-        projection of M; and the time of this minimum. If the margin is 0, the nearest rotation is
-        not unique. A small margin indicates a poor curve, but a large margin does not guarantee a
-        good curve (see docs/near_optimal.md).
+        The ``margin`` is the minimum over t of the sum of the two smallest eigenvalues of RᵀM,
+        where R is the projection of M. The minimum is reached at ``margin_time``. If the margin is
+        0, the nearest rotation is not unique. A small margin indicates a poor curve, but a large
+        margin does not guarantee a good curve (see docs/near_optimal.md).
     """
 
     ends: Array
@@ -63,7 +63,7 @@ class ProjectedPolynomial(Curve):
 
     @property
     def margin(self) -> Array:
-        """The least sum of the two smallest eigenvalues of RᵀM."""
+        """The minimum over time of the sum of the two smallest eigenvalues of RᵀM."""
         return self._least_gap[1]
 
     @property
@@ -77,7 +77,7 @@ class ProjectedPolynomial(Curve):
         return least_over_time(lambda t: gap(hermite(ends, t[..., None, None])), self.batch_shape)
 
     def may_jump(self) -> bool:
-        """Return whether the gap may vanish, judged by 9 sample times and, if in doubt, by 65."""
+        """Return whether the margin may be 0, judged from 9 or, if in doubt, 65 sample times."""
         may = np.ones(self.count, bool)
         ends = np.moveaxis(self.take(np.arange(self.count)).ends, 1, 0)
         for count in (9, 65):
@@ -96,24 +96,23 @@ class ProjectedPolynomial(Curve):
 def projected_cubic_so3(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
 ) -> ProjectedPolynomial:
-    """Return the projected cubic with these ends, near-optimal for minimum acceleration.
+    """Return the projected cubic with these ends, which is near-optimal for minimum acceleration.
 
     Source: BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
 
     Parameters
     ----------
     R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        Rotation matrices at the start and at the end, and angular velocities at both, in the body
-        frame.
+        Rotation matrices, and angular velocities in the body frame, at the start and at the end.
     duration : array_like, shape (...), optional
         The duration of the motion; velocities are per unit of this time.
 
     Returns
     -------
     ProjectedPolynomial
-        A `Curve` with ``margin``. It consists of the nearest rotations to the cubic M(t) that has
-        the values R and the derivatives R ŵ at both ends. It meets all four boundary conditions
-        exactly.
+        A `Curve` with the attribute ``margin``. It consists of the nearest rotations to the cubic
+        M(t) that has the values R and the derivatives R ŵ at both ends. It meets all four boundary
+        conditions exactly.
 
     See Also
     --------
@@ -125,10 +124,10 @@ def projected_cubic_so3(
     such a time, and a call at this time raises ValueError. At other times, the curve is correct. A
     ``margin`` below 1e-6 gives a RuntimeWarning that names the time. If ``margin`` is small, the
     curve turns by up to π in a time of about ``margin`` divided by the speed of M. At each time,
-    the curve is accurate to a few eps ‖M‖ divided by the sum of the two eigenvalues, and its
-    derivatives to a few eps divided by the square and the cube of this sum.
-    The curve does not depend on the choice of frames: for L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 it is
-    L R(t) Q. The optimum is `minimum_acceleration_so3`. For the inertia of a body, see
+    the error of the curve is a few eps ‖M‖ divided by the sum of the two eigenvalues. The errors of
+    its first two derivatives are a few eps divided by the square and the cube of this sum.
+    The curve does not depend on the choice of frames: the ends L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 give
+    the curve L R(t) Q. The optimum is `minimum_acceleration_so3`. For the inertia of a body, see
     `weighted_cubic_so3`.
 
     Examples
@@ -166,8 +165,8 @@ def weighted_cubic_so3(
     -------
     ProjectedPolynomial
         The cubic of `projected_cubic_so3`, projected by `project_so_weighted` with the weight W of
-        `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is that of M W,
-        with W scaled to trace 3.
+        `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is the margin
+        of M W, where W is scaled to the trace 3.
 
     Notes
     -----
@@ -217,14 +216,14 @@ def projected_quintic_so3(
     Returns
     -------
     ProjectedPolynomial
-        A `Curve` with ``margin``. It consists of the nearest rotations to the quintic M(t) that has
-        the values R, the first derivatives R ŵ and the second derivatives R (ŵ² + â) at both ends.
-        It meets all six boundary conditions exactly.
+        A `Curve` with the attribute ``margin``. It consists of the nearest rotations to the quintic
+        M(t) that has the values R, the first derivatives R ŵ and the second derivatives R (ŵ² + â)
+        at both ends. It meets all six boundary conditions exactly.
 
     Notes
     -----
     In general, this curve is not near the curve of least jerk, `minimum_jerk_so3`. From rest to
-    rest, it costs 1.17 times the optimum for a turn by 60°, and 11.6 times for 120°.
+    rest, it costs 1.17 times the optimum for a turn by 60°, and 11.6 times the optimum for 120°.
     `exponential_quintic_so3` is near the optimum. The singular set and the symmetries are as for
     `projected_cubic_so3`.
 
@@ -251,7 +250,7 @@ def ends_of_quintic(
     a1: ArrayLike,
     duration: ArrayLike,
 ) -> tuple[Ends, Array, Array, Array]:
-    """Return `Ends`, a0 and a1 rescaled to unit time, and the duration, in a common batch shape."""
+    """Return `Ends`, a0 and a1, all rescaled to unit time, and the duration."""
     ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
     batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
     ends, T = ends.broadcast_to(batch).over(duration)
@@ -260,14 +259,14 @@ def ends_of_quintic(
 
 
 def projected_cubic(ends: Ends, duration: Array) -> ProjectedPolynomial:
-    """Return `projected_cubic_so3` for ends rescaled to unit time, without a warning."""
+    """Return the projected cubic for ends rescaled to unit time, without a warning."""
     R0, R1, w0, w1 = ends
     M = np.stack([R0, R1, R0 @ hat(w0), R1 @ hat(w1)], axis=-3)
     return ProjectedPolynomial(ends=M, duration=duration)
 
 
 def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
-    """Return the curve, with a warning if its margin is below 1e-6."""
+    """Return the curve; warn if its margin is below 1e-6."""
     if curve.may_jump():
         warn_if_nearly_singular(curve.margin, curve.margin_time)
     return curve
@@ -276,7 +275,7 @@ def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
 def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
     """Return w, w', w'', one for each given derivative M', M'', M'''.
 
-    R is the nearest rotation to M, and the components are on the first axes of all arrays.
+    R is the nearest rotation to M. In all arrays, the first axes index the components.
 
     S = RᵀM is symmetric. With A = RᵀM' and K(S) = tr(S) I − S, differentiation gives
     K(S) w = vee(A − Aᵀ), K(S) w' = vee(A' − A'ᵀ) − K(S') w and
@@ -305,7 +304,7 @@ def _spin(S: Array, w: Array) -> Array:
 
 
 def _transposed_times(R: Array, M: Array) -> Array:
-    """Return RᵀM, computed row by row, several times faster than NumPy's einsum."""
+    """Return RᵀM, computed by rows; this is several times faster than NumPy's einsum."""
     product = np.empty_like(M)
     for i in range(3):
         np.multiply(R[0, i], M[0], out=product[i])
@@ -320,7 +319,7 @@ def _skew(A: Array) -> Array:
 
 
 def _solve(S: Array, b: Array) -> Array:
-    """Solve (tr(S) I − S) x = b by the L D Lᵀ factors of this positive definite matrix."""
+    """Solve (tr(S) I − S) x = b by the L D Lᵀ factorisation of the matrix."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = S
     d1 = yy + zz
     l21, l31 = -xy / d1, -xz / d1

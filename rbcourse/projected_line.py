@@ -37,16 +37,16 @@ _PI_REST = 1.2246467991473532e-16  # π − np.pi
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ProjectedLine(AlongGeodesic):
-    """The projection of a straight line between two rotations, with p(t) = θ(f(t)).
+    """The projection of a straight line between two rotations; here p(t) = θ(f(t)).
 
     Source: BK Prop. 6, BK (15), BK (17).
 
     Attributes
     ----------
     margin : ndarray, shape (...)
-        2 cos(‖σ‖/2). This is the least sum of the two smallest eigenvalues of RᵀM for all M on the
-        line, with the projection R of M. If the margin is 0, the middle of the line has no unique
-        projection.
+        2 cos(‖σ‖/2). This is the minimum, over all M on the line, of the sum of the two smallest
+        eigenvalues of RᵀM, where R is the projection of M. If the margin is 0, the middle of the
+        line has no unique projection.
     """
 
     timing: Progress
@@ -55,7 +55,7 @@ class ProjectedLine(AlongGeodesic):
 
     @property
     def margin(self) -> Array:
-        """The least sum of the two smallest eigenvalues of RᵀM."""
+        """The minimum over time of the sum of the two smallest eigenvalues of RᵀM."""
         return 2 * np.cos(self._angle / 2)
 
     @property
@@ -94,7 +94,7 @@ class ProjectedLine(AlongGeodesic):
         return values
 
     def _f_at(self, t: Array, order: int) -> Array:
-        """Return f or a derivative at the times t: shape (T, 1), or (T, N) for a stack of N."""
+        """Return f or a derivative at the times t; the shape is (T, 1), or (T, N) for N curves."""
         name, shape, each = f"f(t, {order})", (len(t), *self.timed), [1] * len(self.timed)
         value = as_array(name, self.timing(t.copy().reshape(-1, *each), order))
         try:
@@ -107,7 +107,7 @@ class ProjectedLine(AlongGeodesic):
 
     @property
     def breakpoints(self) -> Array:
-        """The `Curve.breakpoints`, with more of them near t = 1/2 if the margin is small."""
+        """The `Curve.breakpoints`, refined near t = 1/2 if the margin is small."""
         return near_margins(super().breakpoints, 0.5, self.margin)
 
 
@@ -124,22 +124,23 @@ def projected_line_so3(
         As for `projected_cubic_so3`.
     f : callable, optional
         For order 0, ``f(t, order)`` returns the position on the line at time t, with f(0) = 0 and
-        f(1) = 1 to 1e-12. For order 1 and 2, it returns the derivatives. The jerk ``c(t, 3)`` also
-        needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch axis.
-        By default f(t) = t.
+        f(1) = 1 up to 1e-12. For orders 1 and 2, it returns the derivatives. The jerk ``c(t, 3)``
+        also needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch
+        axis. By default f(t) = t.
 
     Returns
     -------
     ProjectedLine
-        A `Curve` with ``margin``.
+        A `Curve` with the attribute ``margin``.
 
     Notes
     -----
     Singular set: R0 and R1 are a half-turn apart. At f(t) = 1/2, the projection then jumps from R0
     to R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a few
-    eps; below 1e-6 there is a RuntimeWarning. The projection is accurate to eps divided by the sum
-    of the two smallest eigenvalues of RᵀM. This sum is at least ``margin``. A call of the curve
-    also raises ValueError if `f` returns non-finite values or another shape.
+    eps; a ``margin`` below 1e-6 gives a RuntimeWarning. The projection is accurate to eps divided
+    by the sum of the two smallest eigenvalues of RᵀM. This sum is at least ``margin``. A call of
+    the curve also raises ValueError if `f` returns non-finite values or an array of the wrong
+    shape.
 
     Examples
     --------
@@ -202,10 +203,10 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return θ(t), or a derivative, where exp(ω̂₀ θ(t)) is nearest to (1 − t) I + t exp(ω̂₀).
 
     For the angle 0, the limit θ(t) = t is returned. The angle π is singular: θ is 0 before t = 1/2,
-    1/2 at this time and 1 after it. Since `numpy.pi` is less than π by 1.2e-16, the jump has the
-    finite slope 1e16 for `numpy.pi`.
+    1/2 at this time and 1 after it. For `numpy.pi`, which is less than π by 1.2e-16, the jump has
+    the finite slope 1e16.
     Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², with s from BK
-    (17); the paper prints s.
+    (17); the paper prints s instead of s².
 
     Parameters
     ----------
@@ -235,20 +236,20 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
 
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
-    """Return the position on the line whose projection has constant speed, or a derivative.
+    """Return the position f(t) for which the projection has constant speed, or a derivative.
 
-    It is the inverse of `theta`: theta(f(t)) = t. The rounding of f changes theta(f(t)) by up to
-    eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
+    The function f is the inverse of `theta`: theta(f(t)) = t. The rounding of f changes theta(f(t))
+    by up to eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
 
     For the angle 0, the limit f(t) = t is returned. The angle π is singular: f is 0 at t = 0, 1 at
-    t = 1, and 1/2 at all times in between. Since `numpy.pi` is less than π by 1.2e-16, f' is about
-    1e16 at the ends for `numpy.pi`.
+    t = 1, and 1/2 at all times in between. For `numpy.pi`, which is less than π by 1.2e-16, f' is
+    about 1e16 at the ends.
     Source: BK Cor. 2.
 
     Parameters
     ----------
     t : array_like, shape (...)
-        In [0, 1].
+        Times in [0, 1].
     angle, order
         As for `theta`.
 

@@ -23,7 +23,7 @@ NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see marg
 
 
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
-    """Return which matrices are rotations: MᵀM = I and det M = 1.
+    """Test whether matrices are rotations: MᵀM = I and det M = 1.
 
     Source: RR 1.1, RR (1), RR (2); BK 2.1.
 
@@ -51,7 +51,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 
 
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
-    """Return which matrices are poses [[R, d], [0, 1]], with a rotation R and finite d.
+    """Test whether matrices are poses [[R, d], [0, 1]], with a rotation R and finite d.
 
     Source: RR 1.3; BK 2.1.
 
@@ -60,7 +60,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     A : array_like, shape (..., n + 1, n + 1)
         Matrices with non-finite entries give False and raise no error.
     atol : float, optional
-        As for `is_so`, with R for M. It is also the largest accepted error of the last row.
+        The largest accepted error of R, as for `is_so`, and of the last row.
 
     Returns
     -------
@@ -81,7 +81,8 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
 def project_so(M: ArrayLike) -> Array:
     """Return the rotation R nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
-    RᵀM is symmetric, and its two smallest eigenvalues sum to 0 or more. L M projects to L R, and
+    RᵀM is symmetric, and the sum of its two smallest eigenvalues is at least 0. L M projects to L
+    R, and
     M L to R L, for every rotation L. The paper prints U Vᵀ, which is a reflection if det M < 0.
     Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
 
@@ -100,11 +101,11 @@ def project_so(M: ArrayLike) -> Array:
 
     Notes
     -----
-    Singular set: matrices M for which the two smallest eigenvalues of RᵀM sum to 0. Their rank is n
-    − 2 or less, or their smallest singular value is repeated and det M < 0. Several rotations are
-    then equally near, and one of them is returned. Near this set, R is accurate to a few eps ‖M‖
-    divided by this sum. FOAM (see `rbcourse._foam`) projects large stacks of 3 × 3 matrices, except
-    near the singular set; the SVD projects all others.
+    Singular set: matrices M for which the two smallest eigenvalues of RᵀM sum to 0. Such matrices
+    have rank n − 2 or less, or they have det M < 0 and a repeated smallest singular value. Several
+    rotations are then equally near, and one of them is returned. Near this set, R is accurate to a
+    few eps ‖M‖ divided by the sum of these eigenvalues. FOAM (see `rbcourse._foam`) projects large
+    stacks of 3 × 3 matrices, except near the singular set; the SVD projects all others.
 
     Examples
     --------
@@ -116,19 +117,18 @@ def project_so(M: ArrayLike) -> Array:
 
 
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
-    """Return the rotation R with the least √tr(XᵀX W), X = M − R: `project_so` of M W.
+    """Return the rotation R that minimizes √tr(XᵀX W), where X = M − R: `project_so` of M W.
 
-    For a body, tr(XᵀX W) is the sum of the squared distances between the images of its points under
-    M and under R, weighted by mass. `rbcourse.metrics.weight_from_inertia` returns the W of a given
-    metric.
+    For a body with points p, tr(XᵀX W) is the sum of the squared distances between M p and R p,
+    weighted by mass. `rbcourse.metrics.weight_from_inertia` returns the W of a given metric.
     Source: BK 4, for metrics that the paper leaves to a later publication.
 
     Parameters
     ----------
     M, W : array_like, shape (..., n, n)
-        W is symmetric, to 1e-12 of the largest entry, and has no negative eigenvalues, to a few eps
-        of the largest. For a body, it is ∫ p pᵀ dm over its points p in the body frame. A scale
-        factor of W does not matter.
+        W is symmetric (up to 1e-12 of the largest entry) and has no negative eigenvalues (up to a
+        few eps of the largest). For a body, it is ∫ p pᵀ dm over its points p in the body frame. A
+        scale factor of W does not matter.
 
     Returns
     -------
@@ -138,9 +138,9 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     -----
     L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L. On
     SO(3), W induces the left-invariant metric tr(W) I − W, which is the inertia of the body.
-    Singular set: M W is in the singular set of `project_so`. A W of rank n − 1, such as that of a
-    flat body, determines R if M W has the same rank. A W of rank n − 2 or less, such as that of a
-    thin rod, never determines R.
+    Singular set: M W is in the singular set of `project_so`. If W has rank n − 1, as for a flat
+    body, it determines R if M W has the same rank. If W has rank n − 2 or less, as for a thin rod,
+    it never determines R.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
-        No column may depend linearly on the columns before it, to rounding.
+        The columns must be linearly independent.
 
     Returns
     -------
@@ -201,10 +201,10 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 
 
 def distance_to_so(M: ArrayLike) -> Array:
-    """Return ‖M − R‖, in the Frobenius norm, for the nearest rotation R: √Σ (σ_i − 1)².
+    """Return the Frobenius norm ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)².
 
-    The smallest singular value σ of M has the sign of det M.
-    Source: BK 4, BK Remark 6, where the paper prints the square, and no sign.
+    Here σ_i are the singular values of M; the smallest is given the sign of det M.
+    Source: BK 4, BK Remark 6, where the paper prints the square, without the sign.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def distance_to_so(M: ArrayLike) -> Array:
 
 
 def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return `project_so` of M, in the memory layout of M, and whether it is unique."""
+    """Return the nearest rotation to M, in the memory layout of M, and whether it is unique."""
     flat = M.reshape(-1, *M.shape[-2:])
     R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
     if M.shape[-1] == 3 and len(flat) >= MANY:
@@ -247,7 +247,7 @@ def _nearest_by_svd(M: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def gap(M: Array) -> Array:
-    """Return the sum of the two smallest eigenvalues of RᵀM, with the nearest rotation R to M."""
+    """Return the sum of the two smallest eigenvalues of RᵀM, where R is nearest to M."""
     return _signed_singular_values(M)[..., -2:].sum(axis=-1)
 
 
@@ -258,7 +258,7 @@ def _signed_singular_values(M: Array) -> Array:
 
 
 def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
-    """Return the small skew-symmetric Ω that corrects K = Uᵀ M V: Ω d + d Ω = K − Kᵀ.
+    """Return the small skew-symmetric Ω with Ω d + d Ω = K − Kᵀ, where K = Uᵀ M V.
 
     After an SVD, K − Kᵀ is about ten eps ‖M‖. If d_i + d_j nearly vanishes, Ω_ij is set to 0.
     """

@@ -41,7 +41,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Candidates. Non-finite entries give False and raise no error.
+        Quaternions with non-finite entries give False.
     atol : float, optional
         The largest accepted difference of the norm from 1.
 
@@ -112,7 +112,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions; any other norm scales the points by its square.
+        Unit quaternions. A quaternion of another norm n scales the points by n².
     p : array_like, shape (..., 3)
 
     Returns
@@ -155,9 +155,9 @@ def project_quaternion(q: ArrayLike) -> Array:
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return q or −q, whichever has w ≥ 0: a unique unit quaternion for each rotation.
 
-    Singular set: half-turns, where w = 0 to 4 eps. Then w is set to 0, and the sign is chosen so
-    that the component of largest magnitude is positive. If several magnitudes are largest, to 1e-8,
-    the first of these components is made positive.
+    Singular set: half-turns, where |w| is less than 4 eps. Then w is set to 0, and the sign is
+    chosen so that the component of largest magnitude is positive. If several components have the
+    largest magnitude (up to 1e-8), the first of them is made positive.
     Source: BK Remark 7.
 
     Parameters
@@ -186,9 +186,9 @@ def canonical_quaternion(q: ArrayLike) -> Array:
 def continuous_quaternions(q: ArrayLike) -> Array:
     """Choose the signs of quaternions along a path so that each is near to the previous one.
 
-    Unlike the quaternions of `quaternion_from_matrix`, they do not jump where w passes through 0.
-    Singular set: successive rotations are a half-turn apart. The sign is then changed if the
-    previous sign was changed.
+    Unlike the quaternions of `quaternion_from_matrix`, the result does not jump where w passes
+    through 0. Singular set: successive rotations are a half-turn apart. The sign is then changed if
+    the previous sign was changed.
 
     Parameters
     ----------
@@ -217,8 +217,8 @@ def continuous_quaternions(q: ArrayLike) -> Array:
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
-    The angular speed is constant. Singular set: half-turns, where q0 · q1 = 0 to 4 eps. Of the two
-    shortest arcs, the arc to the given q1 is returned.
+    The angular speed is constant. Singular set: half-turns, where q0 · q1 is 0 up to 4 eps. Of the
+    two shortest arcs, the arc to the given q1 is returned.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 
     Parameters
@@ -256,7 +256,7 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
 
     If `slerp` turns by the angle a about an axis, this function turns by 2π − a about the opposite
     axis. If `slerp` ends at q1, this function ends at −q1, and vice versa. Singular set: q0 and q1
-    are the same rotation, to 4 eps; ValueError is raised. Near this set, the axis is accurate to
+    are the same rotation up to 4 eps; ValueError is raised. Near this set, the axis is accurate to
     eps/‖q1 − q0‖.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
 

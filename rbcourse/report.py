@@ -142,10 +142,10 @@ def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 
 
 def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random rotation matrix, shape (3, 3): uniform (Arvo's method) unless `naive`.
+    """Return a random rotation matrix, shape (3, 3), which is uniformly random unless `naive`.
 
-    If naive, the three angles are uniform, but the rotation is not. `rng` is a Generator, a seed or
-    None.
+    Uniform rotations are drawn by Arvo's method. If naive, the three angles are uniform, but the
+    rotation is not. `rng` is a Generator, a seed or None.
     Source: RR 2.1.
 
     Examples
@@ -157,7 +157,7 @@ def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
 
 
 def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
-    """Return a random unit quaternion, shape (4,): uniform (Shoemake's method) unless `naive`.
+    """Return a random unit quaternion, shape (4,), which is uniformly random unless `naive`.
 
     Source: RR 2.2.
 
@@ -196,9 +196,9 @@ def visualize(
 ) -> tuple[Figure, Animation]:
     """Show the images of v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) under `steps` random rotations.
 
-    If `quaternion` is True, `random_quaternion` gives the rotations v ↦ q v q⁻¹, otherwise
-    `random_rotation_matrix` gives them. Return a figure and an animation as `visualize_rotation`
-    does.
+    If `quaternion` is True, the rotations are v ↦ q v q⁻¹ with q from `random_quaternion`.
+    Otherwise, `random_rotation_matrix` gives the rotations. Return a figure and an animation as
+    `visualize_rotation` does.
     Source: RR 2.2, RR Fig. 4, RR Fig. 5.
 
     Examples
@@ -241,8 +241,8 @@ def forward_propagate_rigid_body(
     """Return the path of a planar body that follows a plan, shape (commands + 1, 3).
 
     The plan is a list of (velocity, duration). A velocity is (vx, vy, vtheta) in m/s, m/s and
-    rad/s, and a duration is at least 0 in s. vx and vy are along the axes of `frame`, which is
-    "world", as in the report, or "body".
+    rad/s, and a duration is at least 0 in s. The velocities vx and vy are along the axes of
+    `frame`, which is "world" (as in the report) or "body".
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
@@ -344,7 +344,7 @@ def _show_images(name: str, alt: str, images: Any) -> tuple[Figure, Animation]:
 def _show_path(
     name: str, alt: str, states: Array, moving: Callable[[Any, Any], Update]
 ) -> tuple[Figure, Animation]:
-    """Show a path: at most six equally spaced states in a pale colour, and at most 40 frames."""
+    """Show at most six equally spaced states in a pale colour, and animate at most 40 frames."""
     last = len(states) - 1
     pale, frames = (
         np.linspace(0, last, min(count, last + 1)).round().astype(int) for count in (6, 40)
@@ -355,7 +355,7 @@ def _show_path(
 
 
 def _passes(test: Callable[..., Any], x: ArrayLike, epsilon: float) -> bool:
-    """Return the result of a membership test for a single matrix; it is False for a stack."""
+    """Return whether x passes a membership test; a stack never passes."""
     epsilon = as_tolerance("epsilon", epsilon)
     try:
         verdict = test(x, epsilon)

@@ -1,7 +1,7 @@
-"""Random rotations: uniform ones, naive ones that are not uniform, and tests of uniformity.
+"""Random rotations: uniform samples, naive samples (not uniform), and tests of uniformity.
 
-Uniform means distributed by the Haar measure: a set of rotations is as likely as the same set
-multiplied by any rotation from the left or from the right.
+Uniform means distributed by the Haar measure: multiplying a set of rotations by a rotation, from
+the left or the right, does not change the probability of the set.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ __all__ = [
 ]
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
-_BLOCK = 6136  # number of draws that fit into the cache; arrays of 6144 would collide
+_BLOCK = 6136  # draws that fit into the cache; multiples of 512 cause cache conflicts
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
     """Return Arvo's rotation −M B for three numbers; uniform numbers give uniform rotations.
 
     B turns by 2π x₁ about the z axis, and −M is a half-turn about V = (√z cos 2π x₂, √z sin 2π x₂,
-    √(1 − z)): M = I − 2 V Vᵀ. The printed M B has determinant −1.
+    √(1 − z)): M = I − 2 V Vᵀ. The printed product M B has the determinant −1.
     Source: RR 2.1, RR (9), RR (10), RR (11); J. Arvo, Fast random rotation matrices, Graphics Gems
     III, 1992.
 
@@ -102,14 +102,15 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     Parameters
     ----------
     size : int or tuple of int, optional
-        The number of rotations; by default one, without a batch axis.
+        The number of rotations, or a batch shape; by default one rotation, without a batch axis.
     rng : Generator, int or None, optional
         A generator, a seed, or None for fresh numbers, as for `numpy.random.default_rng`.
 
     Returns
     -------
     ndarray, shape size + (3, 3)
-        ``arvo_rotation(rng.random(size + (3,)))``, to a few eps, on every processor.
+        On every processor, the result is ``arvo_rotation(rng.random(size + (3,)))`` up to a few
+        eps.
 
     Examples
     --------
@@ -133,7 +134,8 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
     Returns
     -------
     ndarray, shape size + (4,)
-        ``shoemake_quaternion(rng.random(size + (3,)))``, to a few eps, on every processor.
+        On every processor, the result is ``shoemake_quaternion(rng.random(size + (3,)))`` up to a
+        few eps.
 
     Examples
     --------
@@ -201,7 +203,7 @@ def _in_blocks(
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return random draws; the kernel maps uniform numbers, (3, m), to entries, (…, m)."""
+    """Return random draws; the kernel maps 3 × m uniform numbers to the entries of m draws."""
     shape, generator = as_size(size), as_generator(rng)
     draws = np.empty((math.prod(shape), math.prod(core)))
     width = min(len(draws), _BLOCK)
@@ -232,7 +234,6 @@ def _arvo(x: Array, entries: Array) -> None:
 
 
 def _shoemake(x: Array, entries: Array) -> None:
-    """Write `shoemake_quaternion`."""
     (c1, c2), (s1, s2) = _cos_sin(x[1:])
     sigma1, sigma2 = np.sqrt(1 - x[0]), np.sqrt(x[0])
     for entry, on_circle, sigma in zip(
@@ -242,7 +243,7 @@ def _shoemake(x: Array, entries: Array) -> None:
 
 
 def _cos_sin(turns: Array) -> tuple[Array, Array]:
-    """Return cosine and sine from the tangent of half the angle, which NumPy computes faster."""
+    """Return cosine and sine, computed fast from the tangent of half the angle."""
     tangent = np.pi * turns
     np.tan(tangent, tangent)
     versed = tangent * tangent
@@ -275,7 +276,7 @@ def angle_law(angle: ArrayLike) -> Array:
     Parameters
     ----------
     angle : array_like, shape (...)
-        a, in [0, π].
+        The angle a, in [0, π].
 
     Returns
     -------
@@ -307,16 +308,16 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
             Means of the trace and of its square. For large n, they are normal with means 0, 1 and
             variances 1/n, 2/n.
         angle
-            The largest distance of the angle's distribution from `angle_law`. It has Kolmogorov's
-            distribution.
+            The largest difference between the distribution of the angle and `angle_law`. It has
+            Kolmogorov's distribution.
         image of e₁, image of e₃
             χ² of the first and of the last column on 20 cells of the sphere. The cells have equal
-            areas: 4 in height by 5 in longitude. For large n, the distribution is χ² with 19
-            degrees of freedom.
+            areas; there are 4 in height and 5 in longitude. For large n, the distribution is χ²
+            with 19 degrees of freedom.
         angle to next, angle to half
             The statistic of the row "angle" for two sets of turns: from each draw with an even
             index to the next draw, and from each draw of the first half to its partner in the
-            second half. Both detect draws that depend on each other.
+            second half. Both statistics detect draws that depend on each other.
 
     Examples
     --------
@@ -357,7 +358,7 @@ def _angle_test(R: Array) -> UniformityTest:
 
 
 def _cell_test(points: Array) -> UniformityTest:
-    """Return the χ² of points of the sphere; zones of equal height have equal areas."""
+    """Return the χ² test of points on the sphere; zones of equal height have equal areas."""
     from scipy.stats import chisquare
 
     x, y, z = points.T

@@ -191,7 +191,7 @@ def vee_se3(matrix: ArrayLike) -> Array:
     Parameters
     ----------
     matrix : array_like, shape (..., 4, 4)
-        The skew-symmetric part of its 3 × 3 block is used; the last row is not read.
+        The skew-symmetric part of its 3 × 3 block is used; the last row is ignored.
 
     Returns
     -------
@@ -245,7 +245,7 @@ def log_se3(A: ArrayLike) -> Array:
     """Return the twist (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π.
 
     The result is accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists give
-    A. The returned ω is that of `log_so3`.
+    A. `log_so3` then chooses ω.
     Source: BK 2.6.
 
     Parameters
@@ -297,7 +297,7 @@ def adjoint_se3(A: ArrayLike) -> Array:
 def check_path(
     times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> tuple[Array, Array, Array | None]:
-    """Return times, poses or rotations, and velocities or None, as arrays.
+    """Check a path; return its times, its poses or rotations, and its velocities or None.
 
     ValueError names the first wrong shape, the first time that does not increase, or the first
     invalid matrix.

@@ -25,12 +25,12 @@ BASIS_SO3.flags.writeable = False
 
 
 def hat(w: Array) -> Array:
-    """Return `hat_so3` of vectors without checks."""
+    """Compute `hat_so3` without checks."""
     return (w @ BASIS_SO3.reshape(3, 9)).reshape(*w.shape, 3) + 0.0
 
 
 def vee(W: Array) -> Array:
-    """Return `vee_so3` of matrices without checks."""
+    """Compute `vee_so3` without checks."""
     return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
 
 
@@ -82,7 +82,7 @@ def exp_so3(w: ArrayLike) -> Array:
     """Return the rotation by ‖w‖ about w: I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a.
 
     Rodrigues' formula is accurate to a few eps (1 + a). The result is a rotation for every a, but
-    no digit is significant above a = 1/eps. There is no singular set; w = 0 gives I exactly.
+    for a > 1/eps, no digit is significant. There is no singular set; w = 0 gives I exactly.
     Source: BK 2.5.
 
     Parameters
@@ -105,11 +105,11 @@ def exp_so3(w: ArrayLike) -> Array:
 
 
 def log_so3(R: ArrayLike) -> Array:
-    """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, to rounding.
+    """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, up to rounding.
 
-    The result is accurate to a few eps. Singular set: half-turns (to 8 eps in the angle), where w
-    and −w are equally short. The sign is then chosen so that the component of largest magnitude is
-    positive (see `canonical_quaternion`).
+    The result is accurate to a few eps. Singular set: half-turns (up to 8 eps in the angle), where
+    w and −w are equally short. The sign is then chosen so that the component of largest magnitude
+    is positive (see `canonical_quaternion`).
     Source: BK 2.5.
 
     Parameters
@@ -153,7 +153,7 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
 
 
 def right_jacobian_so3(w: ArrayLike) -> Array:
-    """Return J for which J w' is the body angular velocity along the curve exp_so3(w(t)).
+    """Return the matrix J for which J w' is the body angular velocity along exp_so3(w(t)).
 
     The transpose of J is the left Jacobian, which gives the angular velocity in the fixed frame.
     Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, …
@@ -205,6 +205,6 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
 
 
 def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n̂ and a of w = a n; a has two trailing axes of length 1."""
+    """Return n̂ and a for w = a n; a has two trailing axes of length 1."""
     axis, angle = axis_and_angle(w)
     return hat(axis), angle[..., None]

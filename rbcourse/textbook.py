@@ -1,9 +1,9 @@
-"""Textbook versions of the fast functions: short, slow, and written as on the board.
+"""Short, slow, readable textbook versions of the fast functions.
 
 Read them first. Each function has the name, units, frames and singular set of its fast counterpart.
-The results agree to rounding or, for an optimum, to a tolerance. Arguments are not checked. R0 and
-R1 have the shape (3, 3), and w0 and w1 the shape (3,). The times t have the shape (N,); R has the
-shape (N, 3, 3), and w and w' the shape (N, 3).
+The textbook and the fast version agree up to rounding or, for an optimum, up to a tolerance.
+Arguments are not checked. R0 and R1 have the shape (3, 3), and w0 and w1 the shape (3,). The times
+t have the shape (N,); R has the shape (N, 3, 3), and w and w' the shape (N, 3).
 """
 
 import ast
@@ -35,7 +35,7 @@ __all__ = [
 
 
 def show(function: Callable[..., Any]) -> None:
-    """Print the code of a function, which must have a docstring, without the docstring.
+    """Print the code of a function without its docstring.
 
     Examples
     --------
@@ -87,8 +87,8 @@ def projected_cubic_so3(
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the projected cubic at the times t.
 
-    Let S = RᵀM, A = RᵀM' and G = tr(S) I − S. S is symmetric. Differentiating this condition once
-    and twice gives G w = vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
+    Let S = RᵀM, A = RᵀM' and G = tr(S) I − S. Since S is symmetric, differentiation gives G w =
+    vee(A − Aᵀ) and G w' = vee(A' − A'ᵀ) − G' w.
     Source: BK 6.2.
 
     Examples
@@ -112,9 +112,8 @@ def projected_cubic_so3(
 def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
     """Return the cubic on [0, 1] with values x0, x1 and derivatives v0, v1 at its ends.
 
-    x0, x1, v0, v1 have the same shape. The result has the coefficients of 1, t, t², t³ and the
-    shape (4, ...). Of all curves with these boundary conditions, the cubic has the least ∫ ‖x''‖²
-    dt.
+    x0, x1, v0, v1 have the same shape. The result, shape (4, ...), contains the coefficients of 1,
+    t, t², t³. Of all curves with these boundary conditions, the cubic has the least ∫ ‖x''‖² dt.
     Source: BK 6.2.
 
     Examples
@@ -152,8 +151,8 @@ def minimum_torque_so3(
 ) -> tuple[Array, Array]:
     """Return R and w of the least-torque motion at the times t, by SciPy's `solve_bvp`.
 
-    The equations are σ' = J(σ)⁻¹ w with R = R0 exp(σ̂), Euler's equation G w' = τ − w × G w, and R
-    p = c. Here p = G (τ' + w × τ) − G w × τ, and c is an unknown constant. ‖σ‖ must be below 2π. If
+    With R = R0 exp(σ̂), the equations are σ' = J(σ)⁻¹ w, R p = c, and Euler's equation G w' = τ − w
+    × G w. Here p = G (τ' + w × τ) − G w × τ, and c is an unknown constant. ‖σ‖ must be below 2π. If
     the solver fails, a RuntimeError names the reason. The solver may find a stationary curve that
     is not the cheapest.
     Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
@@ -229,7 +228,7 @@ def minimum_acceleration_so3(
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the optimum at the times t, by SciPy's `solve_bvp`.
 
-    The equations are σ' = J(σ)⁻¹ w, with R = R0 exp(σ̂), and w''' = −w × w''. ‖σ‖ must be below 2π.
+    With R = R0 exp(σ̂), the equations are σ' = J(σ)⁻¹ w and w''' = −w × w''. ‖σ‖ must be below 2π.
     If the solver fails, a RuntimeError names the reason.
     Source: BK (19).
 
@@ -263,7 +262,7 @@ def minimum_acceleration_so3(
 
 
 def spline_velocities(times: Array, R: Array) -> Array:
-    """Return the velocities at rotations R, shape (N, 3, 3), that make w' continuous.
+    """Return the angular velocities w for which w' is continuous at the rotations R.
 
     Let Q = R_iᵀ R_{i+1}, s = vee skew Q, and B = ½ (tr Q I − Qᵀ). A projected cubic of duration h
     has h² w'(0) = 6 s − 4 h w_i − 2 h B w_{i+1} and h² w'(1) = −6 s + 2 h Bᵀ w_i + 4 h w_{i+1}. At
@@ -294,7 +293,7 @@ def minimum_acceleration_spline_so3(
 ) -> tuple[Array, Array]:
     """Return w and w' of the optimum through the rotations R, by SciPy's `solve_bvp`.
 
-    All legs are solved together, each with its own time from 0 to 1. The equations are those of
+    All legs are solved together; the time of each leg runs from 0 to 1. The equations are those of
     `minimum_acceleration_so3`. At the inner rotations, w and w' are continuous. At both ends, w is
     given, or w' = 0. If the solver fails, a RuntimeError names the reason.
     Source: beyond BK 12.
@@ -342,8 +341,8 @@ def fastest(turn: Array, inertia: Array, torque: float, cells: int) -> tuple[Arr
 
     Let σ be the rotation vector `turn` and R = exp(σ̂ s). In a cell of length h, x = s'² changes
     linearly, and u = s'' = (x_i+1 − x_i)/2h. The two terms of the torque G σ u + (σ × G σ) x are
-    perpendicular. The larger x of the two ends of a cell satisfies ‖G σ‖² u² + ‖σ × G σ‖² x² = τ².
-    The first pass goes backward from the end, the second forward from the start.
+    perpendicular. In each cell, ‖G σ‖² u² + ‖σ × G σ‖² x² = τ² at the end where x is larger. The
+    first pass goes backward from the end, and the second pass goes forward from the start.
     Source: beyond BK 16.
 
     Examples

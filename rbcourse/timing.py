@@ -9,14 +9,14 @@ other limit has the form ‖a u + b x + k‖ ≤ 1.
 
 The path is divided into cells of length h. In a cell, u is constant, x changes linearly from x_i to
 y = x_i+1, and u = (y − x_i)/2h. Each limit is imposed at both ends of the cell. Since a, b and k
-may jump between cells, their values inside the cell are used. The limit is ‖p x_i + q y + k‖ ≤ 1,
-with p = b − a/2h, q = a/2h at the start, and p = −a/2h, q = b + a/2h at the end. These limits are
+may jump between cells, their values inside the cell are used. The limit is ‖p x_i + q y + k‖ ≤ 1.
+At the start, p = b − a/2h and q = a/2h; at the end, p = −a/2h and q = b + a/2h. These limits are
 ellipses, or strips, in the plane of x_i and y.
 
 The algorithm makes two passes. The backward pass finds the largest x_i from which the end can be
-reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. The limits of a
-cell are convex, so if some timing satisfies the limits on the cells, the passes find one. The
-motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
+reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. Since the
+limits of a cell are convex, the passes find a timing that satisfies the limits on the cells, if
+there is one. The motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
 
 Near the top of an ellipse, x_i grows only if y decreases. TOPP-RA chooses the largest x_i, which is
 not the best choice there, since a small gain of x_i causes a large loss of y. The time depends
@@ -25,9 +25,9 @@ nearly equally on x_i and y, so `_tops` maximises x_i + y. On 80 random paths, t
 
 Pham and Pham (TOPP-RA, IEEE Transactions on Robotics 34, 2018) find reachable and controllable sets
 of joints by two passes of linear programs. Nguyen and Pham (Journal of Guidance, Control, and
-Dynamics, 2016) time rotations with bounds on angular velocities, accelerations or torques. For this
-module, only the abstracts or introductions of both papers were read. We found no other method with
-limits on norms for poses.
+Dynamics, 2016) compute timings of rotations with bounds on angular velocities, accelerations or
+torques. For this module, only the abstracts or introductions of both papers were read. We found no
+other method for the timing of poses in which the limits are norms of vectors.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def fastest(
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     rates: tuple[float, float] = (0.0, 0.0),
 ) -> Timed:
-    """Return the path of a curve with the fastest timing within limits.
+    """Return a curve that follows the given path as fast as the limits allow.
 
     Source: beyond BK 16.
 
@@ -83,13 +83,13 @@ def fastest(
     curve : Curve
         A single curve. Only its path is used; its times do not matter.
     angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
-        The largest norms of ω, of the velocity of the point `centre` of the body, of ω', and of the
-        acceleration of this point. Three numbers limit the magnitudes of the components in the body
-        frame instead. For rotations, only ω, ω' and the torque can be limited.
+        The largest allowed norms: of ω, of the velocity of the body's point `centre`, of ω', and of
+        the acceleration of this point. Three numbers limit the magnitudes of the components in the
+        body frame instead. For rotations, only ω, ω' and the torque can be limited.
     torque, force : float or array_like, shape (3,)
-        The largest norms of the torque G ω' + ω × G ω and of the force, which is `mass` times the
-        acceleration of `centre`, minus the weight. At least one limit on an acceleration, the
-        torque or the force is required.
+        The largest allowed norms of the torque G ω' + ω × G ω and of the force. The force is `mass`
+        times the acceleration of `centre`, minus the weight. At least one limit on an acceleration,
+        the torque or the force is required.
     inertia : array_like, shape (3, 3), optional
         The inertia G about the centre of mass; required for a limit on the torque.
     mass, centre, gravity : float; array_like, shape (3,); optional
@@ -119,10 +119,10 @@ def fastest(
     Notes
     -----
     The grid has 1,000 cells or, for a chain, 250 for each leg (25 if there are many legs). It is
-    refined, up to eight times, until the limits hold to 1e-4 between its points. T is then about
-    1e-3 above the shortest time. The motion stops where the velocity of the path jumps. Its
-    acceleration jumps where the acceleration of the path jumps, at both ends, and between cells;
-    the jerk is not limited. A thousand cells take about 50 ms.
+    refined, by factors of at most eight, until the limits hold up to 1e-4 between its points. T is
+    then about 1e-3 above the shortest time. The motion stops where the velocity of the path jumps.
+    The acceleration of the motion jumps where the acceleration of the path jumps, at both ends, and
+    between cells; the jerk is not limited. A thousand cells take about 50 ms.
 
     Examples
     --------
@@ -167,7 +167,7 @@ def fastest(
 
 
 def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
-    """Return the largest share of each limit that a curve uses, and the time when it does so.
+    """Return, for each limit, the largest share that a curve uses, and the time of this maximum.
 
     Source: beyond BK 16.
 
@@ -181,9 +181,9 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
     Returns
     -------
     dict of str to (float, float)
-        The share, and the first time at which it is reached to within a millionth. The curve is
-        evaluated at 20,001 times and on both sides of the joints of a chain; a limit may be
-        exceeded between these times.
+        The largest share, and the first time at which the curve reaches it, up to one part in a
+        million. The curve is evaluated at 20,001 times and on both sides of the joints of a chain;
+        a limit may be exceeded between these times.
 
     Examples
     --------
@@ -237,11 +237,11 @@ class Timed(Curve):
         return self.curve.size
 
     def lasting(self, duration: Array) -> Self:
-        """Return the curve with another duration."""
+        """Return the same curve with another duration."""
         return replace(self, duration=duration, rate=self.rate * (self.duration / duration))
 
     def progress(self, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return s, s' and s'' at times."""
+        """Return s, s' and s'' at the times t."""
         t = as_time(t, 0, self.domain)
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.s) - 2)
         past, v = t - self.times[i], self.rate[i]
@@ -427,7 +427,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
     low, high = [0.0] * N + [last], [inf] * N + [min(most_there, cap[N])]
     if last > high[N] * (1 + 1e-9):
         raise ValueError("rates[1] is above a limit on a speed")
-    for i in range(N - 1, -1, -1):  # backward: the x from which the end can be reached
+    for i in range(N - 1, -1, -1):  # find the largest x from which the end can be reached
         high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])
         low[i] = max(0.0, -_largest(least[i], low[i + 1])) if low[i + 1] > 0 else 0.0
         if high[i] == inf:
@@ -438,13 +438,13 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
     if x[0] < max(low[0], first) * (1 - 1e-9):
         why = "too low for rates[1]" if low[0] > x[0] else "too high to brake, or above a limit"
         raise ValueError(f"rates[0] is {why}")
-    for i in range(N):  # forward: as fast as the first pass allows
+    for i in range(N):
         x.append(max(min(_largest(back[i], x[i]), high[i + 1]), low[i + 1], 0.0))
     return np.array(x)
 
 
 def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
-    """Return A, …, F of limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0, (6, N, limits)."""
+    """Return the coefficients of the limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0."""
     made = []
     for a, b, k in rows:
         q = a / (2 * h[:, None])
@@ -460,7 +460,7 @@ def _tops(Q: Array, caps: Array) -> Array:
     This y is found by bisection of its logarithm.
     """
     A, B, C, D, E, F = Q
-    free = A == 0  # the limit concerns only y
+    free = A == 0  # the limit does not depend on x
     low, high = np.full((len(A), 1), 1e-60), np.minimum(caps[1:], 1e60)[:, None]
     for _ in range(50):
         y = np.sqrt(low * high)

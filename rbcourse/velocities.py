@@ -1,4 +1,4 @@
-"""Velocities at poses of a path, from parabolas or from splines of continuous acceleration.
+"""Velocities at poses of a path, from parabolas or from splines with continuous acceleration.
 
 A cubic leg of duration h joins R₀ to R₁ = R₀ Q. At its ends, the ambient cubic M(t) of BK 6 has
 M = R and M' = R ŵ. So its projection has w' = vee skew(Rᵀ M''), which is linear in the velocities.
@@ -7,13 +7,13 @@ With s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(
     h² w'(0) = 6 s − 4 h w₀ − 2 h B w₁,    h² w'(1) = −6 s + 2 h Bᵀ w₀ + 4 h w₁.
 
 The condition that w' is the same on both sides of each inner pose is a linear system for the
-velocities. It has symmetric elements (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]] and loads 6 s/h² at both ends
-of each leg. No singular value of B is larger than 1. So the system is diagonally dominant and
-positive definite, and it has exactly one solution, for any poses. For unit quaternions
+velocities. Each leg contributes a symmetric element (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]], and the load 6
+s/h² at both of its ends. No singular value of B is larger than 1. So the system is diagonally
+dominant and positive definite, and it has exactly one solution, for any poses. For unit quaternions
 q = (cos ½θ, x) of Q, the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For
-a body with the weight W, K = Rᵀ M'' W has vee(K − Kᵀ) = τ = G w' + w × G w. So the torque is made
-continuous: G replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are those of Q W and −Qᵀ W. For
-the velocity of the origin in the body frame, B = Q.
+a body with the weight W, let K = Rᵀ M'' W. Then vee(K − Kᵀ) = τ = G w' + w × G w. The torque is
+continuous if G replaces I, B is given by B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are computed
+from Q W and −Qᵀ W. For the velocity of the origin in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
@@ -62,8 +62,8 @@ def spline_velocities(
     ends : {"natural", "periodic"} or pair of array_like, optional
         "natural": the acceleration is 0 at both ends. "periodic": velocity and acceleration in the
         body frame are the same at both ends; the poses there may differ. A pair gives the first and
-        the last velocity: twists (ω, v) of the origin in the body frame, shape (6,), or ω, shape
-        (3,). None in a pair means a natural end.
+        the last velocity in the body frame: twists (ω, v), shape (6,), or ω, shape (3,). None in a
+        pair means a natural end.
     inertia : array_like, shape (3, 3), optional
         The inertia of a body, as for `weighted_cubic_so3`. The torque is then continuous, and
         "natural" means zero torque at the ends. The default is 2 I.
@@ -78,8 +78,8 @@ def spline_velocities(
     -----
     If the poses are moved, the velocities move with them; if the times are reversed, the velocities
     are those of the reversed path. For rotations about one axis by small angles, the velocities are
-    those of SciPy's ``CubicSpline``. Singular set: successive poses that are a half-turn apart to
-    within 1e-6 raise ValueError, since no leg joins them.
+    those of SciPy's ``CubicSpline``. Singular set: successive poses that are a half-turn apart (up
+    to 1e-6) raise ValueError, since no leg joins them.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def spline_velocities(
 
 
 class KnotSystem(NamedTuple):
-    """A quadratic function ½ xᵀ H x − xᵀ b of unknowns x at N knots, summed over the legs.
+    """A quadratic function ½ xᵀ H x − xᵀ b of unknowns x at N knots: a sum over the legs.
 
     Each leg adds its element [[A, B], [Bᵀ, D]] to H and (b0, b1) to b at its two knots. The blocks
     have the shape (N − 1, m, m), and the loads the shape (N − 1, m).
@@ -114,7 +114,7 @@ class KnotSystem(NamedTuple):
     b1: Array
 
     def solve(self, fixed: NDArray[np.bool_], given: Array, periodic: bool = False) -> Array:
-        """Return the x, shape (N, m), that minimises the function, with x = `given` if `fixed`.
+        """Return the minimizer x, shape (N, m), where x = `given` at the knots that are `fixed`.
 
         If `periodic`, x is the same at the first and the last knot. LinAlgError is raised if H is
         not positive definite.
@@ -198,7 +198,7 @@ def _skew(X: Array) -> Array:
 
 
 def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], Array]:
-    """Return a mask of the poses with given velocities, and the velocities, 0 if not given."""
+    """Return a mask of the poses whose velocities are given, and the velocities (0 elsewhere)."""
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "periodic"):
@@ -220,7 +220,7 @@ def is_periodic(ends: PathEnds) -> bool:
 def resting_spline(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
     """Return w, d', w' and d'' at the poses; for rotations, d' and d'' have no components.
 
-    All of them are 0 at both ends and where two successive poses are equal to rounding.
+    All of them are 0 at both ends and where two successive poses are equal up to rounding.
     """
     change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
     same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
@@ -246,13 +246,13 @@ def _accelerations(system: KnotSystem, x: Array) -> Array:
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
-    """Return velocities from parabolas, each through a pose of a path and its two neighbours.
+    """Return velocities from parabolas; each parabola joins a pose to its two neighbours.
 
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
-    acceleration jumps at the poses. Between random poses, the motion costs 12 % more than the
-    optimum, in the median, no matter how small the steps are. The `spline_velocities` have neither
-    drawback. If the poses are samples of a smooth motion, twice as many samples divide the excess
-    over the optimum (with the same end velocities) by 4.
+    acceleration jumps at the poses. For random poses, the motion costs 12 % more than the optimum
+    in the median, however small the steps are. The `spline_velocities` have neither drawback. If
+    the poses are samples of a smooth motion, doubling their number divides the excess over the
+    optimum (with the same end velocities) by 4.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     origin is in R³. The parabola of the rotation is in exponential coordinates about the middle
     pose, so that the velocities move with the poses. At the first and the last pose, the parabola
     of the neighbour gives the velocity. For two poses, the velocity is constant.
-    Singular set: neighbours that are a half-turn apart to within 1e-6 raise ValueError.
+    Singular set: neighbours that are a half-turn apart (up to 1e-6) raise ValueError.
 
     Examples
     --------
@@ -287,7 +287,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     turns = log_so3(R[:-1].mT @ R[1:])
     w = _slopes_of_parabolas(h, turns / h)
     for end, turn in ((0, -turns[0]), (-1, turns[-1])):
-        w[end] = right_jacobian_so3(turn) @ w[end]  # from coordinates about the neighbour
+        w[end] = right_jacobian_so3(turn) @ w[end]  # convert from coordinates about the neighbour
     if not d.size:
         return w
     chords = np.diff(d[..., 0], axis=0)
