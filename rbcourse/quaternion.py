@@ -155,7 +155,7 @@ def project_quaternion(q: ArrayLike) -> Array:
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return q or −q, whichever has w ≥ 0: a unique unit quaternion for each rotation.
 
-    Singular set: half-turns, where |w| is less than 4 eps. Then w is set to 0, and the sign is
+    Singular set: half-turns, where ``abs(w) < 4 eps``. Then w is set to 0, and the sign is
     chosen so that the component of largest magnitude is positive. If several components have the
     largest magnitude (up to 1e-8), the first of them is made positive.
     Source: BK Remark 7.
