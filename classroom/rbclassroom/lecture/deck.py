@@ -99,6 +99,8 @@ def section(slide: Slide) -> str:
         layout = "wide" if slide.picture.aspect > WIDE else f"split{narrow}"
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
+    if heading := re.match(r"\s*<h3>.*?</h3>", words):
+        head, words = head + heading[0], words[heading.end() :]
     layout += " tabled" * ("<table" in words)
     shown = f"<figure>{slide.picture.html}</figure>" if slide.picture else ""
     notes = "".join(f"<div>{marked(note)}</div>" for note in slide.notes)

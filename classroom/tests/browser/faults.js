@@ -10,12 +10,14 @@ async () => {
     const say = (what) => faults.push(`${number + 1}: ${what}`);
     const sheet = section.getBoundingClientRect(), body = section.querySelector(".body").getBoundingClientRect();
     const box = (part) => part.getBoundingClientRect(), seen = (part) => part.checkVisibility() && box(part).width;
-    for (const part of section.querySelectorAll(".words, .words *, mjx-container > svg")) {
+    for (const part of section.querySelectorAll(".words, .words *, .body mjx-container > svg")) {
       if (!seen(part) || part.closest("aside, mjx-assistive-mml") || part.closest("mjx-container > svg > *")) continue;
       const { left, right, top, bottom } = box(part), room = 3 * scale;
       if (left < body.left - room || right > body.right + room) say(`too wide: ${part.tagName} ${part.textContent}`);
       if (top < body.top - 2 * room || bottom > body.bottom + 2 * room) say(`too high: ${part.tagName} ${part.textContent}`);
     }
+    const heading = section.querySelector("h3");
+    if (heading && box(heading).height > 160 * scale) say(`heading of more than two lines: ${heading.textContent}`);
     const cut = () => [...section.querySelectorAll("figure > :is(img, canvas), figure > div > div:not(.rbcourse-view)")].filter((part) => {
       const { left, right, bottom } = box(part), margin = part.parentElement.dataset.crop ? 1e9 : 3 * scale;
       return seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin);
