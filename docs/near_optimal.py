@@ -21,7 +21,7 @@ TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
 u0, u1 = [one, one, -one / 2], [one, one, one / 2]
-# Hermite's cubics: among the values and rates at 0 and 1, one is 1 and three are 0
+# Hermite's cubics: of the four values and rates at 0 and 1, one is 1 and the others are 0
 TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
 
 

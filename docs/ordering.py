@@ -6,9 +6,9 @@ near_optimal.py. For each pair of a worse and a better closed form, ordering.csv
     E_worse - c E_better = sum_kl M_kl V_k . V_l + share volume^2,
 
 where volume is sigma . (e x d), share >= 0 and M is positive definite. The V_k are all products of
-an inner product with sigma, e or d, except for ss sigma. So the left side is positive unless
-e = d = 0. Each product V_k . V_l is a monomial. Of the entries M_kl with the same monomial, all
-except one are free. ordering.csv contains the free entries.
+an inner product with sigma, e or d, except for (sigma . sigma) sigma. So the left side is positive
+unless e = d = 0. Each product V_k . V_l is a monomial. Of the entries M_kl with the same monomial,
+all except one are free. ordering.csv contains the free entries.
 """
 
 import csv
@@ -33,7 +33,7 @@ near = _load()
 VOLUME = ss * ee * dd + 2 * se * sd * ed - ss * ed**2 - ee * sd**2 - dd * se**2
 
 
-# "se d" names the vector se times d; names with an even number of letters d come first
+# "se d" means (sigma . e) d; names with an even number of letters d come first
 VECTORS = [f"{inner} {vector}" for inner in near.NAMES for vector in "sed"]
 VECTORS = sorted((name for name in VECTORS if name != "ss s"), key=lambda x: x.count("d") % 2)
 
