@@ -7,8 +7,8 @@ and the timings θ and f in `rbcourse.projected_line`. The module `rbcourse.text
 versions of the main algorithms.
 
 The line "Source" of a docstring cites the equations that the function implements. BK is Belta and
-Kumar (2002), and RR is the report by Samayamantula and Zou. Sources such as "beyond BK 12" are
-entries of docs/ledger.md, which are in neither text.
+Kumar (2002), and RR is the report by Samayamantula and Zou. A source such as "beyond BK 12" is an
+entry of docs/ledger.md whose content is in neither text.
 
 `BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), are the standard bases of the Lie
 algebras. `METRIC_SO3` and `METRIC_SE3` are the matrices of the metrics that the trace induces (BK

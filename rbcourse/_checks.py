@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array
 
-Rng: TypeAlias = "np.random.Generator | int | None"  # a string needs no import of numpy.random
+Rng: TypeAlias = "np.random.Generator | int | None"  # in quotes, so numpy.random is not imported
 
 
 def as_array(

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rbcourse._numerics import Array, at_cache_line, blocks, scaled
 
 LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; for smaller ζ, the result loses digits
-_BLOCK = 5128  # matrices that fit into the cache; multiples of 512 cause cache conflicts
+_BLOCK = 5128  # number of matrices that fit into the cache; multiples of 512 cause conflicts
 
 
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:

@@ -13,10 +13,10 @@ from rbcourse._numerics import Array
 def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
     """Evaluate a Hermite polynomial, or its derivative of the given order, at the times t.
 
-    The ends of a line are its values x0, x1 at t = 0 and 1. For a cubic, the derivatives v0, v1
-    follow, and for a quintic, also the second derivatives a0, a1. The times broadcast with the
-    ends. The polynomial meets all boundary conditions exactly. The line minimizes ∫ ‖x'‖² dt, the
-    cubic ∫ ‖x''‖² dt, and the quintic ∫ ‖x'''‖² dt.
+    `ends` contains the values x0, x1 at t = 0 and 1, for a cubic also the derivatives v0, v1, and
+    for a quintic also the second derivatives a0, a1. The times broadcast with the ends. The
+    polynomial meets all boundary conditions exactly. The line minimizes ∫ ‖x'‖² dt, the cubic
+    ∫ ‖x''‖² dt, and the quintic ∫ ‖x'''‖² dt.
     Source: BK 6, BK 6.2.
     """
     return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))

@@ -154,10 +154,10 @@ def corrected_bezier_so3(
 
     Notes
     -----
-    R_m = R0 exp(σ̂/2) is the half-way rotation. The vector σ is the logarithm of R0ᵀ R1, of any
-    length, that is nearest to the sum of the three legs of the Bézier curve.
-    The curve is near-optimal for small excursions: if the excursion is multiplied by s, the
-    relative excess over the optimum is multiplied by about s⁸ (s⁴ or s² for the other closed
+    R_m = R0 exp(σ̂/2) is the half-way rotation. Among all logarithms of R0ᵀ R1, including those
+    longer than π, σ is the one nearest to the sum of the three legs of the Bézier curve.
+    The corrected curve is near-optimal for small excursions: if the excursion is multiplied by s,
+    the relative excess over the optimum is multiplied by about s⁸ (s⁴ or s² for the other closed
     forms). The deviation δ is of third order in the excursion. Large end velocities make δ large,
     and the curve may then cost more than the Bézier curve (see docs/near_optimal.md). The singular
     set and the symmetries are as for `bezier_so3`. Ends are also singular if two logarithms are

@@ -213,7 +213,7 @@ def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
 
 
 def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
-    """Rescale the costs of legs from unit time to their durations; sum the costs of a chain."""
+    """Rescale the costs of legs from unit time to their durations; add up the costs of a chain."""
     with np.errstate(over="ignore"):
         costs = costs / legs.flat.duration**power
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
@@ -245,9 +245,9 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
     """Integrate `density` over unit time for each curve of a stack, by adaptive quadrature.
 
     Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
-    nodes differ by more than `rtol` times the integral. For the K curves `some`, whose indices in
-    the stack are `index`, ``density(some, t, index)`` returns the integrand at the times t, shape
-    (T, K). Error messages begin with `name`.
+    nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
+    integrand of the K curves `some`, which have the indices `index` in the stack, at the times t,
+    shape (T, K). Error messages begin with `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")

@@ -40,8 +40,7 @@ class _Ends(NamedTuple):
 class Ends(_Ends):
     """Boundary conditions: rotations and angular velocities at both ends, in a common batch shape.
 
-    Because `Ends` is a tuple, a function ``make`` that returns a curve is called as
-    ``make(*ends)``.
+    `Ends` is a tuple, so that ``make(*ends)`` calls a function ``make`` with these arguments.
     Source: BK 6.2.
 
     Parameters
@@ -83,7 +82,7 @@ class Ends(_Ends):
         return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
 
     def broadcast_to(self, batch: tuple[int, ...]) -> Self:
-        """Return the ends with another batch shape."""
+        """Return the ends, broadcast to another batch shape."""
         shapes = (3, 3), (3, 3), (3,), (3,)
         arrays = zip(self, shapes, strict=True)
         return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
@@ -469,8 +468,8 @@ def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
     -------
     Curve
         A curve of the same kind. If the duration is multiplied by k, velocities and accelerations
-        are divided by k and k², and `acceleration_cost` by k³. A `chain` that starts at time a then
-        passes the pose of time t at the time a + k (t − a).
+        are divided by k and k², and `acceleration_cost` by k³. If a `chain` starts at the time a,
+        its pose at the time t moves to the time a + k (t − a).
 
     Examples
     --------
@@ -495,7 +494,7 @@ def identity(t: Array, order: int) -> Array:
 
 
 def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
-    """Return words that name a curve of a stack in messages, or "" for a single curve."""
+    """Return words by which messages identify one curve of a stack, or "" for a single curve."""
     index = [int(i) for i in np.unravel_index(curve, batch_shape)] if batch_shape else []
     return f" of curve {index}" if index else ""
 
@@ -523,7 +522,7 @@ def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
 
 
 def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Refine `points` in [0, 1] near `times`, by points at distances 1/32, 1/64, …, `widths`."""
+    """Add to `points` the points of [0, 1] at distances 1/32, 1/64, …, `widths` from `times`."""
     cuts = [points]
     for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))

@@ -53,8 +53,8 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     -----
     Domain: small excursions. The relative error is proportional to the square of the excursion (for
     "cumulative_bezier_so3", to the excursion). On random problems with ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ <
-    1, this error was at most 14 % for all other forms. The error can be larger if E is much smaller
-    than usual for ends of this size, for example if the velocities are along σ.
+    1, this error was at most 14 % for all forms except that one. The error can be larger if E is
+    much smaller than usual for ends of this size, for example if the velocities are along σ.
     Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ.
 
     Examples
@@ -81,7 +81,7 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
 
 @lru_cache
 def _forms() -> dict[str, tuple[Array, Array]]:
-    """Return the powers of six inner products, and their coefficients, in each polynomial E."""
+    """Return the terms of each polynomial E: powers of six inner products, and coefficients."""
     path = os.path.join(os.path.dirname(__file__), "leading_excess.csv")
     with open(path, encoding="utf-8") as file:
         head, over, *rows = csv.reader(file)

@@ -55,7 +55,7 @@ def chain(
         As for `bessel_velocities`.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists or angular velocities at the poses. The default is the `spline_velocities`, with
-        velocity 0 at both ends, and at successive poses that are equal up to rounding.
+        velocity 0 at both ends and at successive poses that are equal up to rounding.
     leg : callable, optional
         A function, from this package or your own, that makes the legs. It returns a stack of
         two-point curves, and is called once for all legs. Its arguments are the keyword
@@ -73,10 +73,9 @@ def chain(
     Raises
     ------
     ValueError
-        As for `bessel_velocities`. Other causes are `velocities` that are given although `leg`
-        takes none, and a `leg` that needs other arguments, raises ValueError, or misses the next
-        pose by more than 1e-6. The message names the first such place. Warnings and other errors
-        are those of `leg`.
+        As for `bessel_velocities`. Also if `velocities` are given but `leg` takes none, or if `leg`
+        needs other arguments, raises ValueError, or misses the next pose by more than 1e-6. The
+        message names the first such place. Warnings and other errors are those of `leg`.
 
     Notes
     -----

@@ -138,9 +138,9 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     -----
     L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L. On
     SO(3), W induces the left-invariant metric tr(W) I − W, which is the inertia of the body.
-    Singular set: M W is in the singular set of `project_so`. If W has rank n − 1, as for a flat
-    body, it determines R if M W has the same rank. If W has rank n − 2 or less, as for a thin rod,
-    it never determines R.
+    Singular set: M W is in the singular set of `project_so`. A W of rank n − 1, as for a flat body,
+    determines R if M W has the same rank. A W of rank n − 2 or less, as for a thin rod, never
+    determines R.
 
     Examples
     --------
@@ -203,7 +203,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
 def distance_to_so(M: ArrayLike) -> Array:
     """Return the Frobenius norm ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)².
 
-    Here σ_i are the singular values of M; the smallest is given the sign of det M.
+    Here σ_i are the singular values of M; the smallest is multiplied by the sign of det M.
     Source: BK 4, BK Remark 6, where the paper prints the square, without the sign.
 
     Parameters

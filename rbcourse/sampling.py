@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
-_BLOCK = 6136  # draws that fit into the cache; multiples of 512 cause cache conflicts
+_BLOCK = 6136  # number of draws that fit into the cache; multiples of 512 cause conflicts
 
 
 def arvo_rotation(x: ArrayLike) -> Array:

@@ -15,8 +15,8 @@ ellipses, or strips, in the plane of x_i and y.
 
 The algorithm makes two passes. The backward pass finds the largest x_i from which the end can be
 reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. Since the
-limits of a cell are convex, the passes find a timing that satisfies the limits on the cells, if
-there is one. The motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
+limits of a cell are convex, the passes find a timing that satisfies the limits on the cells, if one
+exists. The motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
 
 Near the top of an ellipse, x_i grows only if y decreases. TOPP-RA chooses the largest x_i, which is
 not the best choice there, since a small gain of x_i causes a large loss of y. The time depends
@@ -119,10 +119,10 @@ def fastest(
     Notes
     -----
     The grid has 1,000 cells or, for a chain, 250 for each leg (25 if there are many legs). It is
-    refined, by factors of at most eight, until the limits hold up to 1e-4 between its points. T is
-    then about 1e-3 above the shortest time. The motion stops where the velocity of the path jumps.
-    The acceleration of the motion jumps where the acceleration of the path jumps, at both ends, and
-    between cells; the jerk is not limited. A thousand cells take about 50 ms.
+    refined by factors of at most eight, until no limit is exceeded by more than 1e-4 between its
+    points. T is then about 1e-3 above the shortest time. The motion stops where the velocity of the
+    path jumps. The acceleration of the motion jumps where the acceleration of the path jumps, at
+    both ends, and between cells; the jerk is not limited. A thousand cells take about 50 ms.
 
     Examples
     --------

@@ -11,9 +11,9 @@ velocities. Each leg contributes a symmetric element (1/h) [[4 I, 2 B], [2 Bᵀ,
 s/h² at both of its ends. No singular value of B is larger than 1. So the system is diagonally
 dominant and positive definite, and it has exactly one solution, for any poses. For unit quaternions
 q = (cos ½θ, x) of Q, the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For
-a body with the weight W, let K = Rᵀ M'' W. Then vee(K − Kᵀ) = τ = G w' + w × G w. The torque is
-continuous if G replaces I, B is given by B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and the loads are computed
-from Q W and −Qᵀ W. For the velocity of the origin in the body frame, B = Q.
+a body with the weight W, let K = Rᵀ M'' W. Then vee(K − Kᵀ) = τ = G w' + w × G w. For a continuous
+torque, three things change: G replaces I; B is defined by B w = vee(Q ŵ W − (Q ŵ W)ᵀ); and the
+loads are computed from Q W and −Qᵀ W. For the velocity of the origin in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
@@ -249,8 +249,8 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """Return velocities from parabolas; each parabola joins a pose to its two neighbours.
 
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
-    acceleration jumps at the poses. For random poses, the motion costs 12 % more than the optimum
-    in the median, however small the steps are. The `spline_velocities` have neither drawback. If
+    acceleration jumps at the poses. For random poses, the median excess of the cost over the
+    optimum is 12 %, however small the steps are. The `spline_velocities` have neither drawback. If
     the poses are samples of a smooth motion, doubling their number divides the excess over the
     optimum (with the same end velocities) by 4.
 

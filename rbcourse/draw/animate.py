@@ -147,7 +147,7 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
 
 
 def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return pictures as a GIF that repeats forever; frames last multiples of 10 ms."""
+    """Return pictures as a GIF that repeats forever; each frame lasts a multiple of 10 ms."""
     content = io.BytesIO()
     ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)
     durations = [int(10 * step) for step in np.diff(ends)]

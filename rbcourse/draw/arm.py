@@ -70,7 +70,7 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
 def moving_arm(
     ax: Axes, path: Array, shown: Iterable[int], lengths: ArrayLike = LINKS
 ) -> Callable[[int], list[Any]]:
-    """Draw an arm at some states in a pale colour; return a function that moves the arm.
+    """Draw some states of an arm in a pale colour; return a function that moves the arm.
 
     The axes show all points that the arm can reach. ``update(i)`` moves the arm to state i, draws
     the path of the tip up to this state, and returns the moving artists (RR 4.3, RR Fig. 8, RR Fig.
@@ -122,7 +122,7 @@ def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
 
 
 def show_reach(ax: Axes, lengths: ArrayLike = LINKS) -> None:
-    """Make axes show all points that an arm can reach; dotted circles bound them."""
+    """Make axes show all points that an arm can reach; dotted circles bound these points."""
     total, longest = np.sum(lengths), np.max(lengths)
     for radius in (total, max(0.0, 2 * longest - total)):
         ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))

@@ -72,7 +72,7 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
 def draw_cube_motion(
     ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
 ) -> list[Any]:
-    """Draw a cube at each pose; stars at the centres of the cubes are in front.
+    """Draw a cube at each pose, and stars in front of the cubes at their centres.
 
     The edges of the cubes have the length `side` in m. Behind these cubes, blue outlines show cubes
     at the poses `compared`. Return the artists of the cubes, and then the stars (BK Fig. 5).
@@ -148,7 +148,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # the name is beyond the numbers, beside the last of the largest gaps
+        else:  # the name is farther out than the numbers, beside the last of the widest gaps
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]

@@ -70,7 +70,7 @@ def draw_compared(
 def moving_route(
     ax: Axes, path: Array, length: float, shown: Iterable[int]
 ) -> Callable[[int], list[Any]]:
-    """Draw a rectangle at some poses in a pale colour; return a function that moves it.
+    """Draw some poses of a rectangle in a pale colour; return a function that moves the rectangle.
 
     ``update(i)`` moves the rectangle to state i, draws the path of its centre up to this state, and
     returns the moving artists (RR 3.3, RR Fig. 6, RR Fig. 7).
@@ -119,8 +119,8 @@ def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
 def extent_of(path: Array) -> float:
     """Return the larger of a path's extents in x and y, or 0 if it is due to rounding.
 
-    An extent below 1e-12 of the largest coordinate, or below 1e-12 m, is due to rounding, since the
-    body stays on the spot or returns to it.
+    An extent below 1e-12 of the largest coordinate, or below 1e-12 m, counts as rounding: the body
+    stays on the spot or returns to it.
     """
     places = path[:, :2]
     extent = float(np.ptp(places, axis=0).max())

@@ -28,7 +28,7 @@ class Piece:
     ----------
     kind : str
         A filled "face"; a "line"; a "mark", such as a letter, which always faces the viewer; or a
-        "ball", a mark whose plane separates the other pieces.
+        "ball", a mark whose plane separates pieces behind it from pieces in front.
     places : ndarray, shape (n, 3) or (n, 4)
         The positions relative to the middle of the axes, in pixels. For lines, the fourth number is
         the visible length from the start, which places the dashes.
@@ -114,17 +114,16 @@ def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
 def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
     """Return pieces from the farthest to the nearest, cut where they pass through faces.
 
-    The plane of a face has the eye on one of its sides. Pieces on the other side are drawn first,
-    then pieces in the plane in the order of zorder, and then pieces on the side of the eye. The
-    pieces on each side are ordered in the same way by their next face. A piece in the plane that
-    covers faces, such as an edge, is drawn with the pieces on the side of the eye. Otherwise the
-    next faces could cover half of it. The first face is the one whose plane cuts the fewest faces
-    and lines. Pieces that no face separates are drawn in the order of zorder, then of their mean
-    depth in `whole_pixels`, and then in the given order. `eye` is the direction to the eye, shape
-    (3,).
+    The eye is on one side of the plane of a face. Pieces on the other side are drawn first, then
+    pieces in the plane in the order of zorder, and then pieces on the side of the eye. The pieces
+    on each side are ordered in the same way by their next face. A piece in the plane that covers
+    faces, such as an edge, is drawn with the pieces on the side of the eye. Otherwise the next
+    faces could cover half of it. The first face is the one whose plane cuts the fewest faces and
+    lines. Pieces that no face separates are drawn in the order of zorder, then of their mean depth
+    in `whole_pixels`, and then in the given order. `eye` is the direction to the eye, shape (3,).
     """
     drawn: list[Piece] = []
-    todo = [(False, pieces)]  # (whether the pieces are in order, pieces); the last pair is next
+    todo = [(False, pieces)]  # pairs (are the pieces in order?, pieces), taken from the end
     while todo:
         ready, group = todo.pop()
         wall = _wall(group, eye)

@@ -48,7 +48,7 @@ def image_table(images: Images) -> Table:
 
 
 def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[Any]]:
-    """Draw a sphere for each sample; return a function that draws images of v0 and v1 on them.
+    """Draw one sphere per sample; return a function that draws images of v0 and v1 on the spheres.
 
     A dot is the image of v0. The stroke from the dot ends at the image of v1, so that a turn about
     v0 is visible, too. ``update(i)`` shows the first i rotations and returns

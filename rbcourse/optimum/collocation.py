@@ -29,8 +29,8 @@ Arrays: TypeAlias = tuple[Array, ...]
 class Solution(NamedTuple):
     """A solution of R p = c, with R and the highest derivative k of w at the nodes.
 
-    The cost is ∫ ‖u‖² dt. `beaten` is True if Newton's method fails from a known curve that costs
-    less.
+    The cost is ∫ ‖u‖² dt. `beaten` is True if a known curve costs less, but Newton's method fails
+    when it starts from that curve.
     """
 
     R: Array
@@ -108,7 +108,7 @@ def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
 
 
 def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
-    """Solve problems of balls like `relax`; the linear systems use the nodes of the given R."""
+    """Solve problems of balls as `relax` does, with linear systems on the nodes of the given R."""
     parts = equations.R0, equations.R1, equations.ends
     return relax(BallStationary(*parts, R.shape[1]), R)
 

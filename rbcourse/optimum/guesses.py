@@ -14,19 +14,19 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-LONGEST = 100.0  # rad: a larger length does not add more full turns
+LONGEST = 100.0  # rad: a length above this does not add more full turns
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 _TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
 
 
 def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.intp], Array]:
-    """Return a problem index for each starting curve, and the starting curves at n nodes.
+    """Return the problem index of each starting curve, and these curves at n nodes.
 
     Let v be the rotation vector from the Bézier control point C₁ = R0 exp(ŵ0/3) to the control
     point R1 exp(−ŵ1/3), for the short way or the long way. If ‖w0‖/3 + ‖w1‖/3 + `bend` is at least
-    2k − 1 full turns, both vectors v are also used with k additional full turns. End accelerations
-    cause the `bend`. With β = 3t² − 2t³, the curve
+    2k − 1 full turns, both vectors v are also used with k additional full turns. `bend` is the
+    contribution of end accelerations. With β = 3t² − 2t³, the curve
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
 
@@ -181,9 +181,9 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
     For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation u
     changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
     the integral of the squared new deviation. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the ends, and
-    p has half as many coefficients as there are nodes. A quarter of η or three times η is used if
-    that makes the curve cheaper. The steps end when one of them lowers the cost by less than the
-    fraction `worthwhile`.
+    p has half as many coefficients as there are nodes. A quarter of η or three times η is used
+    instead if the curve then costs less. The steps end when one of them lowers the cost by less
+    than the fraction `worthwhile`.
     """
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
@@ -198,7 +198,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Return the cheapest of R and the curves after `SHARES` of the step, and its cost."""
+    """Return R or, if cheaper, the best curve after a step times one of `SHARES`; and its cost."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))

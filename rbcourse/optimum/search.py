@@ -69,7 +69,7 @@ class Limits:
     turned: float = 3.0  # full turns are added to curves up to this cost ratio
     turned_again: float = 1.2  # second full turns are added to curves up to this cost ratio
     worth_a_turn: float = 0.3  # no turn is added if the cost is below this share of a turn's cost
-    promising_turn: float = 1.5  # curves that cost more after `new_turns` are dropped
+    promising_turn: float = 1.5  # after `new_turns`, curves above this cost ratio are dropped
     starts: tuple[int, float] = (40, 5e-4)
     new_turns: tuple[int, float] = (3, 5e-4)
     on_more_nodes: tuple[int, float] = (40, 1e-4)
@@ -90,7 +90,7 @@ class Task(NamedTuple):
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
-    # maps problem indices and n to the problem index of each start, and the starts at n nodes
+    # for problem indices and n: the problem index of each start, and the starts at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = LIMITS.nodes  # of starting curves
@@ -229,7 +229,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
 def _with_more_turns(
     task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
 ) -> tuple[Numbers, Array, Array]:
-    """Lower the costs of the cheapest curves on more nodes, also after adding full turns.
+    """Lower, on more nodes, the costs of the cheapest curves and of these curves plus full turns.
 
     The cheapest motion may turn once or twice more about the axis of a small moment. From rest to
     rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No turn
@@ -271,7 +271,7 @@ def _with_more_turns(
 def _leave_the_axis(
     task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
 ) -> None:
-    """Bend solutions whose axis is almost constant; solve from bent curves that cost less.
+    """Bend solutions whose axis is almost constant; start Newton's method from cheaper bent curves.
 
     Such a solution may be a saddle. If all starts turn about one axis, no step leaves the axis,
     even if a curve that leaves it costs less.
@@ -315,7 +315,7 @@ def _follow_on(
     n: int,
     found: list[Solution | Failure],
 ) -> None:
-    """Solve some problems from more starts; n nodes make their costs more accurate."""
+    """Solve some problems from more starts, on n nodes, where the costs are more accurate."""
     mine = np.isin(problem, index)
     problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, index, n)
@@ -363,7 +363,7 @@ def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
     """Solve the problems from these curves; cheaper solutions replace those in `found`.
 
-    If two solutions have the same cost, the first one is kept, so that rounding does not decide.
+    If two solutions have the same cost, the first one is kept, so that rounding does not choose.
     """
     for i, one in zip(problem, task.solver(task.equations.take(problem), R), strict=True):
         if found[i] is NOTHING or cost_of(one) < (1 - SAME) * cost_of(found[i]):

@@ -113,10 +113,10 @@ def minimum_acceleration_spline_so3(
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
     periodic ends, such a curve may not exist. For example, take rotations by 0, 1 and 0.3 rad about
     one axis, at the times 0, 1 and 1 + √2. The result costs 5.6, but with more full turns on the
-    legs, the cost can be as small as you like. If the result is `certified`, it is proven to be a
-    local minimum; for bodies, a leg can be a saddle. A leg that is much shorter than its neighbours
-    may spin; to prevent this, insert poses. Singular set: neighbouring rotations a half-turn apart
-    raise ValueError.
+    legs, the cost can be as small as you like. A `certified` result is proven to be a local
+    minimum. For bodies, a result that is not certified can have a leg that is a saddle. A leg that
+    is much shorter than its neighbours may spin; to prevent this, insert poses. Singular set:
+    neighbouring rotations a half-turn apart raise ValueError.
 
     Examples
     --------
@@ -616,7 +616,7 @@ def _momenta(problem: _Problem, legs: Equations, unknowns: Arrays) -> tuple[Arra
 
 
 def _balanced(problem: _Problem, legs: Equations, unknowns: Arrays) -> bool:
-    """Tell whether the momenta agree on both sides of each pose without given values."""
+    """Tell whether the momenta agree on both sides of each pose that has no given values."""
     weight = problem.weight[:, None] * problem.scale
     found = weight[:, None] * _momenta(problem, legs, unknowns)[0]
     jump = np.zeros_like(problem.given)
