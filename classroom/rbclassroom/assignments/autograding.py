@@ -105,14 +105,14 @@ class RestoreCells(nbgrader.OverwriteCells):  # the base class adds the hidden t
     """Restore the locked cells; refuse code that overrides names or objects of the tests."""
 
     def preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
-        """Restore the notebook as it was released, and store the remarks in its metadata."""
+        """Restore the locked cells and hidden tests, and store remarks in the metadata."""
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
         remarks = locked_cells.restore(nb, original)
         if len(remarks) > 2:
             remarks[1:] = [f"and {len(remarks) - 1} more changes"]
-        for cell in nb.cells:  # nbgrader fails at text that looks like the mark of a region
+        for cell in nb.cells:  # nbgrader fails if a student's cell has these words
             if locked_cells.is_answer(cell) or not marks_of(cell):
                 regions = r"\b(BEGIN|END) (HIDDEN TESTS|MARK SCHEME)"
                 cell.source = re.sub(regions, r"\1-\2", cell.source)

@@ -38,11 +38,11 @@ Row = tuple[str, str, str]  # the list, the file or student, and the reason
 
 
 class Upload(NamedTuple):
-    """A notebook that a student handed in; the last of several, in sorted order, is used."""
+    """An upload by a student; of several, the one with the greatest first four fields is used."""
 
     number: int  # Canvas gives larger numbers to later uploads
     date: str
-    prepared: bool  # the student's check wrote the file
+    prepared: bool  # whether the student's check wrote the file
     file: str
     about: dict[str, str]
     content: bytes
@@ -156,7 +156,7 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
 
 def _shown(name: str) -> str:
     """Return a name in normal form C, without control characters."""
-    with contextlib.suppress(UnicodeError):  # many zips do not flag their UTF-8 names
+    with contextlib.suppress(UnicodeError):  # many zips do not declare that their names are UTF-8
         name = name.encode("cp437").decode("utf-8")
     name = name.encode("utf-8", "replace").decode("utf-8")
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
@@ -229,7 +229,7 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
         found += [row["id"]] * (key(words.split("_")) == key(plain.split("_")))
     if len(found) == 1:
         return found[0]
-    # add a number to unknown Canvas students, and to anonymous or reserved names
+    # names of unknown Canvas students, and anonymous or reserved names, get a number
     alone = plain not in ("", "participant", "aux", "con", "nul", "prn") and not canvas
     return plain if alone else f"{plain}_{number}".strip("_") or "student"
 

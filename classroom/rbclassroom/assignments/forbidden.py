@@ -44,7 +44,7 @@ def find_in_cells(cells: list[NotebookNode]) -> list[tuple[int, int, str]]:
     given = [node for at in trees.keys() - own for node in ast.walk(trees[at])]
     names = {_defines(node) for node in given} - {""}
     attributes = ATTRIBUTES | {node.attr for node in given if isinstance(node, ast.Attribute)}
-    modules = set[str]()  # imported names, and names for parts of modules
+    modules = set[str]()  # names of imported modules and of their parts
     for node in (node for tree in trees.values() for node in ast.walk(tree)):
         if isinstance(node, ast.alias):
             modules.add(_defines(node))

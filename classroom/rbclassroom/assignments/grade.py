@@ -232,7 +232,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
 
 
 def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
-    """Return a page of feedback that names the problems, and marks `to_do` as not graded yet."""
+    """Name the problems in a page of feedback, and mark those in `to_do` as not graded yet."""
     cells, names = nbformat.read(graded, as_version=4).cells, dict[str, str]()
     for at, cell in enumerate(cells):
         title = re.sub(r" \(\d+ points?\)$", "", locked_cells.title_of(cells, at))

@@ -101,7 +101,7 @@ def build_wheel(course: Path) -> tuple[str, bytes]:
     """Build the wheel of a distribution, reproducibly and without a network."""
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, "-m", "flit_core.wheel", "--outdir", folder]
-        own = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # zips store no earlier date
+        own = {**os.environ, "SOURCE_DATE_EPOCH": "315532800"}  # the earliest date in a zip
         subprocess.run(words, cwd=course, env=own, check=True, capture_output=True)
         (built,) = Path(folder).glob("*.whl")
         return built.name, built.read_bytes()
@@ -132,7 +132,7 @@ def pack(files: dict[str, bytes]) -> bytes:
     packed = io.BytesIO()
     with ZipFile(packed, "w") as archive:
         for path, data in sorted(files.items()):
-            entry = ZipInfo(path)  # without a date, the earliest date is used
+            entry = ZipInfo(path)  # by default with the earliest date
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
     return packed.getvalue()

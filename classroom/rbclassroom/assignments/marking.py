@@ -41,7 +41,7 @@ class Problem:
     inputs: Sequence[Sequence[Any]]  # the arguments of each trial
     answers: Sequence[Any]  # the right result of each trial
     mistakes: Sequence[Mistake] = ()
-    allowed: Sequence[str] = ()  # names of the package that the student may use
+    allowed: Sequence[str] = ()  # the student may use these names of the package
     accuracy: float = 1e-9
     angles: Sequence[int] = ()
 
@@ -85,7 +85,7 @@ class Problem:
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
-            # in each trial, any function of the mistake may match
+            # in each trial, one of the mistake's functions has to match
             trials = zip(given, *mistake.results, strict=True)
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
@@ -185,7 +185,7 @@ def curves_of(axes: Any) -> list[Array]:
         if (style := line.get_drawstyle()) != "default":
             outlines.append(np.column_stack(STEP_LOOKUP_MAP[style](*line.get_xydata().T)))
     for a, b in ((np.array(outline[:-1]), np.array(outline[1:])) for outline in outlines):
-        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # top edges of steps run rightwards
+        treads = (a[:, 1] == b[:, 1]) & (a[:, 0] < b[:, 0])  # top edges go from left to right
         found.append((a + b)[treads] / 2)
     for values, edges, _ in (p.get_data() for p in axes.patches if isinstance(p, StepPatch)):
         found.append(np.column_stack([(edges[1:] + edges[:-1]) / 2, values]))

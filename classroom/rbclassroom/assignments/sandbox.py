@@ -88,7 +88,7 @@ def box(folder: Path, seconds: int) -> list[str]:
     python, is_root = [sys.prefix, sys.base_prefix, *packages], os.geteuid() == 0
     seen = {str(parent) for path in (*python, str(folder)) for parent in Path(path).parents}
     kinds = ["ipc", "pid", "net", "uts", "cgroup-try"] + ["user"] * (not is_root)
-    # these powers are lost when the user changes
+    # root has these powers until the user changes
     powers = ["SETUID", "SETGID", "DAC_READ_SEARCH"] * is_root
     # the command ends when this process ends, or after `seconds`
     words = ["setpriv", "--pdeathsig=KILL", "timeout", "--signal=KILL", str(seconds)]

@@ -59,9 +59,9 @@ MADE = "made-by-course.txt"
 class Sources:
     """The sources of the book in `folder`, and files in `extra` that are copied to the book.
 
-    Binder takes the lessons from the GitHub repository ``owner/name`` in `repository`, if it is not
-    empty. `live` tells whether Python runs in the pages. `shown` has data for the templates in
-    ``pages/``.
+    If `repository` is not empty, Binder takes the lessons from this GitHub repository,
+    ``owner/name``. `live` tells whether Python runs in the pages. `shown` has data for the
+    templates in ``pages/``.
     """
 
     root: Path
@@ -207,7 +207,7 @@ class Sources:
                 self.shown["run"] = relinked(
                     text[text.index("| to learn |") : text.index("<!--")], path, page
                 )
-                continue  # the template of this page uses the text
+                continue  # a template shows this text
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")

@@ -32,7 +32,7 @@ html_js_files = ["book.js"]
 exclude_patterns = ["files"]
 html_favicon = "static/favicon.svg"
 html_copy_source = html_show_sourcelink = html_show_sphinx = html_show_copyright = False
-html_show_search_summary = False  # pages opened from disk cannot read others; see `write_texts`
+html_show_search_summary = False  # a page opened from disk cannot read others; see `write_texts`
 mathjax_path = "tex-svg.js"
 mathjax3_config = {"svg": {"scale": 0.97, "mtextInheritFont": True}}
 

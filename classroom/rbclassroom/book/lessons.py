@@ -107,7 +107,7 @@ def folded(cells: list[NotebookNode]) -> list[NotebookNode]:
 def with_picture_files(
     shown: str, known: dict[bytes, str], folder: Path, loading: str = "lazy"
 ) -> str:
-    """Return HTML with pictures in separate files, which by default are loaded when visible.
+    """Return HTML with pictures in files; by default a picture is loaded when it becomes visible.
 
     `known` maps the contents of pictures to their addresses. Other pictures are written to the
     folder ``pictures`` inside `folder`. The attribute ``data-cuts`` of a wide picture lists the
@@ -184,7 +184,7 @@ def _put(path: Path, text: str) -> None:
 
 
 def with_files(shown: str) -> str:
-    """Return a figure whose caption links to its files, and whose still links to its full size."""
+    """Link the caption of a figure to its files, and its still to the picture in full size."""
 
     def put(caption: re.Match[str]) -> str:
         name, endings = caption[1], caption[2].split(", ")

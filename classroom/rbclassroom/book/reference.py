@@ -19,7 +19,7 @@ from rbclassroom.course.ledger import Entry
 
 
 def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the modules that have a page, as a dict with headings as keys; see `module`."""
+    """Return the modules that have a page, as a dict of lists by heading; see `module`."""
     groups = {title: names.split() for title, names in CONTENTS["modules"].items()}
     for room, title in CONTENTS["rooms"].items():
         folder = root / file_of(room).removesuffix(".py")
@@ -126,7 +126,7 @@ def _imported(tree: ast.Module) -> dict[str, str]:
 
 
 def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return the tests of a function in its module's test file, or else its tests elsewhere."""
+    """Return a function's tests in its module's test file or, if none are there, all its tests."""
     *room, module, _ = name.split(".")
     own = "/".join([*room, f"test_{module}"])
     found = named.get(name, [])

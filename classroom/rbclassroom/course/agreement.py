@@ -213,7 +213,7 @@ def _same_columns(one: tuple[str, ...], other: tuple[str, ...]) -> bool:
         return False
     try:
         ours, theirs = (np.array(column[1:], dtype=float) for column in (one, other))
-    except ValueError:  # the columns are words, and they differ
+    except ValueError:  # the columns contain words that differ
         return False
     largest = np.abs(theirs).max(initial=0, where=np.isfinite(theirs))
     allowed = np.maximum(2e-11 * np.abs(theirs), max(1e-12 * largest, 1e-13))

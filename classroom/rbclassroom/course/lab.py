@@ -41,7 +41,7 @@ def configure() -> Path:
     server = {
         "jpserver_extensions": extensions,
         "tornado_settings": {"static_custom_path": [str(folder / "custom")]},
-        "answer_yes": True,  # Ctrl-C ends the server without a question
+        "answer_yes": True,  # Ctrl-C ends the server without asking
     }
     settings = {
         "ServerApp": server,

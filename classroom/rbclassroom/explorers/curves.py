@@ -38,7 +38,7 @@ def theta_explorer() -> Explorer:
         side.plot([0, 1], [0, 1], color=COLOURS["reference"], lw=1)
         side.set(xlim=(0, 1), ylim=(0, 1), xlabel="time t", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
         black, pink = ({"color": COLOURS[name]} for name in ("optimum", "projection"))
-        side.tick_params("y", pad=8)  # so that the dots do not cover the numbers
+        side.tick_params("y", pad=8)  # otherwise the dots cover the numbers
         dot: dict[str, Any] = {"marker": "o", "ms": 10, "ls": ""}
         artists = {
             "arc": new_line(ax, **black, lw=2.5),

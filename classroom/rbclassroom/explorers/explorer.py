@@ -49,15 +49,15 @@ class State:
 
     shown: list[Any]
     drawn: NDArray[np.int16]
-    texts: list[Any]  # (name, value) pairs, a notice, and all of these in one line
+    texts: list[Any]  # pairs of a name and a value, a notice, and a line with all of these
 
 
 class Explorer(ipywidgets.Box):  # type: ignore[misc]
     """A picture, its controls, and the displayed values.
 
     The background is drawn once. The browser plays recorded states, and asks Python for missing
-    states; each change of another control is sent as one state. If the values of the controls have
-    no picture, the panel gives the reason, and the artists that move are hidden.
+    states; each change of another control is sent as one state. If no picture exists for the values
+    of the controls, the panel gives the reason, and the artists that move are hidden.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         return {name: control.value for name, control in self.controls.items()}
 
     def put(self, **values: Any) -> None:
-        """Set some of the controls, in their order, and send only the final state."""
+        """Set some of the controls, one after the other, and send only the final state."""
         self._resting = True
         try:
             for name in [name for name in self.controls if name in values]:
@@ -191,7 +191,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
     def _push(self, first: int, states: Sequence[State], notice: str = "") -> None:
         self.picture.run = {
             "version": self._version,
-            "number": self.picture.run.get("number", 0) + 1,  # because equal runs are not sent
+            "number": self.picture.run.get("number", 0) + 1,  # equal runs would not be sent
             "index": first,
             "states": joined([state.drawn for state in states]),
             "texts": [state.texts for state in states],

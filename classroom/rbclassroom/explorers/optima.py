@@ -75,8 +75,8 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: one cube follows the optimum, another the projection.
 
-    The boundary conditions are those of the paper, except for three that can be changed; the goal
-    is pale. The controls are the ``turn``, as a fraction of the paper's; ``spin``, the last
+    The boundary conditions are those of the paper, but three of them can be changed. The goal has a
+    pale colour. The controls are the ``turn``, as a fraction of the paper's; ``spin``, the last
     component of ω(1) in rad per unit time; ``rise``, the last component of the final velocity in m
     per unit time; and the time ``t``, which the play button moves (BK 6.3, BK (14), BK Fig. 5).
     """

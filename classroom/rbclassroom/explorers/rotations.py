@@ -128,8 +128,8 @@ def random_explorer() -> Explorer:
     """Return an explorer of random rotations: the images of e₁, and tests of uniformity.
 
     The controls are the ``sampler``, "three angles" or "uniform", the ``number`` of rotations,
-    which the play button moves, and the ``seed``. For each seed, the rotations are always the first
-    of the same 2000 (RR 2, RR 2.1, RR 2.2).
+    which the play button moves, and the ``seed``. Each seed has a fixed sequence of 2000 rotations,
+    and its first ``number`` rotations are shown (RR 2, RR 2.1, RR 2.2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="space")

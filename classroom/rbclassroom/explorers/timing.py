@@ -22,7 +22,7 @@ def timing_explorer() -> Explorer:
     """Return an explorer of the fastest timing of a path within limits.
 
     The right picture is the phase plane: the rate of the path parameter s against s, with a pose at
-    each integer s. No timing may lie above the limit curves; a grey line is the timing at a
+    each integer s. No timing may lie above the limit curves. The grey line is the timing at a
     constant rate. The box moves with the fastest timing. The controls are the largest allowed
     ``angular_speed`` of the box, the largest ``speed`` and ``acceleration`` of its centre, and
     ``t``, the time as a fraction of the duration, which the play button moves (beyond BK 16).

@@ -1,8 +1,8 @@
 """Lesson 4: the drift of matrices that should be rotations, and their repair.
 
-A 2 × 2 matrix is a multiple of a turn plus a multiple of a reflection. As a map of complex
-numbers it takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends only on z. The
-`shadows` are these z, and the rotations are the unit circle.
+A 2 × 2 matrix is a multiple of a turn plus a multiple of a reflection. As a map of complex numbers
+it takes ζ to ``z ζ + m ζ*``, and the nearest rotation, ``z/|z|``, depends only on z. The function
+`shadows` returns z; for rotations, z is on the unit circle.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -149,7 +149,7 @@ CARRIED = {
 
 
 def carried_table(turned: Array) -> dict[str, Array]:
-    """Return where the arrows of `CARRIED` end after the body has turned by these angles."""
+    """Return the tips of the arrows of `CARRIED` after the body has turned by these angles."""
     angles = {name: np.pi / 6 + share * turned for name, (_, share) in CARRIED.items()}
     ends = {name: np.stack([np.cos(a), np.sin(a)], axis=-1) for name, a in angles.items()}
     return {"turn [rad]": turned} | columns("{} {} [1]", ends)

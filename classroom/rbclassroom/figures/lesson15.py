@@ -53,7 +53,7 @@ def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, 
 
 
 def _least(a: list[Array], b: list[Array]) -> Array:
-    """Return, for each s, the minimum over r of the maximum over all limits of ‖a r + b‖²."""
+    """For each s, return the largest ‖a r + b‖² of all limits, at the r that makes it smallest."""
     if not a:
         return np.zeros(1)
     A, B = np.array(a), np.array(b)

@@ -224,7 +224,7 @@ def _changed(statement: ast.stmt, modules: set[str]) -> set[str]:
 
 
 def _root(node: ast.AST) -> set[str]:
-    """Return a set with the first name, as in ``name.part[0].method``, or an empty set."""
+    """Return {"name"} for a chain such as ``name.part[0].method``, otherwise an empty set."""
     while isinstance(node, ast.Attribute | ast.Subscript | ast.Starred):
         node = node.value
     return {node.id} if isinstance(node, ast.Name) else set()

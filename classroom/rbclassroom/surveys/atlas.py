@@ -123,8 +123,8 @@ def _as_count(name: str, value: int) -> int:
 def starts() -> dict[str, Maker]:
     """Return initial guesses of Newton's method, to see how the result depends on the guess.
 
-    The guesses are all closed forms except two, and the exponential cubic that turns the long way
-    round. If the Cayley cubic is far from the optimum, the method seldom converges from this guess.
+    The guesses are the exponential cubic that turns the long way round, and all closed forms except
+    two. If the Cayley cubic is far from the optimum, the method seldom converges from this guess.
     The corrected Bézier curve leads to the same result as the Bézier curve.
     """
     return {way: make for way, make in WAYS.items() if way not in ("Cayley", "corrected")} | {
@@ -196,7 +196,7 @@ def cell_table(
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
-    """Return the least x that a fraction `share` of the entries on the last axis does not exceed.
+    """Return, over the last axis, the least y such that a fraction `share` of x is at most y.
 
     NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 

@@ -140,7 +140,7 @@ def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Arra
 
 
 def _least(inertia: ArrayLike | None, chunk: Ends) -> Array:
-    # no warning is needed, because the cost is NaN
+    # a cost of NaN needs no warning
     with warnings.catch_warnings(category=RuntimeWarning, action="ignore"):
         return np.asarray(rb.minimum_acceleration_so3(*chunk, inertia).cost)
 
@@ -173,7 +173,7 @@ def _in_chunks(
                     f"are sent to other processes ({error})"
                 ) from error
             executor = stack.enter_context(processes())
-        stack.enter_context(threadpool_limits(1))  # threads share the limit until all are done
+        stack.enter_context(threadpool_limits(1))  # all threads keep this limit until the end
         compute = map if executor is None else executor.map
         for part in compute(work, firsts, chunks):
             parts.append(part)
@@ -212,7 +212,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _end_with_parent() -> None:
-    """Ignore Ctrl-C, and end when the parent is killed, because the queue does not report this."""
+    """Ignore Ctrl-C, and end this process if its parent is killed, which no queue reports."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None
